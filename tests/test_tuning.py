@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import xarray as xr
 
 import seakeep
 from seakeep import HankelDMDc, RequestError, metrics
 from seakeep.models import processes
 from seakeep.models.selection import WORST
+from seakeep.tuning import tuned_campaign
 
 sys.path.insert(0, str(Path(__file__).parent / "models"))
 
@@ -208,11 +208,8 @@ def test_the_command_takes_windows_and_folds_from_the_file(tmp_path, monkeypatch
 
 
 def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():
-    from seakeep.cli.tuning import _tuned
-
     chosen = [seakeep.ReadOut("bow", ("heave", "pitch"), "stacked"), seakeep.ReadOut("a", ("b",))]
     spec = replace(SPEC, ridge=1e-3, lead=3, readouts=chosen)
-    result = seakeep.TuneResult(spec, xr.Dataset(), "")
     before = """[model]
 ridge = 1  # as it was
 # of the model
@@ -225,7 +222,7 @@ of = ["heave"]
 [models.other]
 states = ["a"]  # kept
 """
-    text = _tuned(before, None, result, ["readouts"], None, None)
+    text = tuned_campaign(before, None, spec, ["readouts"], None, None)
     middle = """
 [model.readouts.bow]
 kind = "stacked"
@@ -242,20 +239,18 @@ states = ["a"]  # kept
     assert text.endswith(middle)
     assert "# of the model\nstate_delays = 6\n" in text
     assert "old" not in text
-    assert _tuned(text, None, result, ["readouts"], None, None) == text
-    without = replace(result, spec=replace(spec, readouts=()))
-    none = _tuned(text, None, without, ["readouts"], None, None)
-    assert "readouts = {}\n" in none
+    assert tuned_campaign(text, None, spec, ["readouts"], None, None) == text
+    without = replace(spec, readouts=())
+    none = tuned_campaign(text, None, without, ["readouts"], None, None)
+    assert tomllib.loads(none)["model"]["readouts"] == {}
     assert none.endswith('\n# of the next table\n[models.other]\nstates = ["a"]  # kept\n')
-    kept = _tuned(before, None, result, [], None, None)
+    kept = tuned_campaign(before, None, spec, [], None, None)
     assert kept.endswith(before[before.index("[model.readouts.old]") :])
     assert "# as it was" not in kept  # it spoke of the λ before
     assert "ridge = 0.001 # chosen by seakeep tune" in kept
 
 
 def test_a_tuned_file_holds_rank_and_alignment():
-    from seakeep.cli.tuning import _tuned
-
     before = """[model]
 preset = "recommended"
 rank = 3
@@ -267,20 +262,22 @@ celerity = 2.0
 [next]
 """
     aligned = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
-    spec = replace(SPEC, ridge=0.0, rank=64, alignment=aligned)
-    result = seakeep.TuneResult(spec, xr.Dataset(), "")
-    read = tomllib.loads(_tuned(before, None, result, ["rank", "alignment"], "recommended", 20.0))
+    slow = seakeep.SlowSquares("eta", lead=1.0)
+    spec = replace(SPEC, ridge=0.0, rank=64, alignment=aligned, observables=[slow])
+    varied = ["rank", "alignment", "observables"]
+    read = tomllib.loads(tuned_campaign(before, None, spec, varied, "recommended", 20.0))
+    assert read["model"]["observables"] == [{"kind": "slow_squares", "of": ["eta"], "lead": 1.0}]
     assert read["model"]["alignment"] == {
         "mode": "dispersion",
         "surge": "predicted",
     }
     assert (read["model"]["rank"], read["model"]["ridge"]) == (64, 0.0)
     assert "next" in read
-    plain = replace(SPEC, ridge=1e-3)
-    result = replace(result, spec=plain)
-    read = tomllib.loads(_tuned(before, None, result, ["rank", "alignment"], "recommended", 20.0))
+    spec = replace(SPEC, ridge=1e-3)
+    read = tomllib.loads(tuned_campaign(before, None, spec, varied, "recommended", 20.0))
     assert not {"rank", "alignment", "preset"} & set(read["model"])
-    kept = tomllib.loads(_tuned(before, None, result, ["ridge"], "recommended", 20.0))["model"]
+    text = tuned_campaign(before, None, spec, ["ridge"], "recommended", 20.0)
+    kept = tomllib.loads(text)["model"]
     assert kept["alignment"] == {"mode": "effective", "celerity": 2.0}
 
 
@@ -342,12 +339,9 @@ of = ["heave"]
 
 
 def test_a_tuned_file_states_what_was_varied_in_periods_and_the_preset_it_goes_with():
-    from seakeep.cli.tuning import _tuned
-
     spec = replace(SPEC, ridge=1e-3, lead=15, ridge_scale="per_snapshot")
-    result = seakeep.TuneResult(spec, xr.Dataset(), "")
     before = '[model]\nstates = ["a"]\nselect = { horizon = [5] }\nlead = "1 T"  # one period\n'
-    text = _tuned(before, None, result, ["lead", "observables"], "recommended", 20.0)
+    text = tuned_campaign(before, None, spec, ["lead", "observables"], "recommended", 20.0)
     assert tomllib.loads(text)["model"] == {
         "states": ["a"],
         "lead": "0.75 T",
@@ -358,8 +352,8 @@ def test_a_tuned_file_states_what_was_varied_in_periods_and_the_preset_it_goes_w
     }
     assert "one period" not in text
     # A length in periods is as exact as the samples that it stands for; samples stay samples.
-    odd = replace(result, spec=replace(spec, input_delays=1234))
-    text = _tuned(before, None, odd, ["input_delays"], "recommended", 31.37)
+    odd = replace(spec, input_delays=1234)
+    text = tuned_campaign(before, None, odd, ["input_delays"], "recommended", 31.37)
     assert round(float(tomllib.loads(text)["model"]["input_delays"].split()[0]) * 31.37) == 1234
-    text = _tuned(before.replace('"1 T"', "3"), None, result, ["lead"], None, 20.0)
+    text = tuned_campaign(before.replace('"1 T"', "3"), None, spec, ["lead"], None, 20.0)
     assert tomllib.loads(text)["model"]["lead"] == 15

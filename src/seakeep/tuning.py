@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Collection, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,11 +22,15 @@ from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import select
 from seakeep.models.settings import FOLDS, Folds
 from seakeep.models.training import check_names, until
+from seakeep.toml import Length
 
 if TYPE_CHECKING:
     from seakeep.report.figures.tuning import Figure
 
-__all__ = ["TuneResult", "tune"]
+__all__ = ["TuneResult", "tune", "tuned_campaign"]
+
+LENGTHS = ("state_delays", "input_delays", "lead")
+FIRST = "# seakeep_file: tuned campaign\n"
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,3 +239,121 @@ class _Kept(dict[str, Any]):
         super().__setitem__(key, value)
         with replacing(self.path) as place:
             place.write_text(json.dumps({"digest": self.digest, "scores": self}), encoding="utf-8")
+
+
+def tuned_campaign(
+    text: str,
+    model: str | None,
+    spec: HankelDMDc,
+    varied: Collection[str],
+    preset: str | None,
+    period: float | None,
+) -> str:
+    """Write a choice into the table of a model in a campaign file; all else stays as it was.
+
+    Parameters
+    ----------
+    text : str
+        The campaign file.
+    model : str or None
+        Key in ``[models.NAME]``; None for the table ``[model]``.
+    spec : HankelDMDc
+        The settings that were chosen.
+    varied : collection of str
+        What they were chosen among; the ridge always.
+    preset : str or None
+        What the table takes, stated or not.
+    period : float or None
+        Encounter period, samples; None writes lengths in samples.
+
+    Returns
+    -------
+    str
+    """
+    import tomlkit
+    from tomlkit.items import Table
+
+    document = tomlkit.parse(text)
+    table: Any = document["model"] if model is None else document["models"][model]
+    # Blank lines and comments there belong to the next table, if this one is in one place.
+    between: list[Any] = []
+    body = _end(table) if isinstance(table, Table) else []
+    while body and body[-1][0] is None:
+        between.insert(0, body.pop())
+    values = _choice(spec, table, varied, preset, period)
+    stale = {"select", "rank"}  # nothing is left to be chosen
+    stale |= ({"alignment"} & set(varied)) | ({"observables", "readouts"} & set(values))
+    for key in stale | ({"preset"} - set(values)):
+        table.pop(key, None)
+    for key, value in values.items():
+        if table.get(key) != value:
+            table[key] = value
+            if key in ("ridge", "rank", *LENGTHS):
+                table[key].comment("chosen by seakeep tune, by free runs on held-out training runs")
+    if between:
+        _end(table).extend(between)
+    return f"{FIRST}{tomlkit.dumps(document).removeprefix(FIRST)}"
+
+
+def _choice(
+    spec: HankelDMDc,
+    table: Mapping[str, Any],
+    varied: Collection[str],
+    preset: str | None,
+    period: float | None,
+) -> dict[str, Any]:
+    """Keys of the table of a model that state the choice, and the preset that it goes with."""
+    values: dict[str, Any] = {"ridge": spec.ridge, "ridge_scale": spec.ridge_scale}
+    stated = set(varied)
+    if preset is not None and "alignment" in varied and spec.alignment is None:
+        # The preset may bring an alignment, so that all which it states is stated in its place.
+        stated |= {"readouts", *LENGTHS}
+        values["delay_rows"] = spec.delay_rows
+    elif preset is not None:
+        values["preset"] = preset
+    for key in (each for each in LENGTHS if each in stated):
+        count: int = getattr(spec, key)
+        values[key] = count if isinstance(table.get(key), int) else _in_periods(count, period)
+    if spec.rank is not None:
+        values["rank"] = spec.rank
+    if "observables" in stated:
+        values["observables"] = [{"kind": o.kind} | _stated(o) for o in spec.observables]
+    if "alignment" in stated and spec.alignment is not None:
+        values["alignment"] = _stated(spec.alignment, "mode", "surge")
+    if "readouts" in stated:
+        asked = spec.readouts
+        values["readouts"] = (
+            asked
+            if isinstance(asked, str)
+            else {each.channel: {"kind": each.kind, "of": list(each.of)} for each in asked}
+        )
+    return values
+
+
+def _stated(settings: Any, *always: str) -> dict[str, Any]:
+    """Settings that differ from their defaults, and those that are stated always."""
+    values = {each.name: getattr(settings, each.name) for each in fields(settings)}
+    differs = {each.name for each in fields(settings) if values[each.name] != each.default}
+    return {
+        key: list(value) if isinstance(value, tuple) else value
+        for key, value in values.items()
+        if key in {*always, *differs}
+    }
+
+
+def _in_periods(samples: int, period: float | None) -> int | str:
+    """A number of samples as a file states it: in periods, which serve any sampling rate."""
+    if period is None:
+        return samples
+    lengths = (Length(float(f"{samples / period:.{digits}g}")) for digits in range(2, 16))
+    return str(next(each for each in lengths if round(each.at(period)) == samples))
+
+
+def _end(table: Any) -> list[Any]:
+    """Keys and items, lines without a key too, of the table that stands last inside a table."""
+    from tomlkit.items import AoT, Table
+
+    body: list[Any] = table.value.body
+    last = next((item for key, item in reversed(body) if key is not None), None)
+    last = last[-1] if isinstance(last, AoT) else last
+    return _end(last) if isinstance(last, Table) else body

@@ -23,7 +23,7 @@ from seakeep.cli import (
     tuning,
 )
 from seakeep.cli import study as studying
-from seakeep.cli.console import messages, tell_warnings
+from seakeep.cli.console import say, tell_warnings
 from seakeep.errors import SeakeepError
 
 __all__ = ["app", "main"]
@@ -137,18 +137,18 @@ def main(arguments: list[str] | None = None) -> int:
     except SystemExit as leaving:
         status = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
         if status == INTERRUPTED:
-            messages().print(f"Interrupted. {_kept(leaving)}", style="red")
+            say(f"Interrupted. {_kept(leaving)}", style="red")
         return status
     except SeakeepError as error:
         if debug:
             traceback.print_exc()
-        messages().print(f"Error: {error}", style="red")
+        say(f"Error: {error}", style="red")
         return error.exit_status
     except BrokenPipeError:
         return 1
     except Exception as error:
         if debug:
             traceback.print_exc()
-        messages().print(f"Error: {_unforeseen(error)}", style="red")
+        say(f"Error: {_unforeseen(error)}", style="red")
         return 1
     return 0

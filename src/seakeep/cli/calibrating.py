@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import messages, print_table, progress_bar, results
+from seakeep.cli.console import print_table, progress_bar, say, show
 from seakeep.cli.options import (
     DEFAULT_LEVEL,
     CampaignFile,
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from seakeep.campaign import Campaign
     from seakeep.models import HankelEnsemble
     from seakeep.report.tables import Table
-
-__all__ = ["calibrate"]
 
 
 def calibrate(
@@ -104,6 +102,7 @@ def calibrate(
     from seakeep.quality import warn_of_runs
     from seakeep.signals.time_axis import instant_text, span_text
     from seakeep.study.comparison import samples_of
+    from seakeep.study.plan import between
 
     fitted = load_model(ensemble)
     if not is_ensemble(fitted):
@@ -129,7 +128,11 @@ def calibrate(
         begin, end = (instant_text(edge, fitted.dt) for edge in (first, last))
         raise RequestError(f"--start {start} ({begin} s) lies at or after --stop {stop} ({end} s).")
     count = samples_of(steps, read, every, fitted.dt, "--steps")
-    parts = {name: _part(each, first, last) for name, each in prepared.items()}
+    parts = {}
+    for name, each in prepared.items():
+        begin, end = each.attrs.get("train_span", each["time"].values[[0, -1]])
+        stop_at = end if last is None else last
+        parts[name] = between(each, (begin if first is None else first, stop_at))
     with member_executor(workers, scheduler) as executor, progress_bar("Calibrating") as progress:
         calibrated = fitted.calibrate(
             parts,
@@ -144,19 +147,16 @@ def calibrate(
     assert calibrated.calibration is not None
     spans = calibrated.calibration.spans.items()
     used = [f"{name} {span_text(*span, calibrated.dt)}" for name, span in spans]
-    results().print(f"Calibrated on {', '.join(used)}: judge it on other instants.", soft_wrap=True)
+    show(f"Calibrated on {', '.join(used)}: judge it on other instants.")
     calibrated.save(out)
     whole = sum(calibrated.calibration.windows.values())
     if whole / (whole + 1) < calibrated.calibration.found.level:
-        messages().print(
+        say(
             "Note: errors that last for a whole window are seen only once in each. Counted as "
             f"such, {counted(whole, 'window')} would support {100 * whole / (whole + 1):.0f} %; "
             "more windows make the margin surer.",
-            soft_wrap=True,
         )
-    messages().print(
-        f"Wrote {out}. Judge it elsewhere with: seakeep compare {out} {campaign} --band calibrated"
-    )
+    say(f"Wrote {out}. Judge it elsewhere with: seakeep compare {out} {campaign} --band calibrated")
 
 
 def _instant(
@@ -181,15 +181,6 @@ def _instant(
             f"Name an instant inside, or leave {name} out."
         )
     return found
-
-
-def _part(run: xr.Dataset, start: float | None, stop: float | None) -> xr.Dataset:
-    """Part of a run between two instants, by default those of its training span, or its ends."""
-    from seakeep.study.plan import between
-
-    time = run["time"].values
-    begin, end = run.attrs.get("train_span", (time[0], time[-1]))
-    return between(run, (begin if start is None else start, end if stop is None else stop))
 
 
 def _table(ensemble: HankelEnsemble) -> Table:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import messages, progress_bar, results
+from seakeep.cli.console import progress_bar, results, say
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import check_output, is_there, replacing
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from seakeep.campaign import Campaign
-
-__all__ = ["datasets", "init", "prepare"]
 
 SHOWN = 12
 """Findings that prepare prints at most: what fits a screen beside the files' names."""
@@ -66,7 +64,7 @@ def init(
         return
     with replacing(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    messages().print(f"Wrote {out}. Read it, then: seakeep prepare {out}")
+    say(f"Wrote {out}. Read it, then: seakeep prepare {out}")
 
 
 def prepare(
@@ -114,7 +112,7 @@ def prepare(
     if files:
         _report_runs(read, files, failures, sheet)
     if out is not None and out.resolve() != prepared_folder(read).resolve():
-        messages().print(
+        say(
             f"Note: fit, forecast and compare look for prepared runs in {prepared_folder(read)} "
             f"alone, and prepare anew what is not there. Those in {out} are for load_prepared.",
             style="yellow",
@@ -142,7 +140,7 @@ def _report_runs(
     folder = next(iter(files.values())).parent
     runs = load_prepared(read, folder, list(files))
     words = steps_of(next(iter(runs.values())))
-    messages().print(f"{words[0].upper()}{words[1:]}.")
+    say(f"{words[0].upper()}{words[1:]}.")
     _print_findings(runs)
     page = folder / "quality.html"
     pictures = {path.stem.removeprefix("quality_") for path in folder.glob("quality_*.png")}
@@ -153,9 +151,9 @@ def _report_runs(
     try:
         write_quality_sheet(runs, read.settings, read.name, folder, unread)
     except RequestError as error:
-        messages().print(f"Note: no data-quality sheet: {error}", style="yellow")
+        say(f"Note: no data-quality sheet: {error}", style="yellow")
         return
-    messages().print(f"Wrote {page}: check it before you use the runs.")
+    say(f"Wrote {page}: check it before you use the runs.")
 
 
 def _print_findings(runs: Mapping[str, xr.Dataset]) -> None:
@@ -170,9 +168,9 @@ def _print_findings(runs: Mapping[str, xr.Dataset]) -> None:
     for same in list(found.values())[:SHOWN]:
         others = len({each.run for each in same}) - 1
         alike = f" (and in {others} more run{'s' * (others > 1)})" if others else ""
-        messages().print(f"Found in {same[0].run}: {same[0].channel}: {same[0].text}{alike}")
+        say(f"Found in {same[0].run}: {same[0].channel}: {same[0].text}{alike}")
     if len(found) > SHOWN:
-        messages().print(f"Found {len(found) - SHOWN} more: the sheet lists them.")
+        say(f"Found {len(found) - SHOWN} more: the sheet lists them.")
 
 
 datasets = typer.Typer(
@@ -198,16 +196,14 @@ def _list(context: typer.Context) -> None:
     table.add_column("value", overflow="fold")
     for each in DATASETS:
         table.add_row("name", each.name, style="bold")
-        table.add_row("what", each.title)
-        table.add_row("origin", each.origin)
-        table.add_row("licence", each.licence)
-        table.add_row("cite", each.reference)
-        table.add_row("here", state_of(each, folder))
-        if each.note:
-            table.add_row("note", each.note)
-        table.add_row("files", "with their SHA-256")
-        for name, checksum in each.files:
-            table.add_row("", f"{name}  {checksum}")
+        facts = {"what": each.title, "origin": each.origin, "licence": each.licence}
+        facts |= {"cite": each.reference, "here": state_of(each, folder), "note": each.note}
+        facts["files"] = "\n".join(
+            ["with their SHA-256", *(f"{name}  {checksum}" for name, checksum in each.files)]
+        )
+        for key, value in facts.items():
+            if value:
+                table.add_row(key, value)
         table.add_section()
     results().print(table)
 
@@ -236,4 +232,4 @@ def _fetch(
     with progress_bar("Fetching") as progress:
         place = fetch(dataset, folder, progress)
     typer.echo(str(place))
-    messages().print(f"Set SEAKEEP_DATA_DIR={folder.resolve()} so that the examples find it.")
+    say(f"Set SEAKEEP_DATA_DIR={folder.resolve()} so that the examples find it.")

@@ -8,12 +8,10 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli.console import messages, progress_bar, results
+from seakeep.cli.console import progress_bar, say, show
 from seakeep.cli.options import CampaignFile, ModelFile, read_files
 from seakeep.errors import SeakeepError
 from seakeep.files import check_output, check_report, make_folder
-
-__all__ = ["check"]
 
 
 def check(
@@ -59,7 +57,7 @@ def check(
         channels = (identified.states, identified.inputs)
         baselines = fit_baselines(read, *channels, prepared=None if run else runs)
     except SeakeepError as error:
-        messages().print(f"Note: no baselines to compare with: {error}")
+        say(f"Note: no baselines to compare with: {error}")
         baselines = {}
     with progress_bar("Checking") as progress:
         checked = check_model(identified, runs, progress, baselines)
@@ -67,11 +65,11 @@ def check(
     checked = replace(checked, repeats={name: str(each) for name, each in repeats.items()})
     for section in check_sections(checked):
         for text in (*section.points, *section.notices):
-            results().print(f"{section.title}: {text}", soft_wrap=True)
+            show(f"{section.title}: {text}")
     kind = ", ".join(
         counted(len(names), what)
         for names, what in ((identified.states, "state"), (identified.inputs, "input"))
     )
     words = f"{model.name}, a model of kind {identified.kind} ({kind}), on {read.name}."
     page = write_check(checked, out, f"{model.stem}: what the model is worth", words)
-    messages().print(f"Wrote {page}.")
+    say(f"Wrote {page}.")

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
 import sys
 import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 from rich.console import Console
 
@@ -19,17 +18,6 @@ from seakeep.errors import SeakeepWarning
 if TYPE_CHECKING:
     from seakeep.arrays import Progress
     from seakeep.report.tables import Table
-
-__all__ = [
-    "Progress",
-    "messages",
-    "print_table",
-    "progress_bar",
-    "results",
-    "tell_warnings",
-    "worker_count",
-]
-
 
 SECONDS_BETWEEN_LINES = 5.0
 PIPE_WIDTH = 140
@@ -61,18 +49,19 @@ def messages() -> Console:
     return _console(getattr(sys.stderr, "rich_proxied_file", sys.stderr))
 
 
+def say(text: str, style: str | None = None) -> None:
+    """Print a message."""
+    messages().print(text, style=style)
+
+
+def show(text: str) -> None:
+    """Print a line of results, which the terminal may wrap."""
+    results().print(text, soft_wrap=True)
+
+
 @lru_cache(maxsize=1)
 def _console(stream: IO[str]) -> Console:
     return Console(file=stream, highlight=False, soft_wrap=True, markup=False, emoji=False)
-
-
-def worker_count(workers: int | None) -> int:
-    """Number of workers that was asked for; by default one per core that may be used."""
-    if workers is not None:
-        return workers
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @contextmanager
@@ -96,21 +85,15 @@ def progress_bar(what: str) -> Iterator[Progress]:
 
         yield line
         return
-    import rich.progress
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress as rich
     from rich.table import Column
 
-    bar = rich.progress.Progress(
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=20),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[name]}", table_column=Column(ratio=1, no_wrap=True)),
+    bar = rich.Progress(
+        rich.TextColumn("{task.description}"),
+        rich.BarColumn(bar_width=20),
+        rich.MofNCompleteColumn(),
+        rich.TimeRemainingColumn(),
+        rich.TextColumn("{task.fields[name]}", table_column=Column(ratio=1, no_wrap=True)),
         console=console,
         transient=True,
         expand=True,
@@ -129,23 +112,16 @@ def tell_warnings() -> Iterator[None]:
     """Print warnings of seakeep as one line each, and leave the others to Python."""
     told, seen = warnings.showwarning, set[str]()
 
-    def show(
-        message: Warning | str,
-        category: type[Warning],
-        filename: str,
-        lineno: int,
-        file: object = None,
-        line: str | None = None,
-    ) -> None:
+    def once(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
         if issubclass(category, SeakeepWarning):
             if str(message) in seen:  # of several models, once
                 return
             seen.add(str(message))
-            messages().print(f"Note: {message}", style="yellow")
+            say(f"Note: {message}", style="yellow")
         else:
-            told(message, category, filename, lineno, None, line)
+            told(message, category, *where, **more)
 
     with warnings.catch_warnings():
         warnings.simplefilter("always", SeakeepWarning)
-        warnings.showwarning = show
+        warnings.showwarning = once
         yield

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from seakeep.cli.console import messages
+from seakeep.cli.console import say
 from seakeep.cli.options import ModelFile
 from seakeep.errors import RequestError
 from seakeep.files import check_place
 
 if TYPE_CHECKING:
     from seakeep.models import Model
-
-__all__ = ["export"]
 
 
 def export(
@@ -79,10 +77,10 @@ def export(
         written.append(write_onnx(program.model, onnx, steps or 1))
     if mat is not None:
         written.append(program.model.to_mat(mat))
-    messages().print(f"Wrote {', '.join(map(str, written))}.", soft_wrap=True)
+    say(f"Wrote {', '.join(map(str, written))}.")
     if fmu is not None:
-        messages().print(_binary(fmu), soft_wrap=True)
-    messages().print(program.timing, soft_wrap=True)
+        say(_binary(fmu))
+    say(program.timing)
 
 
 def _check_beside(is_given: bool, target: Path | None, option: str) -> None:

@@ -8,8 +8,6 @@ from importlib import metadata
 
 import typer
 
-__all__ = ["info"]
-
 _PACKAGES = ("numpy", "scipy", "xarray", "h5netcdf", "h5py", "pandas", "pydantic", "typer", "pint")
 _EXTRAS = ("matplotlib", "control", "numba")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from seakeep.cli.console import messages, print_table, progress_bar, results
+from seakeep.cli.console import print_table, progress_bar, say, show
 from seakeep.cli.options import (
     DEFAULT_LEVEL,
     BandKind,
@@ -26,7 +26,7 @@ from seakeep.cli.options import (
     member_executor,
     read_files,
 )
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import RequestError
 from seakeep.files import check_output, check_place, make_folder
 
 if TYPE_CHECKING:
@@ -36,11 +36,17 @@ if TYPE_CHECKING:
     from seakeep.models import Model
     from seakeep.study import Comparison
 
-__all__ = ["compare", "fit", "forecast"]
-
 TABLE = "comparison.csv"
 DIFFERENCES = "differences.csv"
-ERRORS = "errors_by_run"
+ERRORS, NOWCAST = "errors_by_run", "nowcast_"
+FOR_ENSEMBLES = (
+    "is for ensembles, and {} holds a single model. Leave it out, or fit an ensemble (kind = "
+    "'bayesian_hankel_dmdc' in [model])."
+)
+NO_NOWCAST = (
+    "and --nowcast do not go together: forecasts start all over the runs, one after the other, "
+    "with the band of the filter, and their errors are in training SDs. Leave one of them out."
+)
 
 
 def fit(
@@ -75,7 +81,7 @@ def fit(
                 identified.spectral_radii(executor=executor, progress=progress)
     typer.echo(identified.summary())
     identified.save(out)
-    messages().print(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
+    say(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
 
 
 def forecast(
@@ -127,8 +133,9 @@ def forecast(
     if out.suffix not in (".nc", ".csv"):
         raise RequestError(f"{out} ends in '{out.suffix}'; a forecast is written as .nc or .csv.")
     check_place(out)
-    from seakeep.campaign import read_campaign
+    from seakeep.campaign import load_prepared, read_campaign
     from seakeep.models import is_ensemble, load_model
+    from seakeep.models.forecasts import is_usable
     from seakeep.quality import warn_of_runs
     from seakeep.report.comparison import (
         forecast_header,
@@ -146,13 +153,13 @@ def forecast(
     check_output(out, "forecast", read_files(read, model), forecast_header(identified.states))
     if not is_ensemble(identified):
         given = {"--level": level is not None, "--band": band is not None, "--members": members}
-        _refuse_for_one(model, given | {"--scheduler": scheduler is not None})
+        _refuse(given | {"--scheduler": scheduler is not None}, FOR_ENSEMBLES.format(model))
     elif members and (level is not None or band is not None):
         raise RequestError(
             f"--{'level' if band is None else 'band'} belongs to the band, and --members writes "
             "the members without it. Leave one of them out."
         )
-    prepared = _prepared(read, run)
+    prepared = load_prepared(read, names=[run])[run]
     warn_of_runs([prepared], [*identified.states, *identified.inputs])
     first = instant_of(start, read, [prepared], "--start")
     if not isfinite(first):
@@ -165,11 +172,7 @@ def forecast(
             member_executor(workers, scheduler) as executor,
             progress_bar("Forecasting") as progress,
         ):
-            how: dict[str, Any] = {
-                "ahead": ahead,
-                "executor": executor,
-                "progress": progress,
-            }
+            how: dict[str, Any] = {"ahead": ahead, "executor": executor, "progress": progress}
             if members:
                 result = identified.forecast(prepared, first, count, **how)
             else:
@@ -189,11 +192,13 @@ def forecast(
     status = result.attrs["status"]
     begin = instant_text(float(result.attrs["start"]), identified.dt)
     reads = look_ahead_words(float(result.attrs.get("reads_input_until", 0.0)))
-    messages().print(
+    say(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
         f"t = {begin} s, status {status}{reads and f'; {reads}'}.{scaled}"
     )
-    if not _usable(result):
+    members_left = result.sizes.get("member", 0) - int(result.attrs.get("diverged", 0))
+    usable = members_left > 0 if "member" in result.dims else is_usable(str(status))
+    if not usable:
         raise typer.Exit(1)
 
 
@@ -268,7 +273,9 @@ def compare(
     fitted = {name: load_model(path) for name, path in names.items()}
     shown = _band(fitted, level, band, scheduler)
     read = read_campaign(campaign)
-    figures = _figures(run or read.test_runs, out, format_)
+    runs = run or read.test_runs
+    names_of_figures = [f"{NOWCAST}{each}" for each in runs] if nowcast else [*runs, ERRORS]
+    figures = _figures(names_of_figures, out, format_)
     used = read_files(read, *model)
     check_output(out / TABLE, "table", used, "run,channel,channel_units,.*")
     check_output(out / DIFFERENCES, "table", used, "run,wave_period,model,.*")
@@ -277,18 +284,11 @@ def compare(
     if baselines:
         fitted = _with_baselines(fitted, read)
     if nowcast:
-        _refuse_in_service(
-            {
-                "--start": start is not None,
-                "--full-scale": full_scale,
-                "--band": band is not None,
-                "--radians": not degrees,
-                "--workers": workers is not None,
-                "--scheduler": scheduler is not None,
-            }
-        )
+        given = {"--start": start, "--band": band, "--workers": workers, "--scheduler": scheduler}
+        stated = {option: value is not None for option, value in given.items()}
+        _refuse(stated | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
         serving = {n: each for n, each in fitted.items() if n in names or hasattr(each, "live")}
-        _nowcast(serving, read, run or read.test_runs, steps, shown["level"], out, figures, used)
+        _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
         return
     with member_executor(workers, scheduler) as executor, progress_bar("Comparing") as progress:
         found = compare_models(
@@ -302,7 +302,8 @@ def compare(
             **shown,
             executor=executor,
         )
-    found = _displayed(found, _scale(read) if full_scale else None, degrees)
+    scale = _scale(read) if full_scale else None
+    found = {n: [_displayed(each, scale, degrees) for each in of] for n, of in found.items()}
     tables = {name: comparison_table(of) for name, of in found.items()}
     _print_comparison(tables, {name: each.kind for name, each in fitted.items()})
     written = [write_comparison(tables, out / TABLE)]
@@ -313,33 +314,17 @@ def compare(
             print_table(block)
         written.append(write_differences(differences, out / DIFFERENCES))
     written += _draw({name: found[name] for name in names}, figures, differences)
-    messages().print("Wrote " + ", ".join(map(str, written)))
+    say("Wrote " + ", ".join(map(str, written)))
     if not all(each.complete for name in names for each in found[name]):
         raise typer.Exit(1)
 
 
-def _displayed(
-    found: dict[str, list[Comparison]], scale: float | None, degrees: bool
-) -> dict[str, list[Comparison]]:
-    """Comparisons at full scale, where there is a scale, and in degrees, if wanted."""
+def _displayed(each: Comparison, scale: float | None, degrees: bool) -> Comparison:
+    """A comparison at full scale, where there is a scale, and in degrees, if wanted."""
     from seakeep.study import at_full_scale, in_degrees
 
-    if scale is not None:
-        found = {name: [at_full_scale(each, scale) for each in of] for name, of in found.items()}
-    if not degrees:
-        return found
-    return {name: [in_degrees(each) for each in of] for name, of in found.items()}
-
-
-def _refuse_in_service(given: Mapping[str, bool]) -> None:
-    """Refuse options that forecasts from all over a run have no place for."""
-    for option, stated in given.items():
-        if stated:
-            raise RequestError(
-                f"{option} and --nowcast do not go together: forecasts start all over the runs, "
-                "one after the other, with the band of the filter, and their errors are in "
-                "training SDs. Leave one of them out."
-            )
+    each = each if scale is None else at_full_scale(each, scale)
+    return in_degrees(each) if degrees else each
 
 
 def _nowcast(
@@ -359,16 +344,14 @@ def _nowcast(
 
     table = out / "nowcast.csv"
     check_output(table, "table", used, HEADER)
-    drawn = {name: each.with_name(f"nowcast_{each.name}") for name, each in figures.items() if name}
-    for path in drawn.values():
-        check_output(path, "figure", used)
     with progress_bar("Playing") as progress:
         found = nowcasts(models, campaign, runs, steps, level=level, progress=progress)
     for block in nowcast_blocks(found):
         print_table(block)
     written = [write_nowcasts(found, table)]
-    written += [save_figure(nowcast_figure(found, run), path) for run, path in drawn.items()]
-    messages().print("Wrote " + ", ".join(map(str, written)))
+    for name, path in figures.items():
+        written.append(save_figure(nowcast_figure(found, name.removeprefix(NOWCAST)), path))
+    say("Wrote " + ", ".join(map(str, written)))
 
 
 def _named(files: list[Path]) -> dict[str, Path]:
@@ -377,15 +360,15 @@ def _named(files: list[Path]) -> dict[str, Path]:
     return {p.stem if stems.count(p.stem) == 1 else str(p.with_suffix("")): p for p in files}
 
 
-def _figures(runs: list[str], out: Path, suffix: str) -> dict[str, Path]:
-    """File of the figure of each run, and of all runs (""), where figures can be drawn."""
+def _figures(names: list[str], out: Path, suffix: str) -> dict[str, Path]:
+    """Files of figures by name, where figures can be drawn."""
     if find_spec("matplotlib") is None:
-        messages().print(
+        say(
             "Note: no figures, because matplotlib is not installed. "
             "Install it with: pip install 'seakeep[figures]'"
         )
         return {}
-    return {run: out / f"{run or ERRORS}.{suffix}" for run in (*runs, "")}
+    return {name: out / f"{name}.{suffix}" for name in names}
 
 
 def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str, Model]:
@@ -413,7 +396,7 @@ def _print_comparison(tables: Mapping[str, xr.Dataset], kinds: Mapping[str, str]
         print_table(block)
     for name, table in tables.items():
         for text in band_findings(table):
-            results().print(f"{name}, {text}" if several else text, soft_wrap=True)
+            show(f"{name}, {text}" if several else text)
 
 
 def _draw(
@@ -431,7 +414,7 @@ def _draw(
         figure = overlay_figure(dict(zip(found, of_run, strict=True)))
         written.append(save_figure(figure, figures[of_run[0].run]))
     if differences is not None:
-        written.append(save_figure(error_figure(differences), figures[""]))
+        written.append(save_figure(error_figure(differences), figures[ERRORS]))
     return written
 
 
@@ -445,25 +428,10 @@ def _scale(campaign: Campaign) -> float:
     return general.scale_factor
 
 
-def _prepared(campaign: Campaign, run: str) -> xr.Dataset:
-    from seakeep.campaign import load_prepared
-
-    known = list(campaign.settings.runs)
-    if run not in known:
-        raise RequestError(
-            f"the campaign has no run '{run}'.{did_you_mean(run, known)} Runs: {', '.join(known)}."
-        )
-    return load_prepared(campaign, names=[run])[run]
-
-
-def _refuse_for_one(model: Path | str, given: dict[str, bool]) -> None:
-    """Refuse options of ensembles where a file holds a single model."""
-    for option, stated in given.items():
-        if stated:
-            raise RequestError(
-                f"{option} is for ensembles, and {model} holds a single model. Leave it out, or "
-                "fit an ensemble (kind = 'bayesian_hankel_dmdc' in [model])."
-            )
+def _refuse(given: Mapping[str, bool], words: str) -> None:
+    """Refuse the first option that is given."""
+    for option in (each for each, is_given in given.items() if is_given):
+        raise RequestError(f"{option} {words}")
 
 
 def _band(
@@ -478,22 +446,14 @@ def _band(
     ensembles = [each for each in models.values() if is_ensemble(each)]
     if not ensembles:
         given = {"--level": level is not None, "--band": band is not None}
-        _refuse_for_one(", ".join(models), given | {"--scheduler": scheduler is not None})
+        alone = FOR_ENSEMBLES.format(", ".join(models))
+        _refuse(given | {"--scheduler": scheduler is not None}, alone)
     kept = [each.calibration for each in ensembles if each.calibration is not None]
     if kept and band is None:
-        messages().print(
+        say(
             "Note: the ensemble is calibrated, and the band shown is that of its members. "
             "--band calibrated shows the calibrated one."
         )
     if level is None:
         level = kept[0].found.level if kept and band == "calibrated" else DEFAULT_LEVEL
     return {"level": level, "band": band or "members"}
-
-
-def _usable(result: xr.Dataset) -> bool:
-    """Whether there is a forecast at all instants, of one member at least."""
-    from seakeep.models.forecasts import is_usable
-
-    if "member" in result.dims:
-        return int(result.attrs["diverged"]) < result.sizes["member"]
-    return is_usable(str(result.attrs["status"]))

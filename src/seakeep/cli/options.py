@@ -2,36 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import worker_count
 from seakeep.errors import RequestError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from seakeep.campaign import Campaign
-
-__all__ = [
-    "DEFAULT_LEVEL",
-    "BandKind",
-    "CampaignFile",
-    "Degrees",
-    "FullScale",
-    "Level",
-    "ModelFile",
-    "ModelKey",
-    "Scheduler",
-    "Steps",
-    "Workers",
-    "checked_count",
-    "member_executor",
-    "read_files",
-]
 
 DEFAULT_LEVEL = 0.95
 
@@ -116,10 +99,13 @@ def member_executor(
 
 
 def checked_count(workers: int | None, scheduler: str | None) -> int:
-    """Number of local workers; one where a cluster does the work."""
+    """Number of local workers: by default one per core, one where a cluster does the work."""
     if workers is not None and scheduler is not None:
         raise RequestError(
             f"--workers {workers} counts processes on this machine, and --scheduler {scheduler} "
             "hands all work to a cluster. Give one of the two."
         )
-    return 1 if scheduler is not None else worker_count(workers)
+    if workers is None and scheduler is None:
+        usable = getattr(os, "sched_getaffinity", None)  # Linux alone has it
+        return len(usable(0)) if usable else os.cpu_count() or 1
+    return workers or 1

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import print_table, progress_bar, results
+from seakeep.cli.console import print_table, progress_bar, show
 from seakeep.cli.options import Scheduler, checked_count
 
 if TYPE_CHECKING:
-    from seakeep.arrays import Progress
     from seakeep.study import StudyResult
 
-__all__ = ["report", "reproduce", "study"]
-
-Found = TypeVar("Found")
 Preset = Literal["paper", "recommended"]
 
 Workers = Annotated[
@@ -54,20 +51,17 @@ def study(
 
     asked = read_study(study_file)
     folder = out or study_file.parent / f"{study_file.stem}-results"
-    found, page = _run(
-        folder,
-        checked_count(workers, scheduler),
-        scheduler,
-        lambda executor, tell: run_study(asked, folder, executor=executor, progress=tell),
-        _write_study,
-    )
+    with _working(folder, workers, scheduler) as executor:
+        with progress_bar("Study") as tell:
+            found = run_study(asked, folder, executor=executor, progress=tell)
+        page = _write_study(found)
     print_table(overview_table(found), note=False)
     for text in findings(found):
-        results().print(text, soft_wrap=True)
-    results().print(f"\nReport: {page}", soft_wrap=True)
+        show(text)
+    show(f"\nReport: {page}")
 
 
-def _write_study(_: Path, found: StudyResult, __: Executor | None = None) -> Path:
+def _write_study(found: StudyResult) -> Path:
     from seakeep.report.page import write_report
 
     with progress_bar("Report") as tell:
@@ -106,28 +100,29 @@ def reproduce(
     size = Size.quick() if quick else Size()
     pictured = _pictured([act.name for act in ACTS if preset in (None, act.preset)])
 
-    def play(executor: Executor | None, tell: Progress) -> dict[str, StudyResult]:
-        play_acts = partial(
-            reproduce_study, out, preset, size=size, seed=seed, executor=executor, progress=tell
-        )
-        if (near := on_this_machine(executor)) is None:
-            return play_acts()
-        pages = []
-        with submitting(_write_act, None, near) as submit:  # drawn while the next act runs
-            found = play_acts(
-                finished=lambda act, result: pages.append(submit([(result, act.name == pictured)]))
+    pages = []
+    with _working(out, workers, scheduler) as executor:
+        with progress_bar("Study") as tell:
+            play = partial(
+                reproduce_study, out, preset, size=size, seed=seed, executor=executor, progress=tell
             )
-            for done, page in enumerate(pages):
-                tell(done, len(pages), "drawing the pages of the acts")
-                page.result()
-        return found
-
-    count = checked_count(workers, scheduler)
-    found, page = _run(out, count, scheduler, play, _write_reproduction)
+            if (near := on_this_machine(executor)) is None:
+                found = play()
+            else:
+                with submitting(_write_act, None, near) as submit:  # while the next act runs
+                    found = play(
+                        finished=lambda act, result: pages.append(
+                            submit([(result, act.name == pictured)])
+                        )
+                    )
+                    for done, each in enumerate(pages):
+                        tell(done, len(pages), "drawing the pages of the acts")
+                        each.result()
+        page = _write_reproduction(out, found, executor)
     print_table(acts_table(found), note=False)
     for act in (act for act in ACTS if act.name in found):
-        results().print(f"{act.title}: {act.sentence}", soft_wrap=True)
-    results().print(f"\nReport: {page}", soft_wrap=True)
+        show(f"{act.title}: {act.sentence}")
+    show(f"\nReport: {page}")
 
 
 def report(
@@ -145,7 +140,7 @@ def report(
     if acts := read_reproduction(folder):
         page = _write_reproduction(folder, acts)
     else:
-        page = _write_study(folder, read_result(folder))
+        page = _write_study(read_result(folder))
     typer.echo(str(page))
 
 
@@ -177,21 +172,14 @@ def _write_act(_: None, item: tuple[StudyResult, bool]) -> None:
     write_report(item[0], pictures=item[1])
 
 
-def _run(
-    folder: Path,
-    workers: int,
-    scheduler: str | None,
-    work: Callable[[Executor | None, Progress], Found],
-    write: Callable[[Path, Found, Executor | None], Path],
-) -> tuple[Found, Path]:
-    """Do the work and write its report; interrupted work is kept."""
+@contextmanager
+def _working(folder: Path, workers: int | None, scheduler: str | None) -> Iterator[Executor | None]:
+    """What does the work; interrupted work is kept."""
     from seakeep.models.executor import make_executor
 
     try:
-        with make_executor(workers, scheduler) as executor:
-            with progress_bar("Study") as tell:
-                found = work(executor, tell)
-            return found, write(folder, found, executor)
+        with make_executor(checked_count(workers, scheduler), scheduler) as executor:
+            yield executor
     except KeyboardInterrupt as stop:
         stop.add_note(
             f"What was finished is kept in {folder}; the same command continues where it stopped."

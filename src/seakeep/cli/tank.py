@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import messages, print_table, progress_bar
+from seakeep.cli.console import print_table, progress_bar, say
 from seakeep.errors import RequestError
 from seakeep.files import check_output, is_there, make_folder
 
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from seakeep.tank.dynamics import Rig
     from seakeep.tank.realised import Realised
     from seakeep.tank.settings import TankSettings
-
-__all__ = ["tank"]
 
 
 def tank(
@@ -85,7 +83,7 @@ def tank(
                 progress=progress,
             )  # fmt: skip
         count = sum(map(len, files.values()))
-        messages().print(f"Wrote {count} raw files and {out / 'campaign.toml'} (truth apart).")
+        say(f"Wrote {count} raw files and {out / 'campaign.toml'} (truth apart).")
     if statistics or figures:
         measured = _measured(wanted, names, rig)
         if statistics:
@@ -151,4 +149,4 @@ def _draw(settings: TankSettings, rig: Rig, measured: list[Realised], folder: Pa
         data = truth(play_run(settings, each.run, rig), each.run, 0.02)
         written.append(save_figure(run_figure(data), folder / f"run_{each.run}.png"))
     for path in written:
-        messages().print(f"Wrote {path}")
+        say(f"Wrote {path}")

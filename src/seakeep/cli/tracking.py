@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import messages, progress_bar
+from seakeep.cli.console import progress_bar, say
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing, write_netcdf
 
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from seakeep.signals import MotionAgreement, Track
-
-__all__ = ["track"]
 
 TRACK, SHEET = "track", "contact sheet"
 HEADER = r"time \[s\],surge \[m\],heave \[m\],pitch \[deg\],centroid_x \[pixel\],"
@@ -178,11 +176,7 @@ def _labelled(track: Track) -> xr.Dataset:
     }
     time = ("time", track.time, {"units": "s", "long_name": "time"})
     out = xr.Dataset(data, {"time": time}, dict(track.attributes))
-    flags = out["flag"]
-    flags.attrs |= {
-        "flag_values": list(FLAGS.values()),
-        "flag_meanings": " ".join(FLAGS),
-    }
+    out["flag"].attrs |= {"flag_values": list(FLAGS.values()), "flag_meanings": " ".join(FLAGS)}
     return out
 
 
@@ -196,7 +190,7 @@ def _marked(picture: bytes) -> bytes:
 def _as_csv(tracked: xr.Dataset) -> str:
     """Columns with units in brackets; angles in degrees, as loggers write them; NaN is empty."""
     import numpy as np
-    import xarray as xr
+    import pandas as pd
 
     columns = {}
     for name, values in {"time": tracked["time"], **tracked.data_vars}.items():
@@ -205,8 +199,8 @@ def _as_csv(tracked: xr.Dataset) -> str:
             unit, numbers = "deg", np.rad2deg(numbers)
         if np.issubdtype(numbers.dtype, np.floating):
             numbers = np.round(numbers, DECIMALS[unit]) + 0.0
-        columns[f"{name} [{'-' if unit == '1' else unit}]"] = ("row", numbers)
-    text: str = xr.Dataset(columns).to_dataframe().to_csv(index=False, lineterminator="\n")
+        columns[f"{name} [{'-' if unit == '1' else unit}]"] = numbers
+    text: str = pd.DataFrame(columns).to_csv(index=False, lineterminator="\n")
     return text
 
 
@@ -219,14 +213,14 @@ def _summary(track: Track, written: list[Path]) -> None:
         if name != "good" and (count := int((track["flag"] == code).sum()))
     ]
     facts = track.attributes
-    messages().print(
+    say(
         f"{track.time.size} frames at {facts['frame_rate']:g} Hz; flagged: "
         f"{', '.join(flagged) or 'none'} ({int(track['bridged'].sum())} bridged); "
         f"{1e3 * facts['metres_per_pixel']:.4g} mm per pixel ({facts['calibration']}); "
         f"{facts['camera']}."
     )
     if written:
-        messages().print("Wrote " + ", ".join(map(str, written)))
+        say("Wrote " + ", ".join(map(str, written)))
 
 
 def _compare(track: Track, reference: xr.Dataset, max_lag: float | None) -> None:
@@ -240,13 +234,13 @@ def _compare(track: Track, reference: xr.Dataset, max_lag: float | None) -> None
         time = reference["time"].to_numpy()
         found = compare_motion(track[name], track.time, factor * other.to_numpy(), time, max_lag)
         shown, unit = (1e3, "mm") if unit == "m" else displayed(unit)
-        messages().print(
+        say(
             f"{name} against the MRU: correlation {found.correlation:.4f}, video late by "
             f"{found.lag:+.3f} s, RMS difference {shown * found.rms:.3g} {unit}, "
             f"{found.samples} samples"
         )
         if doubt := _doubt(found):
-            messages().print(f"Note: {name}: {doubt}", style="yellow")
+            say(f"Note: {name}: {doubt}", style="yellow")
 
 
 def _doubt(found: MotionAgreement) -> str:

@@ -16,7 +16,7 @@ from seakeep.arrays import whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.conventions import displayed, is_elevation
-from seakeep.errors import DataError, RequestError, did_you_mean, warn
+from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_at_clock
@@ -25,21 +25,9 @@ from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, froude_factor
 from seakeep.signals.time_axis import span_text
 from seakeep.study.fit import warn_of_repeats, warn_of_waves
-from seakeep.study.full_scale import to_full_scale
+from seakeep.study.full_scale import times, to_full_scale
+from seakeep.study.plan import named
 from seakeep.toml import parse_length
-
-__all__ = [
-    "Comparison",
-    "at_full_scale",
-    "compare",
-    "compare_models",
-    "comparison_table",
-    "difference_table",
-    "forecast_at_full_scale",
-    "in_degrees",
-    "instant_of",
-    "samples_of",
-]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +97,16 @@ def in_degrees(comparison: Comparison) -> Comparison:
     Comparison
         Radians, and their rates, turned into degrees; error measures do not change.
     """
-    return replace(
-        comparison,
-        forecast=with_degrees(comparison.forecast),
-        measured=with_degrees(comparison.measured),
-        inputs=with_degrees(comparison.inputs),
-        band=None if comparison.band is None else with_degrees(comparison.band),
-    )
+    return _converted(comparison, with_degrees)
+
+
+def _converted(
+    comparison: Comparison, convert: Callable[[xr.Dataset], xr.Dataset], **changes: xr.Dataset
+) -> Comparison:
+    for part in {"forecast", "measured", "inputs", "band"} - set(changes):
+        if (data := getattr(comparison, part)) is not None:
+            changes[part] = convert(data)
+    return replace(comparison, **changes)  # type: ignore[arg-type]
 
 
 def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
@@ -138,13 +129,8 @@ def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
     RequestError
         If the unit of a channel does not scale.
     """
-    return replace(
-        comparison,
-        forecast=forecast_at_full_scale(comparison.forecast, scale),
-        measured=to_full_scale(comparison.measured, scale),
-        inputs=to_full_scale(comparison.inputs, scale),
-        band=None if comparison.band is None else to_full_scale(comparison.band, scale),
-    )
+    forecast = forecast_at_full_scale(comparison.forecast, scale)
+    return _converted(comparison, lambda run: to_full_scale(run, scale), forecast=forecast)
 
 
 def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
@@ -198,12 +184,8 @@ def with_degrees(run: xr.Dataset) -> xr.Dataset:
     for name, variable in run.data_vars.items():
         units = str(variable.attrs.get("units", ""))
         factor, target = displayed(units)
-        if target == units:
-            continue
-        out[name] = variable * factor
-        out[name].attrs = {**variable.attrs, "units": target}
-        for key in {"training_std", "noise_std"} & set(variable.attrs):
-            out[name].attrs[key] = factor * float(variable.attrs[key])
+        if target != units:
+            out[name] = times(variable, factor).assign_attrs(units=target)
     return out
 
 
@@ -319,13 +301,6 @@ def compare_models(
         As :func:`compare`.
     """
     wanted = list(runs) or campaign.test_runs
-    known = list(campaign.settings.runs)  # unused ones too, if named
-    unknown = [name for name in wanted if name not in known]
-    if unknown:
-        raise RequestError(
-            f"the campaign has no run '{unknown[0]}'.{did_you_mean(unknown[0], known)} "
-            f"Runs: {', '.join(known)}."
-        )
     if not wanted:
         raise RequestError(
             "no run of the campaign tests a model. Name one with --run, or give one "
@@ -344,26 +319,21 @@ def compare_models(
         warn_of_repeats(model, campaign, prepared)
         dt = model.dt
         count = None if steps is None else samples_of(steps, campaign, known_runs, dt, "steps")
-
-        def forecast_run(
-            run: xr.Dataset, start: float, steps: int, model: Model = model
-        ) -> xr.Dataset:
-            if not is_ensemble(model):
-                return model.forecast(run, start=start, steps=steps)
-            tell = None if members is None else _named(members, str(run.attrs["run"]))
-            return model.forecast_summary(
-                run, start, steps, level, band=band, executor=executor, progress=tell
-            )
-
-        found[label] = [
-            _compare_run(model, forecast_run, run, name, first, count, history, lead)
-            for name, run in prepared.items()
-        ]
-        for each in found[label]:
+        found[label] = []
+        for name, run in prepared.items():
+            how: dict[str, Any] = {}
+            if is_ensemble(model):
+                tell = named(members, f"{name}, ")
+                how = {"level": level, "band": band, "executor": executor, "progress": tell}
+            each = _compare_run(model, run, name, first, count, history, lead, how)
+            found[label].append(each)
             _warn_of_known(model, each)
-            steps_of = each.measured.sizes["time"]
-            warn_of_waves(model, prepared[each.run], each.run, each.start, steps_of)
-            _warn_of_look_ahead(each)
+            warn_of_waves(model, run, name, each.start, each.measured.sizes["time"])
+            if (until := float(each.forecast.attrs.get("reads_input_until", -1.0))) > 0.0:
+                warn(
+                    f"the forecast of {name} reads the waves up to {until:.3g} s after the instant "
+                    "that it forecasts: the model needs these waves ahead of time."
+                )
     for of_run in zip(*found.values(), strict=True):
         parts = [part for each in of_run for part in (each.measured, each.inputs)]
         _warn_of_dead(xr.merge(parts, compat="override"), of_run[0].run)
@@ -383,48 +353,29 @@ def check_alike(models: Mapping[str, Model]) -> None:
 
 def _warn_of_known(model: Model, compared: Comparison) -> None:
     """Warn where a forecast lies in what the model, or its calibrated band, was made from."""
-    name, first, last = compared.run, compared.start, float(compared.measured["time"][-1])
-
-    def part_in(spans: Mapping[str, tuple[float, float]]) -> str:
-        """Span of the run that the forecast touches, in words; empty if it does not."""
-        begin, end = spans.get(name, (np.inf, -np.inf))
-        touches = first < end - 0.5 * model.dt and last > begin
-        return f"({span_text(begin, end, model.dt)})" if touches else ""
-
-    memory = "this shows memory, not skill. Test elsewhere (--run, --start, --steps)."
-    told = []
-    if part := part_in(model.training_spans):
-        told.append(f"the forecast of {name} lies in what trained the model {part}: {memory}")
-    calibration = getattr(model, "calibration", None)
-    known = {} if calibration is None else calibration.spans
-    if compared.forecast.attrs.get("band") == "calibrated" and (part := part_in(known)):
-        told.append(f"the band was calibrated on a part of this forecast {part}: {memory}")
-    for text in told:
-        warn(text)
-
-
-def _warn_of_look_ahead(compared: Comparison) -> None:
-    until = float(compared.forecast.attrs.get("reads_input_until", -1.0))
-    if until > 0.0:
-        warn(
-            f"the forecast of {compared.run} reads the waves up to {until:.3g} s after the instant "
-            "that it forecasts: the model needs these waves ahead of time."
-        )
-
-
-def _named(tell: Progress, run: str) -> Progress:
-    return lambda done, total, what: tell(done, total, f"{run}, {what}")
+    first, last = compared.start, float(compared.measured["time"][-1])
+    spans = {f"the forecast of {compared.run} lies in what trained the model": model.training_spans}
+    if compared.forecast.attrs.get("band") == "calibrated":
+        calibration: Any = getattr(model, "calibration", None)
+        spans["the band was calibrated on a part of this forecast"] = calibration.spans
+    for words, known in spans.items():
+        begin, end = known.get(compared.run, (np.inf, -np.inf))
+        if first < end - 0.5 * model.dt and last > begin:
+            warn(
+                f"{words} ({span_text(begin, end, model.dt)}): this shows memory, not skill. Test "
+                "elsewhere (--run, --start, --steps)."
+            )
 
 
 def _compare_run(
     model: Model,
-    forecast_run: Callable[[xr.Dataset, float, int], xr.Dataset],
     run: xr.Dataset,
     name: str,
     start: float | None,
     steps: int | None,
     history: int,
     lead: int,
+    how: Mapping[str, Any],
 ) -> Comparison:
     time = run["time"].values
     begin, end = run.attrs.get("test_span", (time[0], time[-1]))
@@ -437,7 +388,8 @@ def _compare_run(
         last = min(last, time.size - max(lead, 1))
         at = int(np.argmin(np.abs(time - start)))
         steps = max(last - at, 1)
-    found = forecast_run(run, start, steps)
+    forecast = model.forecast_summary if is_ensemble(model) else model.forecast
+    found = forecast(run, start, steps, **how)
     # The last instant may lie a step beyond the record: the input before it is known.
     inside = found[model.states].sel(time=slice(None, time[-1])).assign_attrs(found.attrs)
     if (known := inside.sizes["time"]) < 2:
@@ -447,17 +399,14 @@ def _compare_run(
             "or more steps."
         )
     instants = {"time": inside["time"]}
-    forecast, band = inside, None
-    if "statistic" in inside.dims:
-        forecast = inside.sel(statistic="mean", drop=True)
-        band = inside.sel(statistic=["lower", "upper"])
+    has_band = "statistic" in inside.dims
     return Comparison(
         run=name,
         sea_state=str(run.attrs.get("sea_state", "")),
-        forecast=forecast,
+        forecast=inside.sel(statistic="mean", drop=True) if has_band else inside,
         measured=run[model.states].sel(instants),
         inputs=run.sel(instants)[model.inputs],
-        band=band,
+        band=inside.sel(statistic=["lower", "upper"]) if has_band else None,
     )
 
 
@@ -505,12 +454,9 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
         raise RequestError(
             "there is no comparison to tabulate. Give those of seakeep.study.compare."
         )
-    rows = [_row(comparison, intervals) for comparison in comparisons]
-    table = xr.concat(rows, dim="run")
-    for name, (units, label) in _COLUMNS.items():
-        if name not in table:
-            continue
-        table[name].attrs = {"units": units, "long_name": label}
+    table = xr.concat([_row(comparison, intervals) for comparison in comparisons], dim="run")
+    for name in set(table) & set(_COLUMNS):
+        table[name].attrs = dict(zip(("units", "long_name"), _COLUMNS[str(name)], strict=True))
     return table
 
 
@@ -578,7 +524,7 @@ _COLUMNS = {
 
 def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
     p, m = comparison.forecast, comparison.measured
-    names = [str(name) for name in p.data_vars]
+    names, scale = [str(name) for name in p.data_vars], comparison.full_scale
     slack = metrics.is_slack(predicted=p, measured=m)
     with np.errstate(divide="ignore", invalid="ignore"):
         spread = m.std("time", ddof=1)
@@ -596,12 +542,12 @@ def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
     }
     return xr.Dataset(
         {
-            name: ("channel", np.array([float(values[channel]) for channel in names]))
+            name: ("channel", values[names].to_array().values.astype(float))
             for name, values in each.items()
         }
         | (_interval_entries(p, m, names) if intervals else {})
         | _band_entries(comparison, slack)
-        | _scale_entries(comparison)
+        | ({} if scale is None else {"scale": "full", "scale_factor": scale})
         | {
             "anrmse": comparison.anrmse,
             "training_anrmse": float(each["training_nrmse"].to_array().mean(skipna=False)),
@@ -627,10 +573,9 @@ def _interval_entries(p: xr.Dataset, m: xr.Dataset, names: Sequence[str]) -> dic
     pair = {"predicted": p, "measured": m}
     out: dict[str, Any] = {}
     for key, each in (("nrmse", metrics.nrmse), ("nammae", metrics.normalised_extremes_error)):
-        found = each(**pair, interval=INTERVAL)
-        for bound in found["bound"].values:
-            at = found.sel(bound=bound)
-            out[f"{key}_{bound}"] = ("channel", np.array([float(at[name]) for name in names]))
+        found = each(**pair, interval=INTERVAL)[names].to_array()
+        for bound in metrics.BOUNDS:
+            out[f"{key}_{bound}"] = ("channel", found.sel(bound=bound).values)
     for key, average in (("anrmse", metrics.anrmse), ("mean_nammae", metrics.nammae)):
         for bound, value in zip(metrics.BOUNDS, average(**pair, interval=INTERVAL), strict=True):
             out[f"{key}_{bound}"] = float(value)
@@ -648,19 +593,13 @@ def _in_training_sd(p: xr.Dataset, m: xr.Dataset) -> xr.Dataset:
     )
 
 
-def _scale_entries(comparison: Comparison) -> dict[str, Any]:
-    if (scale := comparison.full_scale) is None:
-        return {}
-    return {"scale": "full", "scale_factor": scale}
-
-
 def _band_entries(comparison: Comparison, slack: xr.Dataset) -> dict[str, Any]:
     if comparison.band is None:
         return {}
     lower, upper = (comparison.band.sel(statistic=key, drop=True) for key in ("lower", "upper"))
     found = statistics.coverage(lower, upper, comparison.measured)
     inside = 100.0 * found["inside"].values
-    judged = ~np.array([bool(slack[str(name)]) for name in found["channel"].values])
+    judged = ~slack.to_array().values
     attrs = comparison.forecast.attrs
     return {
         "coverage": ("channel", inside),

@@ -21,8 +21,6 @@ from seakeep.study.judge import wave_frequency
 from seakeep.study.plan import Plan, between, training_samples, whole_span
 from seakeep.study.settings import Study
 
-__all__ = ["describe_study", "words_of_repeats"]
-
 Runs = Mapping[str, xr.Dataset]
 
 POSITIVE = {
@@ -34,6 +32,7 @@ POSITIVE = {
     "yaw": "right-handed about z",
 }
 WELCH = ("paper", "recommended")
+WORDS = ("sea_state", "waves", "role", "file_sha256")
 
 
 def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
@@ -43,31 +42,29 @@ def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset
         "training": _training(plan, runs),
         "runs": _runs(plan, runs),
         **{f"prepared/{name}": _prepared(run) for name, run in runs.items()},
+        "repeats": _repeats(study.campaign, plan, runs),
+        "spectra": _spectra(plan, runs),
     }
-    if (repeats := _repeats(study.campaign, plan, runs)) is not None:
-        groups["repeats"] = repeats
-    spectra = _spectra(plan, runs)
-    return {**groups, **({"spectra": spectra} if spectra is not None else {})}
+    return {name: group for name, group in groups.items() if group is not None}
 
 
 def _repeats(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset | None:
     """Runs whose test windows repeat input of their training set; None if there are none."""
+    regular = {name for name, run in campaign.settings.runs.items() if run.waves == "regular"}
     spans: dict[str, list[float]] = {}
     for window in (each for windows in plan.tests.values() for each in windows):
-        if campaign.settings.runs[window.run].waves != "regular":
-            edges = spans.setdefault(window.run, [np.inf, -np.inf])
-            edges[0] = min(edges[0], window.start)
-            edges[1] = max(edges[1], window.start + window.steps * plan.dt)
+        if window.run not in regular:
+            end = window.start + window.steps * plan.dt
+            spans.setdefault(window.run, []).extend((window.start, end))
     found = []
     for name, edges in spans.items():
         learnt: dict[str, list[float]] = {}
         for each in plan.training:
-            for run, begin, stop in each.spans if each.may_test(name) else ():
-                if campaign.settings.runs[run].waves != "regular":
-                    known = learnt.setdefault(run, [begin, stop])
-                    known[:] = min(known[0], begin), max(known[1], stop)
-        pieces = {run: between(runs[run], (begin, stop)) for run, (begin, stop) in learnt.items()}
-        test = between(runs[name], (edges[0], edges[1]))
+            for run, *span in each.spans if each.may_test(name) else ():
+                if run not in regular:
+                    learnt.setdefault(run, []).extend(span)
+        pieces = {run: between(runs[run], (min(e), max(e))) for run, e in learnt.items()}
+        test = between(runs[name], (min(edges), max(edges)))
         if (repeat := find_repeat(plan.inputs, pieces, name, test, plan.dt)) is not None:
             found.append(asdict(repeat) | {"words": str(repeat)})
     if not found:
@@ -91,20 +88,20 @@ def words_of_repeats(repeats: xr.Dataset) -> str:
 def _channels(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset:
     first = next(iter(runs.values()))
     names = [*plan.states, *plan.inputs]
-    rows: dict[str, list[str]] = {
-        key: [] for key in ("units", "long_name", "symbol", "source", "positive", "use")
-    }
-    for name in names:
-        canonical = canonical_channel(name)
-        rows["units"].append(str(first[name].attrs.get("units", "")))
-        rows["long_name"].append(str(first[name].attrs.get("long_name", name)))
-        rows["symbol"].append(canonical.symbol if canonical else "")
-        rows["source"].append(_source(campaign, name))
-        rows["positive"].append(_positive(name))
-        rows["use"].append("state" if name in plan.states else "input")
-    variables = {key: ("name", np.array(values, dtype=object)) for key, values in rows.items()}
+    rows = [
+        {
+            "units": str(first[name].attrs.get("units", "")),
+            "long_name": str(first[name].attrs.get("long_name", name)),
+            "symbol": canonical.symbol if (canonical := canonical_channel(name)) else "",
+            "source": _source(campaign, name),
+            "positive": _positive(name),
+            "use": "state" if name in plan.states else "input",
+        }
+        for name in names
+    ]
     return xr.Dataset(
-        {**variables, "channel": ("channel", np.array(plan.states, dtype=object))},
+        {key: ("name", np.array([row[key] for row in rows], dtype=object)) for key in rows[0]}
+        | {"channel": ("channel", np.array(plan.states, dtype=object))},
         coords={"name": names},
         attrs={"frame": campaign.settings.rig.frame or ""},
     )
@@ -147,28 +144,25 @@ def _prepared(run: xr.Dataset) -> xr.Dataset:
 
 
 def _training(plan: Plan, runs: Runs) -> xr.Dataset:
-    single = all(len(each.spans) == 1 for each in plan.training)
     edges = np.full((2, len(plan.training), len(runs)), np.nan)
     for number, each in enumerate(plan.training):
         for run, *span in each.spans:
             edges[:, number, list(runs).index(run)] = span
+    left_out = [", ".join(each.left_out) for each in plan.training]
     out = xr.Dataset(
         {
             "begin": (("training", "of_run"), edges[0], {"units": "s"}),
             "end": (("training", "of_run"), edges[1], {"units": "s"}),
-            "left_out": (
-                "training",
-                np.array([", ".join(each.left_out) for each in plan.training], dtype=object),
-            ),
+            "left_out": ("training", np.array(left_out, dtype=object)),
         },
         coords={"training": [each.name for each in plan.training], "of_run": list(runs)},
     )
-    if single:
-        out["run"] = ("training", np.array([e.spans[0][0] for e in plan.training], dtype=object))
-        out["stop"] = ("training", np.array([e.spans[0][2] for e in plan.training]))
-        longest = training_samples(plan.needs) * plan.dt
-        lengths = [min(longest, e.spans[0][2] - e.spans[0][1]) for e in plan.training]
-        out["reads"] = ("training", np.array(lengths), {"units": "s"})
+    if all(len(each.spans) == 1 for each in plan.training):
+        names, begins, stops = zip(*(each.spans[0] for each in plan.training), strict=True)
+        lengths = np.subtract(stops, begins).clip(max=training_samples(plan.needs) * plan.dt)
+        out["run"] = ("training", np.array(names, dtype=object))
+        out["stop"] = ("training", np.array(stops))
+        out["reads"] = ("training", lengths, {"units": "s"})
     return out
 
 
@@ -186,47 +180,40 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
             slack = slack_share(x, noise) if name.startswith("mooring") else np.nan
             spread = x.std(ddof=1)
             values[:, r, c] = x.mean(), spread, x.min(), x.max(), same.mean(), slack
-    words: dict[str, Any] = {
-        key: ("run", np.array([str(run.attrs.get(key, "")) for run in runs.values()], dtype=object))
-        for key in ("sea_state", "waves", "role", "file_sha256")
-    }
-    nowhere = (np.nan, np.nan)
-    edges = {
-        f"{use}_{end}": (
-            "run",
-            np.array([r.attrs.get(f"{use}_span", nowhere)[k] for r in runs.values()]),
-        )
-        for use in ("train", "test")
-        for k, end in enumerate(("begin", "end"))
-    }
+    waves = [name for name in plan.inputs if is_elevation(name)]
     trained = {run for each in plan.training for run in each.runs}
-    depths = [float(run.attrs.get("water_depth", np.nan)) for run in runs.values()]
+    rows: list[dict[str, Any]] = []
+    for name, run in runs.items():
+        time, facts = run["time"].values, run.attrs
+        is_regular = bool(waves) and facts.get("waves") == "regular"
+        frequency = np.nan
+        if is_regular:
+            frequency = wave_frequency(between(run, whole_span(run))[waves[0]].values, plan.dt)
+        rows.append(
+            {
+                "trains": name in trained,
+                "water_depth": float(facts.get("water_depth", np.nan)),
+                "wave_frequency": frequency,
+                **{key: str(facts.get(key, "")) for key in WORDS},
+                **{
+                    f"{use}_{end}": facts.get(f"{use}_span", (np.nan, np.nan))[k]
+                    for use in ("train", "test")
+                    for k, end in enumerate(("begin", "end"))
+                },
+                "duration": float(time[-1] - time[0]),
+                "samples": time.size,
+            }
+        )
     return xr.Dataset(
         {
-            "trains": ("run", np.array([name in trained for name in runs])),
-            "water_depth": ("run", np.array(depths)),
-            "wave_frequency": ("run", np.array([_frequency(plan, r) for r in runs.values()])),
+            **{
+                key: ("run", np.array([r[key] for r in rows], object if key in WORDS else None))
+                for key in rows[0]
+            },
             **{n: (("run", "name"), values[i]) for i, n in enumerate(numbers)},
-            **words,
-            **edges,
-            "duration": (
-                "run",
-                np.array(
-                    [float(r["time"].values[-1] - r["time"].values[0]) for r in runs.values()]
-                ),
-            ),
-            "samples": ("run", np.array([r.sizes["time"] for r in runs.values()])),
         },
         coords={"run": list(runs), "name": names},
     )
-
-
-def _frequency(plan: Plan, run: xr.Dataset) -> float:
-    """Return the frequency of a run's regular waves, Hz; NaN for others."""
-    waves = [name for name in plan.inputs if is_elevation(name)]
-    if run.attrs.get("waves") != "regular" or not waves:
-        return float("nan")
-    return wave_frequency(between(run, whole_span(run))[waves[0]].values, plan.dt)
 
 
 def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:
@@ -236,9 +223,7 @@ def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:
         return None
     curves, heights = {}, []
     for r, run in enumerate(runs.values()):
-        spans = [run.attrs[k] for k in ("train_span", "test_span") if k in run.attrs]
-        begin = min((float(s[0]) for s in spans), default=float(run["time"].values[0]))
-        x = run[waves[0]].sel(time=slice(begin - 1e-6, None)).values
+        x = run[waves[0]].sel(time=slice(whole_span(run)[0] - 1e-6, None)).values
         heights.append(significant_height(x))
         for k, kind in enumerate(WELCH):
             with suppress(RequestError):  # a record shorter than one segment

@@ -13,7 +13,7 @@ from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, warn
-from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, outside_training
+from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, Spec, outside_training
 from seakeep.models.labelled import mean_period
 from seakeep.models.settings import Select
 from seakeep.models.slow import warn_of_slow_motions
@@ -21,19 +21,8 @@ from seakeep.models.specs import left_open
 from seakeep.quality import warn_of_runs
 from seakeep.signals import find_leakage
 from seakeep.study.plan import between
-from seakeep.study.resolve import Spec, build_spec, can_align, counts_in_periods, mistakes_of
+from seakeep.study.resolve import build_spec, can_align, counts_in_periods, mistakes_of
 from seakeep.toml import Length, refusal
-
-__all__ = [
-    "Repeat",
-    "find_repeat",
-    "fit_baselines",
-    "fit_campaign",
-    "repeats_of",
-    "training_runs",
-    "warn_of_repeats",
-    "warn_of_waves",
-]
 
 NOTHING_TRAINS = (
     "no run of the campaign trains a model. Give one role = 'train', or a span "
@@ -135,7 +124,8 @@ def fit_campaign(
     for name, run in (both | _prepared_tests(campaign, both)).items():
         begin, end = run.attrs.get("test_span", (run["time"].values[0], run["time"].values[-1]))
         warn_of_waves(identified, run, name, float(begin), round((end - begin) / dt))
-    until = max(_reads_ahead(identified, run) for run in runs.values())
+    look_ahead = identified.signature.input_map.look_ahead
+    until = max(look_ahead(run, dt) for run in runs.values()) - dt
     if until > 0.5 * dt:
         warn(
             f"forecasts of this model read the waves up to {until:.3g} s after the instant that "
@@ -180,7 +170,9 @@ def read_training(
     stop = settings.stop
     if isinstance(stop, Length):
         stop = None if period is None else stop.at(period)
-    return spec, prepared, training_runs(prepared, _longest_window(spec, dt)), stop
+    needs = spec.needs(dt)
+    whole = needs.inside or needs.snapshots == 1 or getattr(spec, "train_on", "") == "windows"
+    return spec, prepared, training_runs(prepared, None if whole else needs.snapshots), stop
 
 
 def fit_baselines(
@@ -239,12 +231,6 @@ def fit_baselines(
     return found
 
 
-def _reads_ahead(model: Model, run: xr.Dataset) -> float:
-    """How long after the instant forecast a model reads its input, s; negative: before it."""
-    signature = model.signature
-    return signature.input_map.look_ahead(run, signature.dt) - signature.dt
-
-
 def _prepared_tests(campaign: Campaign, known: Collection[str]) -> dict[str, xr.Dataset]:
     """Test runs that `seakeep prepare` has written; the others are not prepared for a warning."""
     folder = prepared_folder(campaign)
@@ -257,14 +243,6 @@ def warn_of_waves(model: Model, run: xr.Dataset, name: str, start: float, steps:
     """Warn of each respect in which a test lies outside what trained the model."""
     for text in outside_training(model, run, start, steps):
         warn(f"{name}: {text}. Train in such waves too: errors may be large.")
-
-
-def _longest_window(spec: Spec, dt: float) -> int | None:
-    """Most snapshots before the end of a span, where the history may lie before them."""
-    needs = spec.needs(dt)
-    if needs.inside or needs.snapshots == 1 or getattr(spec, "train_on", "") == "windows":
-        return None
-    return needs.snapshots
 
 
 def _warn_of_slow_model(model: Model, runs: Mapping[str, xr.Dataset]) -> None:
@@ -296,13 +274,14 @@ def repeats_of(
         return {}
     missing = [name for name in training if name not in tested]
     prepared = dict(tested) | (load_prepared(campaign, names=missing) if missing else {})
-    pieces = {
-        name: prepared[name].sel(time=slice(first - 1e-6, stop + 1e-6))
-        for name, (first, stop) in training.items()
-    }
+    pieces = {name: between(prepared[name], span) for name, span in training.items()}
     found: dict[str, Repeat] = {}
     for name, run in tested.items():
-        part = _test_part(run, pieces.get(name))
+        part = run
+        if "test_span" in run.attrs:
+            part = between(run, run.attrs["test_span"])
+        elif name in pieces:  # a test on the training part repeats by definition
+            part = run.sel(time=slice(float(pieces[name]["time"][-1]) + 1e-6, None))
         # What a member leaves of a training run is too short to be judged.
         enough = name not in training or part.sizes["time"] >= model.history_samples
         if enough and campaign.settings.runs[name].waves != "regular":
@@ -315,15 +294,6 @@ def warn_of_repeats(model: Model, campaign: Campaign, tested: Mapping[str, xr.Da
     """Warn where a test run's input repeats the model's training input."""
     for repeat in repeats_of(model, campaign, tested).values():
         warn(f"{repeat} This test shows memory, not skill: test on another run.")
-
-
-def _test_part(run: xr.Dataset, trained: xr.Dataset | None) -> xr.Dataset:
-    span = run.attrs.get("test_span")
-    if span is not None:
-        return run.sel(time=slice(span[0] - 1e-6, span[1] + 1e-6))
-    if trained is not None:  # a test on the training part repeats by definition
-        return run.sel(time=slice(float(trained["time"][-1]) + 1e-6, None))
-    return run
 
 
 @dataclass(frozen=True)

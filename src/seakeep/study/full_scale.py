@@ -7,8 +7,6 @@ import xarray as xr
 from seakeep.errors import RequestError
 from seakeep.signals.froude import froude_factor
 
-__all__ = ["to_full_scale"]
-
 ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s",
                "test_span": "s", "water_depth": "m",
                "reads_input_until": "s", "input_predicted_from": "s",
@@ -63,18 +61,20 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
                 f"channels hold numbers over time. Leave it out: run.drop_vars('{name}')."
             )
         factor = froude_factor(str(variable.attrs.get("units", "1")), scale, density_ratio)
-        out[name] = variable.assign_coords(time=out["time"]) * factor
-        out[name].attrs = dict(variable.attrs)
-        for key in {"training_std", "noise_std"} & set(variable.attrs):
-            out[name].attrs[key] = factor * float(variable.attrs[key])
+        out[name] = times(variable.assign_coords(time=out["time"]), factor)
         if "x_position" in variable.attrs:
             out[name].attrs["x_position"] = scale * float(variable.attrs["x_position"])
     out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}
-    for key, unit in ATTRIBUTES.items():
-        if key not in run.attrs:
-            continue
-        by = clock if unit == "s" else scale
+    for key in ATTRIBUTES.keys() & run.attrs:
+        by = clock if ATTRIBUTES[key] == "s" else scale
         value = run.attrs[key]
         pair = isinstance(value, tuple | list)
         out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
     return out
+
+
+def times(channel: xr.DataArray, factor: float) -> xr.DataArray:
+    """Multiply a channel, and the standard deviations among its attributes, by a factor."""
+    known = {"training_std", "noise_std"} & set(channel.attrs)
+    spreads = {key: factor * float(channel.attrs[key]) for key in known}
+    return (channel * factor).assign_attrs(channel.attrs | spreads)

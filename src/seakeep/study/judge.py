@@ -28,28 +28,6 @@ from seakeep.models.executor import in_order
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
 
-__all__ = [
-    "BANDS",
-    "MEASURES",
-    "VARIANTS",
-    "average_of",
-    "band_of",
-    "band_parts",
-    "box_table",
-    "coverage_table",
-    "difference_table",
-    "is_regular",
-    "joined",
-    "judge",
-    "median_of",
-    "references_of",
-    "regular_response",
-    "training_order",
-    "verdict",
-    "wave_frequency",
-]
-
-
 BANDS = ("all", "low", "wave")
 """ε(t) as a whole, and in its two bands."""
 MEASURES = ("nrmse", "nammae", "training_nrmse")
@@ -128,11 +106,10 @@ def lost_forecasts(groups: Mapping[str, xr.Dataset], tests: Iterable[str]) -> xr
 
 def words_of_lost(lost: xr.Dataset) -> str:
     """One sentence that names model, training set and window of each lost forecast."""
-    cells = [lost.isel(cell=number) for number in range(lost.sizes["cell"])]
+    cells = list(lost.to_dataframe().itertuples())
     named = [
-        f"model '{each['model'].item()}', training set '{each['training'].item()}', window "
-        f"{each['window'].item()} of '{each['test'].item()}' ({each['run'].item()} from "
-        f"{each['start'].item():.6g} s)"
+        f"model '{each.model}', training set '{each.training}', window {each.window} of "
+        f"'{each.test}' ({each.run} from {each.start:.6g} s)"
         for each in cells[:SHOWN]
     ]
     more = f"; and {len(cells) - SHOWN} more, in statistics/lost" if len(cells) > SHOWN else ""
@@ -140,6 +117,13 @@ def words_of_lost(lost: xr.Dataset) -> str:
         f"{len(cells)} forecast(s) diverged and are left out: {'; '.join(named)}{more}. A larger "
         "ridge, fewer delays or more training data make a model stable."
     )
+
+
+def _columns(
+    names: Sequence[str], dims: tuple[str, ...], values: Iterable[FloatArray]
+) -> dict[str, tuple[tuple[str, ...], FloatArray]]:
+    """Variables of a table, one per row of `values`."""
+    return {name: (dims, each) for name, each in zip(names, values, strict=True)}
 
 
 def difference_table(
@@ -169,12 +153,10 @@ def difference_table(
 
     found = ratio(cells[None])[0]
     bounds = statistics.two_way_interval(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES)
+    changes = [values - 1.0 for values in (found, *bounds)]
     dims = ("model", "other", "measure", "channel")
     return xr.Dataset(
-        {
-            key: (dims, values - 1.0)
-            for key, values in zip(("change", "lower", "upper"), (found, *bounds), strict=True)
-        },
+        _columns(("change", "lower", "upper"), dims, changes),
         coords={
             "model": test["model"].values,
             "other": test["model"].values,
@@ -292,7 +274,7 @@ def box_table(test: xr.Dataset) -> xr.Dataset:
                 continue
             values[:, m, k, c] = [getattr(box, number) for number in numbers]
     return xr.Dataset(
-        {n: (("model", "measure", "channel"), values[i]) for i, n in enumerate(numbers)},
+        _columns(numbers, ("model", "measure", "channel"), values),
         coords={"model": test["model"], "measure": test["measure"], "channel": names},
     )
 
@@ -323,9 +305,8 @@ def coverage_table(test: xr.Dataset, calibration: xr.Dataset | None = None) -> x
             lower, upper = (bound[judged] for bound in band_of(test, model, band))
             for s, side in enumerate(sides):
                 values[:, m, s] = _coverage_row(test, side, lower, upper, numbers)
-        variables |= {
-            prefix + n: (("model", "against", "channel"), values[i]) for i, n in enumerate(numbers)
-        }
+        keys = [prefix + number for number in numbers]
+        variables |= _columns(keys, ("model", "against", "channel"), values)
     return xr.Dataset(variables, coords={"model": ensembles, "against": sides, "channel": names})
 
 
@@ -357,9 +338,8 @@ def band_parts(test: xr.Dataset, calibration: xr.Dataset | None, level: float) -
     values = np.full((len(numbers), len(ensembles), len(bands), len(parts), len(names)), np.nan)
     for (m, b), table in tables.items():
         values[:, m, b] = [getattr(table, number) for number in numbers]
-    dims = ("model", "band", "part", "channel")
     return xr.Dataset(
-        {number: (dims, values[i]) for i, number in enumerate(numbers)},
+        _columns(numbers, ("model", "band", "part", "channel"), values),
         coords={
             "model": ensembles,
             "band": list(bands),
@@ -400,11 +380,9 @@ def _coverage_row(
     band = statistics.coverage(lower, upper, np.where(known, against, 0.0)[judged])
     rows = []
     for number in numbers:
-        each = np.where(known, getattr(band, number), np.nan)
-        each = np.where(np.isfinite(each), each, np.nan)
-        over_cells = average_of(each)
-        mean = np.nanmean(over_cells) if np.isfinite(over_cells).any() else np.nan
-        rows.append([mean, *average_of(each.T)])
+        each = getattr(band, number)
+        each = np.where(known & np.isfinite(each), each, np.nan)
+        rows.append([average_of(average_of(each)), *average_of(each.T)])
     return np.array(rows)
 
 
@@ -428,10 +406,8 @@ def trend_table(test: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
             )
         found[:, b, m] = [getattr(trend, number) for number in numbers]
     return xr.Dataset(
-        {
-            **{n: (("band", "model"), found[i]) for i, n in enumerate(numbers)},
-            **{n: (("band", "model", "time"), series[i]) for i, n in enumerate(names)},
-        },
+        _columns(numbers, ("band", "model"), found)
+        | _columns(names, ("band", "model", "time"), series),
         coords={"band": test["band"].values, "model": test["model"].values, "time": time},
     )
 
@@ -473,9 +449,7 @@ def _divergences(
     segments = [test.sizes["time"]] * test.sizes["window"]
     table = np.full((len(DIVERGENCE), len(VARIANTS), len(channels)), np.nan)
     curves = np.full((7, len(channels), 512), np.nan)
-    inside = predicted.reshape(
-        len(predicted), test.sizes["window"], test.sizes["time"], len(channels)
-    )
+    inside = predicted.reshape(len(predicted), len(segments), segments[0], len(channels))
     moves = (np.ptp(inside, axis=2).max(axis=1) > 0).all(axis=0) & (np.ptp(measured, axis=0) > 0)
     # What stands still has no density.
     judged = np.flatnonzero(moves if len(predicted) else []).tolist()
@@ -491,14 +465,14 @@ def _divergences(
         else:
             table[:, :, c], curves[:, c] = each
     divergence = xr.Dataset(
-        {n: (("variant", "channel"), table[i]) for i, n in enumerate(DIVERGENCE)},
+        _columns(DIVERGENCE, ("variant", "channel"), table),
         coords={"variant": list(VARIANTS), "channel": list(channels)},
     )
     divergence["diverged_series"] = diverged
     keys = ("value", *(f"{side}_{k}" for side in ("measured", "predicted")
                        for k in ("mean", "lower", "upper")))  # fmt: skip
     densities = xr.Dataset(
-        {key: (("channel", "grid"), curves[i]) for i, key in enumerate(keys)},
+        _columns(keys, ("channel", "grid"), curves),
         coords={"channel": list(channels)},
     )
     return divergence, densities
@@ -576,37 +550,46 @@ def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
     SDs, whose squares add up to that of the NRMSE; ``phase_lead`` is that of the forecast before
     the measurement, degrees.
     """
-    data, runs = groups[f"tests/{test}"], groups["runs"]
-    frequencies = runs["wave_frequency"].sel(run=data["run"].values.astype(str)).values
-    parts = np.array([_parts(data, model, frequencies) for model in data["model"].values])
+    data = groups[f"tests/{test}"]
+    parts = np.array([_parts(groups, test, model) for model in data["model"].values])
     keys = ("error_offset", "error_wave", "error_rest", "amplitude_ratio", "phase_lead")
     return xr.Dataset(
-        {key: (("model", "channel"), parts[:, k]) for k, key in enumerate(keys)},
+        _columns(keys, ("model", "channel"), parts.swapaxes(0, 1)),
         coords={"model": data["model"], "channel": data["channel"]},
     )
 
 
-def _parts(data: xr.Dataset, model: str, frequencies: FloatArray) -> list[FloatArray]:
+def _parts(groups: Mapping[str, xr.Dataset], test: str, model: str) -> list[FloatArray]:
     """Errors and responses of a model, each of shape (channel,)."""
-    time, measured = data["time"].values, data["measured"].values
-    squares, responses = [], []
-    one = data.sel(model=model, measure="nrmse")
-    forecasts, slack = one["mean"].values, np.isnan(one["error"].values)
-    for row, column in zip(*np.nonzero(data["judged"].values), strict=True):
-        found, response = _in_waves(
-            time, frequencies[column], forecasts[row, column], measured[column]
-        )
-        squares.append(np.where(slack[row, column], np.nan, found))
-        responses.append(np.where(slack[row, column], np.nan, response))
-    known, answer = np.stack(squares), np.stack(responses)
+    judged = groups[f"tests/{test}"]["judged"].values
+    squares, responses = _responses(groups, test, model)
+    known, answer = squares[:, judged], responses[judged]
     lost = np.isnan(known).all(axis=(0, 1))
     known[..., lost], answer[..., lost] = 0.0, 1.0
-    errors = np.sqrt(np.nanmean(np.maximum(known, 0.0), axis=0))
+    errors = np.sqrt(np.nanmean(np.maximum(known, 0.0), axis=1))
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)  # a constant forecast has no phase
         direction = np.nanmean(answer / np.abs(answer), axis=0)
     columns_of = [*errors, np.nanmedian(np.abs(answer), axis=0), np.degrees(np.angle(direction))]
     return [np.where(lost, np.nan, each) for each in columns_of]
+
+
+def _responses(
+    groups: Mapping[str, xr.Dataset], test: str, model: str
+) -> tuple[FloatArray, npt.NDArray[np.complex128]]:
+    """:func:`_in_waves` over (training, window, channel); NaN where one is not judged."""
+    data = groups[f"tests/{test}"]
+    frequencies = groups["runs"]["wave_frequency"].sel(run=data["run"].values.astype(str)).values
+    time, measured = data["time"].values, data["measured"].values
+    one = data.sel(model=model, measure="nrmse")
+    forecasts, slack = one["mean"].values, np.isnan(one["error"].values)
+    squares = np.full((3, *slack.shape), np.nan)
+    responses = np.full(slack.shape, np.nan, dtype=complex)
+    for cell in zip(*np.nonzero(data["judged"].values), strict=True):
+        place = frequencies[cell[1]], forecasts[cell], measured[cell[1]]
+        squares[:, *cell], responses[cell] = _in_waves(time, *place)
+    squares[:, slack], responses[slack] = np.nan, np.nan
+    return squares, responses
 
 
 def _in_waves(
@@ -631,13 +614,4 @@ def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> Floa
 
     NaN where a cell or a channel is not judged.
     """
-    data = groups[f"tests/{test}"]
-    frequencies = groups["runs"]["wave_frequency"].sel(run=data["run"].values.astype(str)).values
-    time, measured = data["time"].values, data["measured"].values
-    one = data.sel(model=model, measure="nrmse")
-    forecasts, errors = one["mean"].values, one["error"].values
-    out = np.full(errors.shape, np.nan)
-    for row, column in zip(*np.nonzero(data["judged"].values), strict=True):
-        place = frequencies[column], forecasts[row, column], measured[column]
-        out[row, column] = np.degrees(np.angle(_in_waves(time, *place)[1]))
-    return np.where(np.isnan(errors), np.nan, out)
+    return np.degrees(np.angle(_responses(groups, test, model)[1]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import cast
 
 import numpy as np
@@ -17,8 +18,6 @@ from seakeep.models.labelled import channel_matrix
 from seakeep.models.live import Servable, held_samples
 from seakeep.quality import warn_of_runs
 from seakeep.study.comparison import samples_of
-
-__all__ = ["PERIODS", "SHARE", "labelled_skill", "nowcast", "nowcasts"]
 
 STARTS = 24
 """Forecasts of a run: enough for a root mean square known to a seventh."""
@@ -71,16 +70,14 @@ def nowcasts(
     prepared = load_prepared(campaign, names=list(runs) or campaign.test_runs)
     warn_of_runs(prepared.values(), {c for m in models.values() for c in (*m.states, *m.inputs)})
     out: dict[str, list[xr.Dataset]] = {name: [] for name in models}
-    total, done = len(models) * len(prepared), 0
-    for name, model in served.items():
-        dt = model.signature.dt
-        count = samples_of(steps or f"{PERIODS} T", campaign, list(prepared.values()), dt, "steps")
-        for key, run in prepared.items():
-            found = nowcast(model, run, count, share=share, level=level)
-            out[name].append(found.assign_coords(run=key))
-            done += 1
-            if progress is not None:
-                progress(done, total, f"{name}, {key}")
+    every, longest = list(product(served, prepared)), steps or f"{PERIODS} T"
+    for done, (name, key) in enumerate(every, 1):
+        model = served[name]
+        count = samples_of(longest, campaign, prepared.values(), model.signature.dt, "steps")
+        found = nowcast(model, prepared[key], count, share=share, level=level)
+        out[name].append(found.assign_coords(run=key))
+        if progress is not None:
+            progress(done, len(every), f"{name}, {key}")
     return {name: xr.concat(each, "run") for name, each in out.items()}
 
 

@@ -16,28 +16,13 @@ import xarray as xr
 from seakeep.campaign import load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import DataError, RequestError
-from seakeep.models import Needs
+from seakeep.models import Needs, Spec
 from seakeep.models.calibration import BandScale
 from seakeep.models.selection import groups_of
 from seakeep.models.settings import periods_to_samples
 from seakeep.models.slow import warn_of_slow_motions
-from seakeep.study.resolve import ResolvedModel, Spec, can_align, resolve_model
-from seakeep.study.settings import Study, StudySettings, TestSetSettings
-
-__all__ = [
-    "Plan",
-    "TestWindow",
-    "TrainingSet",
-    "between",
-    "choose_tests",
-    "choose_training",
-    "make_plan",
-    "needs_of",
-    "random_stream",
-    "training_samples",
-    "warn_of_slow_study",
-    "windows_overlap",
-]
+from seakeep.study.resolve import ResolvedModel, can_align, resolve_model
+from seakeep.study.settings import Study, StudySettings, TestSetSettings, TrainingSettings
 
 Runs = Mapping[str, xr.Dataset]
 
@@ -96,6 +81,14 @@ def random_stream(seed: int, purpose: str) -> np.random.Generator:
     return np.random.default_rng([seed, zlib.crc32(purpose.encode())])
 
 
+def named(progress: Progress | None, words: str) -> Progress | None:
+    """Put words before what a progress names."""
+    if progress is None:
+        return None
+    report = progress
+    return lambda done, total, name: report(done, total, f"{words}{name}")
+
+
 def between(run: xr.Dataset, span: tuple[float, float]) -> xr.Dataset:
     """Part of a run between two of its own instants, both included."""
     slack = 1e-6 * float(run.attrs.get("dt", 1.0))
@@ -135,24 +128,18 @@ def choose_training(
             "role = 'train' or a span train = [start, end], or use scheme = 'leave_out'."
         )
     spans = {name: _samples(runs[name], runs[name].attrs["train_span"]) for name in names}
-    if training.scheme == "pooled":
-        for name, (first, last) in spans.items():
-            _check_span(name, last - first + 1, needs, runs[name])
+    pooled = training.scheme == "pooled"
+    longest = max(spans, key=lambda name: spans[name][1] - spans[name][0])
+    for name in spans if pooled else [longest]:
+        _check_span(name, spans[name], needs, runs[name])
+    if pooled:
         return (TrainingSet("pooled", tuple(_of_samples(runs, n, *s) for n, s in spans.items())),)
     rng = random_stream(settings.study.seed, "training")
-    places = _places(spans, training_samples(needs), needs.snapshots, training.placement, rng)
-    if not places:
-        _refuse_training(spans, needs, runs)
-    count = len(places) if training.windows is None else training.windows
-    if count > len(places) and training.placement == "random":
-        raise RequestError(
-            f"training.windows: {count} windows were asked for and {len(places)} are feasible. "
-            "Ask for fewer, or shorten the training length."
-        )
-    chosen = places[:count]
+    needed, remedy = training_samples(needs), "shorten the training length"
+    places = _places("training", training, spans, needed, needs.snapshots, rng, remedy)
     return tuple(
         TrainingSet(f"t{number:02d}", (_of_samples(runs, name, spans[name][0], stop),))
-        for number, (name, stop) in enumerate(chosen)
+        for number, (name, stop) in enumerate(places)
     )
 
 
@@ -162,44 +149,44 @@ def _of_samples(runs: Runs, name: str, first: int, last: int) -> tuple[str, floa
 
 
 def _places(
+    table: str,
+    asked: TrainingSettings | TestSetSettings,
     spans: Mapping[str, tuple[int, int]],
     needed: int,
     width: int,
-    placement: str,
     rng: np.random.Generator,
+    remedy: str,
 ) -> list[tuple[str, int]]:
     """Feasible last samples in random order; with 'apart' no two within `width` samples."""
-    if placement == "random":
-        all_of_them = [
-            (name, stop)
-            for name, (first, last) in spans.items()
-            for stop in range(first + needed - 1, last + 1)
-        ]
-    else:
-        all_of_them = [
-            (name, stop)
-            for name, (first, last) in spans.items()
-            for stop in range(last, first + needed - 2, -max(width, 1))
-        ]
-    return [all_of_them[i] for i in rng.permutation(len(all_of_them))]
+    drawn = asked.placement == "random"
+    every = [
+        (name, stop)
+        for name, (first, last) in spans.items()
+        for stop in (
+            range(first + needed - 1, last + 1)
+            if drawn
+            else range(last, first + needed - 2, -max(width, 1))
+        )
+    ]
+    count = len(every) if asked.windows is None else asked.windows
+    if drawn and count > len(every):
+        raise RequestError(
+            f"{table}.windows: {count} windows were asked for and {len(every)} are feasible. Ask "
+            f"for fewer, or {remedy}."
+        )
+    return [every[i] for i in rng.permutation(len(every))[:count]]
 
 
-def _check_span(name: str, samples: int, needs: Needs, run: xr.Dataset) -> None:
-    needed = training_samples(needs)
-    if samples >= needed:
-        return
-    dt = float(run.attrs["dt"])
-    raise RequestError(
-        f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
-        f"({samples * dt:g} s), and the largest draw of all models needs {needed} "
-        f"({needs.snapshots} snapshots and {needs.history} of delay history, "
-        f"{needed * dt:g} s). Shorten window or the delays, or give longer runs."
-    )
-
-
-def _refuse_training(spans: Mapping[str, tuple[int, int]], needs: Needs, runs: Runs) -> None:
-    longest = max(spans, key=lambda name: spans[name][1] - spans[name][0])
-    _check_span(longest, spans[longest][1] - spans[longest][0] + 1, needs, runs[longest])
+def _check_span(name: str, span: tuple[int, int], needs: Needs, run: xr.Dataset) -> None:
+    samples, needed = span[1] - span[0] + 1, training_samples(needs)
+    if samples < needed:
+        dt = float(run.attrs["dt"])
+        raise RequestError(
+            f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
+            f"({samples * dt:g} s), and the largest draw of all models needs {needed} "
+            f"({needs.snapshots} snapshots and {needs.history} of delay history, "
+            f"{needed * dt:g} s). Shorten window or the delays, or give longer runs."
+        )
 
 
 def _folds(
@@ -221,8 +208,7 @@ def _folds(
         )
     spans = {name: whole_span(runs[name]) for name in names}
     for name in names:
-        first, last = _samples(runs[name], spans[name])
-        _check_span(name, last - first + 1, needs, runs[name])
+        _check_span(name, _samples(runs[name], spans[name]), needs, runs[name])
     return tuple(
         TrainingSet(
             f"without {group[0]}" + (f" (+{len(group) - 1})" if len(group) > 1 else ""),
@@ -252,36 +238,23 @@ def choose_tests(
         first, last = _samples(run, (float(span[0]) + test.startup, float(span[1])))
         # The last step reads the input `lead` samples after the instant that it starts from.
         spans[each] = (max(first, needs.history), min(last, run.sizes["time"] - max(needs.lead, 1)))
-    # A window of `steps` instants after its start: steps + 1 samples.
-    places = _places(spans, steps + 1, steps, test.placement, random_stream(seed, f"tests.{name}"))
-    dt = float(runs[names[0]].attrs["dt"])
-    if not places:
-        longest = max(last - first + 1 for first, last in spans.values())
+    longest = max(last - first + 1 for first, last in spans.values())
+    if longest <= steps:  # a window of `steps` instants after its start: steps + 1 samples
+        dt = float(runs[names[0]].attrs["dt"])
+        periods = np.floor(10 * (longest - 1) * test.length / steps) / 10
+        at_most = f" (length at most {periods:g} periods)" if periods > 0 else ""
         raise RequestError(
             f"tests.{name}: no window is feasible. A window has {steps} instants "
             f"({steps * dt:g} s), and the longest test span ({', '.join(names)}) holds "
             f"{max(longest, 0)} samples after {needs.history} of delay history and the start-up. "
-            f"Reduce length or startup{_longest_length(longest, steps, test.length)}, or give "
-            "longer runs."
+            f"Reduce length or startup{at_most}, or give longer runs."
         )
-    count = len(places) if test.windows is None else test.windows
-    if count > len(places) and test.placement == "random":
-        raise RequestError(
-            f"tests.{name}.windows: {count} windows were asked for and {len(places)} are feasible. "
-            "Ask for fewer, or reduce length."
-        )
-    order = {each: number for number, each in enumerate(names)}
-    chosen = sorted(places[:count], key=lambda place: (order[place[0]], place[1]))
+    rng = random_stream(seed, f"tests.{name}")
+    places = _places(f"tests.{name}", test, spans, steps + 1, steps, rng, "reduce length")
     return tuple(
         TestWindow(each, float(runs[each]["time"].values[last - steps]), steps)
-        for each, last in chosen
+        for each, last in sorted(places, key=lambda place: (names.index(place[0]), place[1]))
     )
-
-
-def _longest_length(samples: int, steps: int, length: float) -> str:
-    """Words for the longest window, in the periods of ``length``, that so many samples hold."""
-    periods = np.floor(10 * (samples - 1) * length / steps) / 10
-    return f" (length at most {periods:g} periods)" if periods > 0 else ""
 
 
 def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
@@ -392,19 +365,11 @@ class Plan:
 
     def is_shown(self, training: int, test: str, window: int) -> bool:
         """Whether the members of a cell are kept for figures."""
-        first = next(iter(self.tests)) == test
-        valid = [
-            k for k, each in enumerate(self.training) if each.may_test(self.tests[test][window].run)
-        ]
-        wanted = self.shown if first else min(self.shown, 1)
-        return window in self.shown_windows(test, wanted) and valid[:1] == [training]
-
-    def shown_windows(self, test: str, count: int | None = None) -> list[int]:
-        """Windows of a test set that figures show, spread over its runs."""
-        first = next(iter(self.tests)) == test
-        wanted = (self.shown if first else min(self.shown, 1)) if count is None else count
-        total = len(self.tests[test])
-        return [int(place) for place in np.linspace(0, total - 1, min(wanted, total)).round()]
+        wanted = self.shown if test == next(iter(self.tests)) else min(self.shown, 1)
+        run, total = self.tests[test][window].run, len(self.tests[test])
+        valid = (k for k, each in enumerate(self.training) if each.may_test(run))
+        spread_over_runs = np.linspace(0, total - 1, min(wanted, total)).round()
+        return window in spread_over_runs and next(valid, None) == training
 
 
 def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dict[str, xr.Dataset]]:

@@ -23,11 +23,10 @@ from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, check_report, is_there, replacing
 from seakeep.models.executor import on_this_machine, submitting
+from seakeep.study.plan import named
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
 from seakeep.study.store import StudyResult, read_result, storing, versions
-
-__all__ = ["ACTS", "SLOW", "Act", "Size", "read_reproduction", "reproduce"]
 
 NOTE = (
     "Virtual tank: a made-up vessel in made-up seas, so no number here replicates the paper's. Its "
@@ -199,7 +198,7 @@ def reproduce(
             read_study(path),
             path.parent,
             executor=executor,
-            progress=_named(progress, f"{act.title}: "),
+            progress=named(progress, f"{act.title}: "),
             extra={"nominal": nominal},
             notes={"preparation_note": f"{act.sentence} {NOTE}", "waves_note": WAVES},
             finished=None if finished is None else partial(finished, act),
@@ -255,7 +254,7 @@ def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:
         if mark.exists():
             check_output(mark, PLAYED)
         with storing(folder):
-            play(settings, folder, progress=_named(progress, "playing "))
+            play(settings, folder, progress=named(progress, "playing "))
         _write(mark, text, PLAYED)
     frequency = np.linspace(0.2, 1.5, 261)
     spectra = {
@@ -282,25 +281,18 @@ def prepare_campaigns(
     near = on_this_machine(executor)
     if near is None:
         for path in campaigns:
-            write_prepared(read_campaign(path), progress=_named(progress, "preparing "))
+            write_prepared(read_campaign(path), progress=named(progress, "preparing "))
         return
     first, *others = campaigns
     with submitting(_prepare, None, near) as submit:
         pending = [submit([path]) for path in others]
-        write_prepared(read_campaign(first), progress=_named(progress, "preparing "))
+        write_prepared(read_campaign(first), progress=named(progress, "preparing "))
         for each in pending:
             each.result()
 
 
 def _prepare(_: None, path: Path) -> None:
     write_prepared(read_campaign(path))
-
-
-def _named(progress: Progress | None, words: str) -> Progress | None:
-    if progress is None:
-        return None
-    report = progress
-    return lambda done, total, name: report(done, total, f"{words}{name}")
 
 
 def detrended_text(campaign: str) -> str:

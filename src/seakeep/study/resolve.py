@@ -16,25 +16,17 @@ from seakeep.campaign.settings import CampaignSettings
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
 from seakeep.models.checks import check_keys
-from seakeep.models.observables import Observable, SlowSquares, observables_of
+from seakeep.models.observables import SlowSquares, observables_of
 from seakeep.models.settings import Folds
 from seakeep.models.specs import left_open
 from seakeep.toml import Length, Mistake, lengths
-
-__all__ = [
-    "ResolvedModel",
-    "Spec",
-    "build_spec",
-    "can_align",
-    "counts_in_periods",
-    "mistakes_of",
-    "resolve_model",
-]
 
 Source = Literal["stated", "preset", "study", "default"]
 
 TABLES = {"alignment": ProbeAlignment, "select": Select}
 """Arguments of a spec that are tables of their own."""
+IN_PERIODS = ("horizon", "cutoff", "lead", "lags")
+"""Settings of choices and observables that count in encounter periods."""
 OF_THE_DATA = ("dt", "encounter_period")
 """Arguments of a spec that are measured, not set."""
 ALIGNMENTS = {"paper": ProbeAlignment(mode="effective", surge="measured")}
@@ -189,16 +181,22 @@ def resolve_model(
             "encounter_period (s) in [campaign]."
         )
     if "select" in stated:
-        stated["select"] = _select(stated["select"], encounter_period)
+        stated["select"] = {"period": encounter_period, **_counted(stated["select"])}
     if "observables" in stated:
-        tables = stated["observables"]
-        stated["observables"] = tuple(_observable(each, encounter_period) for each in tables)
+        stated["observables"] = tuple(
+            replace(each, period=encounter_period)
+            if isinstance(each, SlowSquares) and each.period is None
+            else each
+            for each in observables_of([_counted(table) for table in stated["observables"]])
+        )
     from_study: dict[str, Any] = (
         {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
     )
     filled: Spec | None = None
-    if preset is not None and encounter_period is not None:
-        filled = _filled(kind, preset, encounter_period, dt, alignment)
+    if preset is not None:
+        filled = getattr(kind, preset)(encounter_period, dt)
+        if alignment is not None and "alignment" in known:
+            filled = replace(cast("Any", filled), alignment=alignment)
     data = {"encounter_period": encounter_period, "dt": dt}
     spec = _made(kind, filled, {**from_study, **stated}, data).resolved(dt, encounter_period)
     open_spec = left_open(spec)
@@ -229,20 +227,6 @@ def mistakes_of(
         except RequestError as error:
             return [Mistake(place, str(error))]
     return []
-
-
-def _filled(
-    kind: type[Spec],
-    preset: str,
-    encounter_period: float,
-    dt: float,
-    alignment: ProbeAlignment | None,
-) -> Spec:
-    """Settings of a preset, aligned if the kind can be."""
-    made = getattr(kind, preset)(encounter_period, dt)
-    if alignment is not None and "alignment" in _defaults(kind):
-        made = replace(made, alignment=alignment)
-    return cast("Spec", made)
 
 
 def preset_of(settings: ModelSettings) -> str | None:
@@ -313,26 +297,12 @@ def _sources(
     return {key: source(key) for key in _values(spec)}
 
 
-def _select(table: dict[str, Any], encounter_period: float | None) -> dict[str, Any]:
-    """Keys of a table ``select``, which counts in encounter periods."""
-    made = {"period": encounter_period, **table}
-    if "horizon" in table:
-        given = table["horizon"]
-        every = given if isinstance(given, list | tuple) else (given,)
-        made["horizon"] = tuple(each.value if isinstance(each, Length) else each for each in every)
-    return made
+def _counted(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table whose lengths are numbers of encounter periods: 2 or '2 T', 0.33 or '0.33 /T'."""
 
-
-def _observable(table: Mapping[str, Any], encounter_period: float | None) -> Observable:
-    """An observable of its table, which counts in encounter periods: 2 or '2 T', '0.33 /T'."""
-
-    def counted(value: Any) -> Any:
+    def bare(value: Any) -> Any:
         if isinstance(value, list | tuple):
-            return [counted(each) for each in value]
+            return [bare(each) for each in value]
         return value.value if isinstance(value, Length) else value
 
-    in_periods = {key: counted(table[key]) for key in ("cutoff", "lead", "lags") if key in table}
-    (made,) = observables_of([{**table, **in_periods}])
-    if isinstance(made, SlowSquares) and made.period is None:
-        return replace(made, period=encounter_period)
-    return made
+    return {key: bare(value) if key in IN_PERIODS else value for key, value in table.items()}

@@ -16,7 +16,7 @@ from seakeep.models.executor import WorkerLostError, as_finished
 from seakeep.sizes import LONG_CELLS, MOST_CELLS, check_size
 from seakeep.study.describe import describe_study, words_of_repeats
 from seakeep.study.judge import judge, words_of_lost
-from seakeep.study.plan import Plan, make_plan, training_samples, warn_of_slow_study
+from seakeep.study.plan import Plan, make_plan, named, training_samples, warn_of_slow_study
 from seakeep.study.settings import Study
 from seakeep.study.store import (
     RESULT,
@@ -29,8 +29,6 @@ from seakeep.study.store import (
     write_result,
 )
 from seakeep.study.units import Unit, choice_of, choose, collect, compute, units_of
-
-__all__ = ["run_study"]
 
 
 def run_study(
@@ -96,9 +94,7 @@ def run_study(
         found = relabel(found, _labels(study))
         hand_on(found)
         return found
-    plan, runs = make_plan(
-        study, lambda done, total, name: report(done, total, f"preparing {name}")
-    )
+    plan, runs = make_plan(study, named(report, "preparing "))
     warn_of_slow_study(plan, runs)
     taken = _taken(plan)
     folder.open(study.name)
@@ -216,7 +212,9 @@ def _compute_all(
     report(done, total, f"fitting and forecasting, {taken}")
     # What is chosen serves several models: they wait for it.
     ready = [unit for unit in left if (choice := choices[unit]) is None or choice not in todo]
-    items = deque((unit, _choice(folder, choices.get(unit))) for unit in [*todo, *ready])
+    known = {unit: choice for unit in ready if (choice := choices[unit]) is not None}
+    items: deque[tuple[Unit, Arrays | None]] = deque((unit, None) for unit in todo)
+    items.extend((u, _arrays(folder, known[u]) if u in known else None) for u in ready)
     try:
         for (unit, _), arrays in as_finished(_work, (plan, dict(runs)), items, executor):
             folder.write(unit.name, arrays)
@@ -228,11 +226,6 @@ def _compute_all(
         raise WorkerLostError(
             f"{error} What was finished is kept: the same command continues where it stopped."
         ) from None
-
-
-def _choice(folder: UnitFolder, choice: Unit | None) -> Arrays | None:
-    """What an earlier run of the study has chosen for a unit."""
-    return None if choice is None else _arrays(folder, choice)
 
 
 def _work(data: tuple[Plan, dict[str, xr.Dataset]], item: tuple[Unit, Arrays | None]) -> Arrays:

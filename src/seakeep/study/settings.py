@@ -24,15 +24,6 @@ from seakeep.sizes import MOST_SERIES
 from seakeep.study.resolve import mistakes_of
 from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 
-__all__ = [
-    "Study",
-    "StudyModelSettings",
-    "StudySettings",
-    "TestSetSettings",
-    "TrainingSettings",
-    "read_study",
-]
-
 FORMAT = 7
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
@@ -286,19 +277,18 @@ class Study:
         content["channels"] = [list(self.states), list(self.inputs)]
         content["campaign"] = self.campaign.digest
         content["files"] = {n: self.campaign.checksum_of(n) for n in self.campaign.runs}
-        if self.truth_folder is not None:
-            content["truth"] = _checksums(self.truth_folder)
+        if (folder := self.truth_folder) is not None:
+            files = folder.rglob("*") if is_there(folder) else ()
+            content["truth"] = {
+                each.relative_to(folder).as_posix(): sha256_of(each)
+                for each in files
+                if each.is_file()
+            }
         content["format"] = FORMAT
         kinds = {run.waves for run in self.campaign.settings.runs.values()}
         if None in kinds and any(t.waves == "irregular" for t in self.settings.tests.values()):
             content["waves_not_stated"] = "irregular"
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _checksums(folder: Path) -> dict[str, str]:
-    """SHA-256 of each file of a folder."""
-    files = (each for each in folder.rglob("*") if each.is_file()) if is_there(folder) else ()
-    return {path.relative_to(folder).as_posix(): sha256_of(path) for path in files}
 
 
 def read_study(path: Path | str) -> Study:

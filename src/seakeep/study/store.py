@@ -25,18 +25,6 @@ from seakeep.errors import SHOWN, RequestError, SeakeepError, warn
 from seakeep.files import SEAL, check_report, is_there, read_bytes, read_sealed, replacing
 from seakeep.study.settings import FORMAT
 
-__all__ = [
-    "RESULT",
-    "StorageError",
-    "StudyResult",
-    "UnitFolder",
-    "read_result",
-    "relabel",
-    "storing",
-    "versions",
-    "write_result",
-]
-
 RESULT = "study.nc"
 NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 HEADER = "study.json"
@@ -118,9 +106,10 @@ class UnitFolder:
             tempfile.TemporaryFile(dir=self.folder / UNITS).close()
         header = self.folder / HEADER
         found = _read_header(header) if header.exists() else None
-        if found is not None and self._holds_results():
+        is_finished = (self.folder / RESULT).exists()
+        if found is not None and (is_finished or any((self.folder / UNITS).glob("*.npz"))):
             _check_header(self.folder, found, self._header())
-        elif not (self.folder / RESULT).exists():
+        elif not is_finished:
             check_report(self.folder)
             if found is None and any((self.folder / UNITS).iterdir()):
                 raise RequestError(
@@ -174,9 +163,6 @@ class UnitFolder:
 
     def _header(self) -> dict[str, Any]:
         return {"digest": self.digest, "versions": versions()}
-
-    def _holds_results(self) -> bool:
-        return (self.folder / RESULT).exists() or any((self.folder / UNITS).glob("*.npz"))
 
     def _path(self, name: str) -> Path:
         return self.folder / UNITS / f"{name}.npz"

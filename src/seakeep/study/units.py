@@ -36,8 +36,6 @@ from seakeep.study.nowcast import PERIODS, SHARE, labelled_skill, nowcast
 from seakeep.study.plan import Plan, TestWindow, TrainingSet, between
 from seakeep.study.settings import Study
 
-__all__ = ["Unit", "choice_of", "choose", "collect", "compute", "fit_training", "units_of"]
-
 Runs = Mapping[str, xr.Dataset]
 Arrays = dict[str, npt.NDArray[Any]]
 Read = Callable[["Unit"], Arrays]
@@ -149,17 +147,14 @@ def compute(plan: Plan, runs: Runs, unit: Unit, choice: Arrays | None = None) ->
         "chosen/words": np.array(getattr(fitted, "selection", "")),
         "chosen/look_ahead": np.array(ahead),
     }
-    tested = {
-        test: numbers
-        for test in plan.tests
-        if (numbers := tested_windows(plan, unit.training, test))
-    }
+    every = {test: tested_windows(plan, unit.training, test) for test in plan.tests}
+    tested = {test: numbers for test, numbers in every.items() if numbers}
     spread = training_moments(plan, runs, training)[1]
     for test, numbers, series, lost, envelope in _series(plan, runs, fitted, tested):
         if plan.models[unit.model].is_ensemble:
-            measured = measured_windows(plan, runs, plan.tests[test], numbers)
+            windows = [plan.tests[test][n] for n in numbers]
+            measured, noise = measured_windows(plan, runs, windows), _noise(plan, runs, windows)
             shown = [k for k, n in enumerate(numbers) if plan.is_shown(unit.training, test, n)]
-            noise = _noise(plan, runs, [plan.tests[test][n] for n in numbers])
             pair = {"measured": measured, "training_std": spread, "noise_std": noise}
             found = _judged(series, lost, pair, shown, plan.level)
             found |= {"shown": np.array([numbers[k] for k in shown])} if shown else {}
@@ -197,16 +192,16 @@ def _in_service(
     return out | {"nowcast/run": np.array(names), "nowcast/starts": np.array(starts)}
 
 
-def _collect_nowcast(plan: Plan, arrays: Arrays) -> xr.Dataset:
-    kept = {
-        key.removeprefix("nowcast/"): each
-        for key, each in arrays.items()
-        if key.startswith("nowcast/")
-    }
-    attrs = {"share": SHARE, "level": plan.level, "starts": int(kept.pop("starts"))}
-    names = kept.pop("run").astype(object)
-    found = labelled_skill(kept, plan.dt, plan.states, ("run",))
-    return found.assign_coords(run=names).assign_attrs(attrs)
+def _under(arrays: Arrays, place: str) -> Arrays:
+    """Arrays whose names start with a place, by the rest of their names."""
+    return {k.removeprefix(place): v for k, v in arrays.items() if k.startswith(place)}
+
+
+def _collect_nowcast(plan: Plan, found: Arrays) -> xr.Dataset:
+    attrs = {"share": SHARE, "level": plan.level, "starts": int(found.pop("starts"))}
+    names = found.pop("run").astype(object)
+    skill = labelled_skill(found, plan.dt, plan.states, ("run",))
+    return skill.assign_coords(run=names).assign_attrs(attrs)
 
 
 def _series(
@@ -253,17 +248,19 @@ def _judged(
     return out
 
 
-def measured_windows(
-    plan: Plan, runs: Runs, windows: tuple[TestWindow, ...], numbers: Sequence[int]
-) -> FloatArray:
-    """Measured states of windows of a test set, shape (window, steps, N)."""
+def _after(run: xr.Dataset, window: TestWindow) -> slice:
+    """Samples that a window forecasts."""
+    at = int(np.argmin(np.abs(run["time"].values - window.start)))
+    return slice(at + 1, at + 1 + window.steps)
+
+
+def measured_windows(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray:
+    """Measured states of windows, shape (window, steps, N)."""
     out = []
-    for number in numbers:
-        window = windows[number]
+    for window in windows:
         run = runs[window.run]
-        at = int(np.argmin(np.abs(run["time"].values - window.start)))
-        after = slice(at + 1, at + 1 + window.steps)
-        out.append(np.stack([run[n].values[after] for n in plan.states], axis=-1).astype(float))
+        each = [run[name].values[_after(run, window)] for name in plan.states]
+        out.append(np.stack(each, axis=-1).astype(float))
     return np.stack(out)
 
 
@@ -367,14 +364,12 @@ def collect(study: Study, plan: Plan, runs: Runs, read: Read) -> dict[str, xr.Da
             if plan.calibrated_on:
                 calibrations.append(_collect_calibration(plan, mine))
         first = units[0].training
-        if "nowcast/error" in mine.get(first, {}):
-            groups[f"nowcast/{model}"] = _collect_nowcast(plan, mine[first])
+        if skill := _under(mine.get(first, {}), "nowcast/"):
+            groups[f"nowcast/{model}"] = _collect_nowcast(plan, skill)
         if plan.eigenvalues:
+            parts = _under(mine[first], "eigenvalues/")
             groups[f"eigenvalues/{model}"] = xr.Dataset(
-                {
-                    part: (("member", "mode"), mine[first][f"eigenvalues/{part}"])
-                    for part in ("real", "imag")
-                },
+                {part: (("member", "mode"), values) for part, values in parts.items()},
                 attrs={"training": plan.training[first].name, "dt": plan.dt},
             )
     if calibrations:
@@ -396,7 +391,7 @@ def _collect_test(
     study: Study, plan: Plan, runs: Runs, found: Mapping[Unit, Arrays], test: str
 ) -> xr.Dataset:
     windows, training = plan.tests[test], plan.training
-    measured = measured_windows(plan, runs, windows, range(len(windows)))
+    measured = measured_windows(plan, runs, windows)
     judged = np.array([[each.may_test(w.run) for w in windows] for each in training])
     moments = np.stack([training_moments(plan, runs, each) for each in training])
     dims = ("window", "time", "channel")
@@ -449,13 +444,12 @@ def wave_heights(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> Float
     out = []
     for window in windows:
         run = runs[window.run]
-        at = int(np.argmin(np.abs(run["time"].values - window.start)))
         elevation = run[name].values.astype(float)
         known = np.flatnonzero(np.isfinite(elevation))  # gaps at the ends of a record
         heights = np.full(elevation.size, np.nan)
         part = slice(known[0], known[-1] + 1)
         heights[part] = 2.0 * np.sqrt(envelope_squared(elevation[part], plan.dt))
-        out.append(heights[at + 1 : at + 1 + window.steps])
+        out.append(heights[_after(run, window)])
     return np.stack(out)
 
 
@@ -479,7 +473,7 @@ def _forecasts(plan: Plan, found: Mapping[Unit, Arrays], test: str) -> tuple[Arr
     out: Arrays = {}
     for unit, cells in found.items():
         numbers = list(tested_windows(plan, unit.training, test))
-        part = {k.rpartition("/")[2]: v for k, v in cells.items() if k.startswith(f"tests/{test}/")}
+        part = _under(cells, f"tests/{test}/")
         drawn = [shown.index(k) for k in part.pop("shown", np.array([])).tolist()]
         for key, values in part.items():
             if key not in out:
@@ -505,11 +499,10 @@ def _errors(test: xr.Dataset, dt: float, frequency: float) -> dict[str, Any]:
             "training_std": test["training_std"].values[training],
             "noise_std": test["noise_std"].values,
         }
-        rest = metrics.root_mean_square(pair["predicted"] - measured) / pair["training_std"]
         errors[model, :, training] = (
             metrics.nrmse(**pair),
             metrics.normalised_extremes_error(**pair),
-            rest,
+            metrics.root_mean_square(pair["predicted"] - measured) / pair["training_std"],
         )
         bands = band_error_over_time(**pair, dt=dt, frequency=frequency)
         over_time[model, :, training] = metrics.error_over_time(**pair), *bands
@@ -536,19 +529,12 @@ def true_channels(study: Study, plan: Plan, runs: Runs, test: str) -> FloatArray
     out = []
     for window in plan.tests[test]:
         true = truths[window.run]
-        known = [name for name in plan.states if name in true]
         time = window.start + plan.dt * np.arange(1, window.steps + 1)
-        out.append(
-            np.stack(
-                [
-                    np.interp(time, true["time"].values, true[name].values)
-                    if name in known
-                    else np.full(time.size, np.nan)
-                    for name in plan.states
-                ],
-                axis=-1,
-            )
-        )
+        each: FloatArray = np.full((window.steps, len(plan.states)), np.nan)
+        for k, name in enumerate(plan.states):
+            if name in true:
+                each[:, k] = np.interp(time, true["time"].values, true[name].values)
+        out.append(each)
     return np.stack(out)
 
 
@@ -572,18 +558,13 @@ def _collect_chosen(plan: Plan, found: Mapping[Unit, Arrays]) -> xr.Dataset:
 
 def _collect_calibration(plan: Plan, found: Mapping[int, Arrays]) -> xr.Dataset:
     """Margins over the training sets; NaN of those that no window tests."""
-    names = [key for key in next(iter(found.values())) if key.startswith("calibration/")]
+    margins = {k: _under(arrays, "calibration/") for k, arrays in found.items()}
     variables = {}
-    for name in names:
-        first = next(iter(found.values()))[name]
+    for name, first in next(iter(margins.values())).items():
         nothing = np.full_like(first, np.nan if first.dtype.kind == "f" else 0)
-        rows = [found[k][name] if k in found else nothing for k in range(len(plan.training))]
-        dims = (
-            "training",
-            *(("term",) if first.ndim > 1 else ()),
-            *(("channel",) * (first.ndim > 0)),
-        )
-        variables[name.removeprefix("calibration/")] = (dims, np.stack(rows))
+        rows = [margins.get(k, {name: nothing})[name] for k in range(len(plan.training))]
+        dims = ((), ("channel",), ("term", "channel"))[first.ndim]
+        variables[name] = (("training", *dims), np.stack(rows))
     return xr.Dataset(
         variables,
         coords={"training": [each.name for each in plan.training], "channel": list(plan.states)},
