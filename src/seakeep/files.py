@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
 
 if TYPE_CHECKING:
+    import h5py
     import xarray as xr
 
     from seakeep.arrays import FloatArray
@@ -332,8 +333,11 @@ def read_sealed(path: Path | str) -> io.BytesIO:
     MissingFileError
         If there is no such file, or it cannot be read.
     DataError
-        If its checksum is missing or another one.
+        If its checksum is missing or another one, or values of it lie in other files.
     """
+    # Here, so that commands that read no such file start without HDF5.
+    import h5py
+
     content, stated = _content(read_bytes(path))
     if hashlib.sha256(content).hexdigest() != stated:
         why = "its checksum is another one" if stated else "it has no checksum at its end"
@@ -341,7 +345,27 @@ def read_sealed(path: Path | str) -> io.BytesIO:
             f"{path} was cut off, altered or damaged, or seakeep did not write it: {why}. Copy it "
             "again, or remove it and make it anew."
         )
-    return io.BytesIO(content)
+    sealed = io.BytesIO(content)
+    with h5py.File(sealed, "r") as file:
+        if outside := next(_outside(file), None):
+            raise DataError(
+                f"{path}: the values of {outside} lie in another file, which seakeep does not "
+                "write. Remove it and make it anew."
+            )
+    return sealed
+
+
+def _outside(group: h5py.Group) -> Iterator[str]:
+    """Names of a group and those below it whose values HDF5 would take from other files."""
+    import h5py
+
+    for name in group:
+        if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
+            yield name
+        elif isinstance(item := group[name], h5py.Group):
+            yield from _outside(item)
+        elif isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
+            yield name
 
 
 def write_sealed(

@@ -213,7 +213,7 @@ def test_the_table_of_the_acts_is_made_of_their_cells(results):
 
     table = acts_table(results)
     assert len(table.rows) == sum(len(result.models) for result in results.values())
-    assert table.columns[2:6] == (
+    assert tuple(table.columns[2:6]) == (
         "irregular: waves", "irregular: slow", "λ/L 1.5: waves", "λ/L 1.5: slow"
     )  # fmt: skip
     data = results["raw"].tests["regular_2"]

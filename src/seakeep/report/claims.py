@@ -212,7 +212,8 @@ def _trend(results: Results) -> Verdict:
     return Verdict(
         f"p = {' and '.join(map(probability, values))}; act (b): {' and '.join(kept)}",
         False if min(values) < 0.05 else None,
-        "Mann–Kendall test of ε(t), both models; p below 0.05 is a trend, and above it proves none.",
+        "Mann–Kendall test of ε(t), both models; p below 0.05 is a trend, and above it proves "
+        "none.",
     )
 
 
