@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -77,9 +78,12 @@ def opened_netcdf(path: Path, group: str | None = None) -> xr.Dataset:
     with decoding(path, what, "Copy or download it again."), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnicodeWarning)  # units in another encoding: see _text
         how: dict[str, Any] = {"engine": "scipy"}
-        if not classic:
+        source: Path | io.BytesIO = path
+        if classic:  # of a damaged file that it maps, scipy leaves the file open
+            source = io.BytesIO(path.read_bytes())
+        else:
             how = {"engine": "h5netcdf", "group": _group(path, group), "phony_dims": "sort"}
-        with xr.open_dataset(path, decode_times=False, **how) as opened:
+        with xr.open_dataset(source, decode_times=False, **how) as opened:
             return opened.load()
 
 
