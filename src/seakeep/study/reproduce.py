@@ -358,7 +358,7 @@ def study_text(act: Act, size: Size, seed: int) -> str:
         "[models.fir]",
         'kind = "fir"',
         'preset = "recommended"',
-        'lead = "2 T"  # what the recommended model reads: so the windows of all acts are the same',
+        'lead = "2 T"  # the same windows in all acts',
         'input_delays = "5 T"  # of them 3 T before the instant',
         *alignment,
         "",
