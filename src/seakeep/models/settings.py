@@ -317,13 +317,15 @@ class HankelSettings:
 
     def resolved_in(self, runs: dict[str, xr.Dataset], inputs: Sequence[str]) -> Self:
         """Settings whose lengths are samples of some runs, with the period that these have."""
-        stated = [getattr(self, name) for name in self.lengths]
-        lengths = [each for each in stated if isinstance(each, Length)]
-        if not lengths:
-            return self
         dt = labelled.common_step(runs)
-        in_periods = any(each.unit == "T" for each in lengths)
-        return self.resolved(dt, labelled.mean_period(runs, inputs) * dt if in_periods else None)
+        return self.resolved(
+            dt, labelled.mean_period(runs, inputs) * dt if self.in_periods else None
+        )
+
+    @property
+    def in_periods(self) -> bool:
+        """Whether a length, or a prior of one, counts in encounter periods."""
+        return any(getattr(getattr(self, name), "unit", "") == "T" for name in self.lengths)
 
     def _check_readouts(self) -> None:
         """Refuse read-outs that these settings leave no room for."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
@@ -439,7 +439,6 @@ class BayesianHankelDMDc(HankelSettings):
     train_on: TrainOn = "all"
     dt: float | None = None
     select: Select | None = None
-    seed_sequence: np.random.SeedSequence = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -450,7 +449,14 @@ class BayesianHankelDMDc(HankelSettings):
         check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
         check_choice("train_on", self.train_on, get_args(TrainOn))
         object.__setattr__(self, "select", Select.of(self.select))
-        object.__setattr__(self, "seed_sequence", _seed_sequence(self.seed))
+        if isinstance(seed := self.seed, np.random.Generator):
+            object.__setattr__(self, "seed", int(seed.integers(2**63)))
+        _seed_sequence(self.seed)
+
+    @property
+    def seed_sequence(self) -> np.random.SeedSequence:
+        """Root of the members' generators."""
+        return _seed_sequence(self.seed)
 
     def _read(self, name: str) -> Any:
         prior = prior_of(name, getattr(self, name)) if name in PRIORS else None
@@ -625,7 +631,7 @@ class BayesianHankelDMDc(HankelSettings):
             As :meth:`HankelDMDc.fit`.
         """
         named = as_runs(runs)
-        central = self._in(named, inputs).central(labelled.common_step(named))
+        central = self.resolved_in(named, inputs).central(labelled.common_step(named))
         return self._adopt(
             central.settled(runs, states, inputs, stop, executor=executor, progress=progress)
         )
@@ -643,7 +649,6 @@ class BayesianHankelDMDc(HankelSettings):
             observables=found.settings.observables,
             readouts=found.settings.readouts,
             select=None,
-            seed=self.seed_sequence,
         )
         return Selected(spec, found.rows, found.note, found.readouts)
 
@@ -681,38 +686,38 @@ class BayesianHankelDMDc(HankelSettings):
         """
         named = as_runs(runs)
         check_names(states, inputs)
-        if left_open(self):
+        spec = self.resolved_in(named, inputs)
+        if left_open(spec):
             found = (
-                self.settled(named, states, inputs, stop, executor=executor, progress=progress)
+                spec.settled(named, states, inputs, stop, executor=executor, progress=progress)
                 if selected is None
-                else self._adopt(selected)
+                else spec._adopt(selected)
             )
             ensemble = found.settings._drawn(named, states, inputs, stop, found.readouts)
             return replace(ensemble, selection=found.describe())
         readouts: tuple[FittedReadOut, ...] = ()
-        if self.readouts:
-            central = self._in(named, inputs).central(labelled.common_step(named))
+        if spec.readouts:
+            central = spec.central(labelled.common_step(named))
             readouts = readouts_for(central, until(named, stop), list(states), list(inputs))
-        ensemble = self._drawn(named, states, inputs, stop, readouts)
+        ensemble = spec._drawn(named, states, inputs, stop, readouts)
         return replace(ensemble, selection=STATED if self.observables else "")
 
-    def _in(self, named: dict[str, xr.Dataset], inputs: Sequence[str]) -> BayesianHankelDMDc:
-        """Settings with the encounter period of the runs where none is stated."""
-        if self.encounter_period is not None:
-            return self
-        period = labelled.mean_period(named, inputs) * labelled.common_step(named)
-        return replace(self, encounter_period=period, seed=self.seed_sequence)
+    def resolved_in(self, runs: dict[str, xr.Dataset], inputs: Sequence[str]) -> Self:
+        """Settings with the encounter period of some runs, where it counts and none is stated."""
+        dt, period = _step_of(self.dt, runs), self.encounter_period
+        if period is None and (self.in_periods or self.train_on == "auto"):
+            period = labelled.mean_period(runs, inputs) * dt
+        return replace(self, encounter_period=period).resolved(dt, period)
 
     def _taught_by(self, runs: Collection[xr.Dataset], shortest: float) -> BayesianHankelDMDc:
         """Settings that say what members learn from; `shortest` is the time of a run, s."""
         if self.train_on != "auto":
             return self
-        seed = self.seed_sequence
         assert self.encounter_period is not None
         long = len(runs) > 1 and shortest >= WINDOW.bounds[1] * self.encounter_period
         if not long or any(run.attrs.get("waves") == "regular" for run in runs):
-            return replace(self, train_on="all", seed=seed)
-        return replace(self, train_on="windows", window=self.window or WINDOW, seed=seed)
+            return replace(self, train_on="all")
+        return replace(self, train_on="windows", window=self.window or WINDOW)
 
     def _drawn(
         self,
@@ -724,10 +729,8 @@ class BayesianHankelDMDc(HankelSettings):
     ) -> HankelEnsemble:
         """The ensemble of settings that leave nothing to be chosen."""
         stops = stop_instants(stop, list(named))
-        dt = _step_of(self.dt, named)
-        spec = self._in(named, inputs)
-        spec = spec.resolved(dt, spec.encounter_period)
-        shared = spec.shared(dt)
+        dt = labelled.common_step(named)
+        shared = self.shared(dt)
         labels = labelled.common_labels(named, states), labelled.common_labels(named, inputs)
         if shared.is_mapped:
             named, stops = until(named, stops), dict.fromkeys(named)
@@ -737,7 +740,7 @@ class BayesianHankelDMDc(HankelSettings):
             last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name) + 1
             for name, run in named.items()
         ]
-        spec = spec._taught_by(named.values(), min(samples) * dt)
+        spec = self._taught_by(named.values(), min(samples) * dt)
         members = draw_members(spec, dt, samples, input_map)
         earliest = reach(members, samples, self.history == "inside", input_map)
         arrays, trained = _training_arrays(named, states, inputs, samples, earliest, input_map)
@@ -782,8 +785,6 @@ def left_open(spec: Spec) -> HankelDMDc | BayesianHankelDMDc | None:
 def _seed_sequence(seed: object) -> np.random.SeedSequence:
     if isinstance(seed, np.random.SeedSequence):
         return seed
-    if isinstance(seed, np.random.Generator):
-        return np.random.SeedSequence(int(seed.integers(2**63)))
     if isinstance(seed, str):  # of a file
         entropy, *key = (int(each) for each in seed.split("/"))
         return np.random.SeedSequence(entropy, spawn_key=key)
