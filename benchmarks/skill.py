@@ -78,7 +78,7 @@ train_on = "all"
 [models.windows]
 kind = "bayesian_hankel_dmdc"
 n_members = 12
-window = {{ uniform = [60, 120] }}
+window = {{ uniform = ["60 T", "120 T"] }}
 train_on = "windows"
 
 {baselines}

@@ -51,9 +51,14 @@ def _model(members: int = 0) -> tuple:
     run, channels = as_run(base), names(3, 1)
     if members:
         spec = seakeep.BayesianHankelDMDc(
-            32 * DT, *(seakeep.Uniform(*each) for each in ((5, 10), (0.1, 0.4), (0.2, 1))),
-            seakeep.LogUniform(0.1, 1), n_members=members, dt=DT, seed=0,
-        )  # fmt: skip
+            window=seakeep.Uniform("5 T", "10 T"),
+            state_delays=seakeep.Uniform("0.1 T", "0.4 T"),
+            input_delays=seakeep.Uniform("0.2 T", "1 T"),
+            ridge=seakeep.LogUniform(0.1, 1),
+            encounter_period=32 * DT,
+            n_members=members,
+            seed=0,
+        )
     else:
         spec = seakeep.HankelDMDc(state_delays=8, input_delays=32, ridge=1.0)
     return base, run, spec.fit(run, *channels, stop=base.stop * DT)
