@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from matrices import snapshot_matrices
 
 from seakeep.core import gram as gram_module
-from seakeep.core import identify, rollout, snapshot_matrices
+from seakeep.core import identify, rollout
 from seakeep.core.embedding import TrainingWindow
 from seakeep.core.gram import (
     Piece,
@@ -72,15 +73,13 @@ class Problem:
         return tuple(delay for group, delay in groups if group[0].shape[1])
 
     def identify(self, **options):
-        return identify(
-            self.states,
-            self.inputs,
-            self.windows,
-            state_delays=self.s,
-            input_delays=self.z,
-            direct=self.direct,
+        settings = {
+            "state_delays": self.s,
+            "input_delays": self.z,
+            "direct": self.direct,
             **options,
-        ).coefficients
+        }
+        return identify(self.states, self.inputs, self.windows, **settings).coefficients
 
 
 @st.composite
@@ -141,36 +140,19 @@ def test_the_trace_is_the_sum_of_squares(problem):
 
 
 @settings(deadline=None)
-@given(problems(), st.floats(0.5, 200.0), st.booleans())
-def test_every_form_gives_the_papers_formula(problem, ridge, all_rows):
+@given(problems(), st.floats(0.5, 200.0), st.sampled_from(["all rows", "newest", "a filter"]))
+def test_every_form_gives_the_papers_formula(problem, ridge, kind):
+    """A filter has inputs alone among its regressors."""
+    all_rows, delays = kind == "all rows", problem.s
     regressors, targets = problem.matrices(all_rows)
+    if kind == "a filter":
+        assume(problem.inputs[0].shape[1] + problem.direct[0].shape[1] > 0)
+        regressors, delays = regressors[problem.states[0].shape[1] * (problem.s + 1) :], None
     plain = regressors @ regressors.T + ridge * np.eye(len(regressors))
     expected = np.linalg.solve(plain, regressors @ targets.T).T
     for method in ("primal", "dual", "svd", None):
-        found = problem.identify(ridge=ridge, all_rows=all_rows, method=method)
-        np.testing.assert_allclose(found, expected, atol=RESULT)
-
-
-@settings(deadline=None)
-@given(problems(), st.floats(0.5, 200.0))
-def test_a_filter_of_the_inputs_has_no_states_among_its_regressors(problem, ridge):
-    assume(problem.inputs[0].shape[1] + problem.direct[0].shape[1] > 0)
-    regressors, targets = problem.matrices(all_rows=False)
-    inputs = regressors[problem.states[0].shape[1] * (problem.s + 1) :]
-    plain = inputs @ inputs.T + ridge * np.eye(len(inputs))
-    expected = np.linalg.solve(plain, inputs @ targets.T).T
-    for method in ("primal", "dual", "svd", None):
-        found = identify(
-            problem.states,
-            problem.inputs,
-            problem.windows,
-            state_delays=None,
-            input_delays=problem.z,
-            direct=problem.direct,
-            ridge=ridge,
-            all_rows=False,
-            method=method,
-        ).coefficients
+        options = {"all_rows": all_rows, "method": method, "state_delays": delays}
+        found = problem.identify(ridge=ridge, **options)
         np.testing.assert_allclose(found, expected, atol=RESULT)
 
 

@@ -4,10 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from matrices import snapshot_matrices
 
-from seakeep.core import identify, snapshot_matrices, training_window
+from seakeep.core import identify, training_window
 from seakeep.core.solve import GRAM_LIMIT, REFINED_LIMIT
 
 LONG, WIDE, SQUARE = (1, 1, 40), (9, 19, 6), (4, 9, 20)
@@ -130,64 +129,8 @@ def test_the_paper_formula_in_plain_numpy(shape):
     np.testing.assert_allclose(made.solved(ridge).coefficients, expected, rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize("shape", [LONG, WIDE, SQUARE])
-def test_without_ridge_the_solution_of_least_norm_is_taken(shape):
-    made = problem(shape)
-    y, x = made.matrices
-    expected = x @ np.linalg.pinv(y, rcond=1e-14)
-    # Least singular value about 1e-3 of the largest, coefficients up to 1e3 of order one.
-    np.testing.assert_allclose(made.solved(0.0).coefficients, expected, rtol=1e-9, atol=1e-9)
-
-
 def test_without_ridge_dependent_regressors_share_their_weight():
     states = np.repeat(3.0 ** np.arange(6.0)[:, None], 2, axis=1)
     solution = Problem(states, np.zeros((6, 0)), 0, 0, 5).solved(0.0)
     assert solution.rank == 1
     np.testing.assert_allclose(solution.coefficients, np.full((2, 2), 1.5), rtol=1e-14)  # rounding
-
-
-@pytest.mark.parametrize("shape", [LONG, WIDE, SQUARE])
-@pytest.mark.parametrize("rank", [1, 4, 6])
-def test_a_rank_equals_truncated_singular_values_in_plain_numpy(shape, rank):
-    made = problem(shape)
-    y, x = made.matrices
-    left, values, right = np.linalg.svd(y, full_matrices=False)
-    inverse = right[:rank].T @ np.diag(1 / values[:rank]) @ left[:, :rank].T
-    solution = made.solved(0.0, rank=rank)
-    assert (solution.rank, solution.method) == (rank, "svd")
-    np.testing.assert_allclose(solution.coefficients, x @ inverse, rtol=1e-9, atol=1e-9)
-
-
-def test_a_rank_beyond_the_data_is_cut_to_what_there_is():
-    made = problem(LONG)
-    solution = made.solved(0.0, rank=100)
-    assert solution.rank == 6
-    np.testing.assert_allclose(
-        solution.coefficients, made.solved(0.0).coefficients, rtol=1e-12, atol=1e-12
-    )  # the same arithmetic
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    s=st.integers(0, 3),
-    z=st.integers(0, 3),
-    columns=st.integers(2, 12),
-    ridge=st.floats(1e-3, 1e3),
-    seed=st.integers(0, 1000),
-    all_rows=st.booleans(),
-)
-def test_the_gradient_vanishes_at_the_solution(s, z, columns, ridge, seed, all_rows):
-    made = problem((s, z, columns), seed)
-    y, x = made.matrices
-    g = made.solved(ridge, all_rows=all_rows).coefficients
-    gradient = (g @ y - x[: len(g)]) @ y.T + ridge * g
-    # The terms are sums of up to two dozen products of order ten.
-    np.testing.assert_allclose(gradient, 0, atol=1e-10)
-
-
-@settings(max_examples=20, deadline=None)
-@given(small=st.floats(1e-3, 10), factor=st.floats(1.1, 100), seed=st.integers(0, 100))
-def test_more_ridge_shrinks_the_coefficients(small, factor, seed):
-    made = problem((1, 3, 15), seed)
-    norms = [np.linalg.norm(made.solved(r).coefficients) for r in (small, small * factor)]
-    assert norms[1] < norms[0]

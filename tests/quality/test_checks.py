@@ -9,7 +9,7 @@ import xarray as xr
 
 from seakeep.errors import SeakeepWarning
 from seakeep.quality import Finding, Record, Redundant, as_json, findings_of, warn_of
-from seakeep.quality.agreement import LARGEST_NRMSE, LATE, RUN_AWAY, compare_sensors
+from seakeep.quality.agreement import LATE, RUN_AWAY, compare_sensors
 from seakeep.quality.faults import reading_step
 from seakeep.quality.samples import SamplesKind
 from seakeep.quality.sensors import redundant
@@ -47,6 +47,7 @@ class TestRedundantSensors:
         assert found.kind.name == "LAG"
         assert found.value == pytest.approx(0.3, abs=0.004)  # a tenth of a sample
         assert (found.unit, found.channel, found.run) == ("s", "two", "r")
+        assert against(waves(-0.3))[0].value == pytest.approx(-0.3, abs=0.004)
         assert found.text.startswith("against one: lag +0.30 s (± 0.0")
 
     def test_a_phase_that_drifts_about_zero(self):
@@ -85,14 +86,6 @@ class TestRedundantSensors:
         grown = np.sin(2 * np.pi * (T / PERIOD - part * RUN_AWAY * (T / T[-1] - 0.5)))
         assert bool(kinds(grown, t)) is told
 
-    def test_the_limits_on_lags_alone_make_the_largest_nrmse(self):
-        still = np.sin(2 * np.pi * T / PERIOD)
-        late = np.sin(2 * np.pi * (T / PERIOD - LATE))
-        assert np.std(late - still) / still.std() == pytest.approx(LARGEST_NRMSE, rel=0.01)
-        grown = np.sin(2 * np.pi * (T / PERIOD - RUN_AWAY * (T / T[-1] - 0.5)))
-        # The limit is stated to two digits.
-        assert np.std(grown - still) / still.std() == pytest.approx(LARGEST_NRMSE, rel=0.03)
-
     @pytest.mark.parametrize(("spanned", "told"), [(2, True), (4, True), (7, False), (20, False)])
     def test_motion_below_the_resolution(self, spanned, told):
         step = 2 * np.sqrt(2) * waves().std() / spanned
@@ -102,13 +95,6 @@ class TestRedundantSensors:
 
 
 class TestLags:
-    def test_lag_is_positive_where_the_sensor_is_late(self):
-        late, early = waves(0.5), waves(-0.5)
-        found = compare_sensors(late, waves(), DT)
-        # A parabola through samples 0.04 s apart: within a tenth of them.
-        assert found.lag == pytest.approx(0.5, abs=0.004)
-        assert compare_sensors(early, waves(), DT).lag == pytest.approx(-0.5, abs=0.004)
-
     def test_lag_that_runs_away_beyond_half_a_period(self):
         stretched = np.interp(T * (1 - 1.2 / T[-1]), T, waves())
         found = compare_sensors(stretched, waves(), DT)

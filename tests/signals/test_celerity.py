@@ -60,12 +60,7 @@ def test_phase_celerity_is_that_of_linear_dispersion(frequency):
     assert np.interp(frequency, found.frequency, found.coherence) > 0.9
     within = np.interp(frequency, found.frequency, found.spread)
     assert 0.0 < within < 0.03 * expected
-
-
-def test_where_there_are_no_waves_the_coherence_says_so():
-    (upstream, downstream), *_ = probes(noise=0.001)
-    found = phase_celerity(upstream, downstream, DT, APART, DEPTH)
-    # Six half-overlapping segments: the coherence of nothing has a mean of about a fifth.
+    # Six half-overlapping segments: the coherence of no waves has a mean of about a fifth.
     assert np.median(found.coherence[found.frequency > 3]) < 0.4
 
 
@@ -87,34 +82,9 @@ def test_a_peak_between_samples(lag, period):
     ("call", "kind", "message"),
     [
         (
-            lambda a, b: effective_celerity(a, b[:-1], DT, APART, DEPTH),
-            RequestError,
-            r"two records of the same length are needed, .* received \(4096,\) and \(4095,\)",
-        ),
-        (
-            lambda a, b: effective_celerity(a, np.zeros(b.size), DT, APART, DEPTH),
-            DataError,
-            r"the second record is constant \(0\), so it correlates with nothing. Look for a dead",
-        ),
-        (
             lambda a, b: effective_celerity(a, a, DT, 0.1, DEPTH),
             DataError,
             r"not later than the upstream one \(lag -?0\.0000 s, correlation 1\.000\).* same",
-        ),
-        (
-            lambda a, b: effective_celerity(a, 0.9 * a + 0.1 * np.roll(a, -1), DT, 0.1, DEPTH),
-            DataError,
-            r"not later than the upstream one \(lag -0\.00\d+ s",
-        ),
-        (
-            lambda a, b: phase_celerity(a, b, DT, -1.0, DEPTH),
-            RequestError,
-            r"the separation must be positive \(m\); received -1.0",
-        ),
-        (
-            lambda a, b: phase_celerity(a, b, DT, APART, DEPTH, segment=5000),
-            RequestError,
-            "Welch's method needs segments of 2 to 4096 samples .* received segments of 5000",
         ),
         (
             lambda a, b: correlation_peak(a, b, DT, (0.0, 200.0)),

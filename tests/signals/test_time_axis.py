@@ -98,8 +98,7 @@ def direct_sums(series, position, edges, attenuation):
     return np.array(out)
 
 
-@pytest.mark.parametrize("new_dt", [0.37, 1.0, 1.0007, 3.3, 25.6])
-@pytest.mark.parametrize("attenuation", [60.0, 100.0])
+@pytest.mark.parametrize(("new_dt", "attenuation"), [(0.37, 60.0), (1.0007, 100.0), (25.6, 60.0)])
 def test_tabulated_kernels_are_the_kernels(new_dt, attenuation):
     """On noise, which fills the band: the table's cubic is off by 1.5e-10 of a sample's size."""
     series = np.random.default_rng(0).standard_normal(12000)
@@ -113,15 +112,9 @@ def test_tabulated_kernels_are_the_kernels(new_dt, attenuation):
 RATE, PERIOD = 500.0, 1.64  # of the paper
 
 
-@pytest.mark.parametrize("part", [0.05, 0.4, 0.79, 0.8])
-def test_gain_below_four_fifths_of_the_new_nyquist_frequency(part):
-    """The recommended chain, 500 Hz to 32 samples per period of 1.64 s, tone by tone."""
-    gain, _ = gains(part * 0.5 * 32 / PERIOD)
-    assert gain == pytest.approx(1.0, abs=1.2e-3)  # 60 dB, Kaiser's formula met within 1 dB
-
-
-@pytest.mark.parametrize("part", [1.0, 1.02, 1.4, 2.0, 9.0, 15.0])
+@pytest.mark.parametrize("part", [1.0, 1.4, 9.0])
 def test_gain_above_the_new_nyquist_frequency(part):
+    """The recommended chain, 500 Hz to 32 samples per period of 1.64 s, tone by tone."""
     gain, folded = gains(part * 0.5 * 32 / PERIOD)
     assert gain < 1.2e-3  # 60 dB, within 1 dB
     # As the paper takes samples: what its filter lets pass above the Nyquist frequency is folded.
@@ -141,15 +134,6 @@ def gains(frequency):
     return out
 
 
-def test_more_attenuation_is_more_attenuation():
-    time, new_time = np.arange(6000.0), np.arange(0, 5990, 5.0)
-    above = np.sin(2 * np.pi * np.linspace(0.101, 0.13, 30) * time[:, None])
-    worst = [np.max(np.abs(resample(above, time, new_time, a)[200:-200])) for a in (60.0, 90.0)]
-    # 1e-3 and 3e-5, within about 1 dB.
-    assert worst[0] < 1.2e-3
-    assert worst[1] < 4e-5
-
-
 def test_same_instants_hand_the_samples_on():
     time = 2.0 + np.arange(50) * 0.04
     series = np.random.default_rng(0).standard_normal((50, 2))
@@ -162,26 +146,10 @@ def test_constants_are_kept_exactly_to_the_ends():
     np.testing.assert_allclose(out, 7.0, rtol=1e-14)  # rounding of a sum
 
 
-@pytest.mark.parametrize(
-    ("call", "error", "message"),
-    [
-        (
-            lambda t: resample(t, t, t + 1.0),
-            DataError,
-            r"new instants from 1 to 10\.9 s lie outside the series, which runs from 0 to 9\.9 s",
-        ),
-        (
-            lambda t: resample(t[:50], t, t),
-            DataError,
-            "the series has 50 samples and the time axis 100; they must agree",
-        ),
-        (
-            lambda t: resample(np.where(t > 5, np.nan, t), t, t),
-            DataError,
-            "NaN or infinite, of 100, the first at sample 51",
-        ),
-    ],
-)
-def test_what_cannot_be_resampled(call, error, message):
-    with pytest.raises(error, match=message):
-        call(np.arange(100) * 0.1)
+def test_what_cannot_be_resampled():
+    t = np.arange(100) * 0.1
+    with pytest.raises(DataError, match=r"new instants from 1 to 10\.9 s lie outside the series, "
+                       r"which runs from 0 to 9\.9 s"):  # fmt: skip
+        resample(t, t, t + 1.0)
+    with pytest.raises(DataError, match="the series has 50 samples and the time axis 100"):
+        resample(t[:50], t, t)

@@ -14,8 +14,6 @@ from scipy import signal
 
 from seakeep.arrays import FloatArray
 
-__all__ = ["Decay", "free_decay"]
-
 SMALLEST = 0.02
 """Part of the largest half range below which an extreme counts as noise."""
 

@@ -16,18 +16,6 @@ import numpy.typing as npt
 from seakeep.arrays import BoolArray, FloatArray, as_real
 from seakeep.errors import RequestError
 
-__all__ = [
-    "anrmse",
-    "error_over_time",
-    "fit_percent",
-    "is_slack",
-    "nammae",
-    "normalised_extremes_error",
-    "nrmse",
-    "slack_share",
-]
-
-
 SLACK_PART = 0.01
 """A channel whose measured SD is below this part of its training SD is not judged."""
 NOISE_FACTOR = 2**0.5
@@ -38,7 +26,7 @@ is noise there, which no model forecasts."""
 def paired(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,
-    training_std: npt.ArrayLike | None,
+    training_std: npt.ArrayLike | None = None,
     noise_std: npt.ArrayLike | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Check two histories and return them with the measured SD and which channels are judged.

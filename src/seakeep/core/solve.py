@@ -40,7 +40,7 @@ import numpy as np
 from scipy import linalg
 from scipy.linalg import blas, lapack
 
-from seakeep.arrays import FloatArray, as_real, number, whole_number
+from seakeep.arrays import FloatArray, as_real
 from seakeep.core.embedding import TrainingWindow, embed
 from seakeep.core.gram import (
     Piece,
@@ -53,8 +53,6 @@ from seakeep.core.gram import (
 )
 from seakeep.core.stability import clip_modes
 from seakeep.errors import DataError, RequestError
-
-__all__ = ["Method", "Solution", "identify", "solve"]
 
 Method = Literal["primal", "dual", "svd"]
 
@@ -153,21 +151,14 @@ def identify(
     DataError
         If a sample that trains is not finite.
     """
+    if not 0 <= ridge < np.inf:
+        raise RequestError(f"ridge must be zero or positive, and finite; received {ridge!r}.")
     targets = _checked(states, windows, state_delays or 0, "states")
     groups = [] if state_delays is None else [(targets, state_delays)]
     groups.append((_checked(inputs, windows, input_delays, "inputs"), input_delays))
     if direct is not None:
         groups.append((_checked(direct, windows, 0, "direct"), 0))
-    if not number(ridge, "ridge") >= 0 or ridge == np.inf:
-        raise RequestError(f"ridge must be zero or positive, and finite; received {ridge!r}.")
-    if radius is not None and not 0 < radius < np.inf:
-        raise RequestError(f"radius must be positive and finite; received {radius!r}.")
     groups = [(runs, delays) for runs, delays in groups if runs[0].shape[1]]
-    if not groups or (state_delays is None and all_rows):
-        raise RequestError(
-            "without states among the regressors there must be inputs, and all_rows=False. Give "
-            "state_delays, or inputs."
-        )
     pieces = [
         Piece(
             targets[run],
@@ -198,20 +189,9 @@ def _checked(
     series: Sequence[FloatArray], windows: Sequence[TrainingWindow], delays: int, name: str
 ) -> list[FloatArray]:
     """Series of the runs as (time, channel), finite in the samples that train."""
-    whole_number(delays, f"delays of {name}", least=0)
     arrays = [as_real(each, name) for each in series]
-    if not arrays or len(arrays) != len(windows):
-        raise RequestError(
-            f"{name} has {len(arrays)} run(s) and there are {len(windows)} windows; one array "
-            "(time, channel) per run and window is needed."
-        )
     for array, window in zip(arrays, windows, strict=True):
         begin, end = window.first_column - delays, window.last + 1
-        if array.ndim != 2 or array.shape[1] != arrays[0].shape[-1] or window.columns < 1:
-            raise RequestError(
-                f"{name} has a run of shape {array.shape} and {window.columns} snapshot pairs; "
-                "(time, channel), the same channels in each run, and at least one pair are needed."
-            )
         if not 0 <= begin < end <= len(array):
             raise RequestError(
                 f"samples {begin} to {end - 1} of {name} train, and it has {len(array)}. Shorten "
@@ -267,38 +247,35 @@ class _Delayed:
         trace = gram_trace(self.pieces, self.delays)
         if not self.all_rows and self.rows <= self.columns and ridge >= REFINED_LIMIT * trace:
             return "primal"
-        return self.form() if ridge > 0 and _gram_suffices(ridge, self.gram()) else "svd"
+        return self.form() if ridge > 0 and self.gram_suffices(ridge) else "svd"
 
     def is_squared_away(self, ridge: float) -> bool:
         """Whether λ may be too small for a Gram matrix, by its trace."""
         return ridge < GRAM_LIMIT * gram_trace(self.pieces, self.delays)
 
-    def gram(self) -> FloatArray:
-        """The smaller Gram matrix, its upper triangle."""
+    def gram_suffices(self, ridge: float) -> bool:
+        """Whether λ ≥ 1e-6 σ²_max, from the upper triangle of the smaller Gram matrix."""
         if self.rows <= self.columns:
-            return primal_system(self.pieces, self.delays).gram
-        return snapshot_gram(self.pieces, self.delays)
+            upper = np.triu(primal_system(self.pieces, self.delays).gram)
+        else:
+            upper = np.triu(snapshot_gram(self.pieces, self.delays))
+        # A bound of the largest squared singular value from above, then the value itself.
+        if ridge >= GRAM_LIMIT * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
+            return True
+        top = [len(upper) - 1] * 2
+        largest = linalg.eigvalsh(upper, lower=False, subset_by_index=top, check_finite=False)
+        return bool(ridge >= GRAM_LIMIT * largest[0])
 
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Hankel matrices of regressors and targets, built."""
-        regressors = np.concatenate(
-            [
-                np.concatenate(
-                    [
-                        embed(series, delay, piece.first, piece.count)
-                        for series, delay in zip(piece.series, self.delays, strict=True)
-                    ]
-                )
-                for piece in self.pieces
-            ],
-            axis=1,
-        )
         target_delays = self.delays[0] if self.all_rows else 0
-        targets = [
-            embed(piece.states, target_delays, piece.first + 1, piece.count)
-            for piece in self.pieces
-        ]
-        return regressors, np.concatenate(targets, axis=1)
+        regressors, targets = [], []
+        for piece in self.pieces:
+            groups = zip(piece.series, self.delays, strict=True)
+            extended = [embed(x, delay, piece.first, piece.count) for x, delay in groups]
+            regressors.append(np.concatenate(extended))
+            targets.append(embed(piece.states, target_delays, piece.first + 1, piece.count))
+        return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
 
     def primal(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
@@ -349,17 +326,6 @@ class _Delayed:
         np.matmul(newest.T, regressors, out=out[:N])
         np.matmul(regressors[:, : self.states - N].T, regressors, out=out[N:])
         return out
-
-
-def _gram_suffices(ridge: float, gram: FloatArray) -> bool:
-    """Whether λ ≥ 1e-6 σ²_max, from the upper triangle of the Gram matrix."""
-    # A bound of the largest squared singular value from above, then the value itself.
-    upper = np.triu(gram)
-    if ridge >= GRAM_LIMIT * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
-        return True
-    top = len(gram) - 1
-    largest = linalg.eigvalsh(upper, lower=False, subset_by_index=[top, top], check_finite=False)
-    return bool(ridge >= GRAM_LIMIT * largest[0])
 
 
 def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
@@ -450,7 +416,9 @@ def _all_rows(system: PrimalSystem, factor: FloatArray, ridge: float) -> FloatAr
     states = system.groups[0]
     N, extended, size = states.channels, states.stop, system.groups[-1].stop
     edges, width = len(system.edges), len(system.heads)
-    tau = -1.0 if _is_smooth(system) else 1.0
+    # Whether neighbouring samples are alike: the sign of their products, summed.
+    alike = [system.heads[g.head, g.older][:, : g.channels].trace() for g in system.groups]
+    tau = -1.0 if sum(alike) >= 0 else 1.0
     rank = edges + 2 * width
     rows = np.empty((rank + N, size))
     rows[:edges] = system.edges
@@ -483,15 +451,6 @@ def _all_rows(system: PrimalSystem, factor: FloatArray, ridge: float) -> FloatAr
     shifted = extended - N
     out[N:].reshape(-1)[: shifted * size : size + 1] += 1.0
     return out[:extended]
-
-
-def _is_smooth(system: PrimalSystem) -> bool:
-    """Whether neighbouring samples are alike: the sign of their products, summed."""
-    total = 0.0
-    for group in system.groups:
-        next_lag = system.heads[group.head, group.older][:, : group.channels]
-        total += float(np.trace(next_lag))
-    return total >= 0
 
 
 def _sum_over_lags(rows: FloatArray, channels: int, tau: float) -> None:

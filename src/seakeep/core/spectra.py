@@ -15,8 +15,6 @@ from scipy import signal, stats
 from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import DataError
 
-__all__ = ["Spectra", "cross_spectra"]
-
 OVERLAP_CORRELATION = 1 / 36
 """Squared correlation of the spectra of two Hann segments that share a half (Welch, 1967)."""
 

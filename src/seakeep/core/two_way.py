@@ -19,8 +19,6 @@ from seakeep.arrays import FloatArray, IntArray, as_real, fraction, whole_number
 from seakeep.core.bootstrap import student_interval
 from seakeep.errors import RequestError
 
-__all__ = ["overlap_block", "two_way_interval"]
-
 FEWEST = 3.0
 """Blocks of an axis below which their spread is not known."""
 AT_ONCE = 4_000_000
@@ -84,8 +82,7 @@ def two_way_interval(
         )
     count, part = whole_number(n_series, "n_series"), fraction(level, "level")
     rows, columns = (
-        _positions(size, whole_number(block, "a block"), count, rng)
-        for size, block in zip(shape, blocks, strict=True)
+        _positions(size, block, count, rng) for size, block in zip(shape, blocks, strict=True)
     )
     step = max(1, AT_ONCE // max(each.size for each in tables))
     found = []

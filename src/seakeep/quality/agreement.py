@@ -11,11 +11,6 @@ from seakeep.arrays import BoolArray, FloatArray, as_series
 from seakeep.signals.lags import Lags, windowed_lags
 from seakeep.signals.waves import dominant_period
 
-__all__ = [
-    "Agreement",
-    "compare_sensors",
-]
-
 LEAST_CORRELATION = 0.8
 """At a lower correlation no lag and no scale is given: 36 % of the variance would be the sensor's
 own."""

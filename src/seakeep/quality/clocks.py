@@ -16,8 +16,6 @@ from seakeep.signals.filters import PASSBAND
 from seakeep.signals.synchronisation import ASSUMED
 from seakeep.signals.waves import energy_above
 
-__all__ = ["ClocksKind", "clocks", "others", "periods", "rates", "records", "steps"]
-
 RATE_TOLERANCE = 0.01
 """Part by which a stated rate may differ from the times: rates are written with two digits or more,
 and quartzes keep theirs a thousand times better."""

@@ -16,8 +16,6 @@ from seakeep.signals.filters import odd_extension
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import dominant_period
 
-__all__ = ["find_held", "find_outliers", "noise_share", "reading_step", "saturated"]
-
 MISSING, BRIDGED, OUTLIER, SATURATED, STUCK, REPLACED = 1, 2, 4, 8, 16, 32
 
 FLAGS = {"missing": MISSING, "bridged": BRIDGED, "outlier": OUTLIER, "saturated": SATURATED,

@@ -14,8 +14,6 @@ import xarray as xr
 from seakeep.conventions import displayed
 from seakeep.errors import warn
 
-__all__ = ["Finding", "Kind", "as_json", "findings_of", "warn_of"]
-
 
 class Kind(Enum):
     """Base of the kinds of findings; a member holds its sentence and its remedy.

@@ -13,8 +13,6 @@ from seakeep.quality.faults import OUTLIER, STUCK
 from seakeep.signals import Clock
 from seakeep.signals.time_axis import over_gaps
 
-__all__ = ["Rate", "Record", "Redundant", "filled", "step_of"]
-
 
 @dataclass(frozen=True)
 class Redundant:

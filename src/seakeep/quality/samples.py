@@ -23,8 +23,6 @@ from seakeep.quality.record import Record, channels_of, sound, step_of
 from seakeep.signals.time_axis import stretches
 from seakeep.signals.waves import dominant_period
 
-__all__ = ["SamplesKind", "constant", "flagged", "impossible", "levels", "noise", "units"]
-
 NO_SLOW_MOTION = ("heave", "roll", "pitch")
 """Besides wave elevations, channels whose level has no reason to change within a run."""
 

@@ -7,11 +7,8 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import FloatArray, as_series, time_step
+from seakeep.arrays import FloatArray, as_pair, as_series, time_step
 from seakeep.errors import RequestError
-
-__all__ = ["band_pass", "complementary_filter", "differentiate", "envelope_squared", "integrate"]
-
 
 SHORTEST_RECORD = 0.05
 """Part of the slowest period kept that a record must last."""
@@ -25,15 +22,7 @@ def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
     low, high = band
     rise = np.clip((frequency - 0.75 * low) / (0.5 * low), 0.0, 1.0)
     fall = np.clip((1.1 * high - frequency) / (0.2 * high), 0.0, 1.0)
-    gain: FloatArray = np.sin(0.5 * np.pi * rise) ** 2 * np.sin(0.5 * np.pi * fall) ** 2
-    return gain
-
-
-def _filtered(extended: FloatArray, transfer: FloatArray, padding: int) -> FloatArray:
-    shape = (-1,) + (1,) * (extended.ndim - 1)
-    spectrum = fft.rfft(extended, axis=0) * transfer.reshape(shape)
-    out: FloatArray = fft.irfft(spectrum, n=extended.shape[0], axis=0)
-    return out[padding : extended.shape[0] - padding]
+    return np.asarray((np.sin(0.5 * np.pi * rise) * np.sin(0.5 * np.pi * fall)) ** 2)
 
 
 def reflections(series: FloatArray, order: int) -> FloatArray:
@@ -120,7 +109,7 @@ def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
     return result
 
 
-def _checked_band(band: tuple[float, float], dt: float, samples: int) -> tuple[float, float]:
+def _check_band(band: tuple[float, float], dt: float, samples: int) -> None:
     low, high = band
     nyquist = 0.5 / time_step(dt)
     if not 0 < low < high <= nyquist:
@@ -130,7 +119,6 @@ def _checked_band(band: tuple[float, float], dt: float, samples: int) -> tuple[f
             "the slowest wave and above the drift."
         )
     _check_slowest(low, dt, samples, "the lower edge of the band")
-    return low, high
 
 
 def _check_slowest(frequency: float, dt: float, samples: int, name: str) -> None:
@@ -155,15 +143,18 @@ def _integrated(
     series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int
 ) -> FloatArray:
     array = as_series(series, minimum=4, channels=True)
-    low, _ = edges = _checked_band(band, dt, array.shape[0])
+    _check_band(band, dt, array.shape[0])
     # Averaged column by column, so that a channel has the same bits alone and beside others.
     columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
     array = (columns - columns.mean(axis=1, keepdims=True)).T.reshape(array.shape)
-    extended, padding = _extended(array, low * dt)
+    extended, padding = _extended(array, band[0] * dt)
     frequency = fft.rfftfreq(extended.shape[0], dt)
-    gain = band_gain(frequency, edges)
+    gain = band_gain(frequency, band)
     omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
-    return _filtered(extended, gain / (1j * omega) ** times, padding)
+    transfer = (gain / (1j * omega) ** times).reshape((-1,) + (1,) * (array.ndim - 1))
+    spectrum = fft.rfft(extended, axis=0) * transfer
+    out: FloatArray = fft.irfft(spectrum, n=extended.shape[0], axis=0)
+    return out[padding:-padding]
 
 
 def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> FloatArray:
@@ -320,10 +311,8 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     array = array - array.mean(axis=0)
     padding = array.shape[0] - 1
     extended = np.pad(array, [(padding, padding)] + [(0, 0)] * (array.ndim - 1), mode="reflect")
-    frequency = fft.rfftfreq(extended.shape[0])
-    quadrature = _filtered(extended, np.where(frequency > 0, -1j, 0.0), padding)
-    squared: FloatArray = array**2 + quadrature**2
-    return squared
+    analytic = scipy.signal.hilbert(extended, axis=0)[padding:-padding]
+    return np.asarray(np.abs(analytic) ** 2)
 
 
 def complementary_filter(
@@ -386,12 +375,7 @@ def complementary_filter(
         raise RequestError(
             f"complementary_filter gives a rate or a position: times is 1 or 2; received {times!r}."
         )
-    x, a = as_series(position, minimum=8), as_series(acceleration, minimum=8)
-    if x.shape != a.shape:
-        raise RequestError(
-            f"position and acceleration must be one channel each, of one length; received shapes "
-            f"{x.shape} and {a.shape}."
-        )
+    x, a = as_pair(position, acceleration, minimum=8)
     nyquist = 0.5 / time_step(dt)
     if not 0 < crossover < 0.8 * nyquist:
         raise RequestError(
@@ -399,7 +383,9 @@ def complementary_filter(
             f"frequency); received {crossover:g} Hz. Set it below the slowest wave."
         )
     _check_slowest(crossover, dt, x.size, "the crossover")
-    mean, trend = _line(x)
+    at = np.arange(x.size) - 0.5 * (x.size - 1)
+    slope = float(at @ x / (at @ at))
+    trend = x.mean() + slope * at
     both = np.column_stack([x - trend, a - a.mean()])
     long, padding = _extended(both, crossover * dt)
     frequency = fft.rfftfreq(long.shape[0], dt)
@@ -410,12 +396,5 @@ def complementary_filter(
     slow = spectrum[:, 0] * (omega if times == 1 else 1.0)
     fast = np.where(weight < 1, spectrum[:, 1] / safe**times, 0.0)
     joined = fft.irfft(weight * slow + (1 - weight) * fast, n=long.shape[0])
-    out: FloatArray = joined[padding : padding + x.size]
-    return out + (mean / dt if times == 1 else trend)
-
-
-def _line(x: FloatArray) -> tuple[float, FloatArray]:
-    """Slope per sample and values of the straight line through a series."""
-    at = np.arange(x.size) - 0.5 * (x.size - 1)
-    slope = float(at @ x / (at @ at))
-    return slope, x.mean() + slope * at
+    out: FloatArray = joined[padding:-padding]
+    return out + (slope / dt if times == 1 else trend)

@@ -18,8 +18,6 @@ from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import as_seconds, span_text, uniform_step
 from seakeep.sizes import MOST_TAPS, check_size
 
-__all__ = ["low_pass", "lowpass_taps", "resample"]
-
 
 def lowpass_taps(
     sampling_rate: float, passband: float, stopband: float, attenuation: float = 60.0
@@ -65,10 +63,13 @@ def lowpass_taps(
             f"{sampling_rate / 2:g} Hz. Lower the edges, or filter before resampling."
         )
     edges = (passband / sampling_rate, stopband / sampling_rate)
-    _check_length(
+    check_size(
+        f"a transition from {passband:.10g} to {stopband:.10g} Hz at {sampling_rate:g} Hz with "
+        "this attenuation needs about",
         attenuation / (14.36 * (edges[1] - edges[0])),
-        f"a transition from {passband:.10g} to {stopband:.10g} Hz at {sampling_rate:g} Hz",
-        "Move stopband away from passband, or lower the sampling rate first",
+        MOST_TAPS,
+        "taps",
+        "Move stopband away from passband, or lower the sampling rate first.",
     )
     for extra in range(7):  # Kaiser's formula is a fit, some 3 dB short for short filters
         count, beta = scipy.signal.kaiserord(attenuation + extra, 2 * (edges[1] - edges[0]))
@@ -79,11 +80,6 @@ def lowpass_taps(
         if _deviation(taps, edges) <= 10 ** (-attenuation / 20):
             break
     return taps
-
-
-def _check_length(taps: float, what: str, remedy: str) -> None:
-    asked = f"{what} with this attenuation needs about"
-    check_size(asked, taps, MOST_TAPS, "taps", f"{remedy}.")
 
 
 def _deviation(taps: FloatArray, edges: tuple[float, float]) -> float:
@@ -101,11 +97,10 @@ def odd_extension(array: FloatArray, count: int) -> FloatArray:
 
     Series shorter than `count` are continued by their end values beyond the reflection.
     """
-    reflected = min(count, array.shape[0] - 1)
-    head = 2 * array[:1] - array[reflected:0:-1]
-    tail = 2 * array[-1:] - array[-2 : -reflected - 2 : -1]
-    rest = [(count - reflected, count - reflected)] + [(0, 0)] * (array.ndim - 1)
-    return np.pad(np.concatenate([head, array, tail]), rest, mode="edge")
+    reflected, beside = min(count, array.shape[0] - 1), [(0, 0)] * (array.ndim - 1)
+    near = [(reflected, reflected), *beside]
+    far = [(count - reflected, count - reflected), *beside]
+    return np.pad(np.pad(array, near, mode="reflect", reflect_type="odd"), far, mode="edge")
 
 
 def low_pass(
@@ -263,10 +258,12 @@ def _sinc_sums(
     attenuation = max(positive(attenuation, "the attenuation", "dB"), 50.0)
     width = edges[1] - edges[0]
     length = (attenuation - 7.95) / (4.57 * np.pi * width) + 1  # half of it, by Kaiser's formula
-    _check_length(
+    check_size(
+        "resampling by this factor and passband with this attenuation needs about",
         2 * length,
-        "resampling by this factor and passband",
-        "Resample in two steps, or lower passband",
+        MOST_TAPS,
+        "taps",
+        "Resample in two steps, or lower passband.",
     )
     half = int(np.ceil(length))
     bank = _kernels(half, 0.1102 * (attenuation - 8.7), sum(edges))
@@ -283,13 +280,10 @@ def _sinc_sums(
     rows_at_once = max(1, AT_ONCE // (2 * half))
     for first in range(0, position.size, rows_at_once):
         rows = slice(first, first + rows_at_once)
-        weights = cubic[0, rows, None] * bank[phase[rows]]
-        for each in (1, 2, 3):
-            weights += cubic[each, rows, None] * bank[phase[rows] + each]
+        weights = sum(each[rows, None] * bank[phase[rows] + k] for k, each in enumerate(cubic))
         for column, view in enumerate(views):
             out[rows, column] = np.einsum("ij,ij->i", weights, view[base[rows] + 1])
-    result: FloatArray = out.reshape((position.size, *array.shape[1:]))
-    return result
+    return out.reshape((position.size, *array.shape[1:]))
 
 
 def _kernels(half: int, beta: float, band: float) -> FloatArray:

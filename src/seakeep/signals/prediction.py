@@ -14,8 +14,6 @@ from seakeep.signals.calculus import continued, predicted, reflections, whitenin
 from seakeep.signals.propagation import LEAST_CORRELATION, band_limit, carry_by_dispersion
 from seakeep.waves import group_speed
 
-__all__ = ["draw_sea", "draw_waves", "predict_waves", "predictable_time"]
-
 MEMORY = 4.0
 """Wave periods that a linear prediction looks back. On the virtual tank the error over 0.75
 encounter periods is 0.53 SD with one half of a period, 0.43 with one, 0.38 with two, 0.32 with

@@ -30,8 +30,6 @@ from seakeep.signals.filters import low_pass
 from seakeep.signals.panel import CORNERS, FIELDS, Image, TrackingSettings, find_panel, opencv
 from seakeep.signals.time_axis import stretches
 
-__all__ = ["FLAGS", "LABELS", "Track", "TrackingSettings", "contact_sheet", "track_video"]
-
 Seen = Mapping[str, FloatArray]
 
 FLAGS = {
@@ -280,7 +278,7 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
     width, height = video.size
     if how.region is not None:
         left, top, wide, high = how.region
-        if left + wide > width or top + high > height:
+        if min(left, top) < 0 or not (0 < wide <= width - left and 0 < high <= height - top):
             raise RequestError(
                 f"the region {how.region} (left, top, width, height) leaves the picture of "
                 f"{video.path}, {width} × {height} pixels. Make it smaller."
@@ -420,24 +418,18 @@ def _judge(
     flag[~np.isfinite(seen["area"])] = FLAGS["dropped"]
     # From the middle of the neighbours to either end; twice that where some of them are flagged.
     reach = how.max_speed * step * NEIGHBOURS / usual["scale"] + tolerance
-    flag[_jumps(seen, flag == FLAGS["good"], reach)] = FLAGS["jump"]
+    at = np.flatnonzero(flag == FLAGS["good"])
+    if at.size >= NEIGHBOURS:
+        x, y = seen["x"][at], seen["y"][at]
+        across, down = (
+            place - scipy.ndimage.median_filter(place, NEIGHBOURS, mode="nearest")
+            for place in (x, y)
+        )
+        flag[at[np.hypot(across, down) > reach]] = FLAGS["jump"]
     quality = np.clip(1.0 - 0.5 * shape, 0.0, 1.0)
     flagged = flag != FLAGS["good"]
     quality[flagged] = np.minimum(quality[flagged], FLAGGED_QUALITY)
     return flag, quality
-
-
-def _jumps(seen: Seen, good: BoolArray, reach: float) -> IntArray:
-    """Good frames whose place is further from the median of their neighbours than can be."""
-    at = np.flatnonzero(good)
-    if at.size < NEIGHBOURS:
-        return at[:0]
-    away = np.zeros(at.size)
-    for axis in ("x", "y"):
-        place = seen[axis][at]
-        middle = scipy.ndimage.median_filter(place, NEIGHBOURS, mode="nearest")
-        away = np.hypot(away, place - middle)
-    return at[away > reach]
 
 
 def _motions(
