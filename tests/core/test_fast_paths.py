@@ -264,15 +264,3 @@ def test_free_runs_of_the_papers_size_are_the_loop(kind, windows):
         for history, series in zip(histories, inputs, strict=True)
     ]
     np.testing.assert_allclose(rollout(a, b, histories, inputs), expected, atol=RESULT)
-
-
-def test_a_gap_in_the_inputs_does_not_reach_back_beyond_its_block_of_steps():
-    rng = np.random.default_rng(0)
-    a, b = rng.normal(size=(360, 360)) / 30, rng.normal(size=(360, 2 * 161)) / 10
-    histories, inputs = rng.normal(size=(12, 90, 4)), rng.normal(size=(12, 160 + 400, 2))
-    whole = rollout(a, b, histories, inputs)
-    inputs[3, 160 + 200] = np.nan
-    found = rollout(a, b, histories, inputs)
-    # Step 201 is the first to read the instant 200 after the start; no block is longer than 64.
-    np.testing.assert_allclose(found[3, :128], whole[3, :128], atol=RESULT)
-    assert np.isnan(found[3, 200:]).all()

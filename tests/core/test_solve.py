@@ -120,15 +120,6 @@ def test_corrections_give_newest_rows_the_accuracy_of_singular_values(part):
     assert made.solved(0.99 * REFINED_LIMIT * trace, all_rows=False).method == "svd"
 
 
-@pytest.mark.parametrize("shape", [LONG, WIDE, SQUARE])
-def test_the_paper_formula_in_plain_numpy(shape):
-    made, ridge = problem(shape), 0.3
-    y, x = made.matrices
-    expected = x @ y.T @ np.linalg.inv(y @ y.T + ridge * np.eye(len(y)))
-    # Condition number about 1e3 here.
-    np.testing.assert_allclose(made.solved(ridge).coefficients, expected, rtol=0, atol=1e-11)
-
-
 def test_without_ridge_dependent_regressors_share_their_weight():
     states = np.repeat(3.0 ** np.arange(6.0)[:, None], 2, axis=1)
     solution = Problem(states, np.zeros((6, 0)), 0, 0, 5).solved(0.0)

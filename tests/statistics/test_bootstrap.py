@@ -81,22 +81,6 @@ def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
 # --- the moving-block bootstrap ------------------------------------------------------------------
 
 
-def test_an_autoregression_approaches_its_long_run_variance_as_blocks_grow():
-    phi, samples = 0.8, 20_000
-    long_run = 1.0 / (1 - phi) ** 2
-    x = autoregressive(phi, samples, 5)
-    found = {}
-    for length in (1, 20, 150):
-        drawn = moving_block_bootstrap(x, 1000, length, np.random.default_rng(6))
-        found[length] = drawn.mean(axis=1).var() * samples / long_run
-    # A block of b keeps about 1 − 2φ/(b (1 − φ²)) of it: 0.78 at 20, 0.97 at 150; single draws
-    # leave σ²/long-run = (1 − φ)/(1 + φ) = 0.11. Sampling: 14 % from 133 blocks, 4.5 % from draws.
-    assert found[1] == pytest.approx(0.111, rel=0.2)
-    assert found[20] == pytest.approx(0.78, rel=0.2)
-    assert found[150] == pytest.approx(0.97, rel=0.35)
-    assert found[1] < found[20] < found[150]
-
-
 @settings(max_examples=60, deadline=None)
 @given(
     samples=st.integers(2, 60),

@@ -222,7 +222,7 @@ def block_length(
     >>> import numpy as np
     >>> x = np.random.default_rng(0).standard_normal(480)
     >>> block_length(x), block_length(x, "politis_white")
-    (2, 1)
+    (1, 1)
     """
     choice = choose_block_length(series, rule, segments=segments)
     if choice.capped:
