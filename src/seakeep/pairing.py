@@ -39,11 +39,6 @@ class Paired:
 
 def channel_names(data: xr.Dataset, name: str) -> list[str]:
     """Variables that hold numbers; words, such as the status of a forecast, are not channels."""
-    if strange := [key for key in data.data_vars if not isinstance(key, str)]:
-        raise RequestError(
-            f"{name} has a channel named {strange[0]!r}, which is no text. Rename it: "
-            f"data.rename({{{strange[0]!r}: 'heave'}})."
-        )
     names = [str(key) for key, each in data.data_vars.items() if each.dtype.kind not in "OUST"]
     if not names:
         raise RequestError(f"{name} holds no channel; there is nothing to judge.")

@@ -142,6 +142,8 @@ def compare_sensors(
     ]
     error, moved = ([np.std(z[span]) ** 2 for span in spans] for z in (x - y, y))
     lags = found.lag[_together(found)]
+    short = _windows(x, y, dt, 0.5 * length, period, stuck)[0]
+    straight = np.unwrap(short.lag[_together(short)], period=period)
     middle = float(np.median(lags))
     return Agreement(
         period=period,
@@ -149,7 +151,7 @@ def compare_sensors(
         step=step,
         lag=middle,
         lag_spread=float(1.4826 * np.median(np.abs(lags - middle))),
-        growth=_growth(_windows(x, y, dt, 0.5 * length, period, stuck)[0], period),
+        growth=float(straight[-2:].mean() - straight[:2].mean()) if straight.size > 3 else 0.0,
         correlation=float(np.median(found.correlation)),
         nrmse=float(np.sqrt(np.mean(error) / np.mean(moved))),
         gain=gain,
@@ -182,9 +184,3 @@ def _together(found: Lags) -> BoolArray:
     """Windows in which the two go together: elsewhere a lag says nothing."""
     alike: BoolArray = found.correlation >= 0.6
     return alike if alike.sum() > 3 else np.ones(alike.size, dtype=bool)
-
-
-def _growth(found: Lags, period: float) -> float:
-    """Lag gained from the first two windows to the last two, s."""
-    straight = np.unwrap(found.lag[_together(found)], period=period)
-    return float(straight[-2:].mean() - straight[:2].mean()) if straight.size > 3 else 0.0

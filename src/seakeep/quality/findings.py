@@ -104,14 +104,14 @@ def as_json(findings: Iterable[Finding]) -> str:
         [
             vars(each)
             | {"kind": each.kind.name, "details": dict(each.details), "text": each.text}
-            | {key: _or_none(getattr(each, key)) for key in ("value", "limit", "place")}
+            | {key: _finite(getattr(each, key)) for key in ("value", "limit", "place")}
             for each in findings
         ],
         ensure_ascii=False,
     )
 
 
-def _or_none(value: float | None) -> float | None:
+def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 

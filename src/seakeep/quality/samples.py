@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 import scipy
@@ -79,11 +79,17 @@ def flagged(record: Record) -> Iterator[Finding]:
                 if not hit.any():
                     continue
                 parts = stretches(hit)
+                inner = [(b - a) * dt for a, b in parts if a > 0 and b < hit.size]
                 done = ""
                 if bit == OUTLIER and (flags & REPLACED).any():
                     done = "; replaced by interpolation"
-                if bit == MISSING and record.bridged is not None:
-                    done = f"; not bridged: {_why_open(parts, hit.size, dt, record.bridged)}"
+                elif bit == MISSING and record.bridged is not None:
+                    limit = f"longest_gap = {record.bridged:g} s in [preparation]"
+                    done = "; not bridged: " + (
+                        f"a gap of {max(inner):.3g} s is longer than {limit}"
+                        if inner
+                        else "it stands at an end of the record"
+                    )
                 details = {
                     "samples": int(hit.sum()),
                     "places": len(parts),
@@ -93,14 +99,6 @@ def flagged(record: Record) -> Iterator[Finding]:
                 }
                 start = float(time[parts[0][0]])
                 yield Finding(kind, record.run, name, place=start, details=details)
-
-
-def _why_open(parts: Sequence[tuple[int, int]], size: int, dt: float, longest: float) -> str:
-    inner = [(end - begin) * dt for begin, end in parts if begin > 0 and end < size]
-    if not inner:
-        return "it stands at an end of the record"
-    limit = f"longest_gap = {longest:g} s in [preparation]"
-    return f"a gap of {max(inner):.3g} s is longer than {limit}"
 
 
 def constant(record: Record) -> Iterator[Finding]:

@@ -87,15 +87,16 @@ def predicted_extension(
     A record that stops in the middle of a wave is continued by waves, so that a filter with a
     long response is not fed a jump. The continuation fades out as a half cosine.
     """
-    flat = array.reshape(array.shape[0], -1)
     window = 0.5 * (1 + np.cos(np.pi * np.arange(1, count + 1) / (count + 1))) if fade else 1.0
-    out = np.empty((flat.shape[0] + 2 * count, flat.shape[1]))
-    for column, values in enumerate(np.ascontiguousarray(flat.T)):
+
+    def lengthened(column: FloatArray) -> FloatArray:
+        values = np.ascontiguousarray(column)
         before, after = (
             predicted(inward[-fitted:], count, order) * window for inward in (values[::-1], values)
         )
-        out[:, column] = np.concatenate([before[::-1], values, after])
-    return out.reshape((-1, *array.shape[1:]))
+        return np.concatenate([before[::-1], values, after])
+
+    return np.asarray(np.apply_along_axis(lengthened, 0, array))
 
 
 def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
@@ -263,16 +264,9 @@ def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     >>> bool(np.allclose(differentiate(t**4, 0.1), 4 * t**3))
     True
     """
-    x = as_series(series, minimum=5, channels=True)
-    step = time_step(dt)
-    out = np.empty_like(x)
-    out[2:-2] = (x[:-4] - 8 * x[1:-3] + 8 * x[3:-1] - x[4:]) / 12
-    first = np.array([-25.0, 48, -36, 16, -3]) / 12
-    second = np.array([-3.0, -10, 18, -6, 1]) / 12
-    out[0], out[1] = np.tensordot(first, x[:5], 1), np.tensordot(second, x[:5], 1)
-    out[-1] = -np.tensordot(first[::-1], x[-5:], 1)
-    out[-2] = -np.tensordot(second[::-1], x[-5:], 1)
-    return out / step
+    x, step = as_series(series, minimum=5, channels=True), time_step(dt)
+    # The slope of the quartic through five samples: a filter of Savitzky and Golay.
+    return np.asarray(scipy.signal.savgol_filter(x, 5, 4, deriv=1, delta=step, axis=0))
 
 
 def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:

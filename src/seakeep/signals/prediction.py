@@ -62,15 +62,13 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     >>> bool(np.max(np.abs(predict_waves(tone[:1000], 32) - tone[1000:1032])) < 0.02)
     True
     """
-    array = as_series(series, minimum=4, channels=True)
-    number_of = whole_number(count, "count")
-    flat = array.reshape(array.shape[0], -1)
-    out = np.empty((number_of, flat.shape[1]))
-    for column, values in enumerate(flat.T):
-        mean = values.mean()
-        deviations = values - mean
-        out[:, column] = mean + predicted(deviations, number_of, _memory(deviations))
-    return out.reshape((-1, *array.shape[1:]))
+    array, number = as_series(series, minimum=4, channels=True), whole_number(count, "count")
+
+    def following(values: FloatArray) -> FloatArray:
+        deviations = values - values.mean()
+        return np.asarray(values.mean() + predicted(deviations, number, _memory(deviations)))
+
+    return np.asarray(np.apply_along_axis(following, 0, array))
 
 
 def draw_waves(

@@ -352,12 +352,9 @@ def misplaced_probes(
     Regular waves before a model are left out for a reason: on the measured ship section their
     phases move by up to a fifth of a wavelength with what the model reflects.
     """
-    telling = {
-        name: series
-        for name, series in elevations.items()
-        if name in positions and _telling(as_series(series))
-    }
-    names = sorted(telling, key=lambda name: positions[name])
+    telling = {name: as_series(elevations[name]) for name in elevations if name in positions}
+    names = [name for name in sorted(telling, key=positions.__getitem__)
+             if _telling(telling[name])]  # fmt: skip
     pairs = list(pairwise(names))
     if len(names) > 2:
         pairs.append((names[0], names[-1]))
