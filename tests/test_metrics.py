@@ -322,7 +322,6 @@ STEPPED = labelled(PREDICTED, units="m")
     [
         (PREDICTED.T, MEASURED, r"\(2, 4\) and measured \(4, 2\); .*\(time, channel\).* transp"),
         (PREDICTED[:3], MEASURED, r"predicted has shape \(3, 2\) and measured \(4, 2\)"),
-        (np.stack([PREDICTED] * 3), np.stack([MEASURED] * 2), r"\(2, 4, 2\); the axes before"),
         (PREDICTED[:1], MEASURED[:1], r"a window of 1 sample\(s\) has no standard deviation"),
         (STEPPED, MEASURED, r"both be Datasets .* received Dataset and ndarray"),
         (STEPPED, labelled(MEASURED, ("heave", "mooring_bo")),
@@ -339,9 +338,3 @@ STEPPED = labelled(PREDICTED, units="m")
 def test_what_is_refused(predicted, measured, message):
     with pytest.raises((RequestError, DataError), match=message):
         metrics.nrmse(predicted=predicted, measured=measured)
-
-
-@pytest.mark.parametrize("key", ["training_std", "noise_std"])
-def test_spreads_are_one_per_channel(key):
-    with pytest.raises(RequestError, match=rf"{key} has shape \(3,\); .* 2 channels"):
-        metrics.nrmse(**both(), **{key: [1.0, 1.0, 1.0]})

@@ -81,8 +81,6 @@ def labelled(
     callable
         The measure, under the name and docstring of the one of arrays.
     """
-    if keeps not in ("channel", "time", "neither"):
-        raise RequestError(f"keeps must be 'channel', 'time' or 'neither'; received {keeps!r}.")
     name = label or measure.__name__
 
     @functools.wraps(measure)
@@ -235,12 +233,6 @@ def anrmse_differences(
     True
     """
     level = fraction(interval, "interval")
-    counts = [len(of_model) for of_model in predicted]
-    if not counts or not measured or set(counts) != {len(measured)}:
-        raise RequestError(
-            f"predicted holds forecasts of {counts} runs, per model, and measured {len(measured)} "
-            "runs. Give every model one forecast of each run, and at least one of each."
-        )
     runs, draws, blocks = [], [], 0.0
     for seed, (each, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
         own, redrawn, held = _anrmse_of_run(forecasts, each, seed)

@@ -225,11 +225,6 @@ def coverage_table(
     pairs = pair(lower=lower, upper=upper, measured=measured)
     heights = None
     if waves is not None:
-        if not isinstance(waves, xr.DataArray):
-            raise RequestError(
-                f"waves is a {type(waves).__name__}; with Datasets it must be a DataArray with the "
-                "dimension 'time'."
-            )
         first = pairs.names[0]  # a height beside the bounds of a channel, at their instants
         alone = xr.Dataset({first: waves.assign_attrs(units="")})
         heights = pair(lower=lower[[first]], waves=alone).arrays["waves"][..., 0]

@@ -113,8 +113,6 @@ def test_a_coverage_table_has_parts_channels_and_units():
         np.testing.assert_allclose(found[key], getattr(alone, key), rtol=1e-12)
     assert found["unit"].values.tolist() == [MEASURED[name].attrs["units"] for name in names]
     assert found.attrs["level"] == 0.9
-    with pytest.raises(RequestError, match="waves is a ndarray"):
-        statistics.coverage_table(band - 1, band + 1, MEASURED, waves=waves.values)
 
 
 def test_what_is_refused():

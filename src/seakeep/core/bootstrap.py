@@ -367,6 +367,4 @@ def moving_block_bootstrap(
            [3., 4., 5., 3., 4., 5.]])
     """
     x = as_series(series, "series", minimum=1, channels=True)
-    if x.ndim > 2:
-        raise RequestError(f"series has shape {x.shape}; (time,) or (time, channel) is needed.")
     return x[bootstrap_indices(x.shape[0], n_series, block_length, rng, segments)]

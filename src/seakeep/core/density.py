@@ -74,10 +74,11 @@ class DensityInterval:
 def _as_grid(values: npt.ArrayLike) -> FloatArray:
     """Return the grid of a density; refuse one that does not increase."""
     grid = as_real(values, "the grid")
-    if grid.ndim != 1 or grid.size < 2:
-        raise RequestError(f"the grid has shape {grid.shape}; at least two points are needed.")
-    if not np.all(np.isfinite(grid)) or not np.all(np.diff(grid) > 0):
-        raise RequestError("the grid must increase strictly and be finite; sort it, once each.")
+    if grid.size < 2 or not np.all(np.isfinite(grid)) or not np.all(np.diff(grid) > 0):
+        raise RequestError(
+            "the grid must increase strictly, be finite, and have at least two points; sort it, "
+            "once each."
+        )
     return grid
 
 

@@ -67,14 +67,8 @@ def training_window(
     TrainingWindow
         Its ``columns`` may be zero or negative: the caller knows the names for the message.
 
-    Raises
-    ------
-    RequestError
-        If `history` is neither.
     """
     reach = max(state_delays, input_delays)
-    if history not in ("before", "inside"):
-        raise RequestError(f"history is 'before' or 'inside'; received {history!r}.")
     first = 0 if window is None else last - window + 1
     earliest = first + reach if history == "inside" else reach
     return TrainingWindow(first, last, max(first, earliest))

@@ -202,13 +202,13 @@ def integrate(
         Time step, s.
     band : (float, float)
         Lower and upper edge of the band kept, Hz; the gain is one half there.
-    times : {1, 2}, optional
+    times : int, optional
         How often to integrate.
 
     Returns
     -------
     ndarray
-        The integral, same shape; the unit is the series' times s or s².
+        The integral, same shape; the unit is the series' times s, or s² where `times` is two.
 
     Raises
     ------
@@ -226,8 +226,6 @@ def integrate(
     >>> bool(np.max(np.abs(heave - np.cos(omega * t))) < 0.01)  # to the very ends
     True
     """
-    if times not in (1, 2):
-        raise RequestError(f"integrate once or twice: times must be 1 or 2; received {times!r}.")
     return _integrated(series, dt, band, times)
 
 

@@ -6,14 +6,12 @@ array of the shape they were given.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 import scipy
 from scipy import special
 
-from seakeep.arrays import FloatArray, as_series, number, positive, time_step
+from seakeep.arrays import FloatArray, as_series, fraction, number, positive, time_step
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import as_seconds, span_text, uniform_step
 from seakeep.sizes import MOST_TAPS, check_size
@@ -52,10 +50,6 @@ def lowpass_taps(
     """
     positive(sampling_rate, "the sampling rate", "Hz")
     passband, stopband = number(passband, "passband"), number(stopband, "stopband")
-    if not LEAST_ATTENUATION <= number(attenuation, "the attenuation") < math.inf:
-        raise RequestError(
-            f"the attenuation must be at least {LEAST_ATTENUATION:g} dB; received {attenuation!r}."
-        )
     if not 0 < passband < stopband < sampling_rate / 2:
         raise RequestError(
             f"a low-pass filter needs 0 < passband < stopband < half the sampling rate; received "
@@ -156,8 +150,6 @@ def low_pass(
     return filtered
 
 
-LEAST_ATTENUATION = 8.0
-"""dB; Kaiser's formula holds from there on."""
 PASSBAND = 0.8
 """Part of the lower Nyquist frequency up to which resampling keeps what there is."""
 
@@ -220,11 +212,7 @@ def resample(
             f"the series has {array.shape[0]} samples and the time axis {t.size}; they must agree. "
             "Time runs along the first axis."
         )
-    if not 0 < number(passband, "passband") < 1:
-        raise RequestError(
-            f"passband is a fraction of the Nyquist frequency, between 0 and 1; received "
-            f"{passband!r}."
-        )
+    passband = fraction(passband, "passband, a part of the Nyquist frequency,")
     slack = 1e-6 * dt
     if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:
         raise DataError(
