@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import delay_by_celerity, delay_by_dispersion, encounter_period
@@ -30,24 +28,6 @@ def sea(distance, seed=0, components=60, top=1.13):
 def drifting():
     """Surge of a moored vessel: a slow drift with wave-frequency motion on it."""
     return 0.5 + 0.4 * np.sin(2 * np.pi * TIME / 30) + 0.03 * np.sin(3.0 * TIME)
-
-
-@settings(max_examples=25, deadline=None)
-@given(
-    frequency=st.floats(0.3, 1.1),
-    phase=st.floats(0, 6.28),
-    distance=st.floats(-3.0, 3.0),
-)
-def test_a_sine_is_moved_exactly(frequency, phase, distance):
-    omega = 2 * np.pi * frequency
-    k = float(wavenumber(omega, DEPTH))
-    carried = delay_by_dispersion(
-        np.cos(omega * TIME + phase), DT, distance, DEPTH, highest_frequency=1.2
-    )
-    exact = np.cos(omega * TIME - k * distance + phase)
-    # The record is not a whole number of waves; its ends are continued by linear prediction, whose
-    # error inside is what is left of the fade.
-    np.testing.assert_allclose(carried[INNER], exact[INNER], atol=1e-3)
 
 
 def test_a_vessel_that_drifts_downstream_meets_waves_later():

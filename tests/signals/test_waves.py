@@ -17,19 +17,6 @@ from seakeep.signals import (
 )
 
 
-@given(
-    st.floats(min_value=0.5, max_value=10.0),
-    st.floats(min_value=0.0, max_value=6.28),
-    st.floats(min_value=-5, max_value=5),
-)
-def test_period_of_a_regular_wave(period, phase, offset):
-    t = np.arange(0, 200, 0.05)
-    series = offset + 0.3 * np.sin(2 * np.pi * t / period + phase)
-    # The mean over a broken number of waves shifts all crossings alike; interpolation on 10
-    # samples a wave and more leaves a part in a thousand of a sample.
-    assert encounter_period(series, 0.05) == pytest.approx(period, rel=2e-3)
-
-
 def test_crossings_lie_between_samples():
     np.testing.assert_allclose(zero_up_crossings([-1.0, 3.0, -1.0, -1.0], 0.5), [0.125])
 
