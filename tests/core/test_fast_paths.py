@@ -1,20 +1,18 @@
 """Each trick of the fast core equals the plain formula over random shapes."""
 
 import sys
-from dataclasses import dataclass
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from matrices import snapshot_matrices
+from matrices import Problem
 
 from seakeep.core import gram as gram_module
-from seakeep.core import identify, rollout
+from seakeep.core import rollout
 from seakeep.core.embedding import TrainingWindow
 from seakeep.core.gram import (
-    Piece,
     gram_trace,
     lagged_response,
     lagged_sums,
@@ -28,58 +26,6 @@ ROLLOUT = sys.modules["seakeep.core.rollout"]
 TIGHT = 1e-12
 # The house rule for results; the condition number here is below 1e4.
 RESULT = 1e-10
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Runs with groups of channels: states, delayed and direct inputs, down to none."""
-
-    states: list
-    inputs: list
-    direct: list
-    windows: list
-    s: int
-    z: int
-
-    def matrices(self, all_rows=True):
-        """Plain Hankel matrices."""
-        found = []
-        for x, u, d, window in zip(
-            self.states, self.inputs, self.direct, self.windows, strict=True
-        ):
-            y, target = snapshot_matrices(x, u, window, self.s, self.z, all_rows)
-            beside = d[window.first_column : window.last].T
-            found.append((np.concatenate([y, beside]), target))
-        return tuple(np.concatenate(group, axis=1) for group in zip(*found, strict=True))
-
-    @property
-    def pieces(self):
-        """What the fast paths take, without groups that have no channel."""
-        return [
-            Piece(
-                groups[0],
-                tuple(group for group in groups if group.shape[1]),
-                window.first_column,
-                window.columns,
-            )
-            for *groups, window in zip(
-                self.states, self.inputs, self.direct, self.windows, strict=True
-            )
-        ]
-
-    @property
-    def delays(self):
-        groups = zip((self.states, self.inputs, self.direct), (self.s, self.z, 0), strict=True)
-        return tuple(delay for group, delay in groups if group[0].shape[1])
-
-    def identify(self, **options):
-        settings = {
-            "state_delays": self.s,
-            "input_delays": self.z,
-            "direct": self.direct,
-            **options,
-        }
-        return identify(self.states, self.inputs, self.windows, **settings).coefficients
 
 
 @st.composite
@@ -152,7 +98,7 @@ def test_every_form_gives_the_papers_formula(problem, ridge, kind):
     expected = np.linalg.solve(plain, regressors @ targets.T).T
     for method in ("primal", "dual", "svd", None):
         options = {"all_rows": all_rows, "method": method, "state_delays": delays}
-        found = problem.identify(ridge=ridge, **options)
+        found = problem.solved(ridge, **options).coefficients
         np.testing.assert_allclose(found, expected, atol=RESULT)
 
 
@@ -163,7 +109,7 @@ def test_a_rank_is_that_of_the_truncated_matrix(problem, rank):
     left, values, right = np.linalg.svd(regressors, full_matrices=False)
     kept = min(rank, int(np.sum(values > values[0] * 1e-12)))
     expected = targets @ right[:kept].T / values[:kept] @ left[:, :kept].T
-    found = problem.identify(ridge=0.0, rank=rank)
+    found = problem.solved(0.0, rank=rank).coefficients
     np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
 
 

@@ -268,7 +268,9 @@ def _sinc_sums(
     rows_at_once = max(1, AT_ONCE // (2 * half))
     for first in range(0, position.size, rows_at_once):
         rows = slice(first, first + rows_at_once)
-        weights = sum(each[rows, None] * bank[phase[rows] + k] for k, each in enumerate(cubic))
+        weights = cubic[0, rows, None] * bank[phase[rows]]
+        for each in (1, 2, 3):
+            weights += cubic[each, rows, None] * bank[phase[rows] + each]
         for column, view in enumerate(views):
             out[rows, column] = np.einsum("ij,ij->i", weights, view[base[rows] + 1])
     return out.reshape((position.size, *array.shape[1:]))
