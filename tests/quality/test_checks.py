@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 import pytest
 import xarray as xr
+from seas import sea
 
 from seakeep.errors import SeakeepWarning
 from seakeep.quality import Finding, Record, Redundant, as_json, findings_of, warn_of
@@ -20,9 +21,7 @@ PERIOD = 1.6
 
 
 def waves(shift=0.0, seed=0):
-    frequency = np.linspace(0.4, 0.9, 20)
-    phase = np.random.default_rng(seed).uniform(0, 6.28, 20)
-    return np.cos(2 * np.pi * np.outer(T - shift, frequency) + phase).sum(axis=1)
+    return 3.2 * sea(seed, (0.4, 0.9), peak=PERIOD, components=20).at(T - shift)
 
 
 def against(series, trusted=None, step=np.nan, window=None):
