@@ -110,18 +110,6 @@ def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
     return result
 
 
-def _check_band(band: tuple[float, float], dt: float, samples: int) -> None:
-    low, high = band
-    nyquist = 0.5 / time_step(dt)
-    if not 0 < low < high <= nyquist:
-        raise RequestError(
-            f"a band needs 0 < low < high, and high at most the Nyquist frequency ({nyquist:g} "
-            f"Hz); received ({low:g}, {high:g}) Hz. The lower edge keeps drift out: set it below "
-            "the slowest wave and above the drift."
-        )
-    _check_slowest(low, dt, samples, "the lower edge of the band")
-
-
 def _check_slowest(frequency: float, dt: float, samples: int, name: str) -> None:
     """Refuse a period so long that eight of them, added to the record, take all memory."""
     if frequency * dt * samples < SHORTEST_RECORD:
@@ -144,11 +132,18 @@ def _integrated(
     series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int
 ) -> FloatArray:
     array = as_series(series, minimum=4, channels=True)
-    _check_band(band, dt, array.shape[0])
+    (low, high), nyquist = band, 0.5 / time_step(dt)
+    if not 0 < low < high <= nyquist:
+        raise RequestError(
+            f"a band needs 0 < low < high, and high at most the Nyquist frequency ({nyquist:g} "
+            f"Hz); received ({low:g}, {high:g}) Hz. The lower edge keeps drift out: set it below "
+            "the slowest wave and above the drift."
+        )
+    _check_slowest(low, dt, array.shape[0], "the lower edge of the band")
     # Averaged column by column, so that a channel has the same bits alone and beside others.
     columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
     array = (columns - columns.mean(axis=1, keepdims=True)).T.reshape(array.shape)
-    extended, padding = _extended(array, band[0] * dt)
+    extended, padding = _extended(array, low * dt)
     frequency = fft.rfftfreq(extended.shape[0], dt)
     gain = band_gain(frequency, band)
     omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
