@@ -156,15 +156,14 @@ def correlation_peak(
         )
     lags = np.arange(int(low) - 1, int(high) + 2)
     values = _correlation(a, b, lags)
-    inner = values[1:-1]
-    peaks = np.flatnonzero((inner >= values[:-2]) & (inner >= values[2:]))
+    peaks = scipy.signal.find_peaks(values)[0]
     if not peaks.size:
         raise DataError(
             f"the correlation of the two records has no peak between lags of {bounds[0]:g} and "
-            f"{bounds[1]:g} s (highest {inner.max():.2f}, at an end). Check which probe stands "
-            "upstream, their positions, and the water depth."
+            f"{bounds[1]:g} s (highest {values[1:-1].max():.2f}, at an end). Check which probe "
+            "stands upstream, their positions, and the water depth."
         )
-    best = int(peaks[np.argmax(inner[peaks])]) + 1
+    best = int(peaks[np.argmax(values[peaks])])
     shift, height = parabola_peak(*values[best - 1 : best + 2])
     return float((lags[best] + shift) * step), height
 
@@ -335,8 +334,7 @@ def compare_motion(
         lag = scipy.optimize.fminbound(
             lambda shift: -correlation(shift), lags[best - 1], lags[best + 1], xtol=1e-4 * step
         )
-    inner = values[1:-1]
-    peaks = 1 + np.flatnonzero((inner > values[:-2]) & (inner >= values[2:]))
+    peaks = scipy.signal.find_peaks(values)[0]
     others = peaks[np.abs(peaks - best) > 1]
     rival = others[np.argmax(values[others])] if others.size else None
     crossings = int(np.count_nonzero(np.diff(y1 > np.mean(y1))))

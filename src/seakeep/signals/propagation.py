@@ -506,8 +506,7 @@ def _scores(cross: ComplexArray, norm: float, k: FloatArray, distances: FloatArr
 def _chosen(scores: FloatArray, stated: int) -> int:
     """Of the maxima that may be the highest, the one nearest to what is stated."""
     total = scores.sum(axis=0)
-    inner = total[1:-1]
-    peaks = np.flatnonzero((inner >= total[:-2]) & (inner >= total[2:])) + 1
+    peaks = scipy.signal.find_peaks(total)[0]
     best = peaks[np.argmax(total[peaks])]
     parts = scores[:, [best]] - scores[:, peaks]
     # Jackknife of a sum over groups: leaving one out leaves its part out.

@@ -137,25 +137,17 @@ def repeated_waves(records: Mapping[str, npt.ArrayLike], dt: float) -> dict[str,
     parts = {name: x[waves_part(x, dt)] for name, x in series.items()}
     every = max(int(min(map(_dominant_period, parts.values()), default=1.0) / PER_WAVE), 1)
     parts = {name: x[::every] - x.mean() for name, x in parts.items()}
-    size = scipy.fft.next_fast_len(2 * max(map(len, parts.values()), default=1), real=True)
-    spectra = {name: np.fft.rfft(x, size) for name, x in parts.items()}
     groups: dict[str, str] = {}
     for name, x in parts.items():
-        same = (
-            first
-            for first in dict.fromkeys(groups.values())
-            if _are_alike(x, parts[first], spectra[name] * spectra[first].conj(), size)
-        )
-        groups[name] = next(same, name)
+        firsts = dict.fromkeys(groups.values())
+        groups[name] = next((each for each in firsts if _are_alike(x, parts[each])), name)
     return groups
 
 
-def _are_alike(
-    one: FloatArray, other: FloatArray, cross: npt.NDArray[np.complex128], size: int
-) -> bool:
-    """Whether two records hold the same waves, from their cross-spectrum of `size` samples."""
-    lag = int(np.argmax(np.fft.irfft(cross, size)))
-    lag -= size * (lag >= len(one))
+def _are_alike(one: FloatArray, other: FloatArray) -> bool:
+    """Whether two records, less their means, hold the same waves."""
+    lags = scipy.signal.correlation_lags(len(one), len(other))
+    lag = int(lags[np.argmax(scipy.signal.correlate(one, other, method="fft"))])
     begin, end = max(lag, 0), min(len(one), len(other) + lag)
     if end - begin < OVERLAP * min(len(one), len(other)):
         return False
