@@ -234,8 +234,14 @@ def anrmse_differences(
     """
     level = fraction(interval, "interval")
     runs, draws, blocks = [], [], 0.0
-    for seed, (each, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
-        own, redrawn, held = _anrmse_of_run(forecasts, each, seed)
+    for seed, (truth, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
+        found = [_paired(each, truth) for each in forecasts]
+        cases = [(of.arrays["predicted"], of.arrays["measured"], known) for of, known in found]
+        block = max(_block(p, m) for p, m, _ in cases)
+        own = np.array([float(core.anrmse(predicted=p, measured=m, **k)) for p, m, k in cases])
+        redrawn = np.stack([_redrawn(core.anrmse, p, m, k, block, seed) for p, m, k in cases])
+        redrawn = np.where(np.isnan(own)[:, None], np.nan, redrawn)
+        held = cases[0][1].shape[-2] / block
         runs.append(_with_bounds(own, redrawn, held, level))
         draws.append(redrawn)
         blocks += held
@@ -268,19 +274,6 @@ def _ratio(values: FloatArray) -> FloatArray:
     with np.errstate(divide="ignore", invalid="ignore"):
         out: FloatArray = values / values[0]
     return out
-
-
-def _anrmse_of_run(
-    forecasts: Sequence[xr.Dataset], measured: xr.Dataset, seed: int
-) -> tuple[FloatArray, FloatArray, float]:
-    """ANRMSE of several forecasts of a run, its draws (forecast, draw), and the blocks held."""
-    found = [_paired(each, measured) for each in forecasts]
-    cases = [(of.arrays["predicted"], of.arrays["measured"], known) for of, known in found]
-    block = max(_block(p, m) for p, m, _ in cases)
-    values = np.array([core.anrmse(predicted=p, measured=m, **k) for p, m, k in cases], dtype=float)
-    redrawn = np.stack([_redrawn(core.anrmse, p, m, k, block, seed) for p, m, k in cases])
-    draws = np.where(np.isnan(values)[:, None], np.nan, redrawn)
-    return values, draws, cases[0][1].shape[-2] / block
 
 
 is_slack = labelled(core.is_slack, "channel", label="slackness")
