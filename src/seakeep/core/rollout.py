@@ -229,7 +229,7 @@ class _Propagator:
     """K steps as one: O, P and, where the outputs are not the state, A_K and B_K.
 
     Outputs stand newest first; P and B_K are one matrix for each group of inputs. `state` is
-    A_K for one window, its transpose for several, and the upper half of a mirrored Â.
+    A_K, or the upper half of a mirrored Â.
     """
 
     steps: int
@@ -238,7 +238,6 @@ class _Propagator:
     state: FloatArray | None = None
     state_input: Arrays = ()
     is_mirrored: bool = False
-    is_transposed: bool = False
 
 
 def _propagator(
@@ -266,9 +265,6 @@ def _propagator(
         half = np.zeros((padded, padded))
         half[: len(a) - count, : len(a)] = a[count:]
         return replace(propagator, state=half, is_mirrored=True)
-    if windows > 1 and propagator.state is not None:
-        state = np.ascontiguousarray(propagator.state.T)
-        return replace(propagator, state=state, is_transposed=True)
     return propagator
 
 
@@ -441,13 +437,8 @@ def _run_square(
     states = np.empty((number + 1, windows, size))
     states[number] = start
     states[:number] = _forced(rows, propagator.state_input).reshape(number, windows, size)
-    if not propagator.is_transposed:
-        line = states[:, 0]
-        for block in range(number - 1, -1, -1):
-            line[block] += propagator.state @ line[block + 1]
-    else:
-        for block in range(number - 1, -1, -1):
-            states[block] += states[block + 1] @ propagator.state
+    for block in range(number - 1, -1, -1):
+        states[block] += states[block + 1] @ propagator.state.T
     outputs = states[1:].reshape(-1, size) @ propagator.output_state.T
     outputs += _forced(rows, propagator.output_input)
     newest_first = outputs.reshape(number, windows, -1).transpose(1, 0, 2)
