@@ -34,6 +34,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -43,6 +44,7 @@ from scipy.linalg import blas, lapack
 from seakeep.arrays import FloatArray, as_real
 from seakeep.core.embedding import TrainingWindow, embed
 from seakeep.core.gram import (
+    Group,
     Piece,
     PrimalSystem,
     gram_trace,
@@ -179,7 +181,7 @@ def identify(
         solution = Solution(form(effective), chosen, effective, count)
     if radius is None or state_delays is None:
         return solution
-    size = problem.states
+    size = problem.groups[0].stop
     rows, clipped = clip_modes(solution.coefficients[:, :size], radius)
     coefficients = np.concatenate([rows, solution.coefficients[:, size:]], axis=1)
     return replace(solution, coefficients=coefficients, clipped=clipped)
@@ -213,15 +215,20 @@ class _Delayed:
     delays: tuple[int, ...]
     all_rows: bool
 
-    @property
-    def states(self) -> int:
-        """Rows of the extended state."""
-        return lay_out(self.pieces[0], self.delays)[0].stop
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """Places of the groups; the first ends with the extended state."""
+        return lay_out(self.pieces[0], self.delays)
 
     @property
     def rows(self) -> int:
         """Regressors."""
-        return lay_out(self.pieces[0], self.delays)[-1].stop
+        return self.groups[-1].stop
+
+    @cached_property
+    def trace(self) -> float:
+        """Trace of the Gram matrix."""
+        return gram_trace(self.pieces, self.delays)
 
     @property
     def columns(self) -> int:
@@ -230,28 +237,23 @@ class _Delayed:
 
     def form(self) -> Method:
         """The form that is less work, by its largest terms."""
-        p, n, a = self.rows, self.columns, self.states
+        p, n, a = self.rows, self.columns, self.groups[0].stop
         if not self.all_rows:
             return "primal" if p <= n else "dual"
         b = p - a
-        channels = sum(series.shape[1] for series in self.pieces[0].series)
-        rank = 2 * (channels + len(self.pieces))
+        rank = 2 * (self.groups[-1].head.stop + len(self.pieces))
         primal = p**3 / 3 + 2 * rank * p * (p + a)
         dual = n**3 / 3 + n * n * p + n * a * (a + 2 * b)
         return "primal" if primal <= dual else "dual"
 
     def choose(self, ridge: float) -> Method:
         """The form, or singular values where λ is too small for a Gram matrix."""
-        if not self.is_squared_away(ridge):
+        if ridge >= GRAM_LIMIT * self.trace:
             return self.form()
-        trace = gram_trace(self.pieces, self.delays)
-        if not self.all_rows and self.rows <= self.columns and ridge >= REFINED_LIMIT * trace:
+        is_narrow = not self.all_rows and self.rows <= self.columns
+        if is_narrow and ridge >= REFINED_LIMIT * self.trace:
             return "primal"
         return self.form() if ridge > 0 and self.gram_suffices(ridge) else "svd"
-
-    def is_squared_away(self, ridge: float) -> bool:
-        """Whether λ may be too small for a Gram matrix, by its trace."""
-        return ridge < GRAM_LIMIT * gram_trace(self.pieces, self.delays)
 
     def gram_suffices(self, ridge: float) -> bool:
         """Whether λ ≥ 1e-6 σ²_max, from the upper triangle of the smaller Gram matrix."""
@@ -282,21 +284,18 @@ class _Delayed:
         if self.all_rows:
             system = primal_system(self.pieces, self.delays)
             return _all_rows(system, _factor(system.gram, ridge), ridge)
-        if self.is_squared_away(ridge):
-            return self._refined(ridge)
-        room = self.pieces[0].states.shape[1]
-        system = primal_system(self.pieces, self.delays, room)
-        return np.ascontiguousarray(_solve_beside(system.gram, system.right, ridge))
-
-    def _refined(self, ridge: float) -> FloatArray:
-        """Coefficients of the newest rows, corrected by the residuals of the data."""
+        if ridge >= GRAM_LIMIT * self.trace:
+            room = self.pieces[0].states.shape[1]
+            system = primal_system(self.pieces, self.delays, room)
+            return np.ascontiguousarray(_solve_beside(system.gram, system.right, ridge))
+        # λ is small: residuals of the data correct what the Gram matrix lost.
         system = primal_system(self.pieces, self.delays)
         factor = _factor(system.gram, ridge)
         regressors, targets = self.matrices()
-        found = np.asarray(lapack.dpotrs(factor, system.right.T, lower=1)[0]).T
+        found = _solved(factor, system.right)
         for _ in range(CORRECTIONS):
             right = (targets - found @ regressors) @ regressors.T - ridge * found
-            found += np.asarray(lapack.dpotrs(factor, right.T, lower=1)[0]).T
+            found += _solved(factor, right)
         return found
 
     def dual(self, ridge: float) -> FloatArray:
@@ -310,21 +309,20 @@ class _Delayed:
         N = targets.shape[1]
         if not self.all_rows:
             weights = _solve_beside(snapshot_gram(self.pieces, self.delays, N), targets.T, ridge).T
-            groups = lay_out(self.pieces[0], self.delays)
             top, at = np.zeros((N, self.rows)), 0
             for piece in self.pieces:
                 own = weights[at : at + piece.count]
                 at += piece.count
-                for series, group in zip(piece.series, groups, strict=True):
+                for series, group in zip(piece.series, self.groups, strict=True):
                     top[:, group.rows] += lagged_sums(own, series, piece.first, group.lags)
             return top
         factor = _factor(snapshot_gram(self.pieces, self.delays), ridge)
         stacked = np.concatenate([self.matrices()[0], targets.T])
         half = blas.dtrsm(1.0, factor, stacked.T, lower=1, overwrite_b=1)
         regressors, newest = half[:, : self.rows], half[:, self.rows :]
-        out = np.empty((self.states, self.rows))
+        out = np.empty((self.groups[0].stop, self.rows))
         np.matmul(newest.T, regressors, out=out[:N])
-        np.matmul(regressors[:, : self.states - N].T, regressors, out=out[N:])
+        np.matmul(regressors[:, : len(out) - N].T, regressors, out=out[N:])
         return out
 
 
@@ -343,6 +341,11 @@ def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
             "definite. Raise ridge, or use method='svd'."
         )
     return np.asarray(factor)
+
+
+def _solved(factor: FloatArray, rows: FloatArray) -> FloatArray:
+    """Rows times the inverse of a matrix, by its lower Cholesky factor; in their place."""
+    return np.asarray(lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0]).T
 
 
 def _solve_beside(padded: FloatArray, right: FloatArray, ridge: float) -> FloatArray:
@@ -383,8 +386,7 @@ def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution
     if ridge <= 0 or ridge < GRAM_LIMIT * np.trace(gram):
         return _by_singular_values(regressors, targets, ridge, None)
     factor = _factor(gram, ridge)
-    right = targets @ regressors.T
-    solved = np.asarray(lapack.dpotrs(factor, right.T, lower=1)[0]).T
+    solved = _solved(factor, targets @ regressors.T)
     return Solution(solved, "primal", ridge, min(regressors.shape))
 
 
@@ -432,7 +434,7 @@ def _all_rows(system: PrimalSystem, factor: FloatArray, ridge: float) -> FloatAr
         solving[:, group.newest] *= 0.5
         _sum_over_lags(rows[:rank, group.rows], group.channels, tau)
     rows[rank:] = system.right
-    solved = np.asarray(lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0]).T
+    solved = _solved(factor, rows)
     plus, minus = _generators(solved[:rank], system, tau)
     scale = np.sqrt(ridge)
     plus *= scale
