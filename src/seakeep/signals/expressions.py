@@ -38,9 +38,9 @@ _ALLOWED = "numbers, channel names, + - * / **, parentheses, and the functions "
 
 
 class _RefusedError(Exception):
-    """A node that is not allowed, and the reason."""
+    """A node that is not allowed, and the reason; none is one of another form."""
 
-    def __init__(self, node: ast.expr, reason: str) -> None:
+    def __init__(self, node: ast.expr, reason: str = "") -> None:
         self.node, self.reason = node, reason
 
 
@@ -154,7 +154,7 @@ class Expression:
                     if wrong := _wrong_call(name, len(arguments)):
                         raise _RefusedError(node, wrong)
                     return apply(name, [value(argument) for argument in arguments])
-            raise _RefusedError(node, "{source!r} is none of the allowed forms")
+            raise _RefusedError(node)
 
         return value(self._tree)
 
@@ -218,7 +218,7 @@ def parse(text: str) -> Expression:
             for each, name in quoted.items():
                 source = source.replace(each, f"`{name}`")
             place = len(plain.encode()[: error.node.col_offset].decode()) + 1
-            reason = error.reason.format(source=source)
+            reason = error.reason or f"{source!r} is none of the allowed forms"
         raise RequestError(
             f"the expression {text!r} is not allowed: at character {place}, {reason}. "
             f"Allowed are {_ALLOWED}; write names with blanks or signs between backticks."
