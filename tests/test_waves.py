@@ -17,12 +17,6 @@ def test_deep_water():
     np.testing.assert_allclose(group_speed(omega), 0.5 * GRAVITY / omega, rtol=1e-12)
 
 
-def test_great_depth_is_deep_water():
-    # tanh(kh) is 1 in double precision from kh = 19 on.
-    np.testing.assert_allclose(wavenumber(5.0, depth=100.0), wavenumber(5.0), rtol=1e-15)
-    np.testing.assert_allclose(group_speed(5.0, depth=1e6), group_speed(5.0), rtol=1e-12)
-
-
 def test_shallow_water():
     depth, omega = 2.0, 1e-4
     # The first correction is of the order (kh)²/6 = 3e-10.
@@ -62,21 +56,12 @@ def test_length_to_frequency_and_back(length, depth):
     np.testing.assert_allclose(2 * np.pi / k, length, rtol=1e-12)
 
 
-def test_shapes_broadcast():
-    assert wavenumber(np.ones((3, 1)), np.array([1.0, np.inf])).shape == (3, 2)
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (lambda: wavenumber(-1.0), "the frequency must be zero or positive, .*; received -1.0"),
-        (lambda: wavenumber(np.inf), "the frequency must be .* finite; received inf"),
         (lambda: wavenumber(np.nan), "the frequency must be zero or positive, .*; received nan"),
         (lambda: wavenumber(1.0, 0.0), "the water depth must be positive; received 0"),
-        (
-            lambda: phase_speed(1.0, -3.0),
-            "the water depth must be zero or positive, .*; received -3.0",
-        ),
         (lambda: wavelength_to_frequency(0.0), "the wavelength must be positive; received 0"),
     ],
 )
@@ -85,8 +70,9 @@ def test_what_is_no_wave(call, message):
         call()
 
 
-@pytest.mark.parametrize("value", [1e-9, 1e-3, 1.0, 1e3, 1e9])
-@pytest.mark.parametrize("depth", [1e-9, 1e-3, 1.0, 1e3, 1e9, np.inf])
-def test_no_number_of_a_sea_overflows(value, depth):
+def test_no_number_of_a_sea_overflows():
+    values = np.array([1e-9, 1e-3, 1.0, 1e3, 1e9])
     for function in (wavenumber, phase_speed, group_speed, wavelength_to_frequency):
-        assert np.isfinite(function(value, depth)).all()
+        found = function(values, np.append(values, np.inf)[:, None])
+        assert found.shape == (6, 5)
+        assert np.isfinite(found).all()

@@ -1,8 +1,8 @@
 """Types and checks of the arrays and numbers that public functions take.
 
 Every public function passes its arrays through :func:`as_real` or :func:`as_series`, which refuse
-what is not an array of real numbers: masked values, complex numbers, dates, text, Datasets and rows
-of unequal length. The message says what was received and how to correct it.
+what is not an array of real numbers: masked values, complex numbers, dates and text. The message
+says what was received and how to correct it.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ __all__ = [
     "IntArray",
     "Progress",
     "as_bundle",
+    "as_pair",
     "as_real",
     "as_series",
     "as_table",
     "finite",
     "fraction",
     "number",
-    "plain_number",
     "positive",
     "time_step",
     "whole_number",
@@ -74,8 +74,7 @@ def as_real(
     Raises
     ------
     RequestError
-        If they are not real numbers: masked values, complex, dates, text, a Dataset, or rows of
-        unequal length.
+        If they are not real numbers: masked values, complex, dates or text.
 
     Examples
     --------
@@ -84,18 +83,15 @@ def as_real(
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
-    if hasattr(values, "data_vars"):
+    parts = values if isinstance(values, list | tuple) else [values]
+    masked = sum(int(np.ma.getmaskarray(part).sum()) for part in parts if np.ma.isMA(part))
+    if masked:
         raise error(
-            f"{name} must be an array; received a Dataset. Select one channel: data['heave']."
+            f"{name} holds {masked} masked value(s), which would be read as if they were "
+            "not masked. Fill them with numpy.ma.filled(values, numpy.nan) and treat them as a "
+            "gap, or leave them out."
         )
-    _check_mask(values, name, error)
-    try:
-        array = np.asarray(values)
-    except ValueError as ragged:
-        raise error(
-            f"{name} must be an array of numbers; received rows of unequal length ({ragged}). "
-            "Give every row the same number of values."
-        ) from None
+    array = np.asarray(values)
     if array.dtype.kind not in "fiub":
         remedy = _REMEDIES.get(array.dtype.kind, "Convert every value to a number, gaps to NaN")
         raise error(
@@ -103,21 +99,6 @@ def as_real(
             f"{array.dtype}. {remedy}."
         )
     return np.asarray(array, dtype=np.float64)
-
-
-def _check_mask(values: object, name: str, error: type[SeakeepError]) -> None:
-    """Refuse masked values, in lists of arrays and in DataArrays too."""
-    inner = getattr(values, "data", None) if hasattr(values, "dims") else None
-    parts = values if isinstance(values, list | tuple) else (values, inner)
-    masked = sum(
-        int(np.ma.getmaskarray(part).sum()) for part in parts if isinstance(part, np.ma.MaskedArray)
-    )
-    if masked:
-        raise error(
-            f"{name} holds {masked} masked value(s), which would be read as if they were "
-            "not masked. Fill them with numpy.ma.filled(values, numpy.nan) and treat them as a "
-            "gap, or leave them out."
-        )
 
 
 def as_series(
@@ -199,6 +180,37 @@ def as_bundle(values: object, name: str = "the series", *, minimum: int = 2) -> 
     return np.atleast_2d(array)
 
 
+def as_pair(
+    first: object, second: object, *, minimum: int = 2, moving: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """Return two series of one length, of at least `minimum` samples; `moving` ones vary.
+
+    Raises
+    ------
+    RequestError
+        If they are not series, or differ in length.
+    DataError
+        As :func:`as_series`; also if one is constant and must be `moving`.
+    """
+    pair = tuple(
+        as_series(each, f"the {name} record", minimum=minimum)
+        for name, each in (("first", first), ("second", second))
+    )
+    a, b = pair
+    if a.shape != b.shape:
+        raise RequestError(
+            f"two records of the same length are needed, shape (time,); received {a.shape} and "
+            f"{b.shape}. Cut them to their common time."
+        )
+    for name, each in zip(("first", "second"), pair, strict=True):
+        if moving and np.ptp(each) == 0:
+            raise DataError(
+                f"the {name} record is constant ({each[0]:g}), so it correlates with nothing. "
+                "Look for a dead probe."
+            )
+    return a, b
+
+
 def finite(array: FloatArray, name: str) -> FloatArray:
     """Return an array of at least one axis as it is; refuse NaN and infinity."""
     there = np.isfinite(array)
@@ -212,16 +224,10 @@ def finite(array: FloatArray, name: str) -> FloatArray:
     return array
 
 
-def plain_number(value: Any) -> Any:
-    """Return a number of NumPy, or of an array of one value, as one of Python; others as is."""
-    if not hasattr(value, "item") or value is np.ma.masked or np.size(value) != 1:
-        return value
-    return value.item()
-
-
-def number(value: object, name: str) -> float:
-    """Return a real number as a float; refuse text, dates, arrays, NaN and what is masked."""
-    plain = plain_number(value)
+def number(value: Any, name: str) -> float:
+    """Return a real number as a float; refuse text, dates, NaN and what is masked."""
+    one = hasattr(value, "item") and value is not np.ma.masked and np.size(value) == 1
+    plain = value.item() if one else value
     if isinstance(plain, bool) or not isinstance(plain, int | float) or plain != plain:
         raise RequestError(f"{name} must be a number; received {value!r}.")
     return float(plain)

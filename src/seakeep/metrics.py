@@ -23,17 +23,16 @@ from __future__ import annotations
 import functools
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, Protocol, TypeVar, overload
+from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray, fraction
+from seakeep.arrays import FloatArray, fraction
 from seakeep.core import metrics as core
 from seakeep.core.bootstrap import block_length, bootstrap_indices, student_interval
 from seakeep.errors import RequestError, SeakeepWarning
-from seakeep.pairing import pair
+from seakeep.pairing import Paired, pair
 
 __all__ = [
     "Measure",
@@ -54,43 +53,8 @@ REDRAWN = 300
 AT_ONCE = 2_000_000
 """Values of redrawn records at a time."""
 
-Labels = TypeVar("Labels", covariant=True)
-Numbers = TypeVar("Numbers", covariant=True)
-
-
-class Measure(Protocol[Labels, Numbers]):
-    """A measure of arrays and of Datasets; made by :func:`labelled`."""
-
-    @overload
-    def __call__(
-        self,
-        *,
-        predicted: xr.Dataset,
-        measured: xr.Dataset,
-        training_std: npt.ArrayLike | None = None,
-        noise_std: npt.ArrayLike | None = None,
-        interval: None = None,
-    ) -> Labels: ...
-    @overload
-    def __call__(
-        self,
-        *,
-        predicted: npt.ArrayLike,
-        measured: npt.ArrayLike,
-        training_std: npt.ArrayLike | None = None,
-        noise_std: npt.ArrayLike | None = None,
-        interval: None = None,
-    ) -> Numbers: ...
-    @overload
-    def __call__(
-        self,
-        *,
-        predicted: Any,
-        measured: Any,
-        training_std: npt.ArrayLike | None = None,
-        noise_std: npt.ArrayLike | None = None,
-        interval: float,
-    ) -> Any: ...
+Measure = Callable[..., Any]
+"""A measure of arrays, whose result is numbers, and of Datasets, whose result has labels."""
 
 
 def labelled(
@@ -98,7 +62,7 @@ def labelled(
     keeps: Literal["channel", "time", "neither"],
     units: str = "1",
     label: str | None = None,
-) -> Measure[Any, Any]:
+) -> Measure:
     """Let a measure of arrays take Datasets too.
 
     Parameters
@@ -117,8 +81,6 @@ def labelled(
     callable
         The measure, under the name and docstring of the one of arrays.
     """
-    if keeps not in ("channel", "time", "neither"):
-        raise RequestError(f"keeps must be 'channel', 'time' or 'neither'; received {keeps!r}.")
     name = label or measure.__name__
 
     @functools.wraps(measure)
@@ -138,25 +100,31 @@ def labelled(
         if interval is not None and keeps == "time":
             raise RequestError(f"{name} has a value at each instant, and no interval over time.")
 
-        known = {"training_std": training_std, "noise_std": noise_std}
         if not isinstance(predicted, xr.Dataset):
+            known = {"training_std": training_std, "noise_std": noise_std}
             arrays = {"predicted": predicted, "measured": measured}
             values = _valued(measure, arrays, known, interval)
             return values if values.ndim else values.item()
-        pairs = pair(predicted=predicted, measured=measured)
-        for key, data in zip(known, (predicted, measured), strict=True):
-            if known[key] is None:
-                known[key] = [data[each].attrs.get(key, 0.0) for each in pairs.names]
+        pairs, known = _paired(predicted, measured, training_std, noise_std)
         values = _valued(measure, pairs.arrays, known, interval)
-        bound = () if interval is None else ("bound",)
+        coords: dict[str, Any] = {} if interval is None else {"bound": list(BOUNDS)}
+        dims = (*coords, *pairs.lead)
         if keeps == "channel":
-            out = _per_channel(values, (*bound, *pairs.lead), pairs.names, units, name)
-            return out.assign_coords(bound=list(BOUNDS)) if bound else out
+            return xr.Dataset(
+                {
+                    each: (
+                        dims[: values.ndim - 1],
+                        values[..., column],
+                        {"units": units, "long_name": f"{name} of {each}"},
+                    )
+                    for column, each in enumerate(pairs.names)
+                },
+                coords=coords,
+            )
         if values.ndim == 0:
             return values.item()
-        dims = (*bound, *pairs.lead, *(("time",) if keeps == "time" else ()))
-        coords = {dim: predicted[dim] for dim in dims if dim in predicted.coords}
-        coords |= {each: list(BOUNDS) for each in bound}
+        dims += ("time",) * (keeps == "time")
+        coords |= {dim: predicted[dim] for dim in dims if dim in predicted.coords}
         attrs = {"units": units, "long_name": name}
         return xr.DataArray(values, coords, dims, name=measure.__name__, attrs=attrs)
 
@@ -164,25 +132,22 @@ def labelled(
     return judged
 
 
-def _per_channel(
-    values: Any, lead: tuple[str, ...], names: list[str], units: str, label: str
-) -> xr.Dataset:
-    return xr.Dataset(
-        {
-            name: (
-                lead[: values.ndim - 1],
-                values[..., column],
-                {"units": units, "long_name": f"{label} of {name}"},
-            )
-            for column, name in enumerate(names)
-        }
-    )
+def _paired(
+    predicted: xr.Dataset, measured: xr.Dataset, training_std: Any = None, noise_std: Any = None
+) -> tuple[Paired, dict[str, Any]]:
+    """Arrays of two Datasets, and the standard deviations that are given or that they carry."""
+    pairs = pair(predicted=predicted, measured=measured)
+    known = {"training_std": training_std, "noise_std": noise_std}
+    for key, data in zip(known, (predicted, measured), strict=True):
+        if known[key] is None:
+            known[key] = [data[each].attrs.get(key, 0.0) for each in pairs.names]
+    return pairs, known
 
 
 def _valued(
     measure: Callable[..., Any],
-    arrays: dict[str, Any],
-    known: dict[str, Any],
+    arrays: Mapping[str, Any],
+    known: Mapping[str, Any],
     level: float | None,
 ) -> Any:
     """A measure, or its bounds over redrawn blocks of instants, shape (2, …)."""
@@ -191,9 +156,8 @@ def _valued(
         return value
     if value.dtype == bool:
         raise RequestError(f"{measure.__name__} says yes or no, and has no interval.")
-    p, m, _, _ = core.paired(arrays["predicted"], arrays["measured"], None)
-    tails = fraction(level, "interval")
-    block = _block(p, m)
+    p, m, _, _ = core.paired(**arrays)
+    tails, block = fraction(level, "interval"), _block(p, m)
     axis = max(p.ndim, m.ndim) - 2  # of the draws, behind members and windows
     redrawn = _redrawn(measure, p, m, known, block)
     return np.stack(student_interval(value, redrawn, m.shape[-2] / block, tails, axis))
@@ -269,15 +233,15 @@ def anrmse_differences(
     True
     """
     level = fraction(interval, "interval")
-    counts = [len(of_model) for of_model in predicted]
-    if not counts or not measured or set(counts) != {len(measured)}:
-        raise RequestError(
-            f"predicted holds forecasts of {counts} runs, per model, and measured {len(measured)} "
-            "runs. Give every model one forecast of each run, and at least one of each."
-        )
     runs, draws, blocks = [], [], 0.0
-    for seed, (each, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
-        own, redrawn, held = _anrmse_of_run(forecasts, each, seed)
+    for seed, (truth, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
+        found = [_paired(each, truth) for each in forecasts]
+        cases = [(of.arrays["predicted"], of.arrays["measured"], known) for of, known in found]
+        block = max(_block(p, m) for p, m, _ in cases)
+        own = np.array([float(core.anrmse(predicted=p, measured=m, **k)) for p, m, k in cases])
+        redrawn = np.stack([_redrawn(core.anrmse, p, m, k, block, seed) for p, m, k in cases])
+        redrawn = np.where(np.isnan(own)[:, None], np.nan, redrawn)
+        held = cases[0][1].shape[-2] / block
         runs.append(_with_bounds(own, redrawn, held, level))
         draws.append(redrawn)
         blocks += held
@@ -312,33 +276,12 @@ def _ratio(values: FloatArray) -> FloatArray:
     return out
 
 
-def _anrmse_of_run(
-    forecasts: Sequence[xr.Dataset], measured: xr.Dataset, seed: int
-) -> tuple[FloatArray, FloatArray, float]:
-    """ANRMSE of several forecasts of a run, its draws (forecast, draw), and the blocks held."""
-    cases = []
-    for each in forecasts:
-        of = pair(predicted=each, measured=measured)
-        known = {
-            "training_std": [each[name].attrs.get("training_std", 0.0) for name in of.names],
-            "noise_std": [measured[name].attrs.get("noise_std", 0.0) for name in of.names],
-        }
-        cases.append((of.arrays["predicted"], of.arrays["measured"], known))
-    block = max(_block(p, m) for p, m, _ in cases)
-    values = np.array([core.anrmse(predicted=p, measured=m, **k) for p, m, k in cases], dtype=float)
-    redrawn = np.stack([_redrawn(core.anrmse, p, m, k, block, seed) for p, m, k in cases])
-    draws = np.where(np.isnan(values)[:, None], np.nan, redrawn)
-    return values, draws, cases[0][1].shape[-2] / block
-
-
-is_slack: Measure[xr.Dataset, BoolArray] = labelled(core.is_slack, "channel", label="slackness")
-nrmse: Measure[xr.Dataset, FloatArray] = labelled(core.nrmse, "channel", label="NRMSE")
-normalised_extremes_error: Measure[xr.Dataset, FloatArray] = labelled(
-    core.normalised_extremes_error, "channel", label="NAMMAE"
-)
-fit_percent: Measure[xr.Dataset, FloatArray] = labelled(core.fit_percent, "channel", "%", "fit")
-anrmse: Measure[float | xr.DataArray, float | FloatArray] = labelled(core.anrmse, "neither")
-nammae: Measure[float | xr.DataArray, float | FloatArray] = labelled(core.nammae, "neither")
-error_over_time: Measure[xr.DataArray, FloatArray] = labelled(
+is_slack = labelled(core.is_slack, "channel", label="slackness")
+nrmse = labelled(core.nrmse, "channel", label="NRMSE")
+normalised_extremes_error = labelled(core.normalised_extremes_error, "channel", label="NAMMAE")
+fit_percent = labelled(core.fit_percent, "channel", "%", "fit")
+anrmse = labelled(core.anrmse, "neither")
+nammae = labelled(core.nammae, "neither")
+error_over_time = labelled(
     core.error_over_time, "time", label="error in measured standard deviations"
 )

@@ -39,11 +39,6 @@ class Paired:
 
 def channel_names(data: xr.Dataset, name: str) -> list[str]:
     """Variables that hold numbers; words, such as the status of a forecast, are not channels."""
-    if strange := [key for key in data.data_vars if not isinstance(key, str)]:
-        raise RequestError(
-            f"{name} has a channel named {strange[0]!r}, which is no text. Rename it: "
-            f"data.rename({{{strange[0]!r}: 'heave'}})."
-        )
     names = [str(key) for key, each in data.data_vars.items() if each.dtype.kind not in "OUST"]
     if not names:
         raise RequestError(f"{name} holds no channel; there is nothing to judge.")
@@ -76,7 +71,13 @@ def pair(**sides: xr.Dataset) -> Paired:
     for side, data in others:
         _check_channels(names, reference, data, first, side)
         found = _at_instants(data[names], reference, side, first)
-        further = _check_lead(found, reference, side, first)
+        further = {str(dim) for dim in found.dims} - {"time"}
+        if strange := sorted(further - set(lead)):
+            raise RequestError(
+                f"{side} has the dimension '{strange[0]}' and {first} has not. Select one of it: "
+                f"{side}.isel({strange[0]}=0)."
+            )
+        xr.align(reference, found, join="exact", exclude={"time"})  # the same windows, members …
         values = _stacked(found, names, (*(dim for dim in lead if dim in further), "time"), side)
         if further:
             missing = [axis for axis, dim in enumerate(lead) if dim not in further]
@@ -143,22 +144,3 @@ def _at_instants(data: xr.Dataset, reference: xr.Dataset, side: str, first: str)
             f"{instant_text(given[-1], step)} s, and not every instant of the first is one of the "
             "second. Judge where both exist, on one time axis."
         ) from error
-
-
-def _check_lead(data: xr.Dataset, reference: xr.Dataset, side: str, first: str) -> set[str]:
-    """Dimensions of `data` beside time, which `reference` must have too, with the same labels."""
-    further = {str(dim) for dim in data.dims} - {"time"}
-    for dim in sorted(further):
-        if dim not in reference.dims:
-            raise RequestError(
-                f"{side} has the dimension '{dim}' and {first} has not. Select one of it: "
-                f"{side}.isel({dim}=0)."
-            )
-        labels = [each[dim].values for each in (reference, data) if dim in each.coords]
-        same = reference.sizes[dim] == data.sizes[dim] and np.array_equal(labels[:1], labels[-1:])
-        if not same:
-            raise RequestError(
-                f"{side} and {first} differ along the dimension '{dim}' ({data.sizes[dim]} and "
-                f"{reference.sizes[dim]} entries, or others). Select the same ones of both."
-            )
-    return further

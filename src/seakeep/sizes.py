@@ -34,8 +34,6 @@ MOST_CARRIED = 2000
 """Places at which a wave is read beforehand: 80 kB a sample of a run."""
 MOST_TERMS = 4000
 """Polynomials in the distance of a carried wave: each takes as much memory as the record."""
-MOST_PADDING = 10_000_000
-"""Samples by which a record is continued at either end: 80 MB each."""
 MOST_STEPS = 10_000_000
 """Samples per column of a raw file of the tank, and steps of a simulated run: 80 MB per column."""
 MOST_PRODUCTS = 2e10

@@ -9,18 +9,17 @@ by channel; text, such as the status of an ensemble's members, is left out. All 
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+import inspect
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray
-from seakeep.core import bootstrap as _bootstrap
-from seakeep.core import coverage as _coverage
-from seakeep.core import divergence as _divergence
+from seakeep.arrays import finite
+from seakeep.core import bootstrap, divergence
+from seakeep.core import coverage as of_arrays
 from seakeep.core.bands import BandErrors, band_error_over_time, split_bands
 from seakeep.core.bootstrap import (
     BlockChoice,
@@ -39,7 +38,6 @@ from seakeep.core.coverage import (
     winkler_score,
 )
 from seakeep.core.density import (
-    Bandwidth,
     DensityInterval,
     density_grid,
     density_interval,
@@ -87,16 +85,34 @@ __all__ = [
 ]
 
 
-def _labelled(**sides: object) -> bool:
-    """Whether all are Datasets; refuse a mixture."""
-    kinds = [isinstance(side, xr.Dataset) for side in sides.values()]
-    if any(kinds) and not all(kinds):
-        received = ", ".join(f"{name}: {type(side).__name__}" for name, side in sides.items())
-        raise RequestError(f"give Datasets throughout, or arrays throughout; received {received}.")
-    return all(kinds)
+def _labelled(
+    of_arrays: Callable[..., Any], *sides: str
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Let a function of arrays take Datasets for its arguments `sides`, by the one decorated.
+
+    Its name, signature and docstring are those of the function of arrays.
+    """
+    signature = inspect.signature(of_arrays)
+
+    def decorate(of_datasets: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(of_arrays)
+        def either(*args: Any, **settings: Any) -> Any:
+            received = signature.bind(*args, **settings).arguments
+            kinds = {side: type(received[side]).__name__ for side in sides}
+            labelled = sum(isinstance(received[side], xr.Dataset) for side in sides)
+            if labelled not in (0, len(sides)):
+                words = ", ".join(f"{side}: {kind}" for side, kind in kinds.items())
+                raise RequestError(
+                    f"give Datasets throughout, or arrays throughout; received {words}."
+                )
+            return (of_datasets if labelled else of_arrays)(*args, **settings)
+
+        return either
+
+    return decorate
 
 
-@functools.wraps(_bootstrap.moving_block_bootstrap)
+@functools.wraps(bootstrap.moving_block_bootstrap)
 def moving_block_bootstrap(
     series: Any,
     n_series: int,
@@ -106,124 +122,74 @@ def moving_block_bootstrap(
     segments: Sequence[int] | None = None,
 ) -> Any:
     """Take DataArrays and Datasets too; the docstring shown is that of the array function."""
-    redraw = functools.partial(
-        _bootstrap.moving_block_bootstrap,
-        n_series=n_series,
-        block_length=block_length,
-        rng=rng,
-        segments=segments,
-    )
-    if isinstance(series, xr.DataArray):
-        name = "series" if series.name is None else str(series.name)
-        whole = series.rename(name).to_dataset()
-        drawn = moving_block_bootstrap(whole, n_series, block_length, rng, segments=segments)
-        return drawn[name].rename(series.name)
-    if not isinstance(series, xr.Dataset):
-        return redraw(series)
-    names = channel_names(series, "series")
-    wrong = [name for name in names if series[name].dims != ("time",)]
-    if wrong:
-        raise RequestError(
-            f"'{wrong[0]}' has the dimensions {series[wrong[0]].dims}; ('time',) is needed. "
-            "Select one run and one member."
+    if not isinstance(series, xr.DataArray | xr.Dataset):
+        return bootstrap.moving_block_bootstrap(
+            series, n_series, block_length, rng, segments=segments
         )
-    values = redraw(np.stack([series[name].values for name in names], axis=-1))
-    coords = {"time": series["time"]} if "time" in series.coords else None
-    return xr.Dataset(
-        {
-            name: (("draw", "time"), values[..., column], series[name].attrs)
-            for column, name in enumerate(names)
-        },
-        coords=coords,
+    whole = series.to_dataset(name="series") if isinstance(series, xr.DataArray) else series
+    for name in channel_names(whole, "series"):
+        finite(whole[name].transpose("time", ...).values, f"channel '{name}'")
+    positions = bootstrap.bootstrap_indices(
+        series.sizes["time"], n_series, block_length, rng, segments
     )
+    drawn = series.drop_vars("time", errors="ignore").isel(
+        time=xr.DataArray(positions, dims=("draw", "time"))
+    )
+    return drawn.assign_coords(time=series["time"]) if "time" in series.coords else drawn
 
 
-def _divergence_of(
-    name: str,
-    p: FloatArray,
-    measured: FloatArray,
-    block: int | BlockRule,
-    rng: np.random.Generator,
-    settings: dict[str, Any],
-) -> JsdInterval:
-    # The array core, its messages and warnings with the channel's name.
-    try:
-        if isinstance(block, str):
-            choice = choose_block_length(measured, block, segments=settings["segments"])
-            block = choice.samples
-            if choice.capped:
-                message = f"channel '{name}': {_bootstrap.too_long(choice, measured.size)}"
-                warn(message)
-        return _divergence.jsd_interval(
-            p.reshape(-1, p.shape[-1]), measured, block_length=block, rng=rng, **settings
-        )
-    except DataError as error:
-        raise DataError(f"channel '{name}': {error}") from error
-
-
-@functools.wraps(_divergence.jsd_interval)
+@_labelled(divergence.jsd_interval, "predicted", "measured")
 def jsd_interval(
-    predicted: Any,
-    measured: Any,
+    predicted: xr.Dataset,
+    measured: xr.Dataset,
     *,
     block_length: int | BlockRule,
     rng: np.random.Generator,
-    n_series: int = 100,
-    bandwidth: Bandwidth = "paper",
-    grid: npt.ArrayLike | None = None,
-    segments: Sequence[int] | None = None,
-) -> Any:
-    """Take Datasets too; the docstring shown is that of the array function."""
-    settings: dict[str, Any] = {
-        "n_series": n_series,
-        "bandwidth": bandwidth,
-        "segments": segments,
-    }
-    if not _labelled(predicted=predicted, measured=measured):
-        return _divergence.jsd_interval(
-            predicted, measured, block_length=block_length, rng=rng, grid=grid, **settings
-        )
+    grid: None = None,
+    **settings: Any,
+) -> xr.Dataset:
+    """Judge each channel with a child of the generator; one that has none is named."""
     if grid is not None:
         raise RequestError("channels of a Dataset have grids of their own; leave grid out.")
     pairs = pair(predicted=predicted, measured=measured)
-    names, series = pairs.names, pairs.arrays
-    if series["measured"].ndim > 2:
+    p, m = pairs.arrays["predicted"], pairs.arrays["measured"]
+    if m.ndim > 2:
         raise RequestError(
-            f"measured has the dimensions {measured[names[0]].dims}; ('time',) is needed. Select "
-            "one run."
+            f"measured has the dimensions {measured[pairs.names[0]].dims}; ('time',) is needed. "
+            "Select one run."
         )
-    children = rng.spawn(len(names))
-    found = [
-        _divergence_of(
-            name,
-            series["predicted"][..., column],
-            series["measured"][:, column],
-            block_length,
-            child,
-            settings,
-        )
-        for column, (name, child) in enumerate(zip(names, children, strict=True))
-    ]
-    numbers = [
-        field.name
-        for field in fields(_divergence.JsdInterval)
-        if field.name not in ("draws", "noise", "grid", "predicted", "measured")
-    ]
+    found = []
+    for column, (name, child) in enumerate(zip(pairs.names, rng.spawn(p.shape[-1]), strict=True)):
+        series, block = m[:, column], block_length
+        try:
+            if isinstance(block, str):
+                choice = choose_block_length(series, block, segments=settings.get("segments"))
+                block = choice.samples
+                if choice.capped:
+                    warn(f"channel '{name}': {bootstrap.too_long(choice, series.size)}")
+            rows = p[..., column].reshape(-1, series.size)
+            found.append(
+                divergence.jsd_interval(rows, series, block_length=block, rng=child, **settings)
+            )
+        except DataError as error:
+            raise DataError(f"channel '{name}': {error}") from error
+    arrays = ("draws", "noise", "grid", "predicted", "measured")
+    keys = [field.name for field in fields(JsdInterval) if field.name not in arrays]
     return xr.Dataset(
-        {
-            key: ("channel", [getattr(item, key) for item in found])
-            for key in (*numbers, "uncertainty")
+        {key: ("channel", [getattr(item, key) for item in found])
+         for key in (*keys, "uncertainty")},
+        coords={"channel": pairs.names},
+        attrs={
+            "units": "nat",
+            "n_series": found[0].draws.shape[1],
+            "bandwidth": settings.get("bandwidth", "paper"),
         },
-        coords={"channel": names},
-        attrs={"units": "nat", "n_series": n_series, "bandwidth": bandwidth},
-    )
+    )  # fmt: skip
 
 
-@functools.wraps(_coverage.coverage)
-def coverage(lower: Any, upper: Any, measured: Any) -> Any:
-    """Take Datasets too; the docstring shown is that of the array function."""
-    if not _labelled(lower=lower, upper=upper, measured=measured):
-        return _coverage.coverage(lower, upper, measured)
+@_labelled(of_arrays.coverage, "lower", "upper", "measured")
+def coverage(lower: xr.Dataset, upper: xr.Dataset, measured: xr.Dataset) -> xr.Dataset:
+    """Judge the channels of all; one with gaps is named."""
     pairs = pair(lower=lower, upper=upper, measured=measured)
     names, lead = pairs.names, pairs.lead
     m = pairs.arrays["measured"]
@@ -233,12 +199,9 @@ def coverage(lower: Any, upper: Any, measured: Any) -> Any:
                 f"channel '{name}' of measured holds values that are NaN or infinite. Fill its "
                 "gaps first, or judge a window without them."
             )
-    band = _coverage.coverage(**pairs.arrays)
+    band = of_arrays.coverage(**pairs.arrays)
     return xr.Dataset(
-        {
-            field.name: ((*lead, "channel"), getattr(band, field.name))
-            for field in fields(_coverage.BandCoverage)
-        },
+        {key: ((*lead, "channel"), values) for key, values in vars(band).items()},
         coords=_channels(names, measured)
         | {dim: lower[dim] for dim in lead if dim in lower.coords},
     )
@@ -250,31 +213,28 @@ def _channels(names: Sequence[str], measured: xr.Dataset) -> dict[str, Any]:
     return {"channel": list(names), "unit": ("channel", units)}
 
 
-@functools.wraps(_coverage.coverage_table)
+@_labelled(of_arrays.coverage_table, "lower", "upper", "measured")
 def coverage_table(
-    lower: Any, upper: Any, measured: Any, level: float = 0.95, waves: Any = None
-) -> Any:
-    """Take Datasets too; the docstring shown is that of the array function."""
-    if not _labelled(lower=lower, upper=upper, measured=measured):
-        return _coverage.coverage_table(lower, upper, measured, level, waves)
+    lower: xr.Dataset,
+    upper: xr.Dataset,
+    measured: xr.Dataset,
+    level: float = 0.95,
+    waves: xr.DataArray | None = None,
+) -> xr.Dataset:
+    """Judge the channels of all, by parts of the horizon and by wave height."""
     pairs = pair(lower=lower, upper=upper, measured=measured)
     heights = None
     if waves is not None:
-        if not isinstance(waves, xr.DataArray):
-            raise RequestError(
-                f"waves is a {type(waves).__name__}; with Datasets it must be a DataArray with the "
-                "dimension 'time'."
-            )
         first = pairs.names[0]  # a height beside the bounds of a channel, at their instants
         alone = xr.Dataset({first: waves.assign_attrs(units="")})
         heights = pair(lower=lower[[first]], waves=alone).arrays["waves"][..., 0]
-    found = _coverage.coverage_table(**pairs.arrays, level=level, waves=heights)
-    dims = {"parts": ("part",), "instants": ("part",)}
+    found = of_arrays.coverage_table(**pairs.arrays, level=level, waves=heights)
+    dims = {"instants": ("part",)}
     table = xr.Dataset(
         {
-            field.name: (dims.get(field.name, ("part", "channel")), getattr(found, field.name))
-            for field in fields(CoverageTable)
-            if field.name != "parts"
+            key: (dims.get(key, ("part", "channel")), values)
+            for key, values in vars(found).items()
+            if key != "parts"
         },
         coords={"part": list(found.parts), **_channels(pairs.names, measured)},
     )

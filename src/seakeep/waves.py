@@ -18,33 +18,21 @@ GRAVITY = 9.81
 """Acceleration of gravity, m/s²."""
 
 
-def _checked(name: str, value: npt.ArrayLike, infinite: bool = False) -> FloatArray:
-    array = as_real(value, name)
-    if not np.all((array >= 0) & (np.isfinite(array) | infinite)):
+def _checked(
+    name: str, value: npt.ArrayLike, depth: npt.ArrayLike, positive: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """A quantity that is zero or positive, beside the water depth at which it is wanted."""
+    array, h = as_real(value, name), as_real(depth, "the water depth")
+    if not np.all((array >= 0) & np.isfinite(array)) or (positive and not array.all()):
         raise RequestError(
-            f"{name} must be zero or positive, {'or infinite' if infinite else 'and finite'};"
-            f" received {value!r}. Check its sign and unit (rad/s for frequencies, m for lengths)."
+            f"{name} must be {'positive' if positive else 'zero or positive, and finite'}; "
+            f"received {value!r}. Check its sign and unit (rad/s for frequencies, m for lengths)."
         )
-    return array
-
-
-def _length(name: str, value: npt.ArrayLike, infinite: bool = False) -> FloatArray:
-    array = _checked(name, value, infinite)
-    if np.any(array == 0):
-        raise RequestError(f"{name} must be positive; received 0. Give it in metres.")
-    return array
-
-
-def _side_by_side(first: FloatArray, depth: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """A quantity beside the water depth at which it is wanted."""
-    h = _length("the water depth", depth, infinite=True)
-    try:
-        one, other = np.broadcast_arrays(first, h)
-    except ValueError:
+    if not np.all(h > 0):
         raise RequestError(
-            f"shapes {first.shape} and {h.shape} (of the water depth) do not fit together. "
-            "Give one depth, or one per value."
-        ) from None
+            f"the water depth must be positive; received {depth!r}. Give it in metres."
+        )
+    one, other = np.broadcast_arrays(array, h)
     return one, other
 
 
@@ -81,7 +69,7 @@ def wavenumber(
     >>> round(float(2 * np.pi / k), 2)  # wavelength in metres
     2.11
     """
-    omega, h = _side_by_side(_checked("the frequency", frequency), depth)
+    omega, h = _checked("the frequency", frequency, depth)
     deep = omega**2 / gravity
     k = np.array(deep, dtype=float)
     finite = np.isfinite(h) & (omega > 0)
@@ -122,7 +110,7 @@ def phase_speed(
     RequestError
         As :func:`wavenumber`.
     """
-    omega, h = _side_by_side(_checked("the frequency", frequency), depth)
+    omega, h = _checked("the frequency", frequency, depth)
     k = wavenumber(omega, h, gravity)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(omega > 0, omega / k, np.sqrt(gravity * h))
@@ -152,7 +140,7 @@ def group_speed(
     RequestError
         As :func:`wavenumber`.
     """
-    omega, h = _side_by_side(_checked("the frequency", frequency), depth)
+    omega, h = _checked("the frequency", frequency, depth)
     two_kh = np.where(
         omega > 0, 2.0 * wavenumber(omega, h, gravity) * np.where(omega > 0, h, 1.0), 0
     )
@@ -186,6 +174,6 @@ def wavelength_to_frequency(
     RequestError
         If a wavelength or depth is not positive.
     """
-    length, h = _side_by_side(_length("the wavelength", wavelength), depth)
+    length, h = _checked("the wavelength", wavelength, depth, positive=True)
     k = 2.0 * np.pi / length
     return np.sqrt(gravity * k * np.tanh(k * h))

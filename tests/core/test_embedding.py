@@ -5,33 +5,13 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from seakeep.core import embed, snapshot_matrices, training_window, unembed
+from seakeep.core import embed, training_window
 
 
 def test_blocks_are_lag_major_the_newest_first():
     series = np.array([[0.0, 10], [1, 11], [2, 12], [3, 13]])
     column = embed(series, delays=2, first=3, count=1)[:, 0]
     np.testing.assert_array_equal(column, [3, 13, 2, 12, 1, 11])
-
-
-@given(samples=st.integers(1, 30), channels=st.integers(1, 4), delays=st.integers(0, 10))
-def test_unembed_undoes_embed(samples, channels, delays):
-    series = np.arange(float((samples + delays) * channels)).reshape(-1, channels)
-    columns = embed(series, delays, first=delays, count=samples)
-    assert columns.shape == (channels * (delays + 1), samples)
-    np.testing.assert_array_equal(unembed(columns, channels), series)
-
-
-def test_targets_are_the_regressors_one_sample_later():
-    x, u = np.arange(20.0)[:, None], 100 + np.arange(20.0)[:, None]
-    place = training_window(19, None, 2, 3, "before")
-    y, target = snapshot_matrices(x, u, place, 2, 3, all_rows=True)
-    np.testing.assert_array_equal(y[:, 0], [3, 2, 1, 103, 102, 101, 100])
-    np.testing.assert_array_equal(target[:, 0], [4, 3, 2])
-    np.testing.assert_array_equal(y[:, -1], [18, 17, 16, 118, 117, 116, 115])
-    np.testing.assert_array_equal(target[:, -1], [19, 18, 17])
-    _, top = snapshot_matrices(x, u, place, 2, 3, all_rows=False)
-    np.testing.assert_array_equal(top, target[:1])
 
 
 @pytest.mark.parametrize(

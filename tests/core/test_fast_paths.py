@@ -1,19 +1,18 @@
 """Each trick of the fast core equals the plain formula over random shapes."""
 
 import sys
-from dataclasses import dataclass
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from matrices import Problem
 
 from seakeep.core import gram as gram_module
-from seakeep.core import identify, rollout, snapshot_matrices
+from seakeep.core import rollout
 from seakeep.core.embedding import TrainingWindow
 from seakeep.core.gram import (
-    Piece,
     gram_trace,
     lagged_response,
     lagged_sums,
@@ -27,60 +26,6 @@ ROLLOUT = sys.modules["seakeep.core.rollout"]
 TIGHT = 1e-12
 # The house rule for results; the condition number here is below 1e4.
 RESULT = 1e-10
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Runs with groups of channels: states, delayed and direct inputs, down to none."""
-
-    states: list
-    inputs: list
-    direct: list
-    windows: list
-    s: int
-    z: int
-
-    def matrices(self, all_rows=True):
-        """Plain Hankel matrices."""
-        found = []
-        for x, u, d, window in zip(
-            self.states, self.inputs, self.direct, self.windows, strict=True
-        ):
-            y, target = snapshot_matrices(x, u, window, self.s, self.z, all_rows)
-            beside = d[window.first_column : window.last].T
-            found.append((np.concatenate([y, beside]), target))
-        return tuple(np.concatenate(group, axis=1) for group in zip(*found, strict=True))
-
-    @property
-    def pieces(self):
-        """What the fast paths take, without groups that have no channel."""
-        return [
-            Piece(
-                groups[0],
-                tuple(group for group in groups if group.shape[1]),
-                window.first_column,
-                window.columns,
-            )
-            for *groups, window in zip(
-                self.states, self.inputs, self.direct, self.windows, strict=True
-            )
-        ]
-
-    @property
-    def delays(self):
-        groups = zip((self.states, self.inputs, self.direct), (self.s, self.z, 0), strict=True)
-        return tuple(delay for group, delay in groups if group[0].shape[1])
-
-    def identify(self, **options):
-        return identify(
-            self.states,
-            self.inputs,
-            self.windows,
-            state_delays=self.s,
-            input_delays=self.z,
-            direct=self.direct,
-            **options,
-        ).coefficients
 
 
 @st.composite
@@ -141,36 +86,19 @@ def test_the_trace_is_the_sum_of_squares(problem):
 
 
 @settings(deadline=None)
-@given(problems(), st.floats(0.5, 200.0), st.booleans())
-def test_every_form_gives_the_papers_formula(problem, ridge, all_rows):
+@given(problems(), st.floats(0.5, 200.0), st.sampled_from(["all rows", "newest", "a filter"]))
+def test_every_form_gives_the_papers_formula(problem, ridge, kind):
+    """A filter has inputs alone among its regressors."""
+    all_rows, delays = kind == "all rows", problem.s
     regressors, targets = problem.matrices(all_rows)
+    if kind == "a filter":
+        assume(problem.inputs[0].shape[1] + problem.direct[0].shape[1] > 0)
+        regressors, delays = regressors[problem.states[0].shape[1] * (problem.s + 1) :], None
     plain = regressors @ regressors.T + ridge * np.eye(len(regressors))
     expected = np.linalg.solve(plain, regressors @ targets.T).T
     for method in ("primal", "dual", "svd", None):
-        found = problem.identify(ridge=ridge, all_rows=all_rows, method=method)
-        np.testing.assert_allclose(found, expected, atol=RESULT)
-
-
-@settings(deadline=None)
-@given(problems(), st.floats(0.5, 200.0))
-def test_a_filter_of_the_inputs_has_no_states_among_its_regressors(problem, ridge):
-    assume(problem.inputs[0].shape[1] + problem.direct[0].shape[1] > 0)
-    regressors, targets = problem.matrices(all_rows=False)
-    inputs = regressors[problem.states[0].shape[1] * (problem.s + 1) :]
-    plain = inputs @ inputs.T + ridge * np.eye(len(inputs))
-    expected = np.linalg.solve(plain, inputs @ targets.T).T
-    for method in ("primal", "dual", "svd", None):
-        found = identify(
-            problem.states,
-            problem.inputs,
-            problem.windows,
-            state_delays=None,
-            input_delays=problem.z,
-            direct=problem.direct,
-            ridge=ridge,
-            all_rows=False,
-            method=method,
-        ).coefficients
+        options = {"all_rows": all_rows, "method": method, "state_delays": delays}
+        found = problem.solved(ridge, **options).coefficients
         np.testing.assert_allclose(found, expected, atol=RESULT)
 
 
@@ -181,7 +109,7 @@ def test_a_rank_is_that_of_the_truncated_matrix(problem, rank):
     left, values, right = np.linalg.svd(regressors, full_matrices=False)
     kept = min(rank, int(np.sum(values > values[0] * 1e-12)))
     expected = targets @ right[:kept].T / values[:kept] @ left[:, :kept].T
-    found = problem.identify(ridge=0.0, rank=rank)
+    found = problem.solved(0.0, rank=rank).coefficients
     np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
 
 
@@ -282,15 +210,3 @@ def test_free_runs_of_the_papers_size_are_the_loop(kind, windows):
         for history, series in zip(histories, inputs, strict=True)
     ]
     np.testing.assert_allclose(rollout(a, b, histories, inputs), expected, atol=RESULT)
-
-
-def test_a_gap_in_the_inputs_does_not_reach_back_beyond_its_block_of_steps():
-    rng = np.random.default_rng(0)
-    a, b = rng.normal(size=(360, 360)) / 30, rng.normal(size=(360, 2 * 161)) / 10
-    histories, inputs = rng.normal(size=(12, 90, 4)), rng.normal(size=(12, 160 + 400, 2))
-    whole = rollout(a, b, histories, inputs)
-    inputs[3, 160 + 200] = np.nan
-    found = rollout(a, b, histories, inputs)
-    # Step 201 is the first to read the instant 200 after the start; no block is longer than 64.
-    np.testing.assert_allclose(found[3, :128], whole[3, :128], atol=RESULT)
-    assert np.isnan(found[3, 200:]).all()

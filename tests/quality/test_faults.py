@@ -47,7 +47,7 @@ def faulty(x, kind, length, place):
     return x
 
 
-@pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 7, 10, 15, 40, 100, 300, 1000, 1600, 2900, 3000])
+@pytest.mark.parametrize("length", [1, 3, 4, 5, 10, 40, 300, 1600, 3000])
 @pytest.mark.parametrize("kind", ["held", "zero", "-99.9", "spiked"])
 def test_a_fault_of_any_length_is_reported(kind, length):
     """Shorter runs of plausible readings occur by chance: 4 equal ones do not in 3000 samples."""
@@ -65,15 +65,16 @@ def test_flags_spoil_no_sample_beside_them(noisy, length):
 
 def test_a_sound_series_is_left_alone(noisy):
     assert reported(noisy) == set()
-    change, certain = level_drift(noisy, DT, PERIOD)
-    assert abs(change) < 0.5 * noisy.std() or certain < 5
-
-
-def test_noise_has_no_outliers_and_no_memory():
+    # A pulse of seven samples, three times the spread: it grows and falls.
+    impact = noisy.copy()
+    impact[1500:1507] += 3 * noisy.std() * np.hanning(9)[1:-1]
+    assert not find_outliers(impact).any()
     noise = np.random.default_rng(0).standard_normal(100_000)
     assert not find_outliers(noise).any()
     # The share of n samples of white noise scatters by 1/√n.
     assert noise_share(noise) == pytest.approx(1.0, abs=0.01)
+    change, certain = level_drift(noisy, DT, PERIOD)
+    assert abs(change) < 0.5 * noisy.std() or certain < 5
 
 
 @pytest.mark.parametrize("share", [0.05, 0.3, 0.6])
@@ -93,12 +94,6 @@ def test_spikes_of_harmful_size(noisy, size):
     assert np.flatnonzero(find_outliers(noisy)).tolist() == at
 
 
-def test_a_resolved_impact_is_no_outlier(noisy):
-    """A pulse of seven samples, three times the spread: it grows and falls."""
-    noisy[1500:1507] += 3 * noisy.std() * np.hanning(9)[1:-1]
-    assert not find_outliers(noisy).any()
-
-
 def test_a_line_that_sticks_and_slips_has_no_outliers():
     random = np.random.default_rng(0)
     load = np.repeat(np.cumsum(random.normal(0, 1, 150)), 20) + random.normal(0, 1e-3, T.size)
@@ -107,24 +102,14 @@ def test_a_line_that_sticks_and_slips_has_no_outliers():
     assert np.flatnonzero(find_outliers(load)).tolist() == [1007]
 
 
-def test_still_before_the_waves_is_not_held(noisy):
+def test_at_rest_around_the_waves_is_not_held(noisy):
     noisy[:600] = noisy[600]
-    witness = waves() * (np.arange(3000) >= 600)
     assert not find_held(noisy, DT).any()
-    assert not find_held(noisy, DT, witness).any()
+    assert not find_held(noisy, DT, waves() * (np.arange(3000) >= 600)).any()
     assert find_held(noisy, DT, waves()).sum() == 601  # a witness that moved
-
-
-def test_at_rest_after_the_waves_is_not_held():
     decay = np.exp(-0.1 * np.clip(T - 80, 0, None) * 2 * np.pi / PERIOD)
     x = np.round(waves() * decay, 1)
     assert not find_held(x, DT).any()
-
-
-def test_a_signal_that_freezes_for_its_last_second():
-    x = waves()
-    x[-25:] = x[-25]
-    assert np.flatnonzero(find_held(x, DT)).tolist() == list(range(2975, 3000))
 
 
 @pytest.mark.parametrize("steps", [3, 5, 10, 100])

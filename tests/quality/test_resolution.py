@@ -38,12 +38,8 @@ def test_frames_that_were_interpolated_to_a_faster_rate(every):
 
 def test_noise_larger_than_the_step_hides_it():
     noisy = SEA + 0.05 * RNG.standard_normal(SEA.size)
+    for read in (SEA, np.full(500, 2.0), np.where(T < 50, SEA, SEA[10_000])):  # the last froze once
+        assert np.isnan(reading_step(read))
     assert np.isnan(reading_step(np.round(noisy, 5)))
     # Steps well above the noise are seen through it.
     assert reading_step(0.4 * np.round(noisy / 0.4)) == pytest.approx(0.4, rel=1e-6)
-
-
-@pytest.mark.parametrize("read", [SEA, np.full(500, 2.0), np.where(T < 50, SEA, SEA[10_000])])
-def test_no_steps(read):
-    """A continuous record, a constant one, and one that froze once."""
-    assert np.isnan(reading_step(read))

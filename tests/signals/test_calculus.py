@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import RequestError
 from seakeep.signals import (
     band_pass,
     complementary_filter,
@@ -23,29 +23,20 @@ INNER = slice(2500, -2500)
 @given(
     st.floats(min_value=0.5, max_value=4.0),
     st.floats(min_value=0.0, max_value=6.28),
-    st.sampled_from([1, 2]),
+    st.sampled_from([0, 1, 2]),
 )
 def test_integral_of_a_wave_in_the_band(frequency, phase, times):
     omega = 2 * np.pi * frequency
     wave = np.sin(omega * T + phase)
     derivative = omega**times * np.sin(omega * T + phase + times * np.pi / 2)
-    out = integrate(derivative + 0.2, DT, (0.4, 5.0), times)
+    # What is slower than the band goes: an offset, and a drift.
+    drifting = derivative + 0.2 + 0.01 * np.sin(2 * np.pi * 0.02 * T)
+    out = (
+        integrate(drifting, DT, (0.4, 5.0), times) if times else band_pass(drifting, DT, (0.4, 5.0))
+    )
     # Linear prediction continues a wave over the ends; what is left is the offset's end.
     assert np.max(np.abs(out - wave)[INNER]) < 0.005
     assert np.max(np.abs(out - wave)) < 0.05
-
-
-def test_drift_does_not_pass():
-    out = integrate(0.5 + 0.01 * T + 0.1 * np.sin(2 * np.pi * 0.02 * T), DT, (0.4, 5.0), 2)
-    assert np.max(np.abs(out[INNER])) < 2e-3  # against 0.1/ω² = 6 m unfiltered
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.floats(min_value=0.55, max_value=4.4), st.floats(min_value=0.0, max_value=6.28))
-def test_band_pass_keeps_the_band_and_its_phase(frequency, phase):
-    wave = np.sin(2 * np.pi * frequency * T + phase)
-    out = band_pass(wave + 0.2, DT, (0.4, 5.0))
-    assert np.max(np.abs(out - wave)[INNER]) < 0.005  # the gain is one there; ends leak a little
 
 
 @pytest.mark.parametrize(("frequency", "gain"), [(0.2, 0.0), (0.4, 0.5), (5.0, 0.5), (6.0, 0.0)])
@@ -59,7 +50,6 @@ def test_gain_of_the_band(frequency, gain):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (((0.3, 5.0), 3), "integrate once or twice: times must be 1 or 2; received 3"),
         (((0.0, 5.0), 1), r"needs 0 < low < high.*received \(0, 5\) Hz"),
         (((2.0, 1.0), 1), r"received \(2, 1\) Hz"),
         (((0.3, 60.0), 1), r"at most the Nyquist frequency \(50 Hz\)"),
@@ -82,11 +72,6 @@ def test_error_of_the_derivative_is_the_one_stated():
     error = differentiate(np.sin(omega * t), dt) - omega * np.cos(omega * t)
     # dt⁴ f⁗′/30, its next term (ω dt)² smaller: 1.6 %.
     assert np.max(np.abs(error[2:-2])) == pytest.approx(dt**4 * omega**5 / 30, rel=0.02)
-
-
-def test_derivative_needs_five_samples():
-    with pytest.raises(DataError, match="at least 5 are needed"):
-        differentiate([1.0, 2.0, 3.0, 4.0], 0.1)
 
 
 def test_envelope_of_a_group():

@@ -7,21 +7,12 @@ from seakeep.errors import DataError
 from seakeep.signals import bridge, inspect_times, onto_uniform
 
 
-def test_a_sound_axis_is_left_alone():
-    t = 3.0 + 0.02 * np.arange(500)
-    report = inspect_times(t)
-    assert report.uniform
-    assert report.step == pytest.approx(0.02, rel=1e-12)
-    time, x = onto_uniform(t, np.sin(t))
-    np.testing.assert_array_equal(time, t)
-    np.testing.assert_array_equal(x, np.sin(t))
-
-
 def test_gaps_are_told_and_masked():
     t = 0.02 * np.arange(500)
     kept = np.ones(500, bool)
     kept[100:110] = kept[300] = False
     report = inspect_times(t[kept])
+    assert inspect_times(np.round(np.arange(900) / 30, 3)).uniform  # decimals are no jitter
     assert report.gaps == ((1.98, 0.22), (5.98, 0.04))
     assert (report.missing, report.jittered) == (11, False)
     time, x = onto_uniform(t[kept], np.sin(t[kept]))
@@ -42,15 +33,6 @@ def test_jitter_is_told_and_interpolated_away():
     np.testing.assert_allclose(x[1:-1], np.sin(2 * np.pi * time)[1:-1], atol=1e-4)
 
 
-def test_decimals_of_the_file_are_no_jitter():
-    assert inspect_times(np.round(np.arange(900) / 30, 3)).uniform
-
-
-def test_hardly_a_record():
-    with pytest.raises(DataError, match=r"the run misses 9\d+ samples and has 10"):
-        onto_uniform(np.append(np.arange(9), 1000.0), np.zeros(10))
-
-
 def test_short_gaps_are_bridged_and_long_ones_marked():
     t = 0.01 * np.arange(1000)
     x = np.sin(2 * np.pi * 0.5 * t)
@@ -65,6 +47,8 @@ def test_short_gaps_are_bridged_and_long_ones_marked():
     np.testing.assert_array_equal(result.values[there], x[there])
 
 
-def test_nothing_to_go_by():
+def test_words():
+    with pytest.raises(DataError, match=r"the run misses 9\d+ samples and has 10"):
+        onto_uniform(np.append(np.arange(9), 1000.0), np.zeros(10))
     with pytest.raises(DataError, match=r"the series has 1 value\(s\) in 4 samples"):
         bridge([np.nan, 1.0, np.nan, np.nan], 0.1, 1.0)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from seakeep.errors import DataError, RequestError
 from seakeep.signals import predict_waves
 from seakeep.signals.prediction import draw_sea, draw_waves, predictable_time
 from seakeep.waves import wavenumber
@@ -24,17 +23,6 @@ def test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on():
     error = np.abs(found - [3.0, -1.0] - expected[2:]).max(axis=0) / spread
     assert np.all(error < 0.25)
     assert np.all(np.abs(expected[2:]).max(axis=0) > 0.5 * spread)  # what there was to foresee
-
-
-def test_waves_of_a_few_frequencies_are_foreseen_and_noise_is_not():
-    t = 0.05 * np.arange(1264)
-    tones = sum(np.cos(2 * np.pi * f * t + f) for f in (0.5, 0.61, 0.7))
-    error = predict_waves(tones[:1200], 64) - tones[1200:]
-    # Burg's frequencies are off by a part that goes with the record's inverse length.
-    assert np.abs(error).max() < 0.1 * tones.std()
-    noise = np.random.default_rng(1).standard_normal(1200)
-    # Nothing can be foreseen: the mean, to the error of the coefficients.
-    assert np.abs(predict_waves(noise, 64)).max() < 0.5
 
 
 def test_columns_are_continued_alone_and_a_still_one_stays():
@@ -76,13 +64,6 @@ def test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it(sea):
         assert found.std(axis=0)[:known, column].mean() < 0.1 * spread[column]
 
 
-def test_futures_of_a_sea_lie_in_pairs_and_spread_as_its_errors_do(sea):
-    found = drawn(sea, [0.0, 2.0, 4.0], pairs=60)
-    np.testing.assert_allclose(found[:60] + found[60:] - 2 * found.mean(axis=0), 0, atol=1e-9)
-    # Nothing of the last second is known: the futures spread as the sea itself does.
-    np.testing.assert_allclose(found[:, -10:].std(axis=(0, 1)), sea.std(axis=0), rtol=0.25)
-
-
 def test_futures_of_a_sea_spread_as_the_errors_of_its_prediction():
     rng, trials, pairs = np.random.default_rng(0), 300, 10
     omega = 2 * np.pi * rng.uniform(0.4, 0.9, (trials, 60, 1))
@@ -105,10 +86,3 @@ def test_probes_that_do_not_see_the_same_waves_are_drawn_alone(sea):
     still = np.stack([np.zeros(900), sea[:900, 0]], axis=1)
     expected = draw_waves(still, 60, 8, np.random.default_rng(0))
     np.testing.assert_array_equal(drawn(still, [0.0, 1.0]), expected)
-
-
-def test_what_cannot_be_continued_is_refused():
-    with pytest.raises(RequestError, match="count must be a whole number of at least 1"):
-        predict_waves(np.sin(np.arange(50.0)), 0)
-    with pytest.raises(DataError, match="NaN"):
-        predict_waves([0.0, 1.0, np.nan, 1.0, 2.0], 3)

@@ -54,13 +54,6 @@ def test_positions_differentiate_to_velocities_and_accelerations(body):
     np.testing.assert_allclose(acceleration[inner], expected[inner], atol=1e-5)
 
 
-def test_there_and_back(body):
-    position, angles = body
-    there = transfer_position(position, angles, [0.4, 0.1, -0.2])
-    back = transfer_position(there, angles, [-0.4, -0.1, 0.2])
-    np.testing.assert_allclose(back, position, atol=1e-14)
-
-
 @pytest.mark.parametrize("zeroed", [False, True])
 def test_gravity_is_removed(body, zeroed):
     position, angles = body
@@ -69,13 +62,6 @@ def test_gravity_is_removed(body, zeroed):
     felt = np.einsum("tji,tj->ti", rotation_matrix(angles), acceleration + up)
     found = remove_gravity(felt - (up if zeroed else 0), angles, zeroed=zeroed)
     np.testing.assert_allclose(found, acceleration, atol=1e-12)
-
-
-def test_shapes_are_refused(body):
-    with pytest.raises(RequestError, match=r"shape \(time, 3\).* angles: \(4000,\)"):
-        transfer_position(body[0], T, [0, 0, 1])
-    with pytest.raises(RequestError, match=r"\(x, y, z\) in metres; received \[1, 2\]"):
-        transfer_position(*body, [1, 2])
 
 
 def test_blend_keeps_slow_motion_and_needs_no_drift_removal():
@@ -96,21 +82,18 @@ def test_blend_keeps_slow_motion_and_needs_no_drift_removal():
 
 @pytest.mark.parametrize(
     ("units", "power"),
-    [("m", 1), ("s", 0.5), ("m/s", 0.5), ("m/s^2", 0), ("rad", 0), ("rad/s", -0.5),
-     ("rad/s^2", -1), ("N", 3), ("N m", 4), ("Pa", 1), ("W", 3.5), ("Hz", -0.5), ("kg", 3)],
+    [("m", 1), ("m/s", 0.5), ("m/s^2", 0), ("rad/s", -0.5), ("N m", 4), ("W", 3.5), ("kg", 3)],
 )  # fmt: skip
 def test_froude(units, power):
     assert froude_factor(units, 50.0) == pytest.approx(50.0**power, rel=1e-12)
 
 
-def test_froude_refusals_and_density():
+def test_words_and_density(body):
     assert froude_factor("N", 50.0, 1.025) == pytest.approx(1.025 * 125000)
     with pytest.raises(RequestError, match=r"the unit 'V' is not mechanical"):
         froude_factor("V", 50.0)
-    with pytest.raises(
-        RequestError, match=r"scale factor must be positive \(a ratio\); received 0"
-    ):
-        froude_factor("m", 0)
+    with pytest.raises(RequestError, match=r"shape \(time, 3\).* angles: \(4000,\)"):
+        transfer_position(body[0], T, [0, 0, 1])
 
 
 def test_full_scale_run():

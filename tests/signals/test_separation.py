@@ -2,36 +2,28 @@
 
 import numpy as np
 import pytest
+from seas import sea
 
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import RequestError
 from seakeep.signals import misplaced_probes, probe_separation
-from seakeep.waves import wavenumber
 
 DT, DEPTH = 0.05, 3.6
 PLACES = {"fwd": 48.42, "mid": 50.2, "cog": 52.09}
 
 
-def sea(seed, places, *, length=210.0, band=(0.28, 1.13), reflected=0.0, noise=0.02):
-    """Records of a Pierson–Moskowitz sea of the paper's band, Tp 2.05 s, SD 1, at some places."""
-    rng = np.random.default_rng(seed)
-    edges = np.linspace(*band, 101)
-    f = rng.uniform(edges[:-1], edges[1:])
-    amplitude = np.sqrt(f**-5 * np.exp(-1.25 * (2.05 * f) ** -4))
-    amplitude /= np.sqrt(0.5 * np.sum(amplitude**2))
-    forth, back = rng.uniform(0, 2 * np.pi, (2, f.size))
-    t, k = np.arange(0, length, DT), wavenumber(2 * np.pi * f, DEPTH)
-    turn = np.outer(t, 2 * np.pi * f)
+def records_of(seed, places, *, length=210.0, band=(0.28, 1.13), reflected=0.0, noise=0.02):
+    """Records of a sea at some places, with waves that come back."""
+    rng, t = np.random.default_rng(seed), np.arange(0, length, DT)
+    forth, back = sea(seed, band), sea(seed + 100, band)
     return {
-        name: np.cos(turn - k * x + forth) @ amplitude
-        + reflected * np.cos(turn + k * x + back) @ amplitude
-        + noise * rng.standard_normal(t.size)
+        name: forth.at(t, x) + reflected * back.at(t, -x) + noise * rng.standard_normal(t.size)
         for name, x in places.items()
     }
 
 
 @pytest.mark.parametrize("stated", [3.67, 3.85, 1.0, -3.67, 40.0])
 def test_the_separation_is_found_whatever_was_stated(stated):
-    records = sea(0, {"a": 0.0, "b": 3.67})
+    records = records_of(0, {"a": 0.0, "b": 3.67})
     found = probe_separation(records["a"], records["b"], DT, DEPTH, stated)
     # The taper and the time that the waves take leave 1 mm, the noise less.
     assert found.separation == pytest.approx(3.67, abs=0.005)
@@ -41,64 +33,46 @@ def test_the_separation_is_found_whatever_was_stated(stated):
 
 
 def test_the_error_of_a_carried_elevation_is_what_carrying_makes():
-    records = sea(1, {"a": 0.0, "b": 3.67, "wrong": 3.85}, noise=0.0)
+    records = records_of(1, {"a": 0.0, "b": 3.67, "wrong": 3.85}, noise=0.0)
     found = probe_separation(records["a"], records["b"], DT, DEPTH, 3.85)
     made = np.std(records["wrong"] - records["b"]) / np.std(records["b"])
     # The taper weighs parts of the record otherwise.
     assert found.input_error == pytest.approx(made, rel=0.05)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("conditions", [{}, {"reflected": 0.1}, {"noise": 0.2}, {"length": 60.0}])
 def test_right_positions_pass_and_one_wrong_by_the_paper_s_is_named(seed, conditions):
     """Row 27 of the paper's notes: 0.18 m between what two places of the text call one."""
-    records = sea(seed, PLACES, **conditions)
+    records = records_of(seed, PLACES, **conditions)
     assert misplaced_probes(records, PLACES, DT, DEPTH) == []
     wrong = {**PLACES, "fwd": 48.24}
     (found,) = misplaced_probes(records, wrong, DT, DEPTH)
     assert (found.probe, found.sure) == ("fwd", True)
     # The probe stands 0.18 m nearer to the other one than stated; reflections leave 2 cm.
     assert found.found.separation - found.found.stated == pytest.approx(0.18, abs=0.03)
-
-
-def test_of_two_probes_either_may_be_wrong():
-    records = sea(2, {"fwd": 48.42, "cog": 52.09})
-    (found,) = misplaced_probes(records, {"fwd": 48.24, "cog": 52.09}, DT, DEPTH)
-    assert not found.sure
-    assert not found.sure
-
-
-def test_swapped_cables_are_told():
-    records = sea(3, PLACES)
+    # 5 cm turn the mean wave, 4 m long, by 4 degrees: that does not matter.
+    assert misplaced_probes(records, {**PLACES, "fwd": 48.37}, DT, DEPTH) == []
     swapped = {"fwd": PLACES["cog"], "mid": PLACES["mid"], "cog": PLACES["fwd"]}
     assert misplaced_probes(records, swapped, DT, DEPTH)
-
-
-def test_an_error_that_does_not_matter_is_left_alone():
-    records = sea(4, PLACES)
-    # 5 cm turn the mean wave, 4 m long, by 4 degrees.
-    assert misplaced_probes(records, {**PLACES, "fwd": 48.37}, DT, DEPTH) == []
+    two = {name: records[name] for name in ("fwd", "cog")}
+    (either,) = misplaced_probes(two, wrong, DT, DEPTH)
+    assert not either.sure
 
 
 def test_what_says_nothing_of_positions_is_silent():
     wrong = {"fwd": 48.24, "cog": 52.09}
-    regular = sea(5, {"fwd": 48.42, "cog": 52.09}, band=(0.599, 0.601))
+    regular = records_of(5, {"fwd": 48.42, "cog": 52.09}, band=(0.599, 0.601))
     assert misplaced_probes(regular, wrong, DT, DEPTH) == []
-    short = sea(5, {"fwd": 48.42, "cog": 52.09}, length=15.0)
+    short = records_of(5, {"fwd": 48.42, "cog": 52.09}, length=15.0)
     assert misplaced_probes(short, wrong, DT, DEPTH) == []
-    apart = {"fwd": sea(6, {"fwd": 48.42})["fwd"], "cog": sea(7, {"cog": 52.09})["cog"]}
+    apart = {
+        "fwd": records_of(6, {"fwd": 48.42})["fwd"],
+        "cog": records_of(7, {"cog": 52.09})["cog"],
+    }
     assert misplaced_probes(apart, wrong, DT, DEPTH) == []
-    dead = {**sea(5, {"fwd": 48.42}), "cog": np.zeros(4200)}
+    dead = {**records_of(5, {"fwd": 48.42}), "cog": np.zeros(4200)}
     assert misplaced_probes(dead, wrong, DT, DEPTH) == []
-
-
-def test_bad_records_are_refused():
-    wave = sea(0, {"a": 0.0})["a"]
-    with pytest.raises(RequestError, match="same length"):
-        probe_separation(wave, wave[:-1], DT, DEPTH, 1.0)
+    wave = short["fwd"]
     with pytest.raises(RequestError, match=r"1e.06 m is too far .* Correct the positions"):
         probe_separation(wave, wave, DT, DEPTH, 1e6)
-    with pytest.raises(RequestError, match="the stated separation must be a number"):
-        probe_separation(wave, wave, DT, DEPTH, float("nan"))
-    with pytest.raises(DataError, match="second record is constant"):
-        probe_separation(wave, 0 * wave, DT, DEPTH, 1.0)

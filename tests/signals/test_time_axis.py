@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy import special
 
 from seakeep.errors import DataError
@@ -53,25 +51,6 @@ def test_what_is_no_uniform_axis(time, message):
         uniform_step(time)
 
 
-@settings(max_examples=25, deadline=None)
-@given(
-    st.floats(min_value=0.3, max_value=12.0),
-    st.floats(min_value=0.0, max_value=0.75),
-    st.floats(min_value=0.0, max_value=6.28),
-)
-def test_any_ratio_keeps_what_both_rates_hold(ratio, part, phase):
-    """A sine below 0.8 of the lower Nyquist frequency survives any change of the step."""
-    dt, new_dt = 1.0, ratio
-    time = np.arange(3000) * dt
-    new_time = 3.7 + np.arange(int((time[-1] - 4) / new_dt)) * new_dt
-    frequency = part * 0.5 / max(dt, new_dt)
-    wave = lambda t: np.cos(2 * np.pi * frequency * t + phase)  # noqa: E731
-    out = resample(wave(time), time, new_time)
-    margin = (new_time > 700) & (new_time < 2300)  # half a kernel from either end
-    # 60 dB is 1e-3; Kaiser's formula is met within about 1 dB.
-    assert np.max(np.abs(out - wave(new_time))[margin], initial=0.0) < 1.5e-3
-
-
 @pytest.mark.parametrize("new_dt", [4.0, 5.25, 10.0])
 def test_what_would_alias_is_removed(new_dt):
     time = np.arange(6000.0)
@@ -82,6 +61,9 @@ def test_what_would_alias_is_removed(new_dt):
         inner = slice(int(800 / new_dt), -int(800 / new_dt))
         # 60 dB, within about 1 dB.
         assert np.max(np.abs(out[inner])) < 1.5e-3
+        # As the paper takes samples: what its filter lets pass is folded.
+        folded = resample(above, time, new_time, anti_alias=False)[inner]
+        assert np.abs(folded).max() > 0.9
 
 
 def direct_sums(series, position, edges, attenuation):
@@ -98,8 +80,7 @@ def direct_sums(series, position, edges, attenuation):
     return np.array(out)
 
 
-@pytest.mark.parametrize("new_dt", [0.37, 1.0, 1.0007, 3.3, 25.6])
-@pytest.mark.parametrize("attenuation", [60.0, 100.0])
+@pytest.mark.parametrize(("new_dt", "attenuation"), [(0.37, 60.0), (1.0007, 100.0), (25.6, 60.0)])
 def test_tabulated_kernels_are_the_kernels(new_dt, attenuation):
     """On noise, which fills the band: the table's cubic is off by 1.5e-10 of a sample's size."""
     series = np.random.default_rng(0).standard_normal(12000)
@@ -108,46 +89,6 @@ def test_tabulated_kernels_are_the_kernels(new_dt, attenuation):
     expected = direct_sums(series, wanted, (0.8 * nyquist, nyquist), attenuation)
     out = resample(series, np.arange(12000.0), wanted, attenuation)
     np.testing.assert_allclose(out, expected, atol=2e-9)
-
-
-RATE, PERIOD = 500.0, 1.64  # of the paper
-
-
-@pytest.mark.parametrize("part", [0.05, 0.4, 0.79, 0.8])
-def test_gain_below_four_fifths_of_the_new_nyquist_frequency(part):
-    """The recommended chain, 500 Hz to 32 samples per period of 1.64 s, tone by tone."""
-    gain, _ = gains(part * 0.5 * 32 / PERIOD)
-    assert gain == pytest.approx(1.0, abs=1.2e-3)  # 60 dB, Kaiser's formula met within 1 dB
-
-
-@pytest.mark.parametrize("part", [1.0, 1.02, 1.4, 2.0, 9.0, 15.0])
-def test_gain_above_the_new_nyquist_frequency(part):
-    gain, folded = gains(part * 0.5 * 32 / PERIOD)
-    assert gain < 1.2e-3  # 60 dB, within 1 dB
-    # As the paper takes samples: what its filter lets pass above the Nyquist frequency is folded.
-    assert folded > 0.9
-
-
-def gains(frequency):
-    """Amplitude that a tone has after resampling, with the anti-aliasing filter and without."""
-    time = np.arange(0, 120, 1 / RATE)
-    new = np.arange(0.011, 119.9, PERIOD / 32)
-    # In quadrature: where the tone falls on half the new rate, one phase of it is never sampled.
-    tone = np.column_stack([f(2 * np.pi * frequency * time) for f in (np.cos, np.sin)])
-    out = []
-    for anti_alias in (True, False):
-        kept = resample(tone, time, new, anti_alias=anti_alias)[200:-200]
-        out.append(float(np.sqrt(np.mean(kept[:, 0] ** 2 + kept[:, 1] ** 2))))
-    return out
-
-
-def test_more_attenuation_is_more_attenuation():
-    time, new_time = np.arange(6000.0), np.arange(0, 5990, 5.0)
-    above = np.sin(2 * np.pi * np.linspace(0.101, 0.13, 30) * time[:, None])
-    worst = [np.max(np.abs(resample(above, time, new_time, a)[200:-200])) for a in (60.0, 90.0)]
-    # 1e-3 and 3e-5, within about 1 dB.
-    assert worst[0] < 1.2e-3
-    assert worst[1] < 4e-5
 
 
 def test_same_instants_hand_the_samples_on():
@@ -162,26 +103,10 @@ def test_constants_are_kept_exactly_to_the_ends():
     np.testing.assert_allclose(out, 7.0, rtol=1e-14)  # rounding of a sum
 
 
-@pytest.mark.parametrize(
-    ("call", "error", "message"),
-    [
-        (
-            lambda t: resample(t, t, t + 1.0),
-            DataError,
-            r"new instants from 1 to 10\.9 s lie outside the series, which runs from 0 to 9\.9 s",
-        ),
-        (
-            lambda t: resample(t[:50], t, t),
-            DataError,
-            "the series has 50 samples and the time axis 100; they must agree",
-        ),
-        (
-            lambda t: resample(np.where(t > 5, np.nan, t), t, t),
-            DataError,
-            "NaN or infinite, of 100, the first at sample 51",
-        ),
-    ],
-)
-def test_what_cannot_be_resampled(call, error, message):
-    with pytest.raises(error, match=message):
-        call(np.arange(100) * 0.1)
+def test_what_cannot_be_resampled():
+    t = np.arange(100) * 0.1
+    with pytest.raises(DataError, match=r"new instants from 1 to 10\.9 s lie outside the series, "
+                       r"which runs from 0 to 9\.9 s"):  # fmt: skip
+        resample(t, t, t + 1.0)
+    with pytest.raises(DataError, match="the series has 50 samples and the time axis 100"):
+        resample(t[:50], t, t)

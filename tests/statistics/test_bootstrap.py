@@ -10,7 +10,6 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.statistics import (
     block_length,
     choose_block_length,
-    jsd_interval,
     lag_one_correlation,
     moving_block_bootstrap,
 )
@@ -53,37 +52,18 @@ def test_a_join_is_no_neighbour():
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize("kind", ["circular", "stationary"])
 @pytest.mark.parametrize("phi", [0.3, 0.6, 0.9])
-def test_politis_white_agrees_with_arch(phi, kind):
+def test_politis_white_agrees_with_arch(phi):
     arch = pytest.importorskip("arch.bootstrap")
     ratios = []
     for seed in range(20):
         x = autoregressive(phi, 2000, seed)
-        theirs = float(arch.optimal_block_length(x)[kind].iloc[0])
-        ratios.append(choose_block_length(x, "politis_white", kind=kind).optimum / theirs)
+        theirs = float(arch.optimal_block_length(x)["circular"].iloc[0])
+        ratios.append(choose_block_length(x, "politis_white").optimum / theirs)
     # The same sums: equal to rounding, unless a correlation lies so near its threshold that the
     # two normalisations (by the whole series, and by its two ends) judge it differently.
     assert np.median(np.abs(np.array(ratios) - 1)) < 1e-10
     assert max(abs(np.array(ratios) - 1)) < 0.05
-
-
-def test_politis_white_finds_the_closed_form_of_an_autoregression():
-    phi, samples = 0.6, 20_000
-    # G/g(0) = 2φ/(1 − φ²); D = 4/3 g(0)².
-    expected = (1.5 * (2 * phi / (1 - phi**2)) ** 2 * samples) ** (1 / 3)
-    found = [
-        choose_block_length(autoregressive(phi, samples, seed), "politis_white").optimum
-        for seed in range(20)
-    ]
-    # One estimate scatters by some 5 to 10 %; the median of twenty by less than 5 %.
-    assert np.median(found) == pytest.approx(expected, rel=0.05)
-
-
-def test_encounter_periods_are_counted_in_samples():
-    x = autoregressive(0.5, 1000, 0)
-    assert block_length(x, "encounter_periods", periods=2.5) == 80
-    assert block_length(x, "encounter_periods", periods=2.5, samples_per_period=20) == 50
 
 
 def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
@@ -94,57 +74,11 @@ def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
     choice = choose_block_length(np.linspace(0, 1, 400) + 1e-9)
     assert choice.samples == 100
     assert choice.capped
-
-
-def test_a_block_is_cut_to_the_shortest_segment():
-    x = autoregressive(0.5, 1000, 0)
-    with pytest.warns(SeakeepWarning, match="cut to 60"):
-        found = block_length(x, "encounter_periods", periods=3.0, segments=[500, 60, 440])
-    assert found == 60
-
-
-def test_white_noise_asks_for_short_blocks():
-    x = autoregressive(0.0, 4000, 0)
-    assert block_length(x, "politis_white") == 1
-    assert block_length(x, "carlstein") <= 3
+    with pytest.warns(SeakeepWarning, match="cut to 60"):  # the shortest segment
+        assert block_length(slow, segments=[140, 60, 200]) == 60
 
 
 # --- the moving-block bootstrap ------------------------------------------------------------------
-
-
-def test_white_noise_keeps_the_variance_of_its_mean():
-    x = np.random.default_rng(0).standard_normal(2000)
-    drawn = moving_block_bootstrap(x, 4000, 10, np.random.default_rng(1))
-    # A variance from 4000 draws has a standard error of 2.2 %, that of the blocks' means over
-    # 200 blocks 10 %; one seed, three standard errors.
-    assert drawn.mean(axis=1).var() == pytest.approx(x.var() / x.size, rel=0.3)
-
-
-def test_white_noise_has_the_right_variance_of_the_mean_on_average():
-    found = []
-    for seed in range(40):
-        x = np.random.default_rng(seed).standard_normal(500)
-        drawn = moving_block_bootstrap(x, 200, 5, np.random.default_rng(1000 + seed))
-        found.append(drawn.mean(axis=1).var() * 500)
-    # Forty independent estimates with standard errors of √(2/100 + 2/200) = 17 %: 2.7 % for
-    # their mean; three of them, and 1 % for the finite block (1 − b/T).
-    assert np.mean(found) == pytest.approx(1.0, abs=0.09)
-
-
-def test_an_autoregression_approaches_its_long_run_variance_as_blocks_grow():
-    phi, samples = 0.8, 20_000
-    long_run = 1.0 / (1 - phi) ** 2
-    x = autoregressive(phi, samples, 5)
-    found = {}
-    for length in (1, 20, 150):
-        drawn = moving_block_bootstrap(x, 1000, length, np.random.default_rng(6))
-        found[length] = drawn.mean(axis=1).var() * samples / long_run
-    # A block of b keeps about 1 − 2φ/(b (1 − φ²)) of it: 0.78 at 20, 0.97 at 150; single draws
-    # leave σ²/long-run = (1 − φ)/(1 + φ) = 0.11. Sampling: 14 % from 133 blocks, 4.5 % from draws.
-    assert found[1] == pytest.approx(0.111, rel=0.2)
-    assert found[20] == pytest.approx(0.78, rel=0.2)
-    assert found[150] == pytest.approx(0.97, rel=0.35)
-    assert found[1] < found[20] < found[150]
 
 
 @settings(max_examples=60, deadline=None)
@@ -188,64 +122,30 @@ def test_no_block_crosses_a_join_of_segments():
 NOISE = np.random.default_rng(0).standard_normal(100)
 
 
-@pytest.mark.parametrize(
-    ("series", "message"),
-    [
-        (NOISE[:5], r"5 sample\(s\); at least 8 are needed"),
-        (np.full(40, 3.0), r"the series is constant \(3\)"),
-        (np.where(np.arange(100) == 4, np.nan, NOISE), r"1 value\(s\) that are NaN or infinite"),
-    ],
-)
-@pytest.mark.parametrize("rule", ["carlstein", "politis_white"])
-def test_series_without_a_block_length(series, message, rule):
-    with pytest.raises(DataError, match=message):
-        block_length(series, rule)
+def redrawn(length, segments=None):
+    return moving_block_bootstrap(NOISE, 3, length, np.random.default_rng(0), segments=segments)
 
 
 @pytest.mark.parametrize(
-    ("settings", "message"),
+    ("call", "error", "message"),
     [
-        ({"rule": "carlsten"}, "unknown rule 'carlsten'.* Did you mean 'carlstein'?"),
-        ({"rule": "encounter_periods"}, "how many of them make a block.* periods=None"),
-        ({"rule": "encounter_periods", "periods": -1.0}, "periods=-1"),
-        ({"kind": "moving"}, "'circular' or 'stationary'; received 'moving'"),
-        ({"segments": [50, 60]}, "add up to 110 samples and the series has 100"),
-        ({"segments": [0, 100]}, "a segment must be a whole number of at least 1"),
+        (lambda: block_length(NOISE[:5]), DataError, r"5 sample\(s\); at least 8 are needed"),
+        (lambda: block_length(np.full(40, 3.0)), DataError, r"the series is constant \(3\)"),
+        (
+            lambda: block_length(NOISE, "carlsten"),
+            RequestError,
+            "unknown rule 'carlsten'.* Did",
+        ),
+        (lambda: block_length(NOISE, segments=[50, 60]), RequestError, "add up to 110 samples and"),
+        (lambda: redrawn(101), RequestError, "of 101 samples does not fit into the series of 100"),
+        (
+            lambda: redrawn(40, [70, 30]),
+            RequestError,
+            "not fit into the shortest segment of 30",
+        ),
+        (lambda: redrawn(2.5), RequestError, "block_length must be a whole number of at least 1"),
     ],
 )
-def test_block_length_settings_out_of_range(settings, message):
-    with pytest.raises(RequestError, match=message):
-        block_length(NOISE, **settings)
-
-
-def test_block_length_of_several_series_at_once():
-    with pytest.raises(RequestError, match=r"shape \(50, 2\); expected \(time,\)"):
-        block_length(NOISE.reshape(50, 2))
-
-
-@pytest.mark.parametrize(
-    ("length", "message"),
-    [
-        (101, "block_length of 101 samples does not fit into the series of 100. Choose 1 to 100"),
-        (0, "block_length must be a whole number of at least 1; received 0"),
-        (2.5, "received 2.5"),
-    ],
-)
-def test_blocks_out_of_range(length, message):
-    with pytest.raises(RequestError, match=message):
-        moving_block_bootstrap(NOISE, 3, length, np.random.default_rng(0))
-
-
-def test_blocks_longer_than_a_segment():
-    with pytest.raises(RequestError, match="does not fit into the shortest segment of 30"):
-        moving_block_bootstrap(NOISE, 3, 40, np.random.default_rng(0), segments=[70, 30])
-
-
-def test_a_rule_that_counts_in_periods_says_where_they_are_stated():
-    with pytest.raises(RequestError, match=r"State both to block_length\(\), or a block length in"):
-        jsd_interval(NOISE, NOISE, block_length="encounter_periods", rng=np.random.default_rng(0))
-
-
-def test_gaps_are_not_redrawn():
-    with pytest.raises(DataError, match="NaN or infinite"):
-        moving_block_bootstrap([1.0, np.nan, 2.0], 3, 1, np.random.default_rng(0))
+def test_what_is_refused(call, error, message):
+    with pytest.raises(error, match=message):
+        call()

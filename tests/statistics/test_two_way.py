@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from seakeep import RequestError
 from seakeep.statistics import overlap_block, two_way_interval
 
 TRIALS = 200
@@ -90,11 +89,6 @@ def test_blocks_are_as_long_as_windows_overlap():
     assert overlap_block(apart) == 1
     assert overlap_block([*apart, *apart]) == 2
     assert overlap_block([(run, 0.0, 10.0) for run in "abc"]) == 1
-
-
-def test_cells_of_other_shapes_are_refused():
-    with pytest.raises(RequestError, match=r"cells are arrays of one shape .*\(2, 3\), \(3, 2\)"):
-        two_way_interval(np.sum, np.ones((2, 3)), np.ones((3, 2)), rng=np.random.default_rng())
 
 
 def test_neighbours_are_drawn_together():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from seakeep.core.embedding import embed, snapshot_matrices, training_window, unembed
+from seakeep.core.embedding import embed, training_window
 from seakeep.core.rollout import rollout
 from seakeep.core.solve import Solution, identify
 
@@ -11,9 +11,7 @@ __all__ = [
     "embed",
     "identify",
     "rollout",
-    "snapshot_matrices",
     "training_window",
-    "unembed",
 ]
 
 # The C library of Linux hands memory back to the system when more is free than twice the largest

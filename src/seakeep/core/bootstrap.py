@@ -16,31 +16,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-from seakeep.arrays import (
-    FloatArray,
-    IntArray,
-    as_series,
-    whole_number,
-)
+from seakeep.arrays import FloatArray, IntArray, as_series, whole_number
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
-from seakeep.sizes import check_numbers
 
-__all__ = [
-    "BlockChoice",
-    "BlockRule",
-    "block_length",
-    "bootstrap_indices",
-    "choose_block_length",
-    "lag_one_correlation",
-    "moving_block_bootstrap",
-    "resolve_block_length",
-    "student_interval",
-    "too_long",
-]
+BlockRule = Literal["carlstein", "politis_white"]
 
-BlockRule = Literal["carlstein", "politis_white", "encounter_periods"]
-
-RULES = ("carlstein", "politis_white", "encounter_periods")
+RULES = ("carlstein", "politis_white")
 QUIET_LAGS = 5
 """K of Politis & White: max(5, √log₁₀ T), which is five below 10²⁵ samples."""
 FEWEST_SAMPLES = 8
@@ -71,7 +52,7 @@ class BlockChoice:
     @property
     def capped(self) -> bool:
         """Whether the rule asked for longer blocks than the series allows."""
-        return round(min(self.optimum, 1e18)) > self.cap
+        return self.optimum > self.cap + 0.5
 
 
 def _as_segments(segments: Sequence[int] | None, samples: int) -> IntArray:
@@ -133,14 +114,7 @@ def lag_one_correlation(series: npt.ArrayLike, segments: Sequence[int] | None = 
     return float(x.size * one / ((x.size - pieces.size) * zero))
 
 
-def _carlstein(x: FloatArray, segments: IntArray) -> float:
-    phi = abs(lag_one_correlation(x, segments.tolist()))
-    if phi >= 1.0:
-        return math.inf
-    return float((2.0 * phi / ((1.0 - phi) * (1.0 + phi))) ** (2.0 / 3.0) * np.cbrt(x.size))
-
-
-def _politis_white(x: FloatArray, kind: str, segments: IntArray) -> float:
+def _politis_white(x: FloatArray, segments: IntArray) -> float:
     n = x.size
     longest = min(math.ceil(math.sqrt(n)) + QUIET_LAGS, n - 1)
     covariance = _autocovariance(x, longest, segments)
@@ -155,7 +129,7 @@ def _politis_white(x: FloatArray, kind: str, segments: IntArray) -> float:
     weighted = window * covariance[1 : bandwidth + 1]
     slope = 2.0 * float(np.sum(lags * weighted))
     at_zero = float(covariance[0] + 2.0 * np.sum(weighted))
-    variance = (4.0 / 3.0 if kind == "circular" else 2.0) * at_zero**2
+    variance = 4.0 / 3.0 * at_zero**2
     if variance <= 0.0:
         return 1.0
     return float(np.cbrt(2.0 * slope**2 / variance * n))
@@ -165,16 +139,13 @@ def choose_block_length(
     series: npt.ArrayLike,
     rule: BlockRule = "carlstein",
     *,
-    kind: Literal["circular", "stationary"] = "circular",
-    periods: float | None = None,
-    samples_per_period: float = 32.0,
     segments: Sequence[int] | None = None,
 ) -> BlockChoice:
     r"""Block length of a series with what the rule asked for; warns of nothing.
 
     Parameters
     ----------
-    series, rule, kind, periods, samples_per_period, segments
+    series, rule, segments
         As for :func:`block_length`.
 
     Returns
@@ -191,35 +162,23 @@ def choose_block_length(
             f"unknown rule '{rule}' of the block length.{did_you_mean(str(rule), RULES)} "
             f"There are: {', '.join(RULES)}."
         )
-    if kind not in ("circular", "stationary"):
-        raise RequestError(f"kind must be 'circular' or 'stationary'; received '{kind}'.")
     x = _varying(series)
     pieces = _as_segments(segments, x.size)
     cap = min(x.size // 4, int(pieces.min()))
     if rule == "carlstein":
-        optimum = _carlstein(x, pieces)
-    elif rule == "politis_white":
-        optimum = _politis_white(x, kind, pieces)
-        cap = min(cap, math.ceil(min(3.0 * math.sqrt(x.size), x.size / 3.0)))
+        phi = abs(lag_one_correlation(x, segments))
+        odds = 2.0 * phi / ((1.0 - phi) * (1.0 + phi)) if phi < 1.0 else math.inf
+        optimum = float(odds ** (2.0 / 3.0) * np.cbrt(x.size))
     else:
-        if periods is None or not periods > 0 or not samples_per_period > 0:
-            raise RequestError(
-                "rule 'encounter_periods' needs how many of them make a block, and the samples of "
-                f"one; received periods={periods} and samples_per_period={samples_per_period}. "
-                "State both to block_length(), or a block length in samples."
-            )
-        optimum = float(periods * samples_per_period)
-    samples = int(np.clip(round(min(optimum, 1e18)), 1, cap))
-    return BlockChoice(samples=samples, optimum=optimum, cap=cap, rule=rule)
+        optimum = _politis_white(x, pieces)
+        cap = min(cap, math.ceil(min(3.0 * math.sqrt(x.size), x.size / 3.0)))
+    return BlockChoice(int(np.clip(round(min(optimum, cap)), 1, cap)), optimum, cap, rule)
 
 
 def block_length(
     series: npt.ArrayLike,
     rule: BlockRule = "carlstein",
     *,
-    kind: Literal["circular", "stationary"] = "circular",
-    periods: float | None = None,
-    samples_per_period: float = 32.0,
     segments: Sequence[int] | None = None,
 ) -> int:
     r"""Length of the blocks of a bootstrap.
@@ -228,20 +187,14 @@ def block_length(
     ----------
     series : array_like, shape (time,)
         Uniform samples without gaps, at least eight.
-    rule : {"carlstein", "politis_white", "encounter_periods"}
+    rule : {"carlstein", "politis_white"}
         ``"carlstein"`` is the paper's
         :math:`r = (2\varphi/a)^{2/3} \mathcal T^{1/3}`, :math:`a = (1-\varphi)(1+\varphi)`, with
         :func:`lag_one_correlation` by size, the optimum of an AR(1) (Carlstein 1986).
         ``"politis_white"`` takes the correlations up to the lag where they die out (Politis &
         White 2004, corrected by Patton, Politis & White 2009), no longer than
-        :math:`\min(3\sqrt{\mathcal T}, \mathcal T/3)`. ``"encounter_periods"`` is a fixed number.
-    kind : {"circular", "stationary"}
-        Bootstrap for which Politis–White is optimal; the circular one shares its optimum with the
-        moving-block bootstrap and is meant here.
-    periods : float, optional
-        Mean encounter periods in a block, for ``"encounter_periods"``.
-    samples_per_period : float
-        Samples of one mean encounter period; 32 after preparation.
+        :math:`\min(3\sqrt{\mathcal T}, \mathcal T/3)`; it is the optimum of the circular bootstrap,
+        which that of moving blocks shares.
     segments : sequence of int, optional
         Lengths of the joined pieces; no product and no block then crosses a join.
 
@@ -267,18 +220,11 @@ def block_length(
     Examples
     --------
     >>> import numpy as np
-    >>> x = np.sin(np.arange(480) * 2 * np.pi / 32)
-    >>> block_length(x, "encounter_periods", periods=2.5)
-    80
+    >>> x = np.random.default_rng(0).standard_normal(480)
+    >>> block_length(x), block_length(x, "politis_white")
+    (1, 1)
     """
-    choice = choose_block_length(
-        series,
-        rule,
-        kind=kind,
-        periods=periods,
-        samples_per_period=samples_per_period,
-        segments=segments,
-    )
+    choice = choose_block_length(series, rule, segments=segments)
     if choice.capped:
         warn(too_long(choice, np.size(series)))
     return choice.samples
@@ -312,8 +258,6 @@ def bootstrap_indices(
     """Positions that redraw a series; the same for every series that must keep step with it."""
     whole_number(n_series, "n_series")
     whole_number(block_length, "block_length")
-    asked = f"n_series = {n_series} series of {n_samples} samples take"
-    check_numbers(asked, n_series * n_samples, "Draw fewer.")
     lengths = _as_segments(segments, n_samples)
     shortest = int(lengths.min())
     if block_length > shortest:
@@ -361,9 +305,7 @@ def student_interval(
     lower, upper : ndarray
     """
     middle = np.asarray(value, dtype=float)
-    positive = bool(
-        np.all((redrawn > 0) | np.isnan(redrawn)) and np.all((middle > 0) | np.isnan(middle))
-    )
+    positive = not (np.any(redrawn <= 0) or np.any(middle <= 0))
     if positive:
         middle, redrawn = np.log(middle), np.log(redrawn)
     with warnings.catch_warnings():
@@ -425,6 +367,4 @@ def moving_block_bootstrap(
            [3., 4., 5., 3., 4., 5.]])
     """
     x = as_series(series, "series", minimum=1, channels=True)
-    if x.ndim > 2:
-        raise RequestError(f"series has shape {x.shape}; (time,) or (time, channel) is needed.")
     return x[bootstrap_indices(x.shape[0], n_series, block_length, rng, segments)]

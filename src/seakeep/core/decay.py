@@ -14,8 +14,6 @@ from scipy import signal
 
 from seakeep.arrays import FloatArray
 
-__all__ = ["Decay", "free_decay"]
-
 SMALLEST = 0.02
 """Part of the largest half range below which an extreme counts as noise."""
 
@@ -75,7 +73,7 @@ def free_decay(series: FloatArray, dt: float) -> Decay:
     first = int(np.argmax(ranges))  # other modes die out before
     instants, ranges = instants[first:], ranges[first:]
     above = ranges >= SMALLEST * ranges.max()
-    kept = int(np.argmin(above)) if not above.all() else ranges.size
+    kept = int(np.argmin(np.append(above, False)))
     ranges = ranges[:kept]
     if kept < 2:
         return nothing
@@ -83,8 +81,7 @@ def free_decay(series: FloatArray, dt: float) -> Decay:
     amplitudes = np.sqrt(ranges[:-1] * ranges[1:])
     p, q = float(decrements.mean()), np.nan
     if decrements.size >= 3:
-        basis = np.stack([np.ones_like(amplitudes), amplitudes], axis=1)
-        p, q = (float(each) for each in np.linalg.lstsq(basis, decrements, rcond=None)[0])
+        q, p = map(float, np.polyfit(amplitudes, decrements, 1))
     period = 2 * dt * float(np.diff(instants[: kept + 1]).mean())
     ratio = float(p / np.hypot(2 * np.pi, p))
     return Decay(period, ratio, p, q, decrements.size, amplitudes, decrements)

@@ -14,21 +14,18 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft
 
-from seakeep.arrays import FloatArray, IntArray, as_bundle, as_real, fraction, whole_number
+from seakeep.arrays import (
+    FloatArray,
+    IntArray,
+    as_bundle,
+    as_real,
+    as_series,
+    fraction,
+    whole_number,
+)
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
-from seakeep.sizes import MOST_BINS, check_numbers
-
-__all__ = [
-    "Bandwidth",
-    "DensityInterval",
-    "bootstrapped_densities",
-    "checked_grid",
-    "density_grid",
-    "density_interval",
-    "kernel_bandwidth",
-    "kernel_density",
-]
+from seakeep.sizes import MOST_BINS
 
 Bandwidth = Literal["paper", "silverman"] | float
 
@@ -77,10 +74,11 @@ class DensityInterval:
 def _as_grid(values: npt.ArrayLike) -> FloatArray:
     """Return the grid of a density; refuse one that does not increase."""
     grid = as_real(values, "the grid")
-    if grid.ndim != 1 or grid.size < 2:
-        raise RequestError(f"the grid has shape {grid.shape}; at least two points are needed.")
-    if not np.all(np.isfinite(grid)) or not np.all(np.diff(grid) > 0):
-        raise RequestError("the grid must increase strictly and be finite; sort it, once each.")
+    if grid.size < 2 or not np.all(np.isfinite(grid)) or not np.all(np.diff(grid) > 0):
+        raise RequestError(
+            "the grid must increase strictly, be finite, and have at least two points; sort it, "
+            "once each."
+        )
     return grid
 
 
@@ -98,8 +96,7 @@ def _bandwidths(x: FloatArray, bandwidth: Bandwidth) -> FloatArray:
         upper, lower = np.quantile(x, [0.75, 0.25], axis=-1)
         inner = (upper - lower) / scale
         width = np.where(inner > 0, np.minimum(spread, inner), spread)
-        h: FloatArray = factor * width * x.shape[-1] ** -0.2
-        return h
+        return np.asarray(factor * width * x.shape[-1] ** -0.2)
     if not 0 < bandwidth < math.inf:
         raise RequestError(
             "a bandwidth must be 'paper', 'silverman' or a positive number; received "
@@ -108,7 +105,8 @@ def _bandwidths(x: FloatArray, bandwidth: Bandwidth) -> FloatArray:
     return np.full(x.shape[0], float(bandwidth))
 
 
-def _positive(h: FloatArray, x: FloatArray) -> FloatArray:
+def _positive_bandwidths(x: FloatArray, bandwidth: Bandwidth) -> FloatArray:
+    h = _bandwidths(x, bandwidth)
     if np.any(h <= 0):
         where = int(np.argmax(h <= 0))
         raise DataError(
@@ -148,10 +146,7 @@ def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> f
     >>> round(kernel_bandwidth([0.0, 1.0, 2.0, 3.0, 4.0], "silverman"), 4)
     0.9736
     """
-    x = as_bundle(series, "the series")
-    if x.shape[0] != 1:
-        raise RequestError(f"one series is needed for a bandwidth; received {x.shape[0]}.")
-    return float(_positive(_bandwidths(x, bandwidth), x)[0])
+    return float(_positive_bandwidths(as_series(series)[None], bandwidth)[0])
 
 
 def _exact(x: FloatArray, grid: FloatArray, h: float) -> FloatArray:
@@ -159,8 +154,7 @@ def _exact(x: FloatArray, grid: FloatArray, h: float) -> FloatArray:
     for start in range(0, x.size, CHUNK):
         distance = (grid[:, None] - x[start : start + CHUNK]) / h
         total += np.exp(-0.5 * distance**2).sum(axis=1)
-    out: FloatArray = total / (x.size * h * math.sqrt(2.0 * math.pi))
-    return out
+    return total / (x.size * h * math.sqrt(2.0 * math.pi))
 
 
 def _bins(grid: FloatArray, h: float) -> tuple[int, int, int]:
@@ -185,14 +179,11 @@ def _binned(x: FloatArray, grid: FloatArray, h: float) -> FloatArray:
     angular = 2.0 * np.pi * fft.rfftfreq(size, width)
     smooth = fft.irfft(fft.rfft(counts) * np.exp(-0.5 * (h * angular) ** 2), n=size)
     inner = smooth[beyond : beyond + (grid.size - 1) * fine + 1 : fine]
-    out: FloatArray = np.maximum(inner, 0.0) / (x.size * width)
-    return out
+    return np.asarray(np.maximum(inner, 0.0) / (x.size * width))
 
 
 def _densities(x: FloatArray, grid: FloatArray, h: FloatArray) -> FloatArray:
     even = np.allclose(np.diff(grid), (grid[-1] - grid[0]) / (grid.size - 1), rtol=1e-6, atol=0.0)
-    asked = f"{x.shape[0]} series on a grid of {grid.size} points take"
-    check_numbers(asked, x.shape[0] * grid.size, "Lower n_series or points.")
     out = np.empty((x.shape[0], grid.size))
     for row, (values, width) in enumerate(zip(x, h, strict=True)):
         fast = even and _bins(grid, float(width))[2] <= MOST_BINS
@@ -242,7 +233,7 @@ def kernel_density(
     1.0
     """
     x, points = as_bundle(series, "the series"), _as_grid(grid)
-    out = _densities(x, points, _positive(_bandwidths(x, bandwidth), x))
+    out = _densities(x, points, _positive_bandwidths(x, bandwidth))
     return out[0] if np.ndim(series) == 1 else out
 
 
@@ -277,17 +268,11 @@ def density_grid(
         If its step is over 1.5 bandwidths of a series; a divergence on it is then coarse.
     """
     whole_number(points, "points", 2)
-    if not series or not margin >= 0:
-        raise RequestError(
-            f"a grid needs at least one series and a margin of zero or more; received "
-            f"{len(series)} series and margin={margin}."
-        )
     all_of_them = [as_bundle(item, "the series") for item in series]
-    widths = [_positive(_bandwidths(x, bandwidth), x) for x in all_of_them]
-    room = margin * max(float(h.max()) for h in widths)
-    low = min(float(x.min()) for x in all_of_them) - room
-    high = max(float(x.max()) for x in all_of_them) + room
-    narrow = min(float(h.min()) for h in widths)
+    widths = np.concatenate([_positive_bandwidths(x, bandwidth) for x in all_of_them])
+    low = float(min(map(np.min, all_of_them)) - margin * widths.max())
+    high = float(max(map(np.max, all_of_them)) + margin * widths.max())
+    narrow = float(widths.min())
     step = (high - low) / (points - 1)
     if step > COARSE * narrow:
         warn(
@@ -305,8 +290,7 @@ def checked_grid(
     if grid is None:
         return density_grid(*series, bandwidth=bandwidth)
     points = _as_grid(grid)
-    low = min(float(x.min()) for x in series)
-    high = max(float(x.max()) for x in series)
+    low, high = min(map(np.min, series)), max(map(np.max, series))
     if points[0] > low or points[-1] < high:
         raise RequestError(
             f"the grid runs from {points[0]:g} to {points[-1]:g} and the series from {low:g} to "
@@ -322,7 +306,7 @@ def bootstrapped_densities(
     series: FloatArray, positions: IntArray, grid: FloatArray, bandwidth: Bandwidth
 ) -> FloatArray:
     """Densities of one series redrawn at the given positions."""
-    own = _positive(_bandwidths(series[None], bandwidth), series[None])
+    own = _positive_bandwidths(series[None], bandwidth)
     drawn = series[positions]
     h = _bandwidths(drawn, bandwidth)
     return _densities(drawn, grid, np.where(h > 0, h, own))
@@ -380,5 +364,5 @@ def density_interval(
     positions = bootstrap_indices(x.shape[1], n_series, block, rng, segments)
     drawn = np.concatenate([bootstrapped_densities(row, positions, points, bandwidth) for row in x])
     lower, upper = np.quantile(drawn, [(1 - level) / 2, (1 + level) / 2], axis=0)
-    own = _densities(x, points, _positive(_bandwidths(x, bandwidth), x)).mean(axis=0)
+    own = np.atleast_2d(kernel_density(x, points, bandwidth)).mean(axis=0)
     return DensityInterval(points, own, drawn.mean(axis=0), lower, upper, level, block)

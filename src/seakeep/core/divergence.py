@@ -15,8 +15,6 @@ from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_l
 from seakeep.core.density import Bandwidth, bootstrapped_densities, checked_grid, kernel_density
 from seakeep.errors import RequestError
 
-__all__ = ["JsdInterval", "jensen_shannon", "jsd_interval"]
-
 
 @dataclass(frozen=True)
 class JsdInterval:
@@ -100,15 +98,11 @@ def jensen_shannon(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
                 f"{name} must be finite and not negative, with a positive sum; received values "
                 f"from {mass.min():g} to {mass.max():g}. Does the grid cover the series?"
             )
-    # Scaled to a largest of 1 first, so that tiny or huge masses keep their digits.
-    first = first / first.max(axis=-1, keepdims=True)
-    second = second / second.max(axis=-1, keepdims=True)
     first = first / first.sum(axis=-1, keepdims=True)
     second = second / second.sum(axis=-1, keepdims=True)
     middle = 0.5 * (first + second)
     total = rel_entr(first, middle).sum(axis=-1) + rel_entr(second, middle).sum(axis=-1)
-    out: FloatArray = np.clip(0.5 * total, 0.0, math.log(2.0))
-    return out
+    return np.asarray(np.clip(0.5 * total, 0.0, math.log(2.0)))
 
 
 def jsd_interval(

@@ -15,8 +15,6 @@ import numpy as np
 from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import RequestError
 
-__all__ = ["History", "TrainingWindow", "embed", "snapshot_matrices", "training_window", "unembed"]
-
 History = Literal["before", "inside"]
 
 
@@ -69,14 +67,8 @@ def training_window(
     TrainingWindow
         Its ``columns`` may be zero or negative: the caller knows the names for the message.
 
-    Raises
-    ------
-    RequestError
-        If `history` is neither.
     """
     reach = max(state_delays, input_delays)
-    if history not in ("before", "inside"):
-        raise RequestError(f"history is 'before' or 'inside'; received {history!r}.")
     first = 0 if window is None else last - window + 1
     earliest = first + reach if history == "inside" else reach
     return TrainingWindow(first, last, max(first, earliest))
@@ -122,72 +114,3 @@ def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray
     for lag in range(delays + 1):
         out[lag * channels : (lag + 1) * channels] = series[first - lag : first - lag + count].T
     return out
-
-
-def unembed(columns: FloatArray, channels: int) -> FloatArray:
-    """Recover the series from its extended snapshots; the inverse of :func:`embed`.
-
-    Parameters
-    ----------
-    columns : ndarray, shape (channels * (delays + 1), count)
-        Extended snapshots of consecutive samples.
-    channels : int
-        Number of channels.
-
-    Returns
-    -------
-    ndarray, shape (delays + count, channels)
-        The samples from the oldest delayed one to the last column's newest.
-
-    Raises
-    ------
-    RequestError
-        If the rows are not whole blocks of channels.
-    """
-    columns = as_real(columns, "columns")
-    if columns.ndim != 2 or 0 in columns.shape or columns.shape[0] % channels:
-        raise RequestError(
-            f"columns has shape {columns.shape}; (channels * (delays + 1), count) with {channels} "
-            "channels is needed."
-        )
-    blocks = columns.reshape(-1, channels, columns.shape[1])
-    oldest_first = blocks[:0:-1, :, 0]
-    return np.concatenate([oldest_first, blocks[0].T])
-
-
-def snapshot_matrices(
-    states: FloatArray,
-    inputs: FloatArray,
-    window: TrainingWindow,
-    state_delays: int,
-    input_delays: int,
-    all_rows: bool,
-) -> tuple[FloatArray, FloatArray]:
-    r"""Matrices :math:`\hat Y` and :math:`\hat X'` of one run (paper, equation of ``Y, X'``).
-
-    Parameters
-    ----------
-    states : ndarray, shape (time, N)
-        States x, standardised or not.
-    inputs : ndarray, shape (time, Q)
-        Inputs u; Q may be 0.
-    window : TrainingWindow
-        The samples to use.
-    state_delays, input_delays : int
-        s and z.
-    all_rows : bool
-        Whether the targets are all rows of the next extended snapshot, or its first N alone.
-
-    Returns
-    -------
-    regressors : ndarray, shape (N(s+1) + Q(z+1), columns)
-        Extended states over extended inputs.
-    targets : ndarray, shape (N(s+1) or N, columns)
-        Next extended states.
-    """
-    first, count = window.first_column, window.columns
-    regressors = np.concatenate(
-        [embed(states, state_delays, first, count), embed(inputs, input_delays, first, count)]
-    )
-    targets = embed(states, state_delays if all_rows else 0, first + 1, count)
-    return regressors, targets

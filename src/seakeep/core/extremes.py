@@ -15,8 +15,6 @@ from scipy import stats
 
 from seakeep.arrays import FloatArray
 
-__all__ = ["Weibull", "fit_weibull", "most_probable_extreme", "peaks_between"]
-
 FEWEST = 10
 """Peaks from which on a law is fitted."""
 

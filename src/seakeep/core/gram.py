@@ -39,18 +39,6 @@ import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
 
-__all__ = [
-    "Group",
-    "Piece",
-    "PrimalSystem",
-    "gram_trace",
-    "lagged_response",
-    "lagged_sums",
-    "lay_out",
-    "primal_system",
-    "snapshot_gram",
-]
-
 PANEL = 64
 """Rows, about, in which a Gram matrix is made: few enough to stay in cache."""
 RESPONSES = 24

@@ -15,8 +15,6 @@ from scipy import optimize, stats
 from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import DataError
 
-__all__ = ["Estimate", "dominant_frequency", "estimate", "harmonic_fits"]
-
 MOST = 10
 """Windows of a record: more would hold too few periods each."""
 LEAST = 3

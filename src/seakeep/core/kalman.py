@@ -13,8 +13,6 @@ from scipy import linalg
 
 from seakeep.arrays import BoolArray, FloatArray
 
-__all__ = ["DelayFilter", "process_noise"]
-
 
 class DelayFilter:
     """Covariance and gains of the filter, in place: nothing grows from step to step.
@@ -117,20 +115,14 @@ class DelayFilter:
         """Variances that today's errors alone leave after 1 … `steps` steps, shape (steps, N)."""
         count = len(self.a)
         out = np.empty((steps, count))
-        root = _root(self.covariance)
+        values, vectors = linalg.eigh(self.covariance)
+        kept = values > 1e-14 * max(float(values[-1]), np.finfo(float).tiny)
+        root = vectors[:, kept] * np.sqrt(values[kept])
         for row in out:
             newest = self.a @ root
             root = np.concatenate([root[count:], newest])
             np.einsum("ij,ij->i", newest, newest, out=row)
         return out
-
-
-def _root(covariance: FloatArray) -> FloatArray:
-    """Square root of a covariance, columns of no weight left out."""
-    values, vectors = linalg.eigh(covariance)
-    kept = values > 1e-14 * max(float(values[-1]), np.finfo(float).tiny)
-    root: FloatArray = vectors[:, kept] * np.sqrt(values[kept])
-    return root
 
 
 def process_noise(residual: FloatArray, a: FloatArray, noise: FloatArray) -> FloatArray:

@@ -16,18 +16,6 @@ import numpy.typing as npt
 from seakeep.arrays import BoolArray, FloatArray, as_real
 from seakeep.errors import RequestError
 
-__all__ = [
-    "anrmse",
-    "error_over_time",
-    "fit_percent",
-    "is_slack",
-    "nammae",
-    "normalised_extremes_error",
-    "nrmse",
-    "slack_share",
-]
-
-
 SLACK_PART = 0.01
 """A channel whose measured SD is below this part of its training SD is not judged."""
 NOISE_FACTOR = 2**0.5
@@ -38,7 +26,7 @@ is noise there, which no model forecasts."""
 def paired(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,
-    training_std: npt.ArrayLike | None,
+    training_std: npt.ArrayLike | None = None,
     noise_std: npt.ArrayLike | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Check two histories and return them with the measured SD and which channels are judged.
@@ -59,35 +47,17 @@ def paired(
             f"predicted has shape {p.shape} and measured {m.shape}; both must end in "
             f"(time, channel) of the same size.{hint}"
         )
-    try:
-        np.broadcast_shapes(p.shape, m.shape)
-    except ValueError:
-        raise RequestError(
-            f"predicted has shape {p.shape} and measured {m.shape}; the axes before "
-            "(time, channel) must agree, or be missing in one of them."
-        ) from None
     if m.shape[-2] < 2:
         raise RequestError(
             f"a window of {m.shape[-2]} sample(s) has no standard deviation; judge at least two."
         )
     spread = m.std(axis=-2, ddof=1)
-    reference = as_real(0.0 if training_std is None else training_std, "training_std")
-    if reference.shape not in ((), m.shape[-1:]):
-        raise RequestError(
-            f"training_std has shape {reference.shape}; one value for each of the {m.shape[-1]} "
-            "channels is expected."
-        )
     # A constant that is not a binary fraction has a spread of rounding, not of zero.
-    constant = spread <= 1e-12 * np.abs(m).max(axis=-2)
-    slack = constant | (spread < SLACK_PART * reference)
-    noise = as_real(0.0 if noise_std is None else noise_std, "noise_std")
-    try:
-        slack = slack | (spread < NOISE_FACTOR * np.broadcast_to(noise, spread.shape))
-    except ValueError:
-        raise RequestError(
-            f"noise_std has shape {noise.shape}; one value for each of the {m.shape[-1]} channels "
-            "is expected."
-        ) from None
+    slack = spread <= 1e-12 * np.abs(m).max(axis=-2)
+    known = (("training_std", training_std, SLACK_PART), ("noise_std", noise_std, NOISE_FACTOR))
+    for name, given, part in known:
+        if given is not None:
+            slack |= spread < part * as_real(given, name)
     return p, m, np.where(slack, np.nan, spread), ~slack
 
 

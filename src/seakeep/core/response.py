@@ -10,8 +10,6 @@ import numpy as np
 
 from seakeep.arrays import ComplexArray, FloatArray
 
-__all__ = ["frequency_response"]
-
 
 def frequency_response(
     state_rows: FloatArray,

@@ -31,10 +31,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import blas
 
-from seakeep.arrays import BoolArray, FloatArray, as_real
+from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import RequestError
-
-__all__ = ["rollout", "rollouts"]
 
 Arrays = tuple[FloatArray, ...]
 
@@ -43,8 +41,6 @@ PIECE = 300_000
 
 Few enough that memory that was used once is used again: fresh pages cost as much as the arithmetic
 on them, a third of the time of forty windows."""
-SYMMETRIC = 1e-8
-"""Part of its largest entry by which a symmetric matrix may differ from its mirror image."""
 OUTPUT_ROWS = 192
 """Rows of the outputs of one block of an exact-shift propagator, at most, about."""
 SHIFTING_COST = (2500.0, 6000.0, 900.0)
@@ -152,7 +148,10 @@ def rollouts(
         for number, each in enumerate(read):
             if len(each.start):
                 out[number] = _run(propagator, each.start, each.series, each.steps)
-                _cut_lost(out[number])
+                finite = np.isfinite(out[number])
+                if not finite.all():
+                    gone = np.logical_or.accumulate(~finite.all(axis=2), axis=1)
+                    out[number][gone] = np.nan
     return out
 
 
@@ -175,66 +174,34 @@ def _read(
     direct: npt.ArrayLike | None,
     n_states: int | None,
 ) -> _Read:
-    start = as_real(histories, "histories")
-    driving = as_real(inputs, "inputs")
-    if (
-        a.ndim != 2
-        or start.ndim not in (2, 3)
-        or driving.ndim != 3
-        or b.ndim != 2
-        or len(b) != len(a)
-    ):
-        raise RequestError(
-            "rollout needs A (rows, N(s+1)), B (rows, Q(z+1)), histories (window, N(s+1)) or "
-            "(window, s+1, N), inputs (window, steps, Q(z+1)) or (window, z+steps, Q); received "
-            f"{a.shape}, {b.shape}, {start.shape}, {driving.shape}."
-        )
-    count = _count_states(a, start, n_states)
-    if start.ndim == 3:
-        start = start[:, ::-1].reshape(len(start), start.shape[1] * start.shape[2])
-    if start.shape[1] != a.shape[1] or start.shape[0] != driving.shape[0]:
-        raise RequestError(
-            f"histories {np.shape(histories)} and inputs {driving.shape} do not fit A {a.shape}: "
-            f"a history has {a.shape[1]} values, and both have one row per window."
-        )
-    direct = None if direct is None else as_real(direct, "direct")
-    groups, further = [(b, driving)], () if direct is None else direct.shape
-    if direct is not None:
-        if len(further) != 3 or (len(further) and further[2] > b.shape[1]):
-            raise RequestError(
-                f"direct inputs of shape {further} do not fit B {b.shape}: (window, steps, D) is "
-                "needed, with D of its columns."
-            )
-        split = b.shape[1] - further[2]
-        groups = [
-            (b[:, :split], driving),
-            (b[:, split:], direct),
-        ]
-    steps = _steps(groups[0][0], driving)
-    if direct is not None and further[:2] != (len(start), steps):
-        raise RequestError(
-            f"direct inputs of shape {further} do not stand beside {len(start)} window(s) of "
-            f"{steps} steps: one row per window and step is needed."
-        )
-    groups = [groups[0], *(group for group in groups[1:] if group[1].shape[2])]
-    matrices, series = zip(*groups, strict=True)
-    return _Read(start, matrices, series, steps, count)
-
-
-def _count_states(a: FloatArray, start: FloatArray, given: int | None) -> int:
+    start, driving = as_real(histories, "histories"), as_real(inputs, "inputs")
     rows, size = a.shape
-    if given is not None:
-        count = given
-    elif start.ndim == 3:
-        count = start.shape[2]
-    else:
-        count = rows
-    if count < 1 or size % count or rows not in (count, size):
+    count = n_states or (start.shape[2] if start.ndim == 3 else rows)
+    if size % count or rows not in (count, size):
         raise RequestError(
             f"A of shape {a.shape} does not belong to {count} states: its columns must be a "
             "multiple of N, and its rows N or all of them."
         )
-    return count
+    if start.ndim == 3:
+        start = start[:, ::-1].reshape(len(start), start.shape[1] * count)
+    if start.shape != (len(driving), size):
+        raise RequestError(
+            f"histories {np.shape(histories)} and inputs {driving.shape} do not fit A {a.shape}: "
+            f"a history has {size} values, and both have one row per window."
+        )
+    beside = np.empty((0, 0, 0)) if direct is None else as_real(direct, "direct")
+    split = b.shape[1] - beside.shape[2]
+    steps = _steps(b[:, :split], driving)
+    matrices, series = [b[:, :split]], [driving]
+    if beside.shape[2]:
+        matrices.append(b[:, split:])
+        series.append(beside)
+        if beside.shape[:2] != (len(start), steps):
+            raise RequestError(
+                f"direct inputs of shape {beside.shape} do not stand beside {len(start)} window(s) "
+                f"of {steps} steps: one row per window and step is needed."
+            )
+    return _Read(start, tuple(matrices), tuple(series), steps, count)
 
 
 def _steps(b: FloatArray, inputs: FloatArray) -> int:
@@ -242,18 +209,14 @@ def _steps(b: FloatArray, inputs: FloatArray) -> int:
     length, width = inputs.shape[1:]
     if width == b.shape[1]:
         return int(length)
-    if width == 0 or b.shape[1] == 0 or b.shape[1] % width:
-        mend = (
-            "Check the number of inputs and their delays."
-            if b.shape[1]
-            else "A model without input takes inputs of shape (window, steps, 0)."
-        )
+    if not width or not b.shape[1] or b.shape[1] % width:
         raise RequestError(
             f"inputs with {width} channels do not fit B of shape {b.shape}: its columns must be "
-            f"Q(z+1). {mend}"
+            "Q(z+1). Check the number of inputs and their delays; a model without input takes "
+            "inputs of shape (window, steps, 0)."
         )
     delays = b.shape[1] // width - 1
-    if length - delays < 1:
+    if length <= delays:
         raise RequestError(
             f"inputs of {length} samples do not reach one step: {delays} delays need at least "
             f"{delays + 1} samples."
@@ -261,28 +224,12 @@ def _steps(b: FloatArray, inputs: FloatArray) -> int:
     return int(length - delays)
 
 
-def _cut_lost(out: FloatArray) -> None:
-    """NaN from where a window is not finite on; in pieces of time."""
-    windows, steps, count = out.shape
-    length = max(1, PIECE // (16 * max(1, windows * count)))
-    lost = np.zeros((windows, 1), dtype=bool)
-    for first in range(0, steps, length):
-        piece = out[:, first : first + length]
-        finite = np.isfinite(piece)
-        if finite.all() and not lost.any():
-            continue
-        gone: BoolArray = np.any(~finite, axis=2)
-        gone[:, :1] |= lost
-        piece[np.logical_or.accumulate(gone, axis=1)] = np.nan
-        lost = np.any(gone, axis=1, keepdims=True)
-
-
 @dataclass(frozen=True, eq=False)
 class _Propagator:
     """K steps as one: O, P and, where the outputs are not the state, A_K and B_K.
 
     Outputs stand newest first; P and B_K are one matrix for each group of inputs. `state` is
-    A_K for one window, its transpose for several, and the upper half of a mirrored Â.
+    A_K, or the upper half of a mirrored Â.
     """
 
     steps: int
@@ -291,7 +238,6 @@ class _Propagator:
     state: FloatArray | None = None
     state_input: Arrays = ()
     is_mirrored: bool = False
-    is_transposed: bool = False
 
 
 def _propagator(
@@ -299,12 +245,16 @@ def _propagator(
 ) -> _Propagator:
     """The propagator that costs least; of one step where a longer one overflows."""
     if len(a) == count < a.shape[1]:
-        propagator = _shifting_propagator(a, b, channels, _shifting_steps(count, steps))
+        block, row, per_state = SHIFTING_COST
+        best = round(math.sqrt(steps * block / (row + per_state * count)))
+        times = max(1, min(steps, best, -(-OUTPUT_ROWS // count)))
+        propagator = _shifting_propagator(a, b, channels, times)
         if np.isfinite(propagator.output_state).all():
             return propagator
         return _shifting_propagator(a, b, channels, 1)
     width = sum(group.shape[1] for group in b)
-    is_mirrored = windows == 1 and _is_mirrored(a[count:, : len(a) - count])
+    delayed = a[count:, : len(a) - count]
+    is_mirrored = windows == 1 and delayed.size > 1 and np.array_equal(delayed, delayed.T)
     times = _doublings(len(a), width, windows, steps, is_mirrored)
     propagator = _square_propagator(a, b, count, channels, times)
     assert propagator.state is not None
@@ -315,17 +265,7 @@ def _propagator(
         half = np.zeros((padded, padded))
         half[: len(a) - count, : len(a)] = a[count:]
         return replace(propagator, state=half, is_mirrored=True)
-    if windows > 1 and propagator.state is not None:
-        state = np.ascontiguousarray(propagator.state.T)
-        return replace(propagator, state=state, is_transposed=True)
     return propagator
-
-
-def _shifting_steps(states: int, steps: int) -> int:
-    """Steps of an exact-shift propagator that cost least over a free run."""
-    block, fixed, state = SHIFTING_COST
-    best = round(math.sqrt(steps * block / (fixed + state * states)))
-    return max(1, min(steps, best, -(-OUTPUT_ROWS // states)))
 
 
 def _shifting_propagator(
@@ -357,12 +297,6 @@ def _shifting_propagator(
             ]
             out[at : at + N, start + step * q :] += head @ own
     return _Propagator(steps, output_state, output_input)
-
-
-def _is_mirrored(block: FloatArray) -> bool:
-    if block.size < 2 or not np.array_equal(block[0], block[:, 0]):
-        return False
-    return np.array_equal(block, block.T)
 
 
 def _doublings(size: int, inputs: int, windows: int, steps: int, is_mirrored: bool) -> int:
@@ -503,13 +437,8 @@ def _run_square(
     states = np.empty((number + 1, windows, size))
     states[number] = start
     states[:number] = _forced(rows, propagator.state_input).reshape(number, windows, size)
-    if not propagator.is_transposed:
-        line = states[:, 0]
-        for block in range(number - 1, -1, -1):
-            line[block] += propagator.state @ line[block + 1]
-    else:
-        for block in range(number - 1, -1, -1):
-            states[block] += states[block + 1] @ propagator.state
+    for block in range(number - 1, -1, -1):
+        states[block] += states[block + 1] @ propagator.state.T
     outputs = states[1:].reshape(-1, size) @ propagator.output_state.T
     outputs += _forced(rows, propagator.output_input)
     newest_first = outputs.reshape(number, windows, -1).transpose(1, 0, 2)

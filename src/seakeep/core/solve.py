@@ -34,15 +34,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from scipy import linalg
 from scipy.linalg import blas, lapack
 
-from seakeep.arrays import FloatArray, as_real, number, whole_number
+from seakeep.arrays import FloatArray, as_real
 from seakeep.core.embedding import TrainingWindow, embed
 from seakeep.core.gram import (
+    Group,
     Piece,
     PrimalSystem,
     gram_trace,
@@ -53,8 +55,6 @@ from seakeep.core.gram import (
 )
 from seakeep.core.stability import clip_modes
 from seakeep.errors import DataError, RequestError
-
-__all__ = ["Method", "Solution", "identify", "solve"]
 
 Method = Literal["primal", "dual", "svd"]
 
@@ -153,21 +153,14 @@ def identify(
     DataError
         If a sample that trains is not finite.
     """
+    if not 0 <= ridge < np.inf:
+        raise RequestError(f"ridge must be zero or positive, and finite; received {ridge!r}.")
     targets = _checked(states, windows, state_delays or 0, "states")
     groups = [] if state_delays is None else [(targets, state_delays)]
     groups.append((_checked(inputs, windows, input_delays, "inputs"), input_delays))
     if direct is not None:
         groups.append((_checked(direct, windows, 0, "direct"), 0))
-    if not number(ridge, "ridge") >= 0 or ridge == np.inf:
-        raise RequestError(f"ridge must be zero or positive, and finite; received {ridge!r}.")
-    if radius is not None and not 0 < radius < np.inf:
-        raise RequestError(f"radius must be positive and finite; received {radius!r}.")
     groups = [(runs, delays) for runs, delays in groups if runs[0].shape[1]]
-    if not groups or (state_delays is None and all_rows):
-        raise RequestError(
-            "without states among the regressors there must be inputs, and all_rows=False. Give "
-            "state_delays, or inputs."
-        )
     pieces = [
         Piece(
             targets[run],
@@ -188,7 +181,7 @@ def identify(
         solution = Solution(form(effective), chosen, effective, count)
     if radius is None or state_delays is None:
         return solution
-    size = problem.states
+    size = problem.groups[0].stop
     rows, clipped = clip_modes(solution.coefficients[:, :size], radius)
     coefficients = np.concatenate([rows, solution.coefficients[:, size:]], axis=1)
     return replace(solution, coefficients=coefficients, clipped=clipped)
@@ -198,20 +191,9 @@ def _checked(
     series: Sequence[FloatArray], windows: Sequence[TrainingWindow], delays: int, name: str
 ) -> list[FloatArray]:
     """Series of the runs as (time, channel), finite in the samples that train."""
-    whole_number(delays, f"delays of {name}", least=0)
     arrays = [as_real(each, name) for each in series]
-    if not arrays or len(arrays) != len(windows):
-        raise RequestError(
-            f"{name} has {len(arrays)} run(s) and there are {len(windows)} windows; one array "
-            "(time, channel) per run and window is needed."
-        )
     for array, window in zip(arrays, windows, strict=True):
         begin, end = window.first_column - delays, window.last + 1
-        if array.ndim != 2 or array.shape[1] != arrays[0].shape[-1] or window.columns < 1:
-            raise RequestError(
-                f"{name} has a run of shape {array.shape} and {window.columns} snapshot pairs; "
-                "(time, channel), the same channels in each run, and at least one pair are needed."
-            )
         if not 0 <= begin < end <= len(array):
             raise RequestError(
                 f"samples {begin} to {end - 1} of {name} train, and it has {len(array)}. Shorten "
@@ -233,15 +215,20 @@ class _Delayed:
     delays: tuple[int, ...]
     all_rows: bool
 
-    @property
-    def states(self) -> int:
-        """Rows of the extended state."""
-        return lay_out(self.pieces[0], self.delays)[0].stop
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """Places of the groups; the first ends with the extended state."""
+        return lay_out(self.pieces[0], self.delays)
 
     @property
     def rows(self) -> int:
         """Regressors."""
-        return lay_out(self.pieces[0], self.delays)[-1].stop
+        return self.groups[-1].stop
+
+    @cached_property
+    def trace(self) -> float:
+        """Trace of the Gram matrix."""
+        return gram_trace(self.pieces, self.delays)
 
     @property
     def columns(self) -> int:
@@ -250,76 +237,65 @@ class _Delayed:
 
     def form(self) -> Method:
         """The form that is less work, by its largest terms."""
-        p, n, a = self.rows, self.columns, self.states
+        p, n, a = self.rows, self.columns, self.groups[0].stop
         if not self.all_rows:
             return "primal" if p <= n else "dual"
         b = p - a
-        channels = sum(series.shape[1] for series in self.pieces[0].series)
-        rank = 2 * (channels + len(self.pieces))
+        rank = 2 * (self.groups[-1].head.stop + len(self.pieces))
         primal = p**3 / 3 + 2 * rank * p * (p + a)
         dual = n**3 / 3 + n * n * p + n * a * (a + 2 * b)
         return "primal" if primal <= dual else "dual"
 
     def choose(self, ridge: float) -> Method:
         """The form, or singular values where λ is too small for a Gram matrix."""
-        if not self.is_squared_away(ridge):
+        if ridge >= GRAM_LIMIT * self.trace:
             return self.form()
-        trace = gram_trace(self.pieces, self.delays)
-        if not self.all_rows and self.rows <= self.columns and ridge >= REFINED_LIMIT * trace:
+        is_narrow = not self.all_rows and self.rows <= self.columns
+        if is_narrow and ridge >= REFINED_LIMIT * self.trace:
             return "primal"
-        return self.form() if ridge > 0 and _gram_suffices(ridge, self.gram()) else "svd"
+        return self.form() if ridge > 0 and self.gram_suffices(ridge) else "svd"
 
-    def is_squared_away(self, ridge: float) -> bool:
-        """Whether λ may be too small for a Gram matrix, by its trace."""
-        return ridge < GRAM_LIMIT * gram_trace(self.pieces, self.delays)
-
-    def gram(self) -> FloatArray:
-        """The smaller Gram matrix, its upper triangle."""
+    def gram_suffices(self, ridge: float) -> bool:
+        """Whether λ ≥ 1e-6 σ²_max, from the upper triangle of the smaller Gram matrix."""
         if self.rows <= self.columns:
-            return primal_system(self.pieces, self.delays).gram
-        return snapshot_gram(self.pieces, self.delays)
+            upper = np.triu(primal_system(self.pieces, self.delays).gram)
+        else:
+            upper = np.triu(snapshot_gram(self.pieces, self.delays))
+        # A bound of the largest squared singular value from above, then the value itself.
+        if ridge >= GRAM_LIMIT * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
+            return True
+        top = [len(upper) - 1] * 2
+        largest = linalg.eigvalsh(upper, lower=False, subset_by_index=top, check_finite=False)
+        return bool(ridge >= GRAM_LIMIT * largest[0])
 
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Hankel matrices of regressors and targets, built."""
-        regressors = np.concatenate(
-            [
-                np.concatenate(
-                    [
-                        embed(series, delay, piece.first, piece.count)
-                        for series, delay in zip(piece.series, self.delays, strict=True)
-                    ]
-                )
-                for piece in self.pieces
-            ],
-            axis=1,
-        )
         target_delays = self.delays[0] if self.all_rows else 0
-        targets = [
-            embed(piece.states, target_delays, piece.first + 1, piece.count)
-            for piece in self.pieces
-        ]
-        return regressors, np.concatenate(targets, axis=1)
+        regressors, targets = [], []
+        for piece in self.pieces:
+            groups = zip(piece.series, self.delays, strict=True)
+            extended = [embed(x, delay, piece.first, piece.count) for x, delay in groups]
+            regressors.append(np.concatenate(extended))
+            targets.append(embed(piece.states, target_delays, piece.first + 1, piece.count))
+        return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
 
     def primal(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
         if self.all_rows:
             system = primal_system(self.pieces, self.delays)
             return _all_rows(system, _factor(system.gram, ridge), ridge)
-        if self.is_squared_away(ridge):
-            return self._refined(ridge)
-        room = self.pieces[0].states.shape[1]
-        system = primal_system(self.pieces, self.delays, room)
-        return np.ascontiguousarray(_solve_beside(system.gram, system.right, ridge))
-
-    def _refined(self, ridge: float) -> FloatArray:
-        """Coefficients of the newest rows, corrected by the residuals of the data."""
+        if ridge >= GRAM_LIMIT * self.trace:
+            room = self.pieces[0].states.shape[1]
+            system = primal_system(self.pieces, self.delays, room)
+            return np.ascontiguousarray(_solve_beside(system.gram, system.right, ridge))
+        # λ is small: residuals of the data correct what the Gram matrix lost.
         system = primal_system(self.pieces, self.delays)
         factor = _factor(system.gram, ridge)
         regressors, targets = self.matrices()
-        found = np.asarray(lapack.dpotrs(factor, system.right.T, lower=1)[0]).T
+        found = _solved(factor, system.right)
         for _ in range(CORRECTIONS):
             right = (targets - found @ regressors) @ regressors.T - ridge * found
-            found += np.asarray(lapack.dpotrs(factor, right.T, lower=1)[0]).T
+            found += _solved(factor, right)
         return found
 
     def dual(self, ridge: float) -> FloatArray:
@@ -333,33 +309,21 @@ class _Delayed:
         N = targets.shape[1]
         if not self.all_rows:
             weights = _solve_beside(snapshot_gram(self.pieces, self.delays, N), targets.T, ridge).T
-            groups = lay_out(self.pieces[0], self.delays)
             top, at = np.zeros((N, self.rows)), 0
             for piece in self.pieces:
                 own = weights[at : at + piece.count]
                 at += piece.count
-                for series, group in zip(piece.series, groups, strict=True):
+                for series, group in zip(piece.series, self.groups, strict=True):
                     top[:, group.rows] += lagged_sums(own, series, piece.first, group.lags)
             return top
         factor = _factor(snapshot_gram(self.pieces, self.delays), ridge)
         stacked = np.concatenate([self.matrices()[0], targets.T])
         half = blas.dtrsm(1.0, factor, stacked.T, lower=1, overwrite_b=1)
         regressors, newest = half[:, : self.rows], half[:, self.rows :]
-        out = np.empty((self.states, self.rows))
+        out = np.empty((self.groups[0].stop, self.rows))
         np.matmul(newest.T, regressors, out=out[:N])
-        np.matmul(regressors[:, : self.states - N].T, regressors, out=out[N:])
+        np.matmul(regressors[:, : len(out) - N].T, regressors, out=out[N:])
         return out
-
-
-def _gram_suffices(ridge: float, gram: FloatArray) -> bool:
-    """Whether λ ≥ 1e-6 σ²_max, from the upper triangle of the Gram matrix."""
-    # A bound of the largest squared singular value from above, then the value itself.
-    upper = np.triu(gram)
-    if ridge >= GRAM_LIMIT * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
-        return True
-    top = len(gram) - 1
-    largest = linalg.eigvalsh(upper, lower=False, subset_by_index=[top, top], check_finite=False)
-    return bool(ridge >= GRAM_LIMIT * largest[0])
 
 
 def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
@@ -377,6 +341,11 @@ def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
             "definite. Raise ridge, or use method='svd'."
         )
     return np.asarray(factor)
+
+
+def _solved(factor: FloatArray, rows: FloatArray) -> FloatArray:
+    """Rows times the inverse of a matrix, by its lower Cholesky factor; in their place."""
+    return np.asarray(lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0]).T
 
 
 def _solve_beside(padded: FloatArray, right: FloatArray, ridge: float) -> FloatArray:
@@ -417,8 +386,7 @@ def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution
     if ridge <= 0 or ridge < GRAM_LIMIT * np.trace(gram):
         return _by_singular_values(regressors, targets, ridge, None)
     factor = _factor(gram, ridge)
-    right = targets @ regressors.T
-    solved = np.asarray(lapack.dpotrs(factor, right.T, lower=1)[0]).T
+    solved = _solved(factor, targets @ regressors.T)
     return Solution(solved, "primal", ridge, min(regressors.shape))
 
 
@@ -450,7 +418,9 @@ def _all_rows(system: PrimalSystem, factor: FloatArray, ridge: float) -> FloatAr
     states = system.groups[0]
     N, extended, size = states.channels, states.stop, system.groups[-1].stop
     edges, width = len(system.edges), len(system.heads)
-    tau = -1.0 if _is_smooth(system) else 1.0
+    # Whether neighbouring samples are alike: the sign of their products, summed.
+    alike = [system.heads[g.head, g.older][:, : g.channels].trace() for g in system.groups]
+    tau = -1.0 if sum(alike) >= 0 else 1.0
     rank = edges + 2 * width
     rows = np.empty((rank + N, size))
     rows[:edges] = system.edges
@@ -464,7 +434,7 @@ def _all_rows(system: PrimalSystem, factor: FloatArray, ridge: float) -> FloatAr
         solving[:, group.newest] *= 0.5
         _sum_over_lags(rows[:rank, group.rows], group.channels, tau)
     rows[rank:] = system.right
-    solved = np.asarray(lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0]).T
+    solved = _solved(factor, rows)
     plus, minus = _generators(solved[:rank], system, tau)
     scale = np.sqrt(ridge)
     plus *= scale
@@ -483,15 +453,6 @@ def _all_rows(system: PrimalSystem, factor: FloatArray, ridge: float) -> FloatAr
     shifted = extended - N
     out[N:].reshape(-1)[: shifted * size : size + 1] += 1.0
     return out[:extended]
-
-
-def _is_smooth(system: PrimalSystem) -> bool:
-    """Whether neighbouring samples are alike: the sign of their products, summed."""
-    total = 0.0
-    for group in system.groups:
-        next_lag = system.heads[group.head, group.older][:, : group.channels]
-        total += float(np.trace(next_lag))
-    return total >= 0
 
 
 def _sum_over_lags(rows: FloatArray, channels: int, tau: float) -> None:

@@ -15,8 +15,6 @@ from scipy import signal, stats
 from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import DataError
 
-__all__ = ["Spectra", "cross_spectra"]
-
 OVERLAP_CORRELATION = 1 / 36
 """Squared correlation of the spectra of two Hann segments that share a half (Welch, 1967)."""
 
@@ -51,8 +49,7 @@ class Spectra:
     @property
     def input_power(self) -> FloatArray:
         """Spectra of the inputs, shape (frequency, input)."""
-        result: FloatArray = np.diagonal(self.inputs, axis1=1, axis2=2).real
-        return result
+        return np.asarray(np.diagonal(self.inputs, axis1=1, axis2=2).real)
 
     def only(self, inputs: Sequence[int]) -> Spectra:
         """Those of some of the inputs."""
@@ -63,9 +60,7 @@ class Spectra:
     def ordinary(self) -> FloatArray:
         """Coherence of each pair, shape (frequency, input, output)."""
         both = self.input_power[:, :, None] * self.outputs[:, None]
-        out: FloatArray = np.zeros_like(both)
-        np.divide(np.abs(self.cross) ** 2, both, out=out, where=both > 0)
-        return out
+        return np.asarray(_over(np.abs(self.cross) ** 2, both))
 
     def multiple(self) -> FloatArray:
         r"""Coherence of each output with all inputs, shape (frequency, output).
@@ -73,12 +68,8 @@ class Spectra:
         Corrected for what q inputs explain of noise by chance:
         :math:`1 - (1 - \gamma^2)\,n/(n - q)`, at least zero.
         """
-        rest = np.divide(
-            self.unexplained(), self.outputs,
-            out=np.ones_like(self.outputs), where=self.outputs > 0,
-        )  # fmt: skip
-        result: FloatArray = np.clip(1.0 - rest, 0.0, 1.0)
-        return result
+        rest = _over(self.unexplained(), self.outputs, 1.0)
+        return np.asarray(np.clip(1.0 - rest, 0.0, 1.0))
 
     def unexplained(self) -> FloatArray:
         """Spectra of what no linear map of the inputs explains, shape (frequency, output)."""
@@ -90,15 +81,13 @@ class Spectra:
                 "a shorter segment."
             )
         # Relative to the power of each input, so that units do not matter.
-        power = np.sqrt(self.input_power)
-        scale = np.divide(1.0, power, out=np.zeros_like(power), where=power > 0)
+        scale = _over(1.0, np.sqrt(self.input_power))
         scaled = self.inputs * scale[:, :, None] * scale[:, None]
         cross = self.cross * scale[:, :, None]
         gain = np.linalg.pinv(scaled, rcond=1e-9, hermitian=True) @ cross
         explained = np.sum(np.conj(cross) * gain, axis=1).real
         left = np.clip(self.outputs - explained, 0.0, None)
-        rest: FloatArray = left * self.averages / (self.averages - size)
-        return rest
+        return np.asarray(left * self.averages / (self.averages - size))
 
     def share(self) -> FloatArray:
         r"""Share of the power of each output that no linear map of the inputs explains.
@@ -117,8 +106,8 @@ class Spectra:
             freedom = left**2 / (rest**2).sum(axis=0)
             freedom *= 2 * (self.averages - self.inputs.shape[1]) / MIXED
             limits = [freedom / stats.chi2.ppf(p, freedom) for p in (0.975, 0.025)]
-            share: FloatArray = np.minimum([left, *(left * each for each in limits)] / total, 1.0)
-        return share
+            share = np.minimum([left, *(left * each for each in limits)] / total, 1.0)
+        return np.asarray(share)
 
     def gain(self) -> tuple[ComplexArray, FloatArray]:
         r"""Transfer function of each pair, and the radius of its 95 % circle.
@@ -132,13 +121,17 @@ class Spectra:
             number of averages (Bendat and Piersol, equation 9.90); infinite without power.
         """
         power = self.input_power[:, :, None]
-        gain = np.divide(self.cross, power, out=np.zeros_like(self.cross), where=power > 0)
         freedom = max(2 * self.averages - 2, 1e-3)
         quantile = float(stats.f.ppf(0.95, 2, freedom))
         left = (1.0 - self.ordinary()) * self.outputs[:, None]
-        squares = np.full(left.shape, np.inf)
-        np.divide(2 / freedom * quantile * left, power, out=squares, where=power > 0)
-        return gain, np.sqrt(squares)
+        squares = _over(2 / freedom * quantile * left, power, np.inf)
+        return _over(self.cross, power), np.sqrt(squares)
+
+
+def _over(top: Any, power: FloatArray, without: float = 0.0) -> Any:
+    """Ratio to a power, and what stands `without` any."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(power > 0, top / power, without)
 
 
 def segment_length(samples: float, averages: int, period: float, longest: int) -> int:

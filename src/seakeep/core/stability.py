@@ -13,8 +13,6 @@ from scipy import linalg
 
 from seakeep.arrays import FloatArray
 
-__all__ = ["clip_modes"]
-
 
 def clip_modes(rows: FloatArray, radius: float) -> tuple[FloatArray, tuple[float, ...]]:
     r"""Move the eigenvalues outside a radius onto it, with their angles, and leave all others.

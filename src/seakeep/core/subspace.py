@@ -21,8 +21,6 @@ from seakeep.core.rollout import rollout
 from seakeep.core.solve import solve
 from seakeep.errors import DataError
 
-__all__ = ["StateSpace", "identify_subspace"]
-
 
 @dataclass(frozen=True, eq=False)
 class StateSpace:

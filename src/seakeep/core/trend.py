@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import FloatArray, IntArray, as_series, fraction, whole_number
+from seakeep.arrays import FloatArray, IntArray, as_series, fraction
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError
-
-__all__ = ["TrendTest", "trend_test"]
 
 
 @dataclass(frozen=True)
@@ -42,16 +40,6 @@ class TrendTest:
     p_value: float
     level: float
     block_length: int
-
-
-def _instants(time: npt.ArrayLike | None, samples: int) -> FloatArray:
-    t = np.arange(samples, dtype=float) if time is None else as_series(time, "time")
-    if t.size != samples:
-        raise RequestError(f"time has {t.size} instants and the series {samples} samples.")
-    steps = np.diff(t)
-    if not np.all(steps > 0) or not np.allclose(steps, steps.mean(), rtol=1e-3, atol=0.0):
-        raise RequestError("time must increase in even steps; blocks are counted in samples.")
-    return t
 
 
 def trend_test(
@@ -111,8 +99,10 @@ def trend_test(
     (True, 0.01)
     """
     x = as_series(error_over_time, "the series", minimum=8)
-    t = _instants(time, x.size)
-    whole_number(n_series, "n_series")
+    t = np.arange(x.size, dtype=float) if time is None else as_series(time, "time")
+    steps = np.diff(t)
+    if not np.all(steps > 0) or not np.allclose(steps, steps.mean(), rtol=1e-3, atol=0.0):
+        raise RequestError("time must increase in even steps; blocks are counted in samples.")
     level = fraction(level, "level")
     centred = t - t.mean()
     weights = centred / (centred @ centred)

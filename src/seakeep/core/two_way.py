@@ -15,11 +15,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import FloatArray, IntArray, as_real, fraction, whole_number
+from seakeep.arrays import FloatArray, as_real, fraction, whole_number
 from seakeep.core.bootstrap import student_interval
 from seakeep.errors import RequestError
-
-__all__ = ["overlap_block", "two_way_interval"]
 
 FEWEST = 3.0
 """Blocks of an axis below which their spread is not known."""
@@ -83,10 +81,12 @@ def two_way_interval(
             f"{', '.join(str(each.shape) for each in tables) or 'of none'}."
         )
     count, part = whole_number(n_series, "n_series"), fraction(level, "level")
-    rows, columns = (
-        _positions(size, whole_number(block, "a block"), count, rng)
-        for size, block in zip(shape, blocks, strict=True)
-    )
+    positions = []  # of redrawn rows and columns, in circular blocks
+    for size, block in zip(shape, blocks, strict=True):
+        starts = rng.integers(0, size, size=(count, -(-size // block)))
+        drawn = (starts[:, :, None] + np.arange(block)) % size
+        positions.append(drawn.reshape(count, -1)[:, :size])
+    rows, columns = positions
     step = max(1, AT_ONCE // max(each.size for each in tables))
     found = []
     for first in range(0, count, step):
@@ -98,13 +98,6 @@ def two_way_interval(
         return np.full(values.shape[1:], np.nan), np.full(values.shape[1:], np.nan)
     value = np.asarray(statistic(*(each[None] for each in tables)), dtype=float)[0]
     return student_interval(value, values, held, part)
-
-
-def _positions(size: int, block: int, count: int, rng: np.random.Generator) -> IntArray:
-    """Positions of redrawn rows or columns in circular blocks, shape (count, size)."""
-    starts = rng.integers(0, size, size=(count, -(-size // block)))
-    positions = (starts[:, :, None] + np.arange(block)) % size
-    return positions.reshape(count, -1)[:, :size].astype(np.intp, copy=False)
 
 
 def overlap_block(spans: Sequence[tuple[str, float, float]]) -> int:

@@ -9,8 +9,6 @@ from scipy import fft
 
 from seakeep.arrays import FloatArray, IntArray
 
-__all__ = ["band_edges", "band_energy"]
-
 PER_OCTAVE = 6
 """Bands per octave: each is 12 % wide, as wide as the peak of a record of eight waves."""
 

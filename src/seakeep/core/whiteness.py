@@ -6,14 +6,11 @@ Ljung, System Identification (1999), section 16.6.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from scipy import signal, stats
 
 from seakeep.arrays import FloatArray
-
-__all__ = ["autocorrelation", "input_correlation", "ljung_box"]
 
 
 def autocorrelation(pieces: Sequence[FloatArray], lags: int) -> FloatArray:
@@ -33,11 +30,10 @@ def autocorrelation(pieces: Sequence[FloatArray], lags: int) -> FloatArray:
         One at lag 0; NaN of a channel without variance.
     """
     lags = min(lags, max(map(len, pieces)) - 1)
-    sums = sum(_products(x - x.mean(axis=0), x - x.mean(axis=0), lags) for x in pieces)
-    total = np.asarray(sums)
-    out = np.full(total.shape, np.nan)
-    result: FloatArray = np.divide(total, total[:1], out=out, where=total[:1] > 0)
-    return result
+    centred = [x - x.mean(axis=0) for x in pieces]
+    total = np.asarray(sum(_products(x, x, lags) for x in centred))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(total / total[:1])
 
 
 def ljung_box(correlation: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
@@ -83,24 +79,18 @@ def input_correlation(
     """
     samples = sum(len(e) for e, _ in pieces)
     lags = min(lags, max(len(e) for e, _ in pieces) - 1)
-    size = pieces[0][1].shape[1]
-    e, u = (autocorrelation([pair[side] for pair in pieces], lags) for side in (0, 1))
+    residuals, inputs = ([part - part.mean(axis=0) for part in side]
+                         for side in zip(*pieces, strict=True))  # fmt: skip
+    e, u = autocorrelation(residuals, lags), autocorrelation(inputs, lags)
     both = e[:, :, None] * u[:, None]
     limit = 1.96 * np.sqrt(np.maximum(both[0] + 2 * both[1:].sum(axis=0), 1.0) / samples)
-    columns = []
-    for column in range(size):
-        total: Any = 0.0
-        of_e: Any = 0.0
-        of_u = 0.0
-        for residual, inputs in pieces:
-            r = residual - residual.mean(axis=0)
-            v = inputs[:, [column]] - inputs[:, [column]].mean(axis=0)
-            total = total + _products(r, np.broadcast_to(v, r.shape), lags)
-            of_e, of_u = of_e + (r**2).sum(axis=0), of_u + float((v**2).sum())
-        power = np.sqrt(np.asarray(of_e * of_u))
-        out = np.full(np.shape(total), np.nan)
-        columns.append(np.divide(total, power, out=out, where=power > 0))
-    return np.stack(columns, axis=-1), limit
+    total = np.zeros(both.shape)
+    for r, v in zip(residuals, inputs, strict=True):
+        for column in range(v.shape[1]):
+            total[:, :, column] += _products(r, np.broadcast_to(v[:, [column]], r.shape), lags)
+    of_e, of_u = (sum((part**2).sum(axis=0) for part in side) for side in (residuals, inputs))
+    with np.errstate(invalid="ignore"):
+        return total / np.sqrt(np.multiply.outer(of_e, of_u)), limit
 
 
 def _products(x: FloatArray, past: FloatArray, lags: int) -> FloatArray:

@@ -11,11 +11,6 @@ from seakeep.arrays import BoolArray, FloatArray, as_series
 from seakeep.signals.lags import Lags, windowed_lags
 from seakeep.signals.waves import dominant_period
 
-__all__ = [
-    "Agreement",
-    "compare_sensors",
-]
-
 LEAST_CORRELATION = 0.8
 """At a lower correlation no lag and no scale is given: 36 % of the variance would be the sensor's
 own."""
@@ -147,6 +142,8 @@ def compare_sensors(
     ]
     error, moved = ([np.std(z[span]) ** 2 for span in spans] for z in (x - y, y))
     lags = found.lag[_together(found)]
+    short = _windows(x, y, dt, 0.5 * length, period, stuck)[0]
+    straight = np.unwrap(short.lag[_together(short)], period=period)
     middle = float(np.median(lags))
     return Agreement(
         period=period,
@@ -154,7 +151,7 @@ def compare_sensors(
         step=step,
         lag=middle,
         lag_spread=float(1.4826 * np.median(np.abs(lags - middle))),
-        growth=_growth(_windows(x, y, dt, 0.5 * length, period, stuck)[0], period),
+        growth=float(straight[-2:].mean() - straight[:2].mean()) if straight.size > 3 else 0.0,
         correlation=float(np.median(found.correlation)),
         nrmse=float(np.sqrt(np.mean(error) / np.mean(moved))),
         gain=gain,
@@ -187,9 +184,3 @@ def _together(found: Lags) -> BoolArray:
     """Windows in which the two go together: elsewhere a lag says nothing."""
     alike: BoolArray = found.correlation >= 0.6
     return alike if alike.sum() > 3 else np.ones(alike.size, dtype=bool)
-
-
-def _growth(found: Lags, period: float) -> float:
-    """Lag gained from the first two windows to the last two, s."""
-    straight = np.unwrap(found.lag[_together(found)], period=period)
-    return float(straight[-2:].mean() - straight[:2].mean()) if straight.size > 3 else 0.0

@@ -11,12 +11,10 @@ import numpy as np
 from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.quality.faults import noise_share
 from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, channels_of, sound, step_of
+from seakeep.quality.record import Record, sound, step_of
 from seakeep.signals.filters import PASSBAND
 from seakeep.signals.synchronisation import ASSUMED
 from seakeep.signals.waves import energy_above
-
-__all__ = ["ClocksKind", "clocks", "others", "periods", "rates", "records", "steps"]
 
 RATE_TOLERANCE = 0.01
 """Part by which a stated rate may differ from the times: rates are written with two digits or more,
@@ -180,20 +178,18 @@ def steps(record: Record) -> Iterator[Finding]:
     # A filter halves amplitudes in the middle between its pass band and the Nyquist frequency.
     edge = (0.5 * (PASSBAND + 1.0) if record.anti_alias else 1.0) * 0.5 / dt
     fate = "is damped or lost" if record.anti_alias else "is folded into slower waves"
-    for logger, group in record.groups.items():
-        for name, channel in channels_of(group).items():
-            wanted = is_elevation(name) or name in MOTIONS
-            if not wanted or "derived_from" in channel.attrs:
-                continue
-            cuts = [(ClocksKind.COARSE_STEP, edge)] if own[logger] < dt else []
-            if (passed := record.whole[name].attrs.get("low_pass")) is not None:
-                cuts.append((ClocksKind.LOW_PASS, float(np.mean(passed))))
-            x = sound(group, name)
-            for kind, cut in cuts:
-                share, period = energy_above(x, own[logger], cut)
-                if share > LOST_ENERGY and noise_share(x) < 0.5:
-                    details = {"share": 100 * share, "period": period, "fate": fate}
-                    yield Finding(kind, record.run, name, 1 / dt, cut, "Hz", details=details)
+    for logger, group, name, _ in record.recorded():
+        if not (is_elevation(name) or name in MOTIONS):
+            continue
+        cuts = [(ClocksKind.COARSE_STEP, edge)] if own[logger] < dt else []
+        if (passed := record.whole[name].attrs.get("low_pass")) is not None:
+            cuts.append((ClocksKind.LOW_PASS, float(np.mean(passed))))
+        x = sound(group, name)
+        for kind, cut in cuts:
+            share, period = energy_above(x, own[logger], cut)
+            if share > LOST_ENERGY and noise_share(x) < 0.5:
+                details = {"share": 100 * share, "period": period, "fate": fate}
+                yield Finding(kind, record.run, name, 1 / dt, cut, "Hz", details=details)
 
 
 def periods(record: Record) -> Iterator[Finding]:

@@ -11,12 +11,9 @@ import numpy.typing as npt
 import scipy
 
 from seakeep.arrays import BoolArray, FloatArray, as_series, time_step
-from seakeep.errors import RequestError
 from seakeep.signals.filters import odd_extension
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import dominant_period
-
-__all__ = ["find_held", "find_outliers", "noise_share", "reading_step", "saturated"]
 
 MISSING, BRIDGED, OUTLIER, SATURATED, STUCK, REPLACED = 1, 2, 4, 8, 16, 32
 
@@ -118,15 +115,16 @@ def find_outliers(series: npt.ArrayLike) -> BoolArray:
     left = (4 * medians[REACH - BESIDE :][: x.size] - medians[: x.size]) / 3
     right = (4 * medians[REACH + 1 :][: x.size] - medians[REACH + 4 :][: x.size]) / 3
     away = np.abs(x - 0.5 * (left + right))
+    # Second differences of white noise have six times its variance, and know no slope.
+    noise = 1.4826 * float(np.median(np.abs(np.diff(x, 2)))) / float(np.sqrt(6.0))
     # Where a signal sticks and slips, a sample is far from the middle and belongs to one side.
-    found = (away > max(ALONE * _noise(x), LEAST * spread)) & (away > np.abs(left - right))
+    found = (away > max(ALONE * noise, LEAST * spread)) & (away > np.abs(left - right))
     jumps = np.abs(np.diff(x, prepend=np.inf, append=np.inf))
     for begin, end in stretches(found):
         near = np.median(away[max(begin - AROUND, 0) : end + AROUND])
         apart = min(jumps[begin] / away[begin], jumps[end] / away[end - 1])
         found[begin:end] = away[begin:end].max() > ALONE * 1.4826 * near and apart > ABRUPT
-    far: BoolArray = np.abs(x - middle) > FAR * spread
-    return found | far if spread > 0 else found
+    return np.asarray(found | (np.abs(x - middle) > FAR * spread) & (spread > 0))
 
 
 def _starts(x: FloatArray) -> npt.NDArray[np.intp]:
@@ -138,12 +136,6 @@ def _spread(x: FloatArray) -> tuple[float, float]:
     """Median, and standard deviation by percentiles that one sample in twenty does not move."""
     low, middle, high = np.percentile(x, [5, 50, 95])
     return float(middle), float(high - low) / 3.29  # of a normal series
-
-
-def _noise(x: FloatArray) -> float:
-    """Standard deviation of a series' white noise, by the median of its second differences."""
-    # Second differences of white noise have six times its variance, and know no slope.
-    return 1.4826 * float(np.median(np.abs(np.diff(x, 2)))) / float(np.sqrt(6.0))
 
 
 MEMORY = 4
@@ -204,8 +196,6 @@ def find_held(series: npt.ArrayLike, dt: float, witness: npt.ArrayLike | None = 
 
     Raises
     ------
-    RequestError
-        If the two differ in length.
     DataError
         If a series has gaps.
 
@@ -221,16 +211,16 @@ def find_held(series: npt.ArrayLike, dt: float, witness: npt.ArrayLike | None = 
     x = as_series(series)
     step = time_step(dt)
     other = None if witness is None else as_series(witness)
-    if other is not None and other.shape != x.shape:
-        raise RequestError(
-            f"the witness has {other.size} samples and the series {x.size}; put both on one axis."
-        )
     out = np.zeros(x.size, dtype=bool)
     starts = _starts(x)
     if starts.size < 2:
         return out
     lengths = np.diff(np.append(starts, x.size))
-    expected = _longest(lengths, _frame(x))
+    # Of n runs whose length goes on with probability p, the longest is of log n / log(1/p) (Erdős
+    # and Rényi). Where all readings repeat, as the frames of a slow camera do, they count as one.
+    frame = max(int(np.sort(lengths)[(lengths.size - 1) // 4]), _frame(x))
+    goes_on = max(float(np.mean(lengths >= 2 * frame)), 1 / lengths.size)
+    expected = frame * float(1 + SURE * np.log(lengths.size) / np.log(1 / goes_on))
     long = lengths > expected
     free = np.repeat(~long, lengths)
     if free.sum() < 2:
@@ -275,17 +265,6 @@ def _stay(
         return float("inf")
     wave = min(period, 4 * float(np.sqrt(2)) * spread / step)
     return wave / float(np.pi) * float(np.arccos(max(1 - smallest / amplitude, -1.0)))
-
-
-def _longest(lengths: npt.NDArray[np.intp], frame: int) -> float:
-    """Longest run of equal readings expected by chance, in samples, with a margin.
-
-    Of n runs whose length goes on with probability p, the longest is of log n / log(1/p) (Erdős
-    and Rényi). Where all readings repeat, as the frames of a slow camera do, they count as one.
-    """
-    frame = max(int(np.sort(lengths)[(lengths.size - 1) // 4]), frame)
-    goes_on = max(float(np.mean(lengths >= 2 * frame)), 1 / lengths.size)
-    return frame * float(1 + SURE * np.log(lengths.size) / np.log(1 / goes_on))
 
 
 def saturated(series: FloatArray, held: BoolArray) -> BoolArray:

@@ -14,8 +14,6 @@ import xarray as xr
 from seakeep.conventions import displayed
 from seakeep.errors import warn
 
-__all__ = ["Finding", "Kind", "as_json", "findings_of", "warn_of"]
-
 
 class Kind(Enum):
     """Base of the kinds of findings; a member holds its sentence and its remedy.
@@ -106,14 +104,14 @@ def as_json(findings: Iterable[Finding]) -> str:
         [
             vars(each)
             | {"kind": each.kind.name, "details": dict(each.details), "text": each.text}
-            | {key: _or_none(getattr(each, key)) for key in ("value", "limit", "place")}
+            | {key: _finite(getattr(each, key)) for key in ("value", "limit", "place")}
             for each in findings
         ],
         ensure_ascii=False,
     )
 
 
-def _or_none(value: float | None) -> float | None:
+def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,8 +12,6 @@ from seakeep.arrays import FloatArray
 from seakeep.quality.faults import OUTLIER, STUCK
 from seakeep.signals import Clock
 from seakeep.signals.time_axis import over_gaps
-
-__all__ = ["Rate", "Record", "Redundant", "filled", "step_of"]
 
 
 @dataclass(frozen=True)
@@ -91,6 +89,13 @@ class Record:
     anti_alias: bool = True
     left_out: Mapping[str, str] = field(default_factory=dict)
 
+    def recorded(self) -> Iterator[tuple[str, xr.Dataset, str, xr.Variable]]:
+        """Logger, its channels, and each of them by its name: those that were not derived."""
+        for logger, group in self.groups.items():
+            for name, channel in channels_of(group).items():
+                if "derived_from" not in channel.attrs:
+                    yield logger, group, name, channel
+
 
 def step_of(data: xr.Dataset) -> float:
     """First time step of channels on one axis, s."""
@@ -102,7 +107,7 @@ def channels_of(data: xr.Dataset) -> dict[str, xr.Variable]:
     return {str(name): data.variables[name] for name in data.data_vars}
 
 
-def filled(channel: xr.DataArray | xr.Variable) -> FloatArray:
+def filled(channel: xr.DataArray) -> FloatArray:
     """Values of a channel, straight lines across gaps."""
     return over_gaps(channel.to_numpy())
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 import scipy
@@ -22,8 +22,6 @@ from seakeep.quality.findings import Finding, Kind
 from seakeep.quality.record import Record, channels_of, sound, step_of
 from seakeep.signals.time_axis import stretches
 from seakeep.signals.waves import dominant_period
-
-__all__ = ["SamplesKind", "constant", "flagged", "impossible", "levels", "noise", "units"]
 
 NO_SLOW_MOTION = ("heave", "roll", "pitch")
 """Besides wave elevations, channels whose level has no reason to change within a run."""
@@ -70,58 +68,48 @@ _FLAGS = {
 
 def flagged(record: Record) -> Iterator[Finding]:
     """Samples that carry a flag."""
-    for group in record.groups.values():
-        time, dt = group["time"].to_numpy(), step_of(group)
-        for name, channel in channels_of(group).items():
-            if "derived_from" in channel.attrs or f"{name}_flags" not in group.coords:
+    for _, group, name, _ in record.recorded():
+        if f"{name}_flags" not in group.coords:
+            continue
+        flags, dt = group.variables[f"{name}_flags"].to_numpy(), step_of(group)
+        for bit, kind in _FLAGS.items():
+            hit = (flags & bit) > 0
+            if not hit.any():
                 continue
-            flags = group.variables[f"{name}_flags"].to_numpy()
-            for bit, kind in _FLAGS.items():
-                hit = (flags & bit) > 0
-                if not hit.any():
-                    continue
-                parts = stretches(hit)
-                done = ""
-                if bit == OUTLIER and (flags & REPLACED).any():
-                    done = "; replaced by interpolation"
-                if bit == MISSING and record.bridged is not None:
-                    done = f"; not bridged: {_why_open(parts, hit.size, dt, record.bridged)}"
-                details = {
-                    "samples": int(hit.sum()),
-                    "places": len(parts),
-                    "share": 100 * float(hit.mean()),
-                    "longest": max(end - begin for begin, end in parts) * dt,
-                    "done": done,
-                }
-                start = float(time[parts[0][0]])
-                yield Finding(kind, record.run, name, place=start, details=details)
-
-
-def _why_open(parts: Sequence[tuple[int, int]], size: int, dt: float, longest: float) -> str:
-    inner = [(end - begin) * dt for begin, end in parts if begin > 0 and end < size]
-    if not inner:
-        return "it stands at an end of the record"
-    limit = f"longest_gap = {longest:g} s in [preparation]"
-    return f"a gap of {max(inner):.3g} s is longer than {limit}"
+            parts = stretches(hit)
+            inner = [(end - begin) * dt for begin, end in parts if begin > 0 and end < hit.size]
+            done = ""
+            if bit == OUTLIER and (flags & REPLACED).any():
+                done = "; replaced by interpolation"
+            elif bit == MISSING and record.bridged is not None:
+                limit = f"longest_gap = {record.bridged:g} s in [preparation]"
+                longer = f"a gap of {max(inner, default=0):.3g} s is longer than {limit}"
+                why = longer if inner else "it stands at an end of the record"
+                done = f"; not bridged: {why}"
+            details = {
+                "samples": int(hit.sum()),
+                "places": len(parts),
+                "share": 100 * float(hit.mean()),
+                "longest": max(end - begin for begin, end in parts) * dt,
+                "done": done,
+            }
+            start = float(group["time"][parts[0][0]])
+            yield Finding(kind, record.run, name, place=start, details=details)
 
 
 def constant(record: Record) -> Iterator[Finding]:
     """Channels that never change."""
-    for group in record.groups.values():
-        for name, channel in channels_of(group).items():
-            if "derived_from" not in channel.attrs and not np.ptp(channel.to_numpy()):
-                value, unit = float(channel[0]), str(channel.attrs["units"])
-                yield Finding(SamplesKind.CONSTANT, record.run, name, value, unit=unit)
+    for _, _, name, channel in record.recorded():
+        if not np.ptp(channel.to_numpy()):
+            value, unit = float(channel[0]), str(channel.attrs["units"])
+            yield Finding(SamplesKind.CONSTANT, record.run, name, value, unit=unit)
 
 
 def noise(record: Record) -> Iterator[Finding]:
     """Channels most of whose variance has no memory, such as a record of random readings."""
-    for group in record.groups.values():
-        for name, channel in channels_of(group).items():
-            share = noise_share(sound(group, name))
-            if "derived_from" not in channel.attrs and share > 0.5:
-                details = {"share": 100 * share}
-                yield Finding(SamplesKind.NOISE, record.run, name, details=details)
+    for _, group, name, _ in record.recorded():
+        if (share := noise_share(sound(group, name))) > 0.5:
+            yield Finding(SamplesKind.NOISE, record.run, name, details={"share": 100 * share})
 
 
 def levels(record: Record) -> Iterator[Finding]:

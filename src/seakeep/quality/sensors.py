@@ -22,8 +22,6 @@ from seakeep.quality.findings import Finding, Kind
 from seakeep.quality.record import Record, Redundant, channels_of, filled, step_of
 from seakeep.signals import misplaced_probes
 
-__all__ = ["SensorsKind", "compared", "positions", "redundant"]
-
 
 class SensorsKind(Kind):
     """Findings from the comparison of two sensors."""

@@ -21,6 +21,7 @@ from seakeep.signals.lags import (
     windowed_lags,
 )
 from seakeep.signals.leakage import find_leakage
+from seakeep.signals.panel import TrackingSettings
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.propagation import (
     delay_by_celerity,
@@ -45,7 +46,7 @@ from seakeep.signals.synchronisation import (
     pool_drift,
 )
 from seakeep.signals.time_axis import TimeReport, bridge, inspect_times, onto_uniform, uniform_step
-from seakeep.signals.tracking import Track, TrackingSettings, contact_sheet, track_video
+from seakeep.signals.tracking import Track, contact_sheet, track_video
 from seakeep.signals.waves import (
     encounter_period,
     peak_period,

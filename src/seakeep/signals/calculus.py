@@ -7,11 +7,8 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import FloatArray, as_series, time_step
+from seakeep.arrays import FloatArray, as_pair, as_series, time_step
 from seakeep.errors import RequestError
-
-__all__ = ["band_pass", "complementary_filter", "differentiate", "envelope_squared", "integrate"]
-
 
 SHORTEST_RECORD = 0.05
 """Part of the slowest period kept that a record must last."""
@@ -25,15 +22,7 @@ def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
     low, high = band
     rise = np.clip((frequency - 0.75 * low) / (0.5 * low), 0.0, 1.0)
     fall = np.clip((1.1 * high - frequency) / (0.2 * high), 0.0, 1.0)
-    gain: FloatArray = np.sin(0.5 * np.pi * rise) ** 2 * np.sin(0.5 * np.pi * fall) ** 2
-    return gain
-
-
-def _filtered(extended: FloatArray, transfer: FloatArray, padding: int) -> FloatArray:
-    shape = (-1,) + (1,) * (extended.ndim - 1)
-    spectrum = fft.rfft(extended, axis=0) * transfer.reshape(shape)
-    out: FloatArray = fft.irfft(spectrum, n=extended.shape[0], axis=0)
-    return out[padding : extended.shape[0] - padding]
+    return np.asarray((np.sin(0.5 * np.pi * rise) * np.sin(0.5 * np.pi * fall)) ** 2)
 
 
 def reflections(series: FloatArray, order: int) -> FloatArray:
@@ -98,15 +87,16 @@ def predicted_extension(
     A record that stops in the middle of a wave is continued by waves, so that a filter with a
     long response is not fed a jump. The continuation fades out as a half cosine.
     """
-    flat = array.reshape(array.shape[0], -1)
     window = 0.5 * (1 + np.cos(np.pi * np.arange(1, count + 1) / (count + 1))) if fade else 1.0
-    out = np.empty((flat.shape[0] + 2 * count, flat.shape[1]))
-    for column, values in enumerate(np.ascontiguousarray(flat.T)):
+
+    def lengthened(column: FloatArray) -> FloatArray:
+        values = np.ascontiguousarray(column)
         before, after = (
             predicted(inward[-fitted:], count, order) * window for inward in (values[::-1], values)
         )
-        out[:, column] = np.concatenate([before[::-1], values, after])
-    return out.reshape((-1, *array.shape[1:]))
+        return np.concatenate([before[::-1], values, after])
+
+    return np.asarray(np.apply_along_axis(lengthened, 0, array))
 
 
 def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
@@ -118,19 +108,6 @@ def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
     found = whitening(reflections(past, order))
     result: FloatArray = continued(past, found[None], np.zeros((1, count)))[0]
     return result
-
-
-def _checked_band(band: tuple[float, float], dt: float, samples: int) -> tuple[float, float]:
-    low, high = band
-    nyquist = 0.5 / time_step(dt)
-    if not 0 < low < high <= nyquist:
-        raise RequestError(
-            f"a band needs 0 < low < high, and high at most the Nyquist frequency ({nyquist:g} "
-            f"Hz); received ({low:g}, {high:g}) Hz. The lower edge keeps drift out: set it below "
-            "the slowest wave and above the drift."
-        )
-    _check_slowest(low, dt, samples, "the lower edge of the band")
-    return low, high
 
 
 def _check_slowest(frequency: float, dt: float, samples: int, name: str) -> None:
@@ -155,15 +132,25 @@ def _integrated(
     series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int
 ) -> FloatArray:
     array = as_series(series, minimum=4, channels=True)
-    low, _ = edges = _checked_band(band, dt, array.shape[0])
+    (low, high), nyquist = band, 0.5 / time_step(dt)
+    if not 0 < low < high <= nyquist:
+        raise RequestError(
+            f"a band needs 0 < low < high, and high at most the Nyquist frequency ({nyquist:g} "
+            f"Hz); received ({low:g}, {high:g}) Hz. The lower edge keeps drift out: set it below "
+            "the slowest wave and above the drift."
+        )
+    _check_slowest(low, dt, array.shape[0], "the lower edge of the band")
     # Averaged column by column, so that a channel has the same bits alone and beside others.
     columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
     array = (columns - columns.mean(axis=1, keepdims=True)).T.reshape(array.shape)
     extended, padding = _extended(array, low * dt)
     frequency = fft.rfftfreq(extended.shape[0], dt)
-    gain = band_gain(frequency, edges)
+    gain = band_gain(frequency, band)
     omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
-    return _filtered(extended, gain / (1j * omega) ** times, padding)
+    transfer = (gain / (1j * omega) ** times).reshape((-1,) + (1,) * (array.ndim - 1))
+    spectrum = fft.rfft(extended, axis=0) * transfer
+    out: FloatArray = fft.irfft(spectrum, n=extended.shape[0], axis=0)
+    return out[padding:-padding]
 
 
 def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> FloatArray:
@@ -210,13 +197,13 @@ def integrate(
         Time step, s.
     band : (float, float)
         Lower and upper edge of the band kept, Hz; the gain is one half there.
-    times : {1, 2}, optional
+    times : int, optional
         How often to integrate.
 
     Returns
     -------
     ndarray
-        The integral, same shape; the unit is the series' times s or s².
+        The integral, same shape; the unit is the series' times s, or s² where `times` is two.
 
     Raises
     ------
@@ -234,8 +221,6 @@ def integrate(
     >>> bool(np.max(np.abs(heave - np.cos(omega * t))) < 0.01)  # to the very ends
     True
     """
-    if times not in (1, 2):
-        raise RequestError(f"integrate once or twice: times must be 1 or 2; received {times!r}.")
     return _integrated(series, dt, band, times)
 
 
@@ -272,16 +257,9 @@ def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     >>> bool(np.allclose(differentiate(t**4, 0.1), 4 * t**3))
     True
     """
-    x = as_series(series, minimum=5, channels=True)
-    step = time_step(dt)
-    out = np.empty_like(x)
-    out[2:-2] = (x[:-4] - 8 * x[1:-3] + 8 * x[3:-1] - x[4:]) / 12
-    first = np.array([-25.0, 48, -36, 16, -3]) / 12
-    second = np.array([-3.0, -10, 18, -6, 1]) / 12
-    out[0], out[1] = np.tensordot(first, x[:5], 1), np.tensordot(second, x[:5], 1)
-    out[-1] = -np.tensordot(first[::-1], x[-5:], 1)
-    out[-2] = -np.tensordot(second[::-1], x[-5:], 1)
-    return out / step
+    x, step = as_series(series, minimum=5, channels=True), time_step(dt)
+    # The slope of the quartic through five samples: a filter of Savitzky and Golay.
+    return np.asarray(scipy.signal.savgol_filter(x, 5, 4, deriv=1, delta=step, axis=0))
 
 
 def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
@@ -320,10 +298,8 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     array = array - array.mean(axis=0)
     padding = array.shape[0] - 1
     extended = np.pad(array, [(padding, padding)] + [(0, 0)] * (array.ndim - 1), mode="reflect")
-    frequency = fft.rfftfreq(extended.shape[0])
-    quadrature = _filtered(extended, np.where(frequency > 0, -1j, 0.0), padding)
-    squared: FloatArray = array**2 + quadrature**2
-    return squared
+    analytic = scipy.signal.hilbert(extended, axis=0)[padding:-padding]
+    return np.asarray(np.abs(analytic) ** 2)
 
 
 def complementary_filter(
@@ -386,12 +362,7 @@ def complementary_filter(
         raise RequestError(
             f"complementary_filter gives a rate or a position: times is 1 or 2; received {times!r}."
         )
-    x, a = as_series(position, minimum=8), as_series(acceleration, minimum=8)
-    if x.shape != a.shape:
-        raise RequestError(
-            f"position and acceleration must be one channel each, of one length; received shapes "
-            f"{x.shape} and {a.shape}."
-        )
+    x, a = as_pair(position, acceleration, minimum=8)
     nyquist = 0.5 / time_step(dt)
     if not 0 < crossover < 0.8 * nyquist:
         raise RequestError(
@@ -399,7 +370,9 @@ def complementary_filter(
             f"frequency); received {crossover:g} Hz. Set it below the slowest wave."
         )
     _check_slowest(crossover, dt, x.size, "the crossover")
-    mean, trend = _line(x)
+    at = np.arange(x.size) - 0.5 * (x.size - 1)
+    slope = float(at @ x / (at @ at))
+    trend = x.mean() + slope * at
     both = np.column_stack([x - trend, a - a.mean()])
     long, padding = _extended(both, crossover * dt)
     frequency = fft.rfftfreq(long.shape[0], dt)
@@ -410,12 +383,5 @@ def complementary_filter(
     slow = spectrum[:, 0] * (omega if times == 1 else 1.0)
     fast = np.where(weight < 1, spectrum[:, 1] / safe**times, 0.0)
     joined = fft.irfft(weight * slow + (1 - weight) * fast, n=long.shape[0])
-    out: FloatArray = joined[padding : padding + x.size]
-    return out + (mean / dt if times == 1 else trend)
-
-
-def _line(x: FloatArray) -> tuple[float, FloatArray]:
-    """Slope per sample and values of the straight line through a series."""
-    at = np.arange(x.size) - 0.5 * (x.size - 1)
-    slope = float(at @ x / (at @ at))
-    return slope, x.mean() + slope * at
+    out: FloatArray = joined[padding:-padding]
+    return out + (slope / dt if times == 1 else trend)

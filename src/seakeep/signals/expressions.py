@@ -11,7 +11,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
@@ -20,13 +20,10 @@ import numpy.typing as npt
 from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import DataError, RequestError, did_you_mean
 
-__all__ = ["Expression", "parse"]
-
 Value = TypeVar("Value")
 
-GREATEST_EXPONENT = 16.0
+GREATEST_EXPONENT = 16
 """A physical law has no higher power; 9**9**9 has."""
-
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "add",
     ast.Sub: "subtract",
@@ -34,12 +31,17 @@ _OPERATORS: dict[type[ast.operator], str] = {
     ast.Div: "divide",
     ast.Pow: "power",
 }
-_FUNCTIONS = ("square", "abs", "sqrt", "sin", "cos")
-_ALLOWED = (
-    "numbers, channel names, + - * / **, parentheses, and the functions "
-    "square, abs, sqrt, sin, cos, mean, average"
+_FUNCTIONS = ("square", "abs", "sqrt", "sin", "cos", "mean", "average")
+_ALLOWED = "numbers, channel names, + - * / **, parentheses, and the functions " + ", ".join(
+    _FUNCTIONS
 )
-_QUOTED = re.compile(r"`([^`]*)`")
+
+
+class _RefusedError(Exception):
+    """A node that is not allowed, and the reason; none is one of another form."""
+
+    def __init__(self, node: ast.expr, reason: str = "") -> None:
+        self.node, self.reason = node, reason
 
 
 @dataclass(frozen=True)
@@ -132,18 +134,27 @@ class Expression:
         """
 
         def value(node: ast.expr) -> Value:
-            if isinstance(node, ast.Constant):
-                return number(float(node.value))  # type: ignore[arg-type]
-            if isinstance(node, ast.Name):
-                return channel(self._quoted.get(node.id, node.id))
-            if isinstance(node, ast.BinOp):
-                return apply(_OPERATORS[type(node.op)], [value(node.left), value(node.right)])
-            if isinstance(node, ast.UnaryOp):
-                operand = value(node.operand)
-                return apply("negative", [operand]) if isinstance(node.op, ast.USub) else operand
-            assert isinstance(node, ast.Call)
-            assert isinstance(node.func, ast.Name)
-            return apply(node.func.id, [value(argument) for argument in node.args])
+            match node:
+                case ast.Constant(float() | int() as constant):
+                    return number(float(constant))
+                case ast.Name(name):
+                    return channel(self._quoted.get(name, name))
+                case ast.UnaryOp(ast.USub(), operand):
+                    return apply("negative", [value(operand)])
+                case ast.UnaryOp(ast.UAdd(), operand):
+                    return value(operand)
+                case ast.BinOp(left, operator, right) if type(operator) in _OPERATORS:
+                    if isinstance(operator, ast.Pow) and not _is_exponent(right):
+                        limit = GREATEST_EXPONENT
+                        raise _RefusedError(
+                            node, f"an exponent is a number from -{limit} to {limit}"
+                        )
+                    return apply(_OPERATORS[type(operator)], [value(left), value(right)])
+                case ast.Call(ast.Name(name), arguments, []):
+                    if wrong := _wrong_call(name, len(arguments)):
+                        raise _RefusedError(node, wrong)
+                    return apply(name, [value(argument) for argument in arguments])
+            raise _RefusedError(node)
 
         return value(self._tree)
 
@@ -153,10 +164,7 @@ def _apply(name: str, values: list[FloatArray]) -> FloatArray:
     if name == "mean":
         return np.asarray(np.mean(values[0]))
     if name == "average":
-        total = values[0]
-        for each in values[1:]:
-            total = total + each
-        return total / len(values)
+        return np.asarray(sum(values[1:], values[0]) / len(values))
     result: FloatArray = getattr(np, name)(*values)
     return result
 
@@ -188,92 +196,61 @@ def parse(text: str) -> Expression:
     if not text.strip():
         raise RequestError(f"the expression {text!r} is empty. Write one of {_ALLOWED}.")
     text = " ".join(text.strip().splitlines())
-    plain, quoted = _unquoted(text)
+    quoted: dict[str, str] = {}
+
+    def stand_in(match: re.Match[str]) -> str:
+        # Of the same length; with a click letter, which may be part of an identifier and which no
+        # channel is called.
+        name = f"\u01c3{len(quoted)}".ljust(len(match[0]), "_")
+        quoted[name] = match[1]
+        return name
+
+    plain = re.sub(r"`([^`]*)`", stand_in, text)
     channels: dict[str, None] = {}
-
-    def refusal(position: int, reason: str) -> RequestError:
-        return RequestError(
-            f"the expression {text!r} is not allowed: at character {position}, {reason}. "
-            f"Allowed are {_ALLOWED}; write names with blanks or signs between backticks."
-        )
-
-    def check(node: ast.expr) -> None:
-        source = ast.get_source_segment(plain, node) or plain
-        for stand_in, name in quoted.items():
-            source = source.replace(stand_in, f"`{name}`")
-        if isinstance(node, ast.Name):
-            channels[quoted.get(node.id, node.id)] = None
-        wrong, operands = _judged(node, source)
-        if wrong:
-            raise refusal(len(plain.encode()[: node.col_offset].decode()) + 1, wrong)
-        for each in operands:
-            check(each)
-
     try:
         tree = ast.parse(plain, mode="eval").body
-    except SyntaxError as error:
-        raise refusal(error.offset or 1, "this is not an arithmetic expression") from None
-    check(tree)
+        named = Expression(text, (), tree, quoted)
+        named.fold(lambda _: None, channels.setdefault, lambda *_: None)
+    except (SyntaxError, _RefusedError) as error:
+        place, reason = getattr(error, "offset", 0) or 1, "this is not an arithmetic expression"
+        if isinstance(error, _RefusedError):
+            source = ast.get_source_segment(plain, error.node) or plain
+            for each, name in quoted.items():
+                source = source.replace(each, f"`{name}`")
+            place = len(plain.encode()[: error.node.col_offset].decode()) + 1
+            reason = error.reason or f"{source!r} is none of the allowed forms"
+        raise RequestError(
+            f"the expression {text!r} is not allowed: at character {place}, {reason}. "
+            f"Allowed are {_ALLOWED}; write names with blanks or signs between backticks."
+        ) from None
     if not channels:
         raise RequestError(
             f"the expression {text!r} names no channel, so it would be a constant. "
             "Write the name of a channel in it."
         )
-    return Expression(text, tuple(channels), tree, quoted)
-
-
-def _unquoted(text: str) -> tuple[str, dict[str, str]]:
-    """Put identifiers of the same length for names between backticks."""
-    quoted: dict[str, str] = {}
-
-    def stand_in(match: re.Match[str]) -> str:
-        # A click letter, which may be part of an identifier and which no channel is called.
-        name = f"\u01c3{len(quoted)}".ljust(len(match[0]), "_")
-        quoted[name] = match[1]
-        return name
-
-    return _QUOTED.sub(stand_in, text), quoted
-
-
-def _judged(node: ast.expr, source: str) -> tuple[str, list[ast.expr]]:
-    """What is wrong with a node, empty for nothing, and its operands."""
-    if isinstance(node, ast.Name) or _number(node) is not None:
-        return "", []
-    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
-        wrong = isinstance(node.op, ast.Pow) and not _is_exponent(node.right)
-        limits = f"an exponent is a number from -{GREATEST_EXPONENT:g} to {GREATEST_EXPONENT:g}"
-        return limits * wrong, [node.left, node.right]
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
-        return "", [node.operand]
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
-        return _wrong_call(node.func.id, len(node.args)), node.args
-    return f"{source!r} is none of the allowed forms", []
-
-
-def _number(node: ast.expr) -> float | None:
-    """Value of a plain number; None for all else."""
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-        return float(node.value)  # type: ignore[arg-type]
-    return None
+    return replace(named, channels=tuple(channels))
 
 
 def _is_exponent(node: ast.expr) -> bool:
     """Whether a node is a number that a physical law may have as an exponent."""
-    signed = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
-    number = _number(node.operand if signed else node)  # type: ignore[attr-defined]
-    return number is not None and number <= GREATEST_EXPONENT
+    match node:
+        case ast.UnaryOp(ast.USub(), ast.Constant(float() | int() as size)):
+            return size <= GREATEST_EXPONENT
+        case ast.Constant(float() | int() as size):
+            return size <= GREATEST_EXPONENT
+    return False
 
 
 def _wrong_call(name: str, count: int) -> str:
     """What is wrong with a call of a function with so many arguments; empty for nothing."""
-    known = [*_FUNCTIONS, "mean", "average"]
-    if name not in known:
-        return f"'{name}' is not a known function.{did_you_mean(name, known)}".rstrip(".")
+    if name not in _FUNCTIONS:
+        return f"'{name}' is not a known function.{did_you_mean(name, _FUNCTIONS)}".rstrip(".")
     if name == "mean" and count > 1:
         return (
             "'mean' is the mean of one channel over time; the average of several channels, instant "
             "by instant, is 'average'"
         )
+    if count == 1 or (name == "average" and count):
+        return ""
     wanted = "one or more" if name == "average" else "one"
-    fits = count == 1 or (count > 1 and name == "average")
-    return "" if fits else f"'{name}' takes {wanted} argument(s), not {count}"
+    return f"'{name}' takes {wanted} argument(s), not {count}"

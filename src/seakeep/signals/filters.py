@@ -6,19 +6,15 @@ array of the shape they were given.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 import scipy
 from scipy import special
 
-from seakeep.arrays import FloatArray, as_series, number, positive, time_step
+from seakeep.arrays import FloatArray, as_series, fraction, number, positive, time_step
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import as_seconds, span_text, uniform_step
 from seakeep.sizes import MOST_TAPS, check_size
-
-__all__ = ["low_pass", "lowpass_taps", "resample"]
 
 
 def lowpass_taps(
@@ -54,10 +50,6 @@ def lowpass_taps(
     """
     positive(sampling_rate, "the sampling rate", "Hz")
     passband, stopband = number(passband, "passband"), number(stopband, "stopband")
-    if not LEAST_ATTENUATION <= number(attenuation, "the attenuation") < math.inf:
-        raise RequestError(
-            f"the attenuation must be at least {LEAST_ATTENUATION:g} dB; received {attenuation!r}."
-        )
     if not 0 < passband < stopband < sampling_rate / 2:
         raise RequestError(
             f"a low-pass filter needs 0 < passband < stopband < half the sampling rate; received "
@@ -65,10 +57,13 @@ def lowpass_taps(
             f"{sampling_rate / 2:g} Hz. Lower the edges, or filter before resampling."
         )
     edges = (passband / sampling_rate, stopband / sampling_rate)
-    _check_length(
+    check_size(
+        f"a transition from {passband:.10g} to {stopband:.10g} Hz at {sampling_rate:g} Hz with "
+        "this attenuation needs about",
         attenuation / (14.36 * (edges[1] - edges[0])),
-        f"a transition from {passband:.10g} to {stopband:.10g} Hz at {sampling_rate:g} Hz",
-        "Move stopband away from passband, or lower the sampling rate first",
+        MOST_TAPS,
+        "taps",
+        "Move stopband away from passband, or lower the sampling rate first.",
     )
     for extra in range(7):  # Kaiser's formula is a fit, some 3 dB short for short filters
         count, beta = scipy.signal.kaiserord(attenuation + extra, 2 * (edges[1] - edges[0]))
@@ -79,11 +74,6 @@ def lowpass_taps(
         if _deviation(taps, edges) <= 10 ** (-attenuation / 20):
             break
     return taps
-
-
-def _check_length(taps: float, what: str, remedy: str) -> None:
-    asked = f"{what} with this attenuation needs about"
-    check_size(asked, taps, MOST_TAPS, "taps", f"{remedy}.")
 
 
 def _deviation(taps: FloatArray, edges: tuple[float, float]) -> float:
@@ -101,11 +91,10 @@ def odd_extension(array: FloatArray, count: int) -> FloatArray:
 
     Series shorter than `count` are continued by their end values beyond the reflection.
     """
-    reflected = min(count, array.shape[0] - 1)
-    head = 2 * array[:1] - array[reflected:0:-1]
-    tail = 2 * array[-1:] - array[-2 : -reflected - 2 : -1]
-    rest = [(count - reflected, count - reflected)] + [(0, 0)] * (array.ndim - 1)
-    return np.pad(np.concatenate([head, array, tail]), rest, mode="edge")
+    reflected, beside = min(count, array.shape[0] - 1), [(0, 0)] * (array.ndim - 1)
+    near = [(reflected, reflected), *beside]
+    far = [(count - reflected, count - reflected), *beside]
+    return np.pad(np.pad(array, near, mode="reflect", reflect_type="odd"), far, mode="edge")
 
 
 def low_pass(
@@ -161,8 +150,6 @@ def low_pass(
     return filtered
 
 
-LEAST_ATTENUATION = 8.0
-"""dB; Kaiser's formula holds from there on."""
 PASSBAND = 0.8
 """Part of the lower Nyquist frequency up to which resampling keeps what there is."""
 
@@ -225,11 +212,7 @@ def resample(
             f"the series has {array.shape[0]} samples and the time axis {t.size}; they must agree. "
             "Time runs along the first axis."
         )
-    if not 0 < number(passband, "passband") < 1:
-        raise RequestError(
-            f"passband is a fraction of the Nyquist frequency, between 0 and 1; received "
-            f"{passband!r}."
-        )
+    passband = fraction(passband, "passband, a part of the Nyquist frequency,")
     slack = 1e-6 * dt
     if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:
         raise DataError(
@@ -263,10 +246,12 @@ def _sinc_sums(
     attenuation = max(positive(attenuation, "the attenuation", "dB"), 50.0)
     width = edges[1] - edges[0]
     length = (attenuation - 7.95) / (4.57 * np.pi * width) + 1  # half of it, by Kaiser's formula
-    _check_length(
+    check_size(
+        "resampling by this factor and passband with this attenuation needs about",
         2 * length,
-        "resampling by this factor and passband",
-        "Resample in two steps, or lower passband",
+        MOST_TAPS,
+        "taps",
+        "Resample in two steps, or lower passband.",
     )
     half = int(np.ceil(length))
     bank = _kernels(half, 0.1102 * (attenuation - 8.7), sum(edges))
@@ -288,8 +273,7 @@ def _sinc_sums(
             weights += cubic[each, rows, None] * bank[phase[rows] + each]
         for column, view in enumerate(views):
             out[rows, column] = np.einsum("ij,ij->i", weights, view[base[rows] + 1])
-    result: FloatArray = out.reshape((position.size, *array.shape[1:]))
-    return result
+    return out.reshape((position.size, *array.shape[1:]))
 
 
 def _kernels(half: int, beta: float, band: float) -> FloatArray:

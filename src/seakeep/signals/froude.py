@@ -11,8 +11,6 @@ from seakeep.arrays import positive
 from seakeep.conventions import base_powers
 from seakeep.errors import RequestError
 
-__all__ = ["froude_factor"]
-
 
 def froude_factor(units: str, scale: float, density_ratio: float = 1.0) -> float:
     """Factor from a model's value to the full-scale one.

@@ -10,18 +10,9 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import FloatArray, IntArray, as_series, positive, time_step
+from seakeep.arrays import FloatArray, IntArray, as_pair, positive, time_step
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import record
-
-__all__ = [
-    "Lags",
-    "MotionAgreement",
-    "compare_motion",
-    "correlation_peak",
-    "parabola_peak",
-    "windowed_lags",
-]
 
 
 @dataclass(frozen=True)
@@ -84,26 +75,20 @@ def windowed_lags(
     >>> bool(np.all(np.abs(late.lag - 0.123) < 1e-3))
     True
     """
-    a, b = as_series(series), as_series(reference)
-    time_step(dt)
-    if a.shape != b.shape:
-        raise RequestError(
-            f"the two series must be one channel each, of one length; received shapes {a.shape} "
-            f"and {b.shape}."
-        )
-    positive(largest_lag, "largest_lag", "s")
-    length, reach = round(window / dt), math.ceil(largest_lag / dt)
+    (a, b), step = as_pair(series, reference), time_step(dt)
+    length = round(window / step)
+    reach = math.ceil(positive(largest_lag, "largest_lag", "s") / step)
     if length < 4 or a.size < length + 2 * reach:
         raise RequestError(
-            f"the record lasts {a.size * dt:g} s ({a.size} samples), too short for windows of "
+            f"the record lasts {a.size * step:g} s ({a.size} samples), too short for windows of "
             f"{window:g} s and lags of ±{largest_lag:g} s. Shorten them, in seconds, or sample at "
             "a higher rate."
         )
     starts = np.arange(reach, a.size - length - reach + 1, round(0.5 * length))
     rows = [_peak(a[s - reach : s + length + reach], b[s : s + length], reach) for s in starts]
-    lag, peak = np.array(rows, dtype=float).T
-    centre = (float(dt) * (starts + 0.5 * (length - 1))).astype(float)
-    return Lags(centre, lag * float(dt), peak)
+    lag, peak = np.array(rows).T
+    centre = step * (starts + 0.5 * (length - 1)).astype(float)
+    return Lags(centre, lag * step, peak)
 
 
 def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float, float]:
@@ -161,7 +146,7 @@ def correlation_peak(
     >>> round(lag, 3), round(height, 3)
     (0.333, 1.0)
     """
-    a, b = as_pair(first, second)
+    a, b = (each - each.mean() for each in as_pair(first, second, minimum=8, moving=True))
     step = time_step(dt)
     low, high = np.floor(bounds[0] / step), np.ceil(bounds[1] / step)
     if not low < high or max(abs(low), abs(high)) > a.size // 2:
@@ -171,17 +156,22 @@ def correlation_peak(
         )
     lags = np.arange(int(low) - 1, int(high) + 2)
     values = _correlation(a, b, lags)
-    inner = values[1:-1]
-    peaks = np.flatnonzero((inner >= values[:-2]) & (inner >= values[2:]))
+    peaks = scipy.signal.find_peaks(values)[0]
     if not peaks.size:
         raise DataError(
             f"the correlation of the two records has no peak between lags of {bounds[0]:g} and "
-            f"{bounds[1]:g} s (highest {inner.max():.2f}, at an end). Check which probe stands "
-            "upstream, their positions, and the water depth."
+            f"{bounds[1]:g} s (highest {values[1:-1].max():.2f}, at an end). Check which probe "
+            "stands upstream, their positions, and the water depth."
         )
-    best = int(peaks[np.argmax(inner[peaks])]) + 1
+    best = int(peaks[np.argmax(values[peaks])])
     shift, height = parabola_peak(*values[best - 1 : best + 2])
     return float((lags[best] + shift) * step), height
+
+
+def peak_place(values: FloatArray) -> float:
+    """Place of the highest value, counted in steps, by the parabola through its neighbours."""
+    at = int(np.clip(np.argmax(values), 1, values.size - 2))
+    return at + float(np.clip(parabola_peak(*values[at - 1 : at + 2])[0], -0.5, 0.5))
 
 
 def _correlation(a: FloatArray, b: FloatArray, lags: IntArray) -> FloatArray:
@@ -210,26 +200,6 @@ def parabola_peak(before: float, here: float, after: float) -> tuple[float, floa
         return 0.0, float(here)
     shift = 0.5 * (before - after) / bend
     return float(shift), float(here - 0.25 * (before - after) * shift)
-
-
-def as_pair(
-    first: npt.ArrayLike, second: npt.ArrayLike, minimum: int = 8
-) -> tuple[FloatArray, FloatArray]:
-    """Two records of one length without their means; refuse one that is constant."""
-    a = as_series(first, "the first record", minimum=minimum)
-    b = as_series(second, "the second record", minimum=minimum)
-    if a.shape != b.shape:
-        raise RequestError(
-            f"two records of the same length are needed, shape (time,); received {a.shape} and "
-            f"{b.shape}. Cut them to their common time."
-        )
-    for name, each in (("first", a), ("second", b)):
-        if np.ptp(each) == 0:
-            raise DataError(
-                f"the {name} record is constant ({each[0]:g}), so it correlates with nothing. "
-                "Look for a dead probe."
-            )
-    return a - a.mean(), b - b.mean()
 
 
 SHORTEST = 16
@@ -332,11 +302,12 @@ def compare_motion(
     >>> round(found.lag, 3), round(found.correlation, 3)
     (0.1, 1.0)
     """
-    reach = None if max_lag is None else positive(max_lag, "max_lag", "s")
     first = record(series, time, "the video")
     second = record(reference, reference_time, "the reference")
     (y1, t1), (y2, t2) = ((y[np.isfinite(y)], t[np.isfinite(y)]) for y, t in (first, second))
-    reach = reach or min(LONGEST, 0.25 * float(min(np.ptp(t1), np.ptp(t2))))
+    reach = min(LONGEST, 0.25 * float(min(np.ptp(t1), np.ptp(t2))))
+    if max_lag is not None:
+        reach = positive(max_lag, "max_lag", "s")
     # Only instants whose partner lies inside the other record at every lag searched.
     common = (t1 >= t2[0] + reach) & (t1 <= t2[-1] - reach)
     t1, y1 = t1[common], y1[common]
@@ -360,21 +331,17 @@ def compare_motion(
     best = int(np.argmax(values))
     lag, at_limit = float(lags[best]), best in (0, lags.size - 1)
     if not at_limit:
-        between, options = (lags[best - 1], lags[best + 1]), {"xatol": 1e-4 * step}
-        lag = float(
-            scipy.optimize.minimize_scalar(
-                lambda shift: -correlation(shift), bounds=between, method="bounded", options=options
-            ).x
+        lag = scipy.optimize.fminbound(
+            lambda shift: -correlation(shift), lags[best - 1], lags[best + 1], xtol=1e-4 * step
         )
-    inner = values[1:-1]
-    peaks = 1 + np.flatnonzero((inner > values[:-2]) & (inner >= values[2:]))
+    peaks = scipy.signal.find_peaks(values)[0]
     others = peaks[np.abs(peaks - best) > 1]
-    rival = int(others[np.argmax(values[others])]) if others.size else None
+    rival = others[np.argmax(values[others])] if others.size else None
     crossings = int(np.count_nonzero(np.diff(y1 > np.mean(y1))))
     difference = y1 - spline(t1 - lag)
     return MotionAgreement(
         correlation=correlation(lag),
-        lag=lag,
+        lag=float(lag),
         rms=float(np.std(difference)),
         offset=float(np.mean(difference)),
         samples=int(t1.size),

@@ -13,9 +13,6 @@ from scipy import fft
 from seakeep.arrays import ComplexArray, FloatArray, as_series, fraction, positive, time_step
 from seakeep.signals.waves import encounter_period, waves_part
 
-__all__ = ["Leakage", "find_leakage", "is_regular"]
-
-
 REGULAR = 0.2
 """Envelopes that vary by less than this part of their mean are those of regular waves (a random
 sea's vary by 0.52)."""
@@ -120,9 +117,10 @@ def find_leakage(
         return None
     best: Leakage | None = None
     repeated = np.zeros(record.size, dtype=bool)
-    pool = [(index, as_series(each, minimum=8)) for index, each in enumerate(training)]
-    ready = [(index, _analytic(each)) for index, each in pool if each.size >= length]
-    for start in _starts(record.size, length):
+    pool = [as_series(each, minimum=8) for each in training]
+    ready = [(index, _analytic(each)) for index, each in enumerate(pool) if each.size >= length]
+    starts = {*range(0, record.size - length + 1, max(length // 2, 1)), record.size - length}
+    for start in sorted(starts):
         piece = waves[start : start + length]
         for index, reference in ready:
             match = _correlation(reference, piece)
@@ -135,9 +133,7 @@ def find_leakage(
                 phase = float(np.angle(match[at]))
                 begin = (part.start + start) * step
                 best = Leakage(0.0, height, index, at * step, begin, phase)
-    if best is None:
-        return None
-    return replace(best, share=float(repeated.mean()))
+    return best and replace(best, share=float(repeated.mean()))
 
 
 def _analytic(series: FloatArray) -> ComplexArray:
@@ -157,11 +153,6 @@ def _even(waves: ComplexArray) -> bool:
     return bool(envelope.std() < REGULAR * envelope.mean())
 
 
-def _starts(size: int, length: int) -> list[int]:
-    starts = list(range(0, size - length + 1, max(length // 2, 1)))
-    return starts if starts[-1] == size - length else [*starts, size - length]
-
-
 def _correlation(reference: ComplexArray, piece: ComplexArray) -> ComplexArray:
     """Normalised correlation of a piece with a reference at each place where it fits whole."""
     places = reference.size - piece.size + 1
@@ -173,5 +164,4 @@ def _correlation(reference: ComplexArray, piece: ComplexArray) -> ComplexArray:
     power = np.cumsum(np.concatenate([[0.0], np.abs(reference) ** 2]))
     energy = power[piece.size :] - power[: -piece.size]
     norm = np.sqrt(np.maximum(energy * float(np.sum(np.abs(piece) ** 2)), 1e-300))
-    out: ComplexArray = summed / norm
-    return out
+    return np.asarray(summed / norm)

@@ -14,8 +14,6 @@ from seakeep.signals.calculus import continued, predicted, reflections, whitenin
 from seakeep.signals.propagation import LEAST_CORRELATION, band_limit, carry_by_dispersion
 from seakeep.waves import group_speed
 
-__all__ = ["draw_sea", "draw_waves", "predict_waves", "predictable_time"]
-
 MEMORY = 4.0
 """Wave periods that a linear prediction looks back. On the virtual tank the error over 0.75
 encounter periods is 0.53 SD with one half of a period, 0.43 with one, 0.38 with two, 0.32 with
@@ -64,15 +62,13 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     >>> bool(np.max(np.abs(predict_waves(tone[:1000], 32) - tone[1000:1032])) < 0.02)
     True
     """
-    array = as_series(series, minimum=4, channels=True)
-    number_of = whole_number(count, "count")
-    flat = array.reshape(array.shape[0], -1)
-    out = np.empty((number_of, flat.shape[1]))
-    for column, values in enumerate(flat.T):
-        mean = values.mean()
-        deviations = values - mean
-        out[:, column] = mean + predicted(deviations, number_of, _memory(deviations))
-    return out.reshape((-1, *array.shape[1:]))
+    array, number = as_series(series, minimum=4, channels=True), whole_number(count, "count")
+
+    def following(values: FloatArray) -> FloatArray:
+        deviations = values - values.mean()
+        return np.asarray(values.mean() + predicted(deviations, number, _memory(deviations)))
+
+    return np.asarray(np.apply_along_axis(following, 0, array))
 
 
 def draw_waves(
@@ -111,30 +107,26 @@ def draw_waves(
     >>> futures.shape, bool(np.ptp(futures[:3] + futures[3:], axis=0).max() < 1e-12)
     ((6, 5), True)
     """
-    array = as_series(series, minimum=4, channels=True)
-    number_of = whole_number(count, "count")
-    flat = array.reshape(array.shape[0], -1)
-    expected = np.empty((number_of, flat.shape[1]))
-    errors = np.empty((pairs, *expected.shape))
-    for column, values in enumerate(flat.T):
-        mean = values.mean()
-        deviations = values - mean
-        size = deviations.size
+    array, number = as_series(series, minimum=4, channels=True), whole_number(count, "count")
+
+    def futures(values: FloatArray) -> FloatArray:
+        deviations, size = values - values.mean(), values.size
         order = max(1, min(_memory(deviations), size // 3))
         found = reflections(deviations, order)
         own = whitening(found)
-        made = continued(deviations, own[None], np.zeros((1, number_of)))[0]
-        expected[:, column] = mean + made
+        expected = continued(deviations, own[None], np.zeros((1, number)))[0]
         left = scipy.signal.lfilter(own, [1.0], deviations)[order:]
         power = math.sqrt(size / (size - order)) * left.std()
         apart = rng.standard_normal((pairs, order)) / np.sqrt(
             np.maximum(size - 3 - np.arange(1, order + 1), 1)
         )
         filters = whitening(np.tanh(np.arctanh(np.clip(found, -WHOLLY, WHOLLY)) + apart))
-        innovations = power * rng.standard_normal((pairs, number_of))
-        errors[..., column] = continued(deviations, filters, innovations) - made
-    futures = np.concatenate([expected + errors, expected - errors])
-    return futures.reshape((2 * pairs, -1, *array.shape[1:]))
+        innovations = power * rng.standard_normal((pairs, number))
+        errors = continued(deviations, filters, innovations) - expected
+        middle = values.mean() + expected
+        return np.concatenate([middle + errors, middle - errors])
+
+    return np.asarray(np.apply_along_axis(futures, 0, array))
 
 
 def draw_sea(

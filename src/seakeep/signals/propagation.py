@@ -16,33 +16,26 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 import scipy
+from numpy.polynomial import chebyshev
 from scipy import fft
 
-from seakeep.arrays import ComplexArray, FloatArray, as_real, as_series, number, positive, time_step
+from seakeep.arrays import (
+    ComplexArray,
+    FloatArray,
+    as_pair,
+    as_real,
+    as_series,
+    number,
+    positive,
+    time_step,
+)
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
-from seakeep.signals.lags import as_pair, correlation_peak, parabola_peak
+from seakeep.signals.lags import correlation_peak, peak_place
 from seakeep.signals.leakage import is_regular
 from seakeep.signals.waves import encounter_period, welch_segments
-from seakeep.sizes import MOST_PADDING, MOST_PLACES, MOST_TERMS, check_size
+from seakeep.sizes import MOST_PLACES, MOST_TERMS
 from seakeep.waves import group_speed, phase_speed, wavenumber
-
-__all__ = [
-    "CarriedElevation",
-    "EffectiveCelerity",
-    "Misplaced",
-    "PhaseCelerity",
-    "ProbeSeparation",
-    "band_limit",
-    "carry_by_celerity",
-    "carry_by_dispersion",
-    "delay_by_celerity",
-    "delay_by_dispersion",
-    "effective_celerity",
-    "misplaced_probes",
-    "phase_celerity",
-    "probe_separation",
-]
 
 EARLIEST = 1e-3
 """Part of a step below which a lag is none: rounding leaves either sign of nought."""
@@ -140,19 +133,14 @@ def phase_celerity(
     Spread of the phase: :math:`\sqrt{(1-\gamma^2)/(2 n \gamma^2)}` for n independent segments
     (Bendat and Piersol, Random Data).
     """
-    first, second = as_pair(upstream, downstream)
+    first, second = as_pair(upstream, downstream, minimum=8, moving=True)
     step, apart = time_step(dt), positive(separation, "the separation", "m")
-    length = segment
-    if length is None:
-        length = min(round(60.0 / step), first.size // 2)
-    length, shared = welch_segments(first.size, step, length, None)
+    if segment is None:
+        segment = min(round(60.0 / step), first.size // 2)
+    length, shared = welch_segments(first.size, step, segment, None)
     options = {"fs": 1.0 / step, "window": "hamming", "nperseg": length, "noverlap": shared}
-    frequency, cross = scipy.signal.csd(first, second, **options)
-    power = [scipy.signal.welch(each, **options)[1] for each in (first, second)]
-    kept = frequency > 0
-    frequency, cross = frequency[kept], cross[kept]
-    coherence = np.abs(cross) ** 2 / np.maximum(power[0][kept] * power[1][kept], 1e-300)
-    coherence = np.clip(coherence, 0.0, 1.0)
+    frequency, cross = (each[1:] for each in scipy.signal.csd(first, second, **options))
+    coherence = np.minimum(scipy.signal.coherence(first, second, **options)[1][1:], 1.0)
     expected = wavenumber(2 * np.pi * frequency, depth) * apart
     # csd takes conj(first) · second, so that a later second record has a negative phase.
     phase = expected + np.angle(np.conj(cross) * np.exp(-1j * expected))
@@ -210,7 +198,7 @@ def effective_celerity(
     The paper prints corr[η_fwd(t), η_cog(t − Δt)], whose peak lies at a negative lag, and no
     bound; the highest peak of a narrow-banded sea can lie a period away.
     """
-    first, second = as_pair(upstream, downstream)
+    first, second = as_pair(upstream, downstream, minimum=8, moving=True)
     step, apart = time_step(dt), positive(separation, "the separation", "m")
     cycle = encounter_period(first, step) if period is None else positive(period, "period", "s")
     centre = apart / float(phase_speed(2 * np.pi / cycle, depth))
@@ -364,12 +352,9 @@ def misplaced_probes(
     Regular waves before a model are left out for a reason: on the measured ship section their
     phases move by up to a fifth of a wavelength with what the model reflects.
     """
-    telling = {
-        name: series
-        for name, series in elevations.items()
-        if name in positions and _telling(as_series(series))
-    }
-    names = sorted(telling, key=lambda name: positions[name])
+    telling = {name: as_series(elevations[name]) for name in elevations if name in positions}
+    names = [name for name in sorted(telling, key=positions.__getitem__)
+             if _telling(telling[name])]  # fmt: skip
     pairs = list(pairwise(names))
     if len(names) > 2:
         pairs.append((names[0], names[-1]))
@@ -451,7 +436,7 @@ def probe_separation(
     >>> round(found.separation, 2)
     3.85
     """
-    a, b = as_pair(first, second, minimum=64)
+    a, b = as_pair(first, second, minimum=64, moving=True)
     interval, place = time_step(dt), number(stated, "the stated separation")
     cross, power, k = _spectra(a, b, interval, depth)
     period = encounter_period(a, interval)
@@ -469,14 +454,16 @@ def probe_separation(
     fine = best + step * np.arange(-2 * FINER, 2 * FINER + 1) / FINER
     scores = _scores(cross, power, k, fine)
     total = scores.sum(axis=0)
-    found = _highest(fine, total)
-    left_out = np.array([_highest(fine, total - each) for each in scores])
+    found, *without = (
+        fine[0] + peak_place(values) * step / FINER for values in (total, *(total - scores))
+    )
+    left_out = np.array(without)
     count = GROUPS
     spread = np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean()) ** 2))
     turned = np.abs(1.0 - np.exp(1j * k * (found - place))) ** 2
     weight = np.abs(cross)
     return ProbeSeparation(
-        separation=found,
+        separation=float(found),
         spread=float(spread),
         correlation=float(total.max()),
         stated=place,
@@ -519,8 +506,7 @@ def _scores(cross: ComplexArray, norm: float, k: FloatArray, distances: FloatArr
 def _chosen(scores: FloatArray, stated: int) -> int:
     """Of the maxima that may be the highest, the one nearest to what is stated."""
     total = scores.sum(axis=0)
-    inner = total[1:-1]
-    peaks = np.flatnonzero((inner >= total[:-2]) & (inner >= total[2:])) + 1
+    peaks = scipy.signal.find_peaks(total)[0]
     best = peaks[np.argmax(total[peaks])]
     parts = scores[:, [best]] - scores[:, peaks]
     # Jackknife of a sum over groups: leaving one out leaves its part out.
@@ -528,13 +514,6 @@ def _chosen(scores: FloatArray, stated: int) -> int:
     alike = (total[peaks] >= NEARLY * total[best]) & (parts.sum(axis=0) <= SURELY * error)
     near = peaks[alike]
     return int(near[np.argmin(np.abs(near - stated))])
-
-
-def _highest(places: FloatArray, values: FloatArray) -> float:
-    """Place of the maximum, by the parabola through it and its neighbours."""
-    at = int(np.clip(np.argmax(values), 1, values.size - 2))
-    shift = parabola_peak(*values[at - 1 : at + 2])[0]
-    return float(places[at] + np.clip(shift, -1.0, 1.0) * (places[1] - places[0]))
 
 
 WAVE_SHARE = 0.999
@@ -559,25 +538,11 @@ class CarriedElevation:
 
     def at(self, distance: npt.ArrayLike, sample: int | slice = slice(None)) -> FloatArray:
         """Elevation at a distance from where it was measured."""
-        chosen = self.terms[:, sample]
         half = 0.5 * (self.highest - self.lowest)
         place = np.asarray(distance, dtype=float) - 0.5 * (self.highest + self.lowest)
         scaled = np.clip(place / half, -1.0, 1.0) if half > 0 else np.zeros_like(place)
-        if chosen.ndim == 2 and not scaled.ndim:  # one sample: the sum itself is quicker
-            polynomials = np.cos(np.arange(len(chosen)) * np.arccos(scaled))
-            one: FloatArray = polynomials @ chosen
-            return one
-        x = scaled[:, None] if scaled.ndim and chosen.ndim == 3 else scaled
-        # Clenshaw's recurrence from the highest polynomial down.
-        newer, older, spare = (np.zeros_like(chosen[0]) for _ in range(3))
-        twice = 2.0 * x
-        for term in chosen[:0:-1]:
-            np.multiply(twice, newer, out=spare)
-            spare += term
-            spare -= older
-            newer, older, spare = spare, newer, older
-        result: FloatArray = chosen[0] + x * newer - older
-        return result
+        x = scaled[:, None] if scaled.ndim else scaled
+        return np.asarray(chebyshev.chebval(x, self.terms[:, sample], tensor=False))
 
 
 def band_limit(series: npt.ArrayLike, dt: float, share: float = WAVE_SHARE) -> float:
@@ -614,8 +579,7 @@ def carry_by_dispersion(
 
     def numbers(omega: FloatArray) -> FloatArray:
         beyond = np.maximum(omega - edge, 0.0) / group_speed(edge, depth)
-        result: FloatArray = wavenumber(np.minimum(omega, edge), depth) + beyond
-        return result
+        return np.asarray(wavenumber(np.minimum(omega, edge), depth) + beyond)
 
     return _carried(array, dt, distances, numbers)
 
@@ -679,11 +643,11 @@ def delay_by_dispersion(
     >>> bool(np.max(np.abs(carried - np.cos(omega * t - 2.0 * k))) < 3e-3)
     True
     """
-    array = as_series(series, minimum=4, channels=True)
-    places = _distances(distance, array.shape[0])
-    span = (float(places.min()), float(places.max()))
-    carried = carry_by_dispersion(array, dt, span, depth, highest_frequency)
-    return carried.at(places).reshape(array.shape)
+    return _delayed(
+        series,
+        distance,
+        lambda array, span: carry_by_dispersion(array, dt, span, depth, highest_frequency),
+    )
 
 
 def delay_by_celerity(
@@ -712,25 +676,29 @@ def delay_by_celerity(
     RequestError
         As :func:`delay_by_dispersion`.
     """
-    array = as_series(series, minimum=4, channels=True)
-    places = _distances(distance, array.shape[0])
-    span = (float(places.min()), float(places.max()))
-    return carry_by_celerity(array, dt, span, celerity).at(places).reshape(array.shape)
+    return _delayed(
+        series, distance, lambda array, span: carry_by_celerity(array, dt, span, celerity)
+    )
 
 
-def _distances(distance: npt.ArrayLike, samples: int) -> FloatArray:
-    places = as_real(distance, "the distance")
-    if places.shape not in ((), (samples,)):
+def _delayed(
+    series: npt.ArrayLike,
+    distance: npt.ArrayLike,
+    carry: Callable[[FloatArray, tuple[float, float]], CarriedElevation],
+) -> FloatArray:
+    """A record read at a distance, after `carry` prepared it for a range of them."""
+    array, places = as_series(series, minimum=4, channels=True), as_real(distance, "the distance")
+    if places.shape not in ((), array.shape[:1]):
         raise RequestError(
             f"the distance has shape {places.shape}; expected one number, or one per sample: "
-            f"({samples},)."
+            f"({len(array)},)."
         )
     if not np.all(np.isfinite(places)):
         raise RequestError(
             f"the distance holds {int(np.sum(~np.isfinite(places)))} values that are not finite. "
             "Fill the gap in the position first."
         )
-    return places
+    return carry(array, (float(places.min()), float(places.max()))).at(places).reshape(array.shape)
 
 
 def _carried(
@@ -744,12 +712,7 @@ def _carried(
     A plane wave exp(−ikhξ) is Σ (2 − δ_p0) (−i)^p J_p(kh) T_p(ξ) (Jacobi and Anger), so that its
     coefficients vanish beyond p = kh faster than any power.
     """
-    step = time_step(dt)
-    lowest, highest = (number(value, "a distance") for value in distances)
-    if not (np.isfinite(lowest) and np.isfinite(highest) and lowest <= highest):
-        raise RequestError(
-            f"distances must be a range (lowest, highest) in metres; received {distances!r}."
-        )
+    step, (lowest, highest) = time_step(dt), distances
     flat = array.reshape(array.shape[0], -1)
     mean = flat.mean(axis=0)
     centre, half = 0.5 * (lowest + highest), 0.5 * (highest - lowest)
@@ -785,8 +748,6 @@ def _carried(
 
 def _continued(deviations: FloatArray, delay: float, period: float) -> tuple[FloatArray, int]:
     """Lengthen at both ends by predicted waves that fade out once no delay reaches them."""
-    check_size("the slowest waves take, over the distance,", delay + period, MOST_PADDING,
-               "samples", "Correct the distance (m), or resample to a larger step.")  # fmt: skip
     kept, fading = int(np.ceil(delay + period)), int(np.ceil(4.0 * period))
     order = min(int(np.ceil(2.0 * period)), 500)
     padding = kept + fading

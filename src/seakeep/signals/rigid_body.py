@@ -14,14 +14,6 @@ from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import RequestError
 from seakeep.waves import GRAVITY
 
-__all__ = [
-    "remove_gravity",
-    "rotation_matrix",
-    "transfer_acceleration",
-    "transfer_position",
-    "transfer_velocity",
-]
-
 
 def _vectors(**values: npt.ArrayLike) -> list[FloatArray]:
     """Vectors of one length in time, or of one instant; names are those of the arguments."""

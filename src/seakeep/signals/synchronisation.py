@@ -17,16 +17,7 @@ import scipy
 from seakeep.arrays import FloatArray, IntArray, as_real
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import windowed_lags
-from seakeep.signals.time_axis import record, uniform_step
-
-__all__ = [
-    "Clock",
-    "clock_from_correlation",
-    "clock_from_pulses",
-    "clock_from_shared",
-    "pool_drift",
-    "without_doubtful_drift",
-]
+from seakeep.signals.time_axis import record, stretches, uniform_step
 
 LARGEST_DRIFT = 1e-3
 """Drift allowed for when pulses are matched and lags are searched: a thousand ppm."""
@@ -78,13 +69,11 @@ class Clock:
 
     def reference(self, readings: npt.ArrayLike) -> FloatArray:
         """Reference time of readings of this clock, s."""
-        out: FloatArray = (as_real(readings, "the readings") - self.offset) / (1.0 + self.drift)
-        return out
+        return (as_real(readings, "the readings") - self.offset) / (1.0 + self.drift)
 
     def reading(self, time: npt.ArrayLike) -> FloatArray:
         """What this clock reads at reference times, s."""
-        out: FloatArray = self.offset + (1.0 + self.drift) * as_real(time, "the times")
-        return out
+        return self.offset + (1.0 + self.drift) * as_real(time, "the times")
 
     @property
     def known(self) -> bool:
@@ -185,21 +174,20 @@ def clock_from_pulses(
     )
     names = "the logger's trigger", "the reference's trigger"
     found = [find_pulses(*side, name) for side, name in zip(sides, names, strict=True)]
-    *chosen, modulus = match_pulses(
-        found[0].centres, found[1].centres, expected_offset, LARGEST_DRIFT
-    )
-    centres = [pulses.centres[at] for pulses, at in zip(found, chosen, strict=True)]
+    *chosen, modulus = match_pulses(found[0][0], found[1][0], expected_offset)
+    matched = [centres[at] for (centres, _), at in zip(found, chosen, strict=True)]
     fast = int(np.median(np.diff(sides[1][1])) <= np.median(np.diff(sides[0][1])))
-    template = pulse_template(*sides[fast], found[fast], centres[fast])
-    timed = [time_pulses(*side, at, template) for side, at in zip(sides, centres, strict=True)]
-    errors = np.hypot(timed[0][1], timed[1][1])
-    sound = np.isfinite(errors) & np.isfinite(timed[0][0]) & np.isfinite(timed[1][0])
+    template = pulse_template(*sides[fast], found[fast][1], matched[fast])
+    timed = [time_pulses(*side, at, template) for side, at in zip(sides, matched, strict=True)]
+    (own, own_error), (reference, reference_error) = timed
+    errors = np.hypot(own_error, reference_error)
+    sound = np.isfinite(errors)
     if not sound.any():
         raise DataError(
             "no pulse of the trigger could be timed: the pulses of the two loggers differ in "
             "shape. Check that both columns hold the same trigger."
         )
-    clock = _line(timed[0][0][sound], timed[1][0][sound], errors[sound])
+    clock = _line(own[sound], reference[sound], errors[sound])
     return replace(clock, method="trigger pulses", modulus=modulus)
 
 
@@ -447,99 +435,64 @@ def without_doubtful_drift(clock: Clock) -> Clock:
     )
 
 
-@dataclass(frozen=True)
-class Pulses:
-    """Pulses of a trigger.
-
-    Parameters
-    ----------
-    centres : ndarray, shape (pulse,)
-        Middle between the rising and the falling edge at half height, s.
-    rise, fall : ndarray, shape (pulse,)
-        Instants of the two edges, s, by linear interpolation between samples.
-    height : float
-        Height above the level at rest, in the trigger's unit; negative for pulses down.
-    """
-
-    centres: FloatArray
-    rise: FloatArray
-    fall: FloatArray
-    height: float
-
-    @property
-    def width(self) -> float:
-        """Median width at half height, s."""
-        return float(np.median(self.fall - self.rise))
-
-
-def find_pulses(trigger: FloatArray, time: FloatArray, name: str = "the trigger") -> Pulses:
+def find_pulses(trigger: FloatArray, time: FloatArray, name: str) -> tuple[FloatArray, float]:
     """Find the whole pulses of a trigger at half their height; NaN is taken for rest.
 
     Pulses of less than half or more than twice the median height or width are left out.
+
+    Returns
+    -------
+    centres : ndarray, shape (pulse,)
+        Middle between the rising and the falling edge, by linear interpolation, s.
+    width : float
+        Median width, s.
 
     Examples
     --------
     >>> import numpy as np
     >>> t = np.arange(0, 10, 0.01)
-    >>> pulses = find_pulses(np.exp(-((t - 4.003) / 0.1) ** 2), t)
-    >>> [round(float(c), 3) for c in pulses.centres]
-    [4.003]
+    >>> centres, width = find_pulses(np.exp(-((t - 4.003) / 0.1) ** 2), t, "the trigger")
+    >>> [round(float(c), 3) for c in centres], round(width, 2)
+    ([4.003], 0.17)
     """
     x = np.where(np.isfinite(trigger), trigger, np.nanmedian(trigger)) - np.nanmedian(trigger)
-    sign = 1.0 if x.max() >= -x.min() else -1.0
-    x = sign * x
+    x = x if x.max() >= -x.min() else -x
     noise = 1.4826 * float(np.median(np.abs(x)))
     # Wide stretches outvote spikes: the height is that of the sample in the middle of the time
     # spent above the noise.
     top = float(x.max())
     level = max(8 * noise, 0.02 * top)
     for _ in range(3):
-        rising, falling, peaks = _stretches(x, level)
-        if not rising.size:
+        whole = [(a, b) for a, b in stretches(x > level) if a > 0 and b < x.size]
+        if not whole:
             break
-        top = _weighted_median(peaks, falling - rising)
+        first, after = np.array(whole).T
+        peaks = np.array([x[a:b].max() for a, b in whole])
+        top = float(np.quantile(np.repeat(peaks, after - first), 0.5, method="lower"))
         level = 0.5 * top
-    if not rising.size or top < 6 * noise or top <= 0:
+    if not whole or top < 6 * noise:
         raise DataError(
             f"{name} has no pulses that stand out of its noise (largest value {top:g} above the "
             f"median, noise {noise:g}). Check the column that trigger names in [instruments.NAME]; "
             "or synchronise by another signal: state instead shared (one signal both record), "
             "correlated (two that go together) or offset (s)."
         )
-    half = 0.5 * top
 
-    def crossing(at: IntArray) -> FloatArray:
-        part = (half - x[at]) / (x[at + 1] - x[at])
-        instants: FloatArray = time[at] + part * (time[at + 1] - time[at])
+    def crossing(after: IntArray) -> FloatArray:
+        part = (level - x[after - 1]) / (x[after] - x[after - 1])
+        instants: FloatArray = time[after - 1] + part * (time[after] - time[after - 1])
         return instants
 
-    rise, fall = crossing(rising), crossing(falling)
+    rise, fall = crossing(first), crossing(after)
     width = fall - rise
     sound = (peaks > 0.5 * top) & (peaks < 2 * top)
     usual = np.median(width[sound])
     sound &= (width > 0.5 * usual) & (width < 2 * usual)
-    rise, fall = rise[sound], fall[sound]
-    return Pulses(0.5 * (rise + fall), rise, fall, sign * top)
-
-
-def _stretches(x: FloatArray, level: float) -> tuple[IntArray, IntArray, FloatArray]:
-    """Last samples before a series rises above a level and before it falls below; its peaks."""
-    edges = np.flatnonzero(np.diff((x > level).astype(np.int8)))
-    rising, falling = edges[x[edges] <= level], edges[x[edges] > level]
-    falling = falling[falling > rising[0]] if rising.size else falling[:0]
-    rising = rising[: falling.size]
-    peaks = [x[i : j + 2].max() for i, j in zip(rising, falling, strict=True)]
-    return rising, falling, np.array(peaks, dtype=float)
-
-
-def _weighted_median(values: FloatArray, weights: IntArray) -> float:
-    order = np.argsort(values)
-    total = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
+    return 0.5 * (rise + fall)[sound], float(np.median(width[sound]))
 
 
 def match_pulses(
-    own: FloatArray, reference: FloatArray, expected_offset: float, largest_drift: float
+    own: FloatArray, reference: FloatArray, expected_offset: float
 ) -> tuple[IntArray, IntArray, float]:
     """Indices of the pulses that match in two records (instants, s).
 
@@ -548,10 +501,10 @@ def match_pulses(
     """
     spacing = min((float(np.diff(each).min()) for each in (own, reference) if each.size > 1),
                   default=1.0)  # fmt: skip
-    reach = 0.02 * spacing + largest_drift * float(np.ptp(reference))
+    reach = 0.02 * spacing + LARGEST_DRIFT * float(np.ptp(reference))
     candidates = np.unique(np.round((own[:, None] - reference[None, :]).ravel(), 6))
     counts = np.array([_pairs(own - shift, reference, reach)[0].size for shift in candidates])
-    near = candidates[counts >= min(max(counts.max() - 1, 1), counts.max())]
+    near = candidates[counts >= max(counts.max() - 1, 1)]
     best = float(near[np.argmin(np.abs(near - expected_offset))])
     rivals = near[np.abs(near - best) > 4 * reach]
     modulus = float(np.abs(rivals - best).min()) if rivals.size else float("inf")
@@ -572,16 +525,15 @@ def _pairs(own: FloatArray, reference: FloatArray, reach: float) -> tuple[IntArr
 
 
 def pulse_template(
-    trigger: FloatArray, time: FloatArray, pulses: Pulses, centres: FloatArray
+    trigger: FloatArray, time: FloatArray, width: float, centres: FloatArray
 ) -> scipy.interpolate.CubicSpline:
     """Mean pulse of a record over the time from its centre, 1.5 widths to each side."""
     step = float(np.median(np.diff(time)))
-    count = int(np.ceil(1.5 * pulses.width / step)) + 2
+    count = int(np.ceil(1.5 * width / step)) + 2
     away = step * np.arange(-count, count + 1)
     x = np.where(np.isfinite(trigger), trigger, np.nanmedian(trigger))
-    whole = [c for c in centres if time[0] <= c + away[0] and c + away[-1] <= time[-1]]
-    if not whole:
-        whole = list(centres)
+    inside = (centres + away[0] >= time[0]) & (centres + away[-1] <= time[-1])
+    whole = centres[inside] if inside.any() else centres
     mean = np.mean([np.interp(c + away, time, x) for c in whole], axis=0)
     return scipy.interpolate.CubicSpline(away, mean - np.median(x))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -12,21 +11,6 @@ import scipy
 
 from seakeep.arrays import BoolArray, FloatArray, as_real, time_step
 from seakeep.errors import DataError, RequestError
-
-__all__ = [
-    "Bridged",
-    "TimeReport",
-    "bridge",
-    "check_order",
-    "inspect_times",
-    "instant_text",
-    "onto_uniform",
-    "over_gaps",
-    "record",
-    "span_text",
-    "stretches",
-    "uniform_step",
-]
 
 STEP_TOLERANCE = 0.01
 """A time axis is uniform if no instant is further than this part of a step from its grid."""
@@ -69,22 +53,21 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
             f"{name} has {t.size} instant(s); a time axis needs at least two. "
             "Give the whole record."
         )
-    if not np.all(np.isfinite(t)):
-        at = int(np.flatnonzero(~np.isfinite(t))[0])
+    if (lost := np.flatnonzero(~np.isfinite(t))).size:
         raise DataError(
-            f"the times of {name} hold a value that is not finite at sample {at} "
-            f"({int(np.sum(~np.isfinite(t)))} in all). Remove these rows, or repair the times."
+            f"the times of {name} hold a value that is not finite at sample {lost[0]} "
+            f"({lost.size} in all). Remove these rows, or repair the times."
         )
     steps = np.diff(t)
-    if np.any(steps == 0):
-        at = int(np.flatnonzero(steps == 0)[0])
+    if (repeated := np.flatnonzero(steps == 0)).size:
+        at = repeated[0]
         raise DataError(
             f"the times of {name} repeat: {_shown(t, at)} stands at samples {at} and {at + 1} "
-            f"({int(np.sum(steps == 0))} repetitions in all). Remove the double rows, or raise the "
+            f"({repeated.size} repetitions in all). Remove the double rows, or raise the "
             "number of decimals the logger writes."
         )
-    if np.any(steps < 0):
-        at = int(np.flatnonzero(steps < 0)[0])
+    if (falling := np.flatnonzero(steps < 0)).size:
+        at = falling[0]
         raise DataError(
             f"the times of {name} are not sorted: {_shown(t, at + 1)} follows {_shown(t, at)} at "
             f"sample {at + 1}. Sort the rows by time, or split the file where the clock was "
@@ -143,25 +126,26 @@ def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     step = float((t[-1] - t[0]) / (t.size - 1))
     off = np.abs(t - (t[0] + step * np.arange(t.size)))
     # Times this close to a rising grid are finite and sorted; else the order is looked at.
-    close = step > 0 and np.max(off) <= STEP_TOLERANCE * step
-    if not close:
+    if not (step > 0 and np.max(off) <= STEP_TOLERANCE * step):
         check_order(t, name)
-    if not close and np.max(off) > max(STEP_TOLERANCE * step, printed_tolerance(t, step)):
-        raise DataError(_irregularity(t, name))
+        if np.max(off) > _tolerance(t, step):
+            raise DataError(_irregularity(t, name))
     # A decimal step such as 0.04 that was summed or printed comes back as what was meant.
     rounded = float(f"{step:.10g}")
     return rounded if abs(rounded - step) * t.size < 1e-6 * step else step
 
 
-def printed_tolerance(t: FloatArray, step: float) -> float:
-    """How far rounding to the decimals that the times were written with may move an instant."""
+def _tolerance(t: FloatArray, step: float) -> float:
+    """How far an instant may be from its grid, by the step and by the decimals of the times."""
+    least = STEP_TOLERANCE * step
     for decimals in range(7):
         unit = 10.0**-decimals
         if unit <= 0.1 * step:
             scaled = t / unit
             if np.max(np.abs(scaled - np.rint(scaled))) < 1e-3:
-                return 1.001 * unit  # half a unit at the instant, half at the ends of the grid
-    return 0.0
+                # Half a unit at the instant, half at the ends of the grid.
+                return max(least, 1.001 * unit)
+    return least
 
 
 def _irregularity(t: FloatArray, name: str) -> str:
@@ -247,14 +231,13 @@ def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
     place, step, begin = _grid(t)
     away = t - (begin + step * place)
     at = np.flatnonzero(np.diff(place) > 1)
-    worst = float(np.abs(away).max())
     return TimeReport(
         step=step,
         count=t.size,
         missing=int(place[-1]) + 1 - t.size,
         gaps=tuple((float(t[i]), float(round(t[i + 1] - t[i], 9))) for i in at),
         jitter_rms=float(np.sqrt(np.mean(away**2))),
-        jittered=worst > max(0.01 * step, printed_tolerance(t, step)),
+        jittered=bool(np.abs(away).max() > _tolerance(t, step)),
     )
 
 
@@ -322,20 +305,16 @@ def onto_uniform(
     if not report.gaps and not report.jittered:
         return t.copy(), out
     if report.jittered:
-        flat, source = out.reshape(out.shape[0], -1), x.reshape(t.size, -1)
-        there = np.asarray(np.isfinite(source).all(axis=1))
-        for begin_row, end_row in stretches(there, place):
-            part = slice(begin_row, end_row)
-            if end_row - begin_row >= 4:
-                spline = scipy.interpolate.CubicSpline(t[part], source[part])
-                rows = place[part]
-                flat[rows] = spline(np.clip(grid[rows], t[begin_row], t[end_row - 1]))
+        there = np.isfinite(out.reshape(out.shape[0], -1)).all(axis=1)
+        for first, after in stretches(np.asarray(there)):
+            if after - first >= 4:
+                part = slice(*np.searchsorted(place, [first, after]))
+                spline = scipy.interpolate.CubicSpline(t[part], x[part])
+                out[first:after] = spline(np.clip(grid[first:after], *t[part][[0, -1]]))
     return grid, out
 
 
-def stretches(
-    wanted: BoolArray, place: npt.NDArray[np.int64] | None = None
-) -> list[tuple[int, int]]:
+def stretches(wanted: BoolArray) -> list[tuple[int, int]]:
     """Start and end (not included) of each stretch of true values.
 
     Examples
@@ -345,15 +324,7 @@ def stretches(
     [(1, 3), (4, 5)]
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]]).astype(np.int8)))
-    runs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-    if place is None:
-        return runs
-    parts = []
-    for begin, end in runs:
-        breaks = np.flatnonzero(np.diff(place[begin:end]) > 1) + begin + 1
-        bounds = [begin, *breaks.tolist(), end]
-        parts += list(itertools.pairwise(bounds))
-    return parts
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def over_gaps(series: FloatArray, there: BoolArray | None = None) -> FloatArray:

@@ -30,8 +30,6 @@ from seakeep.signals.filters import low_pass
 from seakeep.signals.panel import CORNERS, FIELDS, Image, TrackingSettings, find_panel, opencv
 from seakeep.signals.time_axis import stretches
 
-__all__ = ["FLAGS", "LABELS", "Track", "TrackingSettings", "contact_sheet", "track_video"]
-
 Seen = Mapping[str, FloatArray]
 
 FLAGS = {
@@ -183,12 +181,10 @@ def _open_video(path: Path | str) -> Iterator[_Video]:
                 "with its true, constant rate."
             )
         width, height, announced = (
-            capture.get(key)
-            for key in (
-                cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT, cv2.CAP_PROP_FRAME_COUNT,
-            )
-        )  # fmt: skip
-        yield _Video(path, rate, max(int(announced), 0), (int(width), int(height)), capture)
+            int(capture.get(getattr(cv2, f"CAP_PROP_FRAME_{each}")))
+            for each in ("WIDTH", "HEIGHT", "COUNT")
+        )
+        yield _Video(path, rate, max(announced, 0), (width, height), capture)
     finally:
         capture.release()
 
@@ -235,13 +231,12 @@ def track_video(
     usual = _usual_panel(seen, how, str(path))
     pixels = int(np.prod(size if how.region is None else how.region[2:]))
     flag, quality = _judge(seen, usual, how, 1.0 / rate, pixels)
-    bad = int(np.sum(flag != FLAGS["good"]))
-    if 2 * bad > flag.size:
-        counts = ", ".join(
-            f"{np.sum(flag == code)} {name}" for name, code in FLAGS.items() if np.any(flag == code)
-        )
+    counts = {name: int(np.sum(flag == code)) for name, code in FLAGS.items()}
+    bad = count - counts["good"]
+    if 2 * bad > count:
+        words = ", ".join(f"{number} {name}" for name, number in counts.items() if number)
         warn(
-            f"{path}: {bad} of {flag.size} frames are flagged ({counts}). Look at the contact "
+            f"{path}: {bad} of {count} frames are flagged ({words}). Look at the contact "
             "sheet; correct the thresholds, state a region, or raise tolerance for a lens that "
             "distorts."
         )
@@ -280,7 +275,7 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
     width, height = video.size
     if how.region is not None:
         left, top, wide, high = how.region
-        if left + wide > width or top + high > height:
+        if min(left, top) < 0 or not (0 < wide <= width - left and 0 < high <= height - top):
             raise RequestError(
                 f"the region {how.region} (left, top, width, height) leaves the picture of "
                 f"{video.path}, {width} × {height} pixels. Make it smaller."
@@ -309,17 +304,18 @@ def _measure(
     numbers: list[int] = []
     rows: list[list[float]] = []
     lamp: list[float] = []
-    at_rest, disc = how.origin is None, None
+    at_rest = how.origin is None
+    disc = None
     if how.lamp is not None:
         x, y, radius = how.lamp
-        below, right = np.mgrid[: video.size[1], : video.size[0]]
+        below, right = np.ogrid[: video.size[1], : video.size[0]]
         disc = np.nonzero((right - x) ** 2 + (below - y) ** 2 <= radius**2)
     for number, frame in video.frames():
-        if at_rest and number >= how.rest * video.rate:
-            at_rest = False
-            if rows:  # refuse after the first frames what would be refused after the last one
-                where = f"first {how.rest:g} s (unless the origin is stated, zero lies there)"
-                _usual_panel(_on_grid(range(len(rows)), rows), how, f"{video.path}, {where}")
+        if at_rest and rows and number >= how.rest * video.rate:
+            at_rest = False  # refuse after the first frames what would be refused after the last
+            where = f"first {how.rest:g} s (unless the origin is stated, zero lies there)"
+            early = dict(zip(FIELDS, np.array(rows).T, strict=True))
+            _usual_panel(early, how, f"{video.path}, {where}")
         numbers.append(number)
         rows.append(list(find_panel(frame, how).values()))
         if disc is not None:
@@ -328,14 +324,9 @@ def _measure(
             progress(len(numbers), max(video.announced, len(numbers)), "frames")
     if progress is not None:
         progress(len(numbers), len(numbers), "frames")
-    return np.array(numbers), _on_grid(numbers, rows), np.array(lamp)
-
-
-def _on_grid(frames: list[int] | range, rows: list[list[float]]) -> dict[str, FloatArray]:
-    """Measurements by name; dropped frames are NaN."""
-    table = np.full((frames[-1] + 1, len(FIELDS)), np.nan)
-    table[list(frames)] = rows
-    return dict(zip(FIELDS, table.T, strict=True))
+    table = np.full((numbers[-1] + 1, len(FIELDS)), np.nan)  # dropped frames are NaN
+    table[numbers] = rows
+    return np.array(numbers), dict(zip(FIELDS, table.T, strict=True)), np.array(lamp)
 
 
 def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, Any]:
@@ -420,24 +411,15 @@ def _judge(
     flag[~np.isfinite(seen["area"])] = FLAGS["dropped"]
     # From the middle of the neighbours to either end; twice that where some of them are flagged.
     reach = how.max_speed * step * NEIGHBOURS / usual["scale"] + tolerance
-    flag[_jumps(seen, flag == FLAGS["good"], reach)] = FLAGS["jump"]
+    at = np.flatnonzero(flag == FLAGS["good"])
+    if at.size >= NEIGHBOURS:
+        place = np.stack([seen["x"][at], seen["y"][at]])
+        middle = scipy.ndimage.median_filter(place, (1, NEIGHBOURS), mode="nearest")
+        flag[at[np.hypot(*(place - middle)) > reach]] = FLAGS["jump"]
     quality = np.clip(1.0 - 0.5 * shape, 0.0, 1.0)
     flagged = flag != FLAGS["good"]
     quality[flagged] = np.minimum(quality[flagged], FLAGGED_QUALITY)
     return flag, quality
-
-
-def _jumps(seen: Seen, good: BoolArray, reach: float) -> IntArray:
-    """Good frames whose place is further from the median of their neighbours than can be."""
-    at = np.flatnonzero(good)
-    if at.size < NEIGHBOURS:
-        return at[:0]
-    away = np.zeros(at.size)
-    for axis in ("x", "y"):
-        place = seen[axis][at]
-        middle = scipy.ndimage.median_filter(place, NEIGHBOURS, mode="nearest")
-        away = np.hypot(away, place - middle)
-    return at[away > reach]
 
 
 def _motions(

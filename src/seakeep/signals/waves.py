@@ -13,27 +13,8 @@ import scipy
 
 from seakeep.arrays import FloatArray, IntArray, as_series, number, time_step, whole_number
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.lags import parabola_peak
+from seakeep.signals.lags import peak_place
 from seakeep.signals.time_axis import over_gaps
-
-__all__ = [
-    "WaveStatistics",
-    "dominant_period",
-    "encounter_period",
-    "energy_above",
-    "energy_period",
-    "noise_floor",
-    "paper_welch",
-    "peak_period",
-    "repeated_waves",
-    "significant_height",
-    "wave_heights",
-    "wave_spectrum",
-    "wave_statistics",
-    "waves_part",
-    "welch_segments",
-    "zero_up_crossings",
-]
 
 
 @dataclass(frozen=True)
@@ -156,25 +137,17 @@ def repeated_waves(records: Mapping[str, npt.ArrayLike], dt: float) -> dict[str,
     parts = {name: x[waves_part(x, dt)] for name, x in series.items()}
     every = max(int(min(map(_dominant_period, parts.values()), default=1.0) / PER_WAVE), 1)
     parts = {name: x[::every] - x.mean() for name, x in parts.items()}
-    size = scipy.fft.next_fast_len(2 * max(map(len, parts.values()), default=1), real=True)
-    spectra = {name: np.fft.rfft(x, size) for name, x in parts.items()}
     groups: dict[str, str] = {}
     for name, x in parts.items():
-        same = (
-            first
-            for first in dict.fromkeys(groups.values())
-            if _are_alike(x, parts[first], spectra[name] * spectra[first].conj(), size)
-        )
-        groups[name] = next(same, name)
+        firsts = dict.fromkeys(groups.values())
+        groups[name] = next((each for each in firsts if _are_alike(x, parts[each])), name)
     return groups
 
 
-def _are_alike(
-    one: FloatArray, other: FloatArray, cross: npt.NDArray[np.complex128], size: int
-) -> bool:
-    """Whether two records hold the same waves, from their cross-spectrum of `size` samples."""
-    lag = int(np.argmax(np.fft.irfft(cross, size)))
-    lag -= size * (lag >= len(one))
+def _are_alike(one: FloatArray, other: FloatArray) -> bool:
+    """Whether two records, less their means, hold the same waves."""
+    lags = scipy.signal.correlation_lags(len(one), len(other))
+    lag = int(lags[np.argmax(scipy.signal.correlate(one, other, method="fft"))])
     begin, end = max(lag, 0), min(len(one), len(other) + lag)
     if end - begin < OVERLAP * min(len(one), len(other)):
         return False
@@ -265,8 +238,7 @@ def zero_up_crossings(
     if hysteresis > 0:
         before = _clear(x, before, hysteresis * float(x.std()))
     first = before - x[before] / (x[before + 1] - x[before])
-    crossings: FloatArray = (part.start + first) * time_step(dt)
-    return crossings
+    return np.asarray((part.start + first) * time_step(dt))
 
 
 def _clear(x: FloatArray, before: IntArray, limit: float) -> IntArray:
@@ -465,19 +437,8 @@ def wave_spectrum(
     x = as_series(series)
     rate = 1.0 / time_step(dt)
     length, shared = welch_segments(x.shape[0], dt, segment, overlap)
-    if padded is not None and padded < length:
-        raise RequestError(
-            f"the transform must be at least as long as a segment ({length} samples); received "
-            f"{padded}. Lengthen it, or leave it out."
-        )
-    try:
-        taper = scipy.signal.get_window(window, length)
-    except ValueError as error:
-        raise RequestError(
-            f"window: {str(error).rstrip('.!')}. Name one of scipy.signal.windows, such as 'hann'."
-        ) from None
     frequency, density = scipy.signal.welch(
-        x, rate, window=taper, nperseg=length, noverlap=shared, nfft=padded
+        x, rate, window=window, nperseg=length, noverlap=shared, nfft=padded
     )
     return frequency, density
 
@@ -521,7 +482,7 @@ def peak_period(
     Raises
     ------
     RequestError
-        If the preset is not known or the record is shorter than a segment.
+        If the record is shorter than a segment.
     DataError
         If the record is constant.
 
@@ -532,20 +493,12 @@ def peak_period(
     >>> round(peak_period(np.sin(2 * np.pi * t / 2.1), 0.05), 1)
     2.1
     """
-    if preset not in ("paper", "recommended"):
-        raise RequestError(f"preset must be 'recommended' or 'paper'; received {preset!r}.")
-    x = as_series(series)
+    x = as_series(series, minimum=4)
     if np.ptp(x) == 0:
         raise DataError("the record is constant: it has no peak period. Look for a dead probe.")
-    options = paper_welch(dt) if preset == "paper" else (None, None, None)
+    options = {"paper": paper_welch(dt), "recommended": (None, None, None)}[preset]
     frequency, density = wave_spectrum(x, dt, *options)
-    if density.size < 3:
-        raise DataError(
-            f"the record has {x.size} samples, too few for the peak of a spectrum. Give more."
-        )
-    top = int(np.clip(np.argmax(density), 1, density.size - 2))
-    shift = np.clip(parabola_peak(*density[top - 1 : top + 2])[0], -0.5, 0.5)
-    return float(1.0 / (frequency[top] + shift * frequency[1]))
+    return float(1.0 / (peak_place(density) * frequency[1]))
 
 
 def wave_statistics(series: npt.ArrayLike, dt: float) -> WaveStatistics:

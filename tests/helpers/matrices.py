@@ -1,0 +1,50 @@
+"""Regressions of delayed series, with the paper's data matrices written out as an oracle."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from seakeep.core import embed, identify
+from seakeep.core.gram import Piece
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Runs with groups of channels: states, delayed and direct inputs, down to none."""
+
+    states: list
+    inputs: list
+    direct: list
+    windows: list
+    s: int
+    z: int
+
+    def matrices(self, all_rows=True):
+        """Plain Hankel matrices: regressors, and all rows of the next states or the newest."""
+        regressors, targets = [], []
+        for x, u, d, window in self.runs():
+            first, count = window.first_column, window.columns
+            groups = (embed(x, self.s, first, count), embed(u, self.z, first, count))
+            regressors.append(np.concatenate([*groups, d[first : window.last].T]))
+            targets.append(embed(x, self.s if all_rows else 0, first + 1, count))
+        return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
+
+    def runs(self):
+        return zip(self.states, self.inputs, self.direct, self.windows, strict=True)
+
+    @property
+    def pieces(self):
+        """What the fast paths take, without groups that have no channel."""
+        return [
+            Piece(x, tuple(g for g in (x, u, d) if g.shape[1]), window.first_column, window.columns)
+            for x, u, d, window in self.runs()
+        ]
+
+    @property
+    def delays(self):
+        groups = zip((self.states, self.inputs, self.direct), (self.s, self.z, 0), strict=True)
+        return tuple(delay for group, delay in groups if group[0].shape[1])
+
+    def solved(self, ridge, **options):
+        settings = {"state_delays": self.s, "input_delays": self.z, "direct": self.direct}
+        return identify(self.states, self.inputs, self.windows, ridge=ridge, **settings | options)

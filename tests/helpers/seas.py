@@ -1,0 +1,33 @@
+"""Irregular seas whose components are known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from seakeep.waves import wavenumber
+
+
+@dataclass(frozen=True)
+class Sea:
+    """A sum of waves in water of some depth, frequencies in Hz."""
+
+    frequency: np.ndarray
+    amplitude: np.ndarray
+    phase: np.ndarray
+    depth: float = 3.6
+
+    def at(self, time, place=0.0):
+        """Elevation at a place, fixed or moving, m downstream."""
+        omega = 2 * np.pi * self.frequency
+        turn = np.outer(time, omega) - np.outer(place + 0 * time, wavenumber(omega, self.depth))
+        return np.cos(turn + self.phase) @ self.amplitude
+
+
+def sea(seed=0, band=(0.28, 1.13), peak=2.05, components=100):
+    """Pierson and Moskowitz' spectrum in the paper's band, SD 1: a component in each part of it."""
+    rng = np.random.default_rng(seed)
+    edges = np.linspace(*band, components + 1)
+    f = rng.uniform(edges[:-1], edges[1:])
+    amplitude = np.sqrt(f**-5 * np.exp(-1.25 * (peak * f) ** -4))
+    amplitude /= np.sqrt(0.5 * np.sum(amplitude**2))
+    return Sea(f, amplitude, rng.uniform(0, 2 * np.pi, components))
