@@ -101,8 +101,7 @@ def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run
     (fold,) = (k for k, each in enumerate(plan.training) if each.left_out == ("unseen",))
 
     def margins(given):
-        found = compute(plan, given, Unit("bayesian", fold))
-        return {key: found[f"calibration/{key}"] for key in ("margin", "windows")}
+        return compute(plan, given, Unit("bayesian", fold))["calibration"]
 
     found = margins(runs)
     steps = plan.tests["unseen"][0].steps

@@ -99,9 +99,9 @@ def results(tmp_path_factory):
 STAGES = (
     "campaign/played.txt",
     "campaign/prepared/*.nc",
-    "paper/units/*.npz",
+    "paper/units/*.nc",
     "paper/study.nc",
-    "raw/units/*.npz",
+    "raw/units/*.nc",
     "paper/report.html",
 )
 """What a killed run had written last."""

@@ -27,6 +27,8 @@ from seakeep.study.plan import make_plan
 from seakeep.study.store import LOCK, UNITS, UnitFolder
 from seakeep.study.units import choice_of, choose, compute, units_of
 
+CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
+
 
 def change(folder, old, new):
     path = folder / "study.toml"
@@ -174,7 +176,7 @@ def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished
         assert process.stdout.readline() == "half a unit\n", "the study ended before it was killed"
         process.send_signal(signal.SIGKILL)
         process.wait()
-    assert len(list((out / "units").glob("*.npz"))) == WHOLE
+    assert len(list((out / "units").glob("*.nc"))) == WHOLE
     assert len(list((out / "units").iterdir())) == WHOLE + 1
     assert not (out / "study.nc").exists()
     told = []
@@ -191,7 +193,7 @@ def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished
 def test_files_of_others_among_the_units_stay(tmp_path):
     units = UnitFolder(tmp_path, "digest")
     units.open("study")
-    units.write("one", {"mean": np.arange(3.0)})
+    units.write("one", CELL)
     (tmp_path / UNITS / "mine").mkdir()
     units.check()
     units.clear()
@@ -227,11 +229,11 @@ def test_one_process_works_in_a_folder_and_who_waited_takes_its_result(
 def test_a_damaged_unit_is_computed_again(change, tmp_path):
     units = UnitFolder(tmp_path, "digest")
     units.open("study")
-    units.write("one", {"mean": np.arange(3.0)})
-    assert units.has("one")
-    path = tmp_path / UNITS / "one.npz"
+    units.write("one", CELL)
+    xr.testing.assert_identical(units.read("one")["cell"], CELL["cell"])
+    path = tmp_path / UNITS / "one.nc"
     path.write_bytes(change(path.read_bytes()))
-    assert not units.has("one")
+    assert units.read("one") is None
 
 
 def test_a_finished_study_is_not_run_again(study_folder, finished):
@@ -285,7 +287,7 @@ def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):
     second = store.UnitFolder(tmp_path, "two")
     second.open("second")
     assert json.loads((tmp_path / "study.json").read_text("utf-8"))["digest"] == "two"
-    second.write("cell", {"mean": np.arange(3.0)})
+    second.write("cell", CELL)
     with pytest.raises(RequestError, match="holds the results of another study"):
         store.UnitFolder(tmp_path, "one").open("first")
 
@@ -334,18 +336,18 @@ def test_a_full_disk_is_told_and_what_is_finished_is_kept(study_folder, monkeypa
     study = read_study(study_folder / "study.toml")
     folder = store.UnitFolder(study_folder / "out", study.digest)
     folder.open("name")
-    folder.write("first", {"mean": np.arange(3.0)})
+    folder.write("first", CELL)
 
     def full(*args, **kwargs):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(StorageError, match=r"No space left.*kept.*continues") as caught:
-        folder.write("second", {"mean": np.arange(3.0)})
+        folder.write("second", CELL)
     assert caught.value.exit_status == 1
-    assert folder.has("first")
-    assert not folder.has("second")
-    assert [path.name for path in (study_folder / "out" / "units").iterdir()] == ["first.npz"]
+    assert folder.read("first") is not None
+    assert folder.read("second") is None
+    assert [path.name for path in (study_folder / "out" / "units").iterdir()] == ["first.nc"]
 
 
 def test_a_result_of_another_format_is_told(finished, monkeypatch):
@@ -455,5 +457,5 @@ def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(t
     for unit in (single, ensemble):
         found, alone = compute(plan, runs, unit, chosen), compute(plan, runs, unit)
         assert found.keys() == alone.keys()
-        for key, values in found.items():
-            np.testing.assert_array_equal(values, alone[key])
+        for name, group in found.items():
+            xr.testing.assert_identical(group, alone[name])

@@ -6,7 +6,6 @@ import pytest
 from seakeep.models.labelled import nearest_sample
 from seakeep.study import read_study, run_study
 from seakeep.study.plan import make_plan
-from seakeep.study.run import _conditional
 from seakeep.waves import wavenumber
 
 # The runs are short, for speed: their windows hold two periods of the slow surge of 17 s.
@@ -108,15 +107,6 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_what_forecasts_are_conditional_on_has_its_own_name(folder):
-    text = (folder / "campaign.toml").read_text("utf-8").replace("surge", "x_tracked")
-    (folder / "campaign.toml").write_text(text, "utf-8")
-    read = STUDY.replace('"predicted"', '"measured", surge_channel = "x_tracked"')
-    (folder / "study.toml").write_text(read, "utf-8")
-    study = read_study(folder / "study.toml")
-    assert _conditional(make_plan(study)[0]) == "x_tracked"
-
-
 def test_cells_by_predicted_surge_are_what_the_models_say(folder):
     study = read_study(folder / "study.toml")
     found = run_study(study, folder / "out")
@@ -165,9 +155,10 @@ def test_every_test_set_has_its_statistics_and_its_start_up_is_cut(folder):
     assert found.groups["runs"].sel(run="wave")["wave_frequency"] == pytest.approx(0.6, abs=0.005)
 
 
-def test_what_a_study_by_measured_surge_is_conditional_on_is_kept(folder):
-    path = folder / "study.toml"
-    text = path.read_text("utf-8").replace('surge = "predicted"', 'surge = "measured"')
-    path.write_text(text, "utf-8")
-    found = run_study(read_study(path), folder / "out")
-    assert found.attrs["conditional_on"] == "surge"
+def test_what_a_study_by_measured_surge_is_conditional_on_is_kept_by_its_name(folder):
+    text = (folder / "campaign.toml").read_text("utf-8").replace("surge", "x_tracked")
+    (folder / "campaign.toml").write_text(text, "utf-8")
+    read = STUDY.replace('"predicted"', '"measured", surge_channel = "x_tracked"')
+    (folder / "study.toml").write_text(read, "utf-8")
+    found = run_study(read_study(folder / "study.toml"), folder / "out")
+    assert found.attrs["conditional_on"] == "x_tracked"

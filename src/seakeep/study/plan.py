@@ -17,7 +17,6 @@ from seakeep.campaign import load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Needs, Spec
-from seakeep.models.calibration import BandScale
 from seakeep.models.selection import groups_of
 from seakeep.models.settings import periods_to_samples
 from seakeep.models.slow import warn_of_slow_motions
@@ -309,49 +308,34 @@ class Plan:
 
     Parameters
     ----------
-    digest : str
-        Of the study.
+    settings : StudySettings
+        What was asked for.
     states, inputs : tuple of str
         Channels.
     dt, encounter_period : float
         s.
-    level : float
-        Probability of the bands.
     models : dict of str to ResolvedModel
         Specs, and where their settings come from.
+    needs : Needs
+        Samples of the largest draw of all models.
     training : tuple of TrainingSet
         Training data of the members.
     tests : dict of str to tuple of TestWindow
         What they are judged on.
-    shown : int
-        Windows of the first test set whose members are kept; one of each further set.
-    needs : Needs
-        Samples of the largest draw of all models.
     calibrated_on : tuple of str
         Runs that train, if bands are to be calibrated on them.
-    scale : {"spread", "constant", "learnt"}
-        What the half-width of calibrated bands follows.
-    eigenvalues : bool
-        Whether those of every model are kept.
-    nowcast : bool
-        Whether models are judged in service too.
     """
 
-    digest: str
+    settings: StudySettings
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     dt: float
     encounter_period: float
-    level: float
     models: dict[str, ResolvedModel]
+    needs: Needs
     training: tuple[TrainingSet, ...]
     tests: dict[str, tuple[TestWindow, ...]]
-    shown: int
-    needs: Needs
     calibrated_on: tuple[str, ...] = ()
-    scale: BandScale = "spread"
-    eigenvalues: bool = True
-    nowcast: bool = False
 
     @property
     def specs(self) -> dict[str, Spec]:
@@ -363,18 +347,25 @@ class Plan:
         """Names of the models that have members."""
         return [name for name, each in self.models.items() if each.is_ensemble]
 
-    def is_shown(self, training: int, test: str, window: int) -> bool:
-        """Whether the members of a cell are kept for figures."""
-        wanted = self.shown if test == next(iter(self.tests)) else min(self.shown, 1)
-        run, total = self.tests[test][window].run, len(self.tests[test])
-        valid = (k for k, each in enumerate(self.training) if each.may_test(run))
-        spread_over_runs = np.linspace(0, total - 1, min(wanted, total)).round()
-        return window in spread_over_runs and next(valid, None) == training
+    def shown(self, test: str) -> dict[int, int]:
+        """Windows of a test set whose members are kept for figures, and the training set of each.
+
+        Of the first test set as many as the settings ask for, of each further set one.
+        """
+        wanted = self.settings.output.shown_windows
+        wanted = wanted if test == next(iter(self.tests)) else min(wanted, 1)
+        windows = self.tests[test]
+        out = {}
+        for k in np.linspace(0, len(windows) - 1, min(wanted, len(windows))).round().astype(int):
+            first = (t for t, each in enumerate(self.training) if each.may_test(windows[k].run))
+            out[int(k)] = next(first)
+        return out
 
 
 def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dict[str, xr.Dataset]]:
     """Prepare the runs of a study and choose its windows."""
     settings, campaign = study.settings, study.campaign
+    general = settings.study
     training_names = list(settings.training.runs) or campaign.training_runs
     testing = {name: _test_runs(study, name) for name in settings.tests}
     wanted = dict.fromkeys([*training_names, *(n for names in testing.values() for n in names)])
@@ -384,10 +375,8 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
     shared = next(iter(runs.values())).attrs
     dt = float(shared["dt"])
     # Prepared runs hold the period where their preparation counts in it.
-    period = settings.study.encounter_period or shared.get("encounter_period")
+    period = general.encounter_period or shared.get("encounter_period")
     period = period or campaign.encounter_period()
-    general = settings.study
-    aligned = can_align(campaign.settings, study.inputs)
     left_out = settings.training.scheme == "leave_out"
     models = {
         name: resolve_model(
@@ -396,15 +385,13 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
             dt,
             preset=general.preset,
             seed=general.seed,
-            aligned=aligned,
+            aligned=can_align(campaign.settings, study.inputs),
             folds=settings.training.leave_out if left_out else "auto",
         )
         for name, each in settings.models.items()
     }
-    specs = [each.spec for each in models.values()]
-    needs = needs_of(specs, dt)
+    needs = needs_of([each.spec for each in models.values()], dt)
     training = choose_training(settings, runs, training_names, needs, study.inputs)
-    default = "whole" if left_out else "test"
     tests = {
         name: choose_tests(
             name,
@@ -413,29 +400,30 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
             testing[name],
             steps=periods_to_samples(test.length, period, dt),
             needs=needs,
-            whole=(test.part or default) == "whole",
-            seed=settings.study.seed,
+            whole=(test.part or ("whole" if left_out else "test")) == "whole",
+            seed=general.seed,
         )
         for name, test in settings.tests.items()
     }
+    for name, windows in tests.items():
+        for window in windows:
+            if not any(each.may_test(window.run) for each in training):
+                raise RequestError(
+                    f"tests.{name}: no model may be tested on the run '{window.run}', because all "
+                    "learn from it. Leave it out of training.runs, or name other runs."
+                )
     plan = Plan(
-        digest=study.digest,
-        states=study.states,
-        inputs=study.inputs,
-        dt=dt,
-        encounter_period=period,
-        level=settings.statistics.level,
-        models=models,
-        training=training,
-        tests=tests,
-        shown=settings.output.shown_windows,
-        needs=needs,
-        calibrated_on=tuple(training_names) if settings.calibrates else (),
-        scale=settings.statistics.scale,
-        eigenvalues=settings.output.eigenvalues,
-        nowcast=settings.output.nowcast,
+        settings,
+        study.states,
+        study.inputs,
+        dt,
+        period,
+        models,
+        needs,
+        training,
+        tests,
+        tuple(training_names) if settings.calibrates else (),
     )
-    _check_pairs(plan)
     return plan, runs
 
 
@@ -480,16 +468,6 @@ def _check_channels(name: str, run: xr.Dataset, channels: list[str]) -> None:
                 f"channel '{channel}' of the run '{name}' has missing values. Fill or cut the gap "
                 "in the campaign, or leave the run out."
             )
-
-
-def _check_pairs(plan: Plan) -> None:
-    for name, windows in plan.tests.items():
-        for window in windows:
-            if not any(each.may_test(window.run) for each in plan.training):
-                raise RequestError(
-                    f"tests.{name}: no model may be tested on the run '{window.run}', because all "
-                    "learn from it. Leave it out of training.runs, or name other runs."
-                )
 
 
 def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:

@@ -20,11 +20,10 @@ from seakeep.study.plan import Plan, make_plan, named, training_samples, warn_of
 from seakeep.study.settings import Study
 from seakeep.study.store import (
     RESULT,
-    Arrays,
+    Groups,
     StudyResult,
     UnitFolder,
     read_result,
-    relabel,
     versions,
     write_result,
 )
@@ -91,7 +90,9 @@ def run_study(
     folder = UnitFolder(out, study.digest)
     folder.check()
     if (found := _finished(study, out, report)) is not None:
-        found = relabel(found, _labels(study))
+        labels = _labels(study)
+        if any(found.attrs[key] != value for key, value in labels.items()):
+            return write_result(out, {**found.attrs, **labels}, found.groups, hand_on)
         hand_on(found)
         return found
     plan, runs = make_plan(study, named(report, "preparing "))
@@ -107,13 +108,12 @@ def run_study(
             groups = describe_study(study, plan, runs)
             if "repeats" in groups:
                 warn(words_of_repeats(groups["repeats"]))
-            groups |= collect(study, plan, runs, lambda unit: _arrays(folder, unit))
+            groups |= collect(study, plan, runs, lambda unit: _groups(folder, unit))
             groups |= judge(groups, study.settings, list(plan.states), executor)
             if "statistics/lost" in groups:
-                words = words_of_lost(groups["statistics/lost"])
-                warn(words)
+                warn(words_of_lost(groups["statistics/lost"]))
             groups |= extra or {}
-            attributes = {**_attributes(study, plan, groups), **(notes or {})}
+            attributes = {**_labels(study), **_attributes(study, plan), **(notes or {})}
             found = write_result(out, attributes, groups, hand_on)
         else:
             hand_on(found)
@@ -121,11 +121,11 @@ def run_study(
     return found
 
 
-def _arrays(folder: UnitFolder, unit: Unit) -> Arrays:
+def _groups(folder: UnitFolder, unit: Unit) -> Groups:
     found = folder.read(unit.name)
     if found is None:
         raise SeakeepError(
-            f"the file {unit.name}.npz in {folder.folder} is missing or damaged. Run the study "
+            f"the file {unit.name}.nc in {folder.folder} is missing or damaged. Run the study "
             "again."
         )
     return found
@@ -152,12 +152,12 @@ def _labels(study: Study) -> dict[str, str]:
     }
 
 
-def _attributes(
-    study: Study, plan: Plan, groups: Mapping[str, xr.Dataset]
-) -> dict[str, str | float | int]:
+def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
     general = study.settings.study
+    alignments = [getattr(spec, "alignment", None) for spec in plan.specs.values()]
+    # Measured output that a forecast reads after its start.
+    read = [each.surge_channel for each in alignments if each and each.surge == "measured"]
     return {
-        **_labels(study),
         "campaign": study.campaign.name,
         "preset": general.preset,
         "seed": general.seed,
@@ -168,16 +168,9 @@ def _attributes(
         "longest_training": training_samples(plan.needs) * plan.dt,
         "preparation": study.campaign.settings.preparation.model_dump_json(),
         "models": json.dumps({name: each.to_json() for name, each in plan.models.items()}),
-        "conditional_on": _conditional(plan),
+        "conditional_on": ", ".join(dict.fromkeys(read)),
         "versions": json.dumps(versions()),
     }
-
-
-def _conditional(plan: Plan) -> str:
-    """Measured output that a forecast reads after its start, through the alignment."""
-    alignments = [getattr(spec, "alignment", None) for spec in plan.specs.values()]
-    read = [each.surge_channel for each in alignments if each and each.surge == "measured"]
-    return ", ".join(dict.fromkeys(read))
 
 
 def _taken(plan: Plan) -> str:
@@ -204,21 +197,22 @@ def _compute_all(
     report: Progress,
     taken: str,
 ) -> None:
-    left = [unit for unit in units if not folder.has(unit.name)]
+    left = [unit for unit in units if folder.read(unit.name) is None]
     choices = {unit: choice_of(plan, unit) for unit in left}
-    todo = [each for each in dict.fromkeys(choices.values()) if each is not None]
-    todo = [each for each in todo if not folder.has(each.name)]
+    # What is chosen serves several models: they wait for it.
+    known = {each: folder.read(each.name) for each in choices.values() if each is not None}
+    todo = [each for each, groups in known.items() if groups is None]
     done, total = len(units) - len(left), len(units) + len(todo)
     report(done, total, f"fitting and forecasting, {taken}")
-    # What is chosen serves several models: they wait for it.
-    ready = [unit for unit in left if (choice := choices[unit]) is None or choice not in todo]
-    known = {unit: choice for unit in ready if (choice := choices[unit]) is not None}
-    items: deque[tuple[Unit, Arrays | None]] = deque((unit, None) for unit in todo)
-    items.extend((u, _arrays(folder, known[u]) if u in known else None) for u in ready)
+    items: deque[tuple[Unit, Groups | None]] = deque((unit, None) for unit in todo)
+    for unit in left:
+        choice = choices[unit]
+        if choice not in todo:
+            items.append((unit, None if choice is None else known[choice]))
     try:
-        for (unit, _), arrays in as_finished(_work, (plan, dict(runs)), items, executor):
-            folder.write(unit.name, arrays)
-            items.extend((each, arrays) for each in left if choices[each] == unit)
+        for (unit, _), groups in as_finished(_work, (plan, dict(runs)), items, executor):
+            folder.write(unit.name, groups)
+            items.extend((each, groups) for each in left if choices[each] == unit)
             done += 1
             what = "settings chosen" if unit.chooses else unit.model
             report(done, total, f"{what}, training set {plan.training[unit.training].name}")
@@ -228,7 +222,7 @@ def _compute_all(
         ) from None
 
 
-def _work(data: tuple[Plan, dict[str, xr.Dataset]], item: tuple[Unit, Arrays | None]) -> Arrays:
-    """Arrays of a unit, which come back to be written: a worker may have another disk."""
+def _work(data: tuple[Plan, dict[str, xr.Dataset]], item: tuple[Unit, Groups | None]) -> Groups:
+    """Groups of a unit, which come back to be written: a worker may have another disk."""
     unit, choice = item
     return choose(*data, unit) if unit.chooses else compute(*data, unit, choice)

@@ -24,7 +24,7 @@ from seakeep.sizes import MOST_SERIES
 from seakeep.study.resolve import mistakes_of
 from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 
-FORMAT = 7
+FORMAT = 8
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 Preset = Literal["paper", "recommended"]
