@@ -26,6 +26,7 @@ from seakeep.signals import encounter_period, froude_factor
 from seakeep.signals.time_axis import span_text
 from seakeep.study.fit import warn_of_repeats, warn_of_waves
 from seakeep.study.full_scale import times, to_full_scale
+from seakeep.study.judge import MEASURES, window_errors
 from seakeep.study.plan import named
 from seakeep.toml import parse_length
 
@@ -104,7 +105,7 @@ def _converted(
     comparison: Comparison, convert: Callable[[xr.Dataset], xr.Dataset], **changes: xr.Dataset
 ) -> Comparison:
     for part in {"forecast", "measured", "inputs", "band"} - set(changes):
-        if (data := getattr(comparison, part)) is not None:
+        if data := getattr(comparison, part):  # a model may have no inputs, and no band
             changes[part] = convert(data)
     return replace(comparison, **changes)  # type: ignore[arg-type]
 
@@ -411,14 +412,13 @@ def _compare_run(
 
 
 def _warn_of_dead(run: xr.Dataset, name: str) -> None:
-    names = [str(channel) for channel in run.data_vars]
-    values = np.stack([run[channel].values for channel in names], axis=-1)
-    for column in np.flatnonzero(is_constant(values)):
-        warn(
-            f"channel '{names[column]}' of {name} is constant ({values[0, column]:.6g}) over the "
-            "forecast. Look for a dead sensor: a state that stands still is not judged, and an "
-            "input that does gives a forecast without waves."
-        )
+    for channel, each in run.data_vars.items():
+        if is_constant(each.values[:, None])[0]:
+            warn(
+                f"channel '{channel}' of {name} is constant ({each.values[0]:.6g}) over the "
+                "forecast. Look for a dead sensor: a state that stands still is not judged, and an "
+                "input that does gives a forecast without waves."
+            )
 
 
 def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = True) -> xr.Dataset:
@@ -455,8 +455,8 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
             "there is no comparison to tabulate. Give those of seakeep.study.compare."
         )
     table = xr.concat([_row(comparison, intervals) for comparison in comparisons], dim="run")
-    for name in set(table) & set(_COLUMNS):
-        table[name].attrs = dict(zip(("units", "long_name"), _COLUMNS[str(name)], strict=True))
+    for name in set(table) & set(UNITS):
+        table[name].attrs["units"] = UNITS[str(name)]
     return table
 
 
@@ -501,116 +501,76 @@ def _wave_period(inputs: xr.Dataset) -> float:
 
 INTERVAL = 0.95
 """Probability between the bounds of the measures."""
-_COLUMNS = {
-    "nrmse": ("1", "RMS error in measured standard deviations"),
-    "nrmse_lower": ("1", "lower bound of its 95 % interval over blocks of the forecast"),
-    "nrmse_upper": ("1", "upper bound of its 95 % interval over blocks of the forecast"),
-    "training_nrmse": ("1", "RMS error in standard deviations of the training"),
-    "fit": ("%", "fit as MATLAB's compare states it"),
-    "nammae": ("1", "error of minimum and maximum in measured standard deviations"),
-    "nammae_lower": ("1", "lower bound of its 95 % interval over blocks of the forecast"),
-    "nammae_upper": ("1", "upper bound of its 95 % interval over blocks of the forecast"),
-    "sd_ratio": ("1", "standard deviation, predicted over measured"),
-    "measured_min": ("channel's", "measured minimum"),
-    "measured_max": ("channel's", "measured maximum"),
-    "predicted_min": ("channel's", "predicted minimum"),
-    "predicted_max": ("channel's", "predicted maximum"),
-    "coverage": ("%", "measured instants in the band"),
-    "band_width": ("channel's", "mean width of the band"),
-    "relative_band_width": ("1", "mean width of the band in measured standard deviations"),
-    "look_ahead": ("s", "time after an instant up to which its forecast reads the waves"),
-}
+UNITS = {"fit": "%", "coverage": "%", "look_ahead": "s"}
+"""Of columns of the table that are neither pure numbers nor in the unit of the channel."""
 
 
 def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
-    p, m = comparison.forecast, comparison.measured
-    names, scale = [str(name) for name in p.data_vars], comparison.full_scale
-    slack = metrics.is_slack(predicted=p, measured=m)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        spread = m.std("time", ddof=1)
-        sd_ratio = p.std("time", ddof=1, skipna=False) / spread.where(~slack)
-    each = {
-        "nrmse": metrics.nrmse(predicted=p, measured=m),
-        "training_nrmse": _in_training_sd(p, m),
-        "fit": metrics.fit_percent(predicted=p, measured=m),
-        "nammae": metrics.normalised_extremes_error(predicted=p, measured=m),
-        "sd_ratio": sd_ratio,
-        "measured_min": m.min("time"),
-        "measured_max": m.max("time"),
-        "predicted_min": p.min("time", skipna=False),
-        "predicted_max": p.max("time", skipna=False),
+    forecast, facts = comparison.forecast, comparison.forecast.attrs
+    names = [str(name) for name in forecast.data_vars]
+    # Over (channel, time): a sum then runs along the samples of a channel.
+    p, m = (each[names].to_dataarray("channel") for each in (forecast, comparison.measured))
+    pair: dict[str, Any] = {
+        "predicted": p.values.T.copy(),
+        "measured": m.values.T.copy(),
+        "training_std": [forecast[n].attrs.get("training_std", np.nan) for n in names],
+        "noise_std": [comparison.measured[n].attrs.get("noise_std", 0.0) for n in names],
     }
-    return xr.Dataset(
-        {
-            name: ("channel", values[names].to_array().values.astype(float))
-            for name, values in each.items()
+    slack = metrics.is_slack(**pair)
+    errors = dict(zip(MEASURES, window_errors(**pair), strict=True))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = p.std("time", ddof=1, skipna=False) / m.std("time", ddof=1).where(~slack)
+    columns = {
+        **errors,
+        "fit": metrics.fit_percent(**pair),
+        "sd_ratio": ratio.values,
+        "measured_min": m.min("time").values,
+        "measured_max": m.max("time").values,
+        "predicted_min": p.min("time", skipna=False).values,
+        "predicted_max": p.max("time", skipna=False).values,
+    }
+    row: dict[str, Any] = {
+        "anrmse": metrics.anrmse(**pair),
+        "training_anrmse": errors["training_nrmse"].mean(),
+        "mean_nammae": metrics.nammae(**pair),
+        "slack_channels": int(slack.sum()),
+        "status": comparison.status,
+        "conditional_on": str(facts.get("conditional_on", "")),
+        "probe_offset": float(facts.get("probe_offset", np.nan)),
+        "probe_offset_spread": float(facts.get("probe_offset_spread", np.nan)),
+        "look_ahead": max(float(facts.get("reads_input_until", 0.0)), 0.0),
+        "start": comparison.start,
+    }
+    if intervals:
+        bounds = {
+            "nrmse": metrics.nrmse(**pair, interval=INTERVAL),
+            "nammae": metrics.normalised_extremes_error(**pair, interval=INTERVAL),
+            "anrmse": metrics.anrmse(**pair, interval=INTERVAL),
+            "mean_nammae": metrics.nammae(**pair, interval=INTERVAL),
         }
-        | (_interval_entries(p, m, names) if intervals else {})
-        | _band_entries(comparison, slack)
-        | ({} if scale is None else {"scale": "full", "scale_factor": scale})
-        | {
-            "anrmse": comparison.anrmse,
-            "training_anrmse": float(each["training_nrmse"].to_array().mean(skipna=False)),
-            "mean_nammae": float(metrics.nammae(predicted=p, measured=m)),
-            "slack_channels": int(slack.to_array().sum()),
-            "status": comparison.status,
-            "conditional_on": str(p.attrs.get("conditional_on", "")),
-            "probe_offset": float(p.attrs.get("probe_offset", np.nan)),
-            "probe_offset_spread": float(p.attrs.get("probe_offset_spread", np.nan)),
-            "look_ahead": max(float(p.attrs.get("reads_input_until", 0.0)), 0.0),
-            "start": comparison.start,
-        },
+        for key, (lower, upper) in bounds.items():
+            into = columns if key in errors else row
+            into |= {f"{key}_lower": lower, f"{key}_upper": upper}
+    if comparison.band is not None:
+        lower, upper = (comparison.band.sel(statistic=key, drop=True) for key in metrics.BOUNDS)
+        found = statistics.coverage(lower, upper, comparison.measured)
+        columns["coverage"] = inside = 100.0 * found["inside"].values
+        columns["band_width"] = found["width"].values
+        columns["relative_band_width"] = found["relative_width"].values
+        row |= {key: facts[key] for key in ("members", "diverged", "level")}
+        row["mean_coverage"] = inside[~slack].mean() if not slack.all() else np.nan
+        row["band"] = str(facts.get("band", "members"))
+    if comparison.full_scale is not None:
+        row |= {"scale": "full", "scale_factor": comparison.full_scale}
+    units = [str(forecast[name].attrs.get("units", "")) for name in names]
+    return xr.Dataset(
+        {key: ("channel", values) for key, values in columns.items()} | row,
         coords={
             "run": comparison.run,
             "channel": names,
-            "channel_units": ("channel", [str(p[name].attrs.get("units", "")) for name in names]),
+            "channel_units": ("channel", units),
         },
     )
-
-
-def _interval_entries(p: xr.Dataset, m: xr.Dataset, names: Sequence[str]) -> dict[str, Any]:
-    """Bounds of the measures over redrawn blocks of the forecast."""
-    pair = {"predicted": p, "measured": m}
-    out: dict[str, Any] = {}
-    for key, each in (("nrmse", metrics.nrmse), ("nammae", metrics.normalised_extremes_error)):
-        found = each(**pair, interval=INTERVAL)[names].to_array()
-        for bound in metrics.BOUNDS:
-            out[f"{key}_{bound}"] = ("channel", found.sel(bound=bound).values)
-    for key, average in (("anrmse", metrics.anrmse), ("mean_nammae", metrics.nammae)):
-        for bound, value in zip(metrics.BOUNDS, average(**pair, interval=INTERVAL), strict=True):
-            out[f"{key}_{bound}"] = float(value)
-    return out
-
-
-def _in_training_sd(p: xr.Dataset, m: xr.Dataset) -> xr.Dataset:
-    """RMS error of each channel over its standard deviation in training."""
-    return xr.Dataset(
-        {
-            name: np.sqrt(((each - m[name]) ** 2).mean(skipna=False))
-            / float(each.attrs.get("training_std", np.nan))
-            for name, each in p.data_vars.items()
-        }
-    )
-
-
-def _band_entries(comparison: Comparison, slack: xr.Dataset) -> dict[str, Any]:
-    if comparison.band is None:
-        return {}
-    lower, upper = (comparison.band.sel(statistic=key, drop=True) for key in ("lower", "upper"))
-    found = statistics.coverage(lower, upper, comparison.measured)
-    inside = 100.0 * found["inside"].values
-    judged = ~slack.to_array().values
-    attrs = comparison.forecast.attrs
-    return {
-        "coverage": ("channel", inside),
-        "band_width": ("channel", found["width"].values),
-        "relative_band_width": ("channel", found["relative_width"].values),
-        "mean_coverage": float(inside[judged].mean()) if judged.any() else np.nan,
-        "members": int(attrs["members"]),
-        "diverged": int(attrs["diverged"]),
-        "level": float(attrs["level"]),
-        "band": str(attrs.get("band", "members")),
-    }
 
 
 def instant_of(
