@@ -15,7 +15,6 @@ from seakeep.check.parts import (
     free_windows,
     gathered,
     judged,
-    one_step,
     ratio,
     window_of,
 )
@@ -126,7 +125,7 @@ def _one_step(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Errors of one step over the test part, inputs and measured states at the same instants."""
     first, last = window_of(model, run)
-    made = one_step(model, run, first, last)
+    made = free_windows(model, run, run["time"].values[first:last], 1)[:, 0]
     after = slice(first + 1, last + 1)
     measured = channel_matrix(run, model.states, name, after)
     inputs = channel_matrix(run, model.inputs, name, after)

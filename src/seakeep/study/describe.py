@@ -11,6 +11,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.campaign import Campaign
+from seakeep.check.parts import whole_span
 from seakeep.conventions import is_elevation
 from seakeep.core.metrics import slack_share
 from seakeep.errors import RequestError
@@ -18,7 +19,7 @@ from seakeep.signals import significant_height, wave_spectrum
 from seakeep.signals.waves import paper_welch
 from seakeep.study.fit import find_repeat
 from seakeep.study.judge import wave_frequency
-from seakeep.study.plan import Plan, between, training_samples, whole_span
+from seakeep.study.plan import Plan, between, trained_parts, training_samples
 from seakeep.study.settings import Study
 
 Runs = Mapping[str, xr.Dataset]
@@ -61,16 +62,8 @@ def _repeats(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset | None:
     for name in dict.fromkeys(each.run for each in windows if each.run not in regular):
         starts = [each.start for each in windows if each.run == name]
         ends = [each.start + each.steps * plan.dt for each in windows if each.run == name]
-        learnt = [
-            span
-            for each in plan.training
-            for span in (each.spans if each.may_test(name) else ())
-            if span[0] not in regular
-        ]
-        pieces = {}
-        for run in dict.fromkeys(span[0] for span in learnt):
-            begins, stops = zip(*(span[1:] for span in learnt if span[0] == run), strict=True)
-            pieces[run] = between(runs[run], (min(begins), max(stops)))
+        learnt = trained_parts([each for each in plan.training if each.may_test(name)], runs)
+        pieces = {run: part for run, part in learnt.items() if run not in regular}
         test = between(runs[name], (min(starts), max(ends)))
         if (repeat := find_repeat(plan.inputs, pieces, name, test, plan.dt)) is not None:
             found[name] = {**asdict(repeat), "words": str(repeat)}

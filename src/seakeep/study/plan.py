@@ -6,7 +6,7 @@ Windows are drawn once and are the same for all models.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ import xarray as xr
 
 from seakeep.campaign import load_prepared
 from seakeep.campaign.prepare import Progress
+from seakeep.check.parts import whole_span
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Needs, Spec
 from seakeep.models.selection import groups_of
@@ -102,12 +103,13 @@ def _samples(run: xr.Dataset, span: tuple[float, float]) -> tuple[int, int]:
     return first, last
 
 
-def whole_span(run: xr.Dataset) -> tuple[float, float]:
-    """Span of a run that may be used at all: training and test spans together."""
-    spans = [run.attrs[key] for key in ("train_span", "test_span") if key in run.attrs]
-    if not spans:
-        return float(run["time"].values[0]), float(run["time"].values[-1])
-    return min(float(s[0]) for s in spans), max(float(s[1]) for s in spans)
+def trained_parts(sets: Iterable[TrainingSet], runs: Runs) -> dict[str, xr.Dataset]:
+    """Part of each run from the first to the last instant that some training sets may read."""
+    spans: dict[str, list[float]] = {}
+    for each in sets:
+        for name, begin, stop in each.spans:
+            spans.setdefault(name, []).extend((begin, stop))
+    return {name: between(runs[name], (min(ends), max(ends))) for name, ends in spans.items()}
 
 
 def choose_training(
@@ -482,12 +484,5 @@ def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:
                 least = trained, f"the training windows of '{model}' in '{training.name}'"
     if least is None:
         return
-    begins: dict[str, list[float]] = {}
-    for training in plan.training:
-        for name, begin, stop in training.spans:
-            begins.setdefault(name, []).extend((begin, stop))
-    parts = {
-        name: runs[name].sel(time=slice(min(ends) - 1e-6, max(ends) + 1e-6))
-        for name, ends in begins.items()
-    }
+    parts = trained_parts(plan.training, runs)
     warn_of_slow_motions(parts, list(plan.states), least[0], plan.encounter_period, least[1])
