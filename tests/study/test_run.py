@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,7 +24,7 @@ from seakeep.study import StorageError, read_result, read_study, run, run_study,
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.store import LOCK, UNITS, UnitFolder
-from seakeep.study.units import choice_of, choose, compute, units_of
+from seakeep.study.units import choice_of, choose, compute, fit_training, units_of
 
 CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
 
@@ -79,56 +78,45 @@ def test_files_of_others_in_the_folder_stay(name, words, tmp_path):
 
 
 def test_cells_are_what_the_models_say(study_folder, finished):
-    study = read_study(study_folder / "study.toml")
-    plan, runs = make_plan(study)
+    plan, runs = make_plan(read_study(study_folder / "study.toml"))
     test = finished.tests["unseen"]
+    # Windows side by side are one product: sums in another order, about 1e-13.
+    near = {"rtol": 1e-9, "atol": 1e-11}
     for number, training in enumerate(plan.training):
-        (name, begin, stop) = training.spans[0]
-        part = runs[name].sel(time=slice(begin - 1e-6, stop + 1e-6))
-        single = plan.specs["deterministic"].fit(part, list(plan.states), list(plan.inputs))
-        ensemble = plan.specs["bayesian"].fit(part, list(plan.states), list(plan.inputs))
+        single, ensemble = (fit_training(plan, runs, name, training) for name in plan.models)
         for k, window in enumerate(plan.tests["unseen"]):
-            run = runs[window.run]
+            run, cell = runs[window.run], test.isel(training=number, window=k)
             alone = single.forecast(run, window.start, window.steps)
             band = ensemble.forecast_summary(run, window.start, window.steps, level=0.95)
-            cell = test.isel(training=number, window=k)
             at = nearest_sample(run["time"].values, window.start, window.run) + 1
             for channel in plan.states:
-                column = cell.sel(channel=channel)
-                # Windows side by side are one product: sums in another order, about 1e-13.
-                kwargs = {"rtol": 1e-9, "atol": 1e-11}
-                ours = column["mean"].sel(model="deterministic")
-                np.testing.assert_allclose(ours, alone[channel], **kwargs)
-                ours = column.sel(model="bayesian", ensemble="bayesian")
-                for statistic in ("mean", "lower", "upper"):
-                    expected = band[channel].sel(statistic=statistic)
-                    np.testing.assert_allclose(ours[statistic], expected, **kwargs)
+                ours = cell.sel(channel=channel)
+                mean = ours["mean"].sel(model="deterministic")
+                np.testing.assert_allclose(mean, alone[channel], **near)
+                ours = ours.sel(model="bayesian", ensemble="bayesian")
+                for key in ("mean", "lower", "upper"):
+                    np.testing.assert_allclose(ours[key], band[channel].sel(statistic=key), **near)
                 measured = run[channel].values[at : at + window.steps]
-                np.testing.assert_array_equal(column["measured"], measured)
+                np.testing.assert_array_equal(ours["measured"], measured)
 
 
 def test_the_error_over_time_is_kept_in_bands_and_each_is_tested_for_a_trend(finished):
     test, trend = finished.tests["unseen"], finished.groups["statistics/trend"].sel(test="unseen")
-    split = 1 / (3.0 * finished.attrs["encounter_period"])  # the default: three periods
     cell = test.isel(training=1, window=2)
     found = band_error_over_time(
         predicted=cell["mean"].sel(model="bayesian").values,
         measured=cell["measured"].values,
         dt=finished.attrs["dt"],
-        frequency=split,
+        frequency=1 / (3.0 * finished.attrs["encounter_period"]),  # the default: three periods
         training_std=cell["training_std"].values,
     )
     bands = cell["error_over_time"].sel(model="bayesian", band=["low", "wave"])
     np.testing.assert_array_equal(bands, found)
-    assert list(trend["band"].values) == ["all", "low", "wave"]
-    for band in ("all", "low", "wave"):
-        at = trend.sel(model="deterministic", band=band)
-        errors = test["error_over_time"].sel(model="deterministic", band=band)
-        mean = errors.mean(("training", "window"))
-        np.testing.assert_allclose(at["error_mean"], mean, rtol=1e-12)
-        slope = np.polyfit(test["time"], mean, 1)[0]
-        assert float(at["slope"]) == pytest.approx(slope, rel=1e-9)
-        assert 0 < float(at["p_value"]) <= 1
+    mean = test["error_over_time"].mean(("training", "window"))
+    np.testing.assert_allclose(*xr.align(trend["error_mean"].transpose(*mean.dims), mean))
+    slope = np.polyfit(test["time"], mean.sel(model="deterministic", band="wave"), 1)[0]
+    at = trend.sel(model="deterministic", band="wave")
+    assert float(at["slope"]) == pytest.approx(slope, rel=1e-9)  # sums in another order
 
 
 def test_arrays_do_not_depend_on_workers(study_folder, finished):
@@ -273,15 +261,6 @@ def test_a_folder_of_another_study_is_refused(study_folder, finished):
         run_study(read_study(study_folder / "study.toml"), study_folder / "out")
 
 
-def test_a_plan_that_failed_leaves_the_folder_free(study_folder):
-    change(study_folder, '["unseen"]', '["first"]')
-    with pytest.raises(RequestError, match="the run 'first' trains"):
-        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-    change(study_folder, '["first"]', '["unseen"]')
-    study = read_study(study_folder / "study.toml")
-    assert run_study(study, study_folder / "out").attrs["digest"] == study.digest
-
-
 def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):
     store.UnitFolder(tmp_path, "one").open("first")
     second = store.UnitFolder(tmp_path, "two")
@@ -320,85 +299,19 @@ def test_a_write_that_fails_names_the_mend_of_its_cause(number, kind, status, me
     assert os.strerror(number) in str(caught.value)
 
 
-def test_no_feasible_training_window(study_folder):
-    change(study_folder, '["10 T", "20 T"]', '["1000 T", "2000 T"]')
-    with pytest.raises(RequestError, match=r"no window is feasible.*Shorten window"):
-        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-
-
-def test_no_feasible_test_window(study_folder):
-    change(study_folder, "length = 6", "length = 6000")
-    with pytest.raises(RequestError, match=r"tests.unseen: no window is feasible.*Reduce length"):
-        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-
-
-def test_a_full_disk_is_told_and_what_is_finished_is_kept(study_folder, monkeypatch):
-    study = read_study(study_folder / "study.toml")
-    folder = store.UnitFolder(study_folder / "out", study.digest)
-    folder.open("name")
-    folder.write("first", CELL)
-
-    def full(*args, **kwargs):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(StorageError, match=r"No space left.*kept.*continues") as caught:
-        folder.write("second", CELL)
-    assert caught.value.exit_status == 1
-    assert folder.read("first") is not None
-    assert folder.read("second") is None
-    assert [path.name for path in (study_folder / "out" / "units").iterdir()] == ["first.nc"]
-
-
-def test_a_result_of_another_format_is_told(finished, monkeypatch):
+def test_a_result_that_cannot_be_read_is_told(finished, monkeypatch):
     monkeypatch.setattr(store, "FORMAT", store.FORMAT + 1)
     with pytest.raises(
         RequestError, match=rf"written in format {store.FORMAT - 1}.*another folder"
     ):
         read_result(finished.folder)
-
-
-def test_words_of_a_result_come_back_in_any_alphabet(finished):
-    groups = dict(finished.groups)
-    name = "chosen"
-    words = np.full(groups[name]["words"].shape, "the best λ of run Åsgård 試験")
-    groups[name] = groups[name].assign(words=(groups[name]["words"].dims, words))
-    store.write_result(finished.folder, finished.attrs, groups)
-    found = read_result(finished.folder).groups[name]["words"].values
-    np.testing.assert_array_equal(found, words)
-
-
-def test_a_damaged_result_is_told(tmp_path):
-    (tmp_path / "study.nc").write_bytes(b"no NetCDF")
-    with pytest.raises(DataError, match=r"study.nc was cut off, altered.* it has no checksum"):
-        read_result(tmp_path)
-
-
-@pytest.mark.parametrize("part", [0.1, 0.3, 0.5, 0.7, 0.9])
-def test_an_altered_result_is_refused(finished, part):
+    monkeypatch.undo()
     path = finished.folder / "study.nc"
     content = bytearray(path.read_bytes())
-    content[int(part * len(content))] ^= 1
+    content[len(content) // 2] ^= 1
     path.write_bytes(content)
     with pytest.raises(DataError, match=r"study\.nc was cut off, altered or damaged"):
         read_result(finished.folder)
-
-
-def test_a_folder_without_a_study_is_told(tmp_path):
-    with pytest.raises(RequestError, match="holds no finished study"):
-        read_result(tmp_path)
-
-
-def test_leaving_runs_out_tests_no_run_that_trains(study_folder):
-    path = study_folder / "study.toml"
-    text = path.read_text("utf-8").replace("windows = 2\n", 'scheme = "leave_out"\n', 1)
-    path.write_text(text.replace('runs = ["unseen"]', 'runs = ["first", "second"]'), "utf-8")
-    plan, _ = make_plan(read_study(path))
-    assert [each.left_out for each in plan.training] == [("first",), ("second",)]
-    for window in plan.tests["unseen"]:
-        learners = [each for each in plan.training if each.may_test(window.run)]
-        assert learners
-        assert all(window.run not in each.runs for each in learners)
 
 
 def test_joined_series_are_the_windows_end_to_end(finished):
@@ -408,16 +321,6 @@ def test_joined_series_are_the_windows_end_to_end(finished):
     assert predicted.shape == (2, 3 * test.sizes["time"], test.sizes["channel"])
     np.testing.assert_array_equal(measured[: test.sizes["time"]], test["measured"][0])
     np.testing.assert_array_equal(predicted[1, -1], test["mean"].sel(model="bayesian")[1, -1, -1])
-
-
-@pytest.mark.parametrize("name", ["report.html", "figures/photo.png", "tables/lines.csv"])
-def test_a_report_is_never_written_among_files_of_others(name, study_folder):
-    mine = study_folder / "out" / name
-    mine.parent.mkdir(parents=True)
-    mine.write_text("mine")
-    with pytest.raises(RequestError, match=r"(not a report that|no report of) seakeep"):
-        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-    assert mine.read_text() == "mine"
 
 
 OPEN = """
