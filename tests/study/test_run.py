@@ -14,17 +14,16 @@ import numpy as np
 import pytest
 import xarray as xr
 from started import started
-from tutorial_study import put_tutorial
+from tutorial_study import assert_cells_are_what_the_models_say, put_tutorial
 
 from seakeep.errors import DataError, RequestError
 from seakeep.models.executor import processes
-from seakeep.models.labelled import nearest_sample
 from seakeep.statistics import band_error_over_time
 from seakeep.study import StorageError, read_result, read_study, run, run_study, store
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.store import LOCK, UNITS, UnitFolder
-from seakeep.study.units import choice_of, choose, compute, fit_training, units_of
+from seakeep.study.units import choice_of, choose, compute, units_of
 
 CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
 
@@ -78,26 +77,9 @@ def test_files_of_others_in_the_folder_stay(name, words, tmp_path):
 
 
 def test_cells_are_what_the_models_say(study_folder, finished):
-    plan, runs = make_plan(read_study(study_folder / "study.toml"))
-    test = finished.tests["unseen"]
+    planned = make_plan(read_study(study_folder / "study.toml"))
     # Windows side by side are one product: sums in another order, about 1e-13.
-    near = {"rtol": 1e-9, "atol": 1e-11}
-    for number, training in enumerate(plan.training):
-        single, ensemble = (fit_training(plan, runs, name, training) for name in plan.models)
-        for k, window in enumerate(plan.tests["unseen"]):
-            run, cell = runs[window.run], test.isel(training=number, window=k)
-            alone = single.forecast(run, window.start, window.steps)
-            band = ensemble.forecast_summary(run, window.start, window.steps, level=0.95)
-            at = nearest_sample(run["time"].values, window.start, window.run) + 1
-            for channel in plan.states:
-                ours = cell.sel(channel=channel)
-                mean = ours["mean"].sel(model="deterministic")
-                np.testing.assert_allclose(mean, alone[channel], **near)
-                ours = ours.sel(model="bayesian", ensemble="bayesian")
-                for key in ("mean", "lower", "upper"):
-                    np.testing.assert_allclose(ours[key], band[channel].sel(statistic=key), **near)
-                measured = run[channel].values[at : at + window.steps]
-                np.testing.assert_array_equal(ours["measured"], measured)
+    assert_cells_are_what_the_models_say(finished, *planned, rtol=1e-9, atol=1e-11)
 
 
 def test_the_error_over_time_is_kept_in_bands_and_each_is_tested_for_a_trend(finished):
