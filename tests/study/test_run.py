@@ -23,7 +23,7 @@ from seakeep.study import StorageError, read_result, read_study, run, run_study,
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.store import LOCK, UNITS, UnitFolder
-from seakeep.study.units import choice_of, choose, compute, units_of
+from seakeep.study.units import compute, compute_task, tasks_of, units_of
 
 CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
 
@@ -334,13 +334,10 @@ def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(t
     put_tutorial(tmp_path, OPEN)
     plan, runs = make_plan(read_study(tmp_path / "study.toml"))
     single, ensemble, mean = units_of(plan)
-    choice = choice_of(plan, single)
-    assert choice == choice_of(plan, ensemble)
-    assert choice.name == "deterministic.t00.choice"
-    assert choice_of(plan, mean) is None
-    chosen = choose(plan, runs, choice)
-    for unit in (single, ensemble):
-        found, alone = compute(plan, runs, unit, chosen), compute(plan, runs, unit)
+    assert tasks_of(plan, [single, ensemble, mean]) == [(single, ensemble), (mean,)]
+    both = compute_task(plan, runs, (single, ensemble))
+    for unit, found in zip((single, ensemble), both, strict=True):
+        alone = compute(plan, runs, unit)
         assert found.keys() == alone.keys()
         for name, group in found.items():
             xr.testing.assert_identical(group, alone[name])

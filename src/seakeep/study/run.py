@@ -27,7 +27,7 @@ from seakeep.study.store import (
     versions,
     write_result,
 )
-from seakeep.study.units import Unit, choice_of, choose, collect, compute, units_of
+from seakeep.study.units import Unit, collect, compute_task, tasks_of, units_of
 
 
 def run_study(
@@ -198,31 +198,21 @@ def _compute_all(
     taken: str,
 ) -> None:
     left = [unit for unit in units if folder.read(unit.name) is None]
-    choices = {unit: choice_of(plan, unit) for unit in left}
-    # What is chosen serves several models: they wait for it.
-    known = {each: folder.read(each.name) for each in choices.values() if each is not None}
-    todo = [each for each, groups in known.items() if groups is None]
-    done, total = len(units) - len(left), len(units) + len(todo)
-    report(done, total, f"fitting and forecasting, {taken}")
-    items: deque[tuple[Unit, Groups | None]] = deque((unit, None) for unit in todo)
-    for unit in left:
-        choice = choices[unit]
-        if choice not in todo:
-            items.append((unit, None if choice is None else known[choice]))
+    done, items = len(units) - len(left), deque(tasks_of(plan, left))
+    report(done, len(units), f"fitting and forecasting, {taken}")
     try:
-        for (unit, _), groups in as_finished(_work, (plan, dict(runs)), items, executor):
-            folder.write(unit.name, groups)
-            items.extend((each, groups) for each in left if choices[each] == unit)
-            done += 1
-            what = "settings chosen" if unit.chooses else unit.model
-            report(done, total, f"{what}, training set {plan.training[unit.training].name}")
+        for task, found in as_finished(_work, (plan, dict(runs)), items, executor):
+            for unit, groups in zip(task, found, strict=True):
+                folder.write(unit.name, groups)
+                done += 1
+                name = plan.training[unit.training].name
+                report(done, len(units), f"{unit.model}, training set {name}")
     except WorkerLostError as error:
         raise WorkerLostError(
             f"{error} What was finished is kept: the same command continues where it stopped."
         ) from None
 
 
-def _work(data: tuple[Plan, dict[str, xr.Dataset]], item: tuple[Unit, Groups | None]) -> Groups:
-    """Groups of a unit, which come back to be written: a worker may have another disk."""
-    unit, choice = item
-    return choose(*data, unit) if unit.chooses else compute(*data, unit, choice)
+def _work(data: tuple[Plan, dict[str, xr.Dataset]], task: tuple[Unit, ...]) -> list[Groups]:
+    """Groups of some units, which come back to be written: a worker may have another disk."""
+    return compute_task(*data, task)

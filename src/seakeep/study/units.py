@@ -7,8 +7,7 @@ by name; :func:`collect` puts those of all units side by side, along models and 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +24,6 @@ from seakeep.formats.netcdf import opened_netcdf
 from seakeep.models import Spec
 from seakeep.models.calibration import Judged, envelope_of, found_margin, held_out
 from seakeep.models.engine import group_series, read_groups
-from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
 from seakeep.models.summaries import STATISTICS, reduce_members
@@ -44,19 +42,15 @@ FILL = {"lost": -2, "windows": 0}
 
 @dataclass(frozen=True)
 class Unit:
-    """A model and the number of a training set: what one worker does at a time.
-
-    A unit that chooses finds the settings that the model, and others like it, leave open.
-    """
+    """A model and the number of a training set: what is computed and kept as a whole."""
 
     model: str
     training: int
-    chooses: bool = False
 
     @property
     def name(self) -> str:
         """Name of its file."""
-        return f"{self.model}.t{self.training:02d}" + ".choice" * self.chooses
+        return f"{self.model}.t{self.training:02d}"
 
 
 def units_of(plan: Plan) -> list[Unit]:
@@ -69,6 +63,16 @@ def units_of(plan: Plan) -> list[Unit]:
     ]
 
 
+def tasks_of(plan: Plan, units: Iterable[Unit]) -> list[tuple[Unit, ...]]:
+    """Units that one worker does in turn: what their settings leave open is chosen once."""
+    out: dict[object, tuple[Unit, ...]] = {}
+    for unit in units:
+        spec = left_open(plan.specs[unit.model])
+        key = unit.training, unit.model if spec is None else spec.central(plan.dt)
+        out[key] = (*out.get(key, ()), unit)
+    return list(out.values())
+
+
 def tested_windows(plan: Plan, training: int) -> dict[str, list[int]]:
     """Windows that a training set may be tested on, by test set; those without any are left out."""
     where = plan.training[training]
@@ -77,46 +81,6 @@ def tested_windows(plan: Plan, training: int) -> dict[str, list[int]]:
         for test, windows in plan.tests.items()
     }
     return {test: numbers for test, numbers in every.items() if numbers}
-
-
-def choice_of(plan: Plan, unit: Unit) -> Unit | None:
-    """The unit that chooses for another one; None where nothing is left open."""
-
-    def central(model: str) -> HankelDMDc | None:
-        spec = left_open(plan.specs[model])
-        return None if spec is None else spec.central(plan.dt)
-
-    if (wanted := central(unit.model)) is None:
-        return None
-    first = next(model for model in plan.models if central(model) == wanted)
-    return Unit(first, unit.training, chooses=True)
-
-
-def choose(plan: Plan, runs: Runs, unit: Unit) -> Groups:
-    """Choose what the settings of a model leave open, on a training set."""
-    parts = training_parts(runs, plan.training[unit.training])
-    spec = left_open(plan.specs[unit.model])
-    assert spec is not None
-    with _named_after(plan, unit):
-        found = spec.central(plan.dt).settled(parts, list(plan.states), list(plan.inputs))
-    content = {
-        "settings": found.settings.to_json(),
-        "rows": found.rows,
-        "note": found.note,
-        "readouts": [each.to_json() for each in found.readouts],
-    }
-    return {"choice": xr.Dataset({"json": json.dumps(content)})}
-
-
-def _chosen(plan: Plan, choice: Groups) -> Selected[HankelDMDc]:
-    """What :func:`choose` found."""
-    content = json.loads(choice["choice"]["json"].item())
-    return Selected(
-        HankelDMDc.from_json(content["settings"]),
-        tuple(content["rows"]),
-        content["note"],
-        tuple(FittedReadOut.from_json(each, plan.states) for each in content["readouts"]),
-    )
 
 
 @contextmanager
@@ -129,7 +93,24 @@ def _named_after(plan: Plan, unit: Unit) -> Iterator[None]:
         raise DataError(f"training set '{name}', model '{unit.model}': {error}") from error
 
 
-def compute(plan: Plan, runs: Runs, unit: Unit, choice: Groups | None = None) -> Groups:
+def compute_task(plan: Plan, runs: Runs, units: Sequence[Unit]) -> list[Groups]:
+    """Compute units of :func:`tasks_of`, in their order."""
+    selected, out = None, []
+    for unit in units:
+        spec = left_open(plan.specs[unit.model])
+        if selected is None and spec is not None:
+            parts = training_parts(runs, plan.training[unit.training])
+            with _named_after(plan, unit):
+                selected = spec.central(plan.dt).settled(
+                    parts, list(plan.states), list(plan.inputs)
+                )
+        out.append(compute(plan, runs, unit, selected))
+    return out
+
+
+def compute(
+    plan: Plan, runs: Runs, unit: Unit, selected: Selected[HankelDMDc] | None = None
+) -> Groups:
     """Fit a model, with the settings that were chosen, and forecast all windows.
 
     Returns
@@ -142,7 +123,7 @@ def compute(plan: Plan, runs: Runs, unit: Unit, choice: Groups | None = None) ->
     """
     training, settings = plan.training[unit.training], plan.settings
     with _named_after(plan, unit):
-        fitted = fit_training(plan, runs, unit.model, training, choice=choice)
+        fitted = fit_training(plan, runs, unit.model, training, selected=selected)
     ahead = (max(fitted.signature.lead_samples, 1) - 1) * plan.dt
     facts = {"units": "s", "long_name": "waves read after the instant that is forecast"}
     chosen = {"words": getattr(fitted, "selection", ""), "look_ahead": ((), ahead, facts)}
@@ -277,16 +258,16 @@ def fit_training(
     model: str,
     training: TrainingSet,
     spec: Spec | None = None,
-    choice: Groups | None = None,
+    selected: Selected[HankelDMDc] | None = None,
 ) -> Any:
     """Fit a model of the study to a training set.
 
-    Its settings may be others, `spec`, and what they leave open may be chosen already, `choice`.
+    Its settings may be others, `spec`, and what they leave open may be chosen already, `selected`.
     """
     spec = spec or plan.specs[model]
     parts, states, inputs = training_parts(runs, training), list(plan.states), list(plan.inputs)
-    if choice is not None and (open_spec := left_open(spec)) is not None:
-        return open_spec.fit(parts, states, inputs, selected=_chosen(plan, choice))
+    if selected is not None and (open_spec := left_open(spec)) is not None:
+        return open_spec.fit(parts, states, inputs, selected=selected)
     return spec.fit(parts, states, inputs)
 
 
