@@ -12,8 +12,8 @@ from seakeep.errors import DataError, SeakeepWarning
 from seakeep.study import read_study, run_study
 from seakeep.study.judge import (
     MEASURES,
+    band_tables,
     box_table,
-    coverage_table,
     difference_table,
     joined,
     median_of,
@@ -141,7 +141,7 @@ def cells(inside=0.5):
 
 
 def test_coverage_by_hand():
-    row = coverage_table(cells()).sel(model="m", against="measured")
+    row = band_tables(cells(), None, 0.95)["coverage"].sel(model="m", against="measured")
     np.testing.assert_allclose(row["inside"], 0.5, rtol=1e-15)
     np.testing.assert_allclose(row["below"], 0.5, rtol=1e-15)
     # Widths of 60 and of 5 in turns, over SDs √(8/7) times amplitudes 1, 2, 1 (10, 20, 10).

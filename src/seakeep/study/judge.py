@@ -12,6 +12,7 @@ import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -22,7 +23,6 @@ from seakeep import metrics, statistics
 from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.core.bands import band_error_over_time
 from seakeep.core.calibration import band_scale, calibrated_bounds
-from seakeep.core.coverage import CoverageTable
 from seakeep.core.metrics import root_mean_square
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
 from seakeep.models import KINDS
@@ -100,29 +100,32 @@ def judge(
 ) -> dict[str, xr.Dataset]:
     """All statistics of a study, as groups ``statistics/…``; the densities side by side."""
     kinds = {name: each.kind for name, each in settings.models.items()}
-    seed, calibration = settings.study.seed, groups.get("calibration")
-    found: dict[str, dict[str, xr.Dataset | None]] = defaultdict(dict)
+    seed = settings.study.seed
+    tables: dict[str, dict[str, xr.Dataset]] = defaultdict(dict)
     for name in settings.tests:
         test = groups[f"tests/{name}"]
-        found["boxes"][name] = boxes = box_table(test)
-        rng = random_stream(seed, f"differences.{name}")
-        found["differences"][name] = changes = difference_table(test, groups["training"], rng)
-        found["skill"][name] = skill_table(boxes, changes, kinds)
-        if test.sizes["ensemble"]:
-            found["coverage"][name] = coverage_table(test, calibration)
-            found["bands"][name] = band_parts(test, calibration, settings.statistics.level)
-        found["trend"][name] = trend_table(test, random_stream(seed, f"trend.{name}"))
-        if is_regular(groups, name):
-            found["response"][name] = regular_response(groups, name)
-    lost = lost_forecasts(groups, settings.tests)
-    out = {} if lost is None else {"statistics/lost": lost}
-    for key, tables in found.items():
-        if made := {name: each for name, each in tables.items() if each is not None}:
-            names = xr.Variable("test", list(made))
-            out[f"statistics/{key}"] = xr.concat(list(made.values()), names, join="outer")
+        boxes, rng = box_table(test), random_stream(seed, f"differences.{name}")
+        differences = difference_table(test, groups["training"], rng)
+        found = {
+            "boxes": boxes,
+            "differences": differences,
+            "skill": skill_table(boxes, differences, kinds),
+            **band_tables(test, groups.get("calibration"), settings.statistics.level),
+            "trend": trend_table(test, random_stream(seed, f"trend.{name}")),
+            "response": regular_response(groups, name) if is_regular(groups, name) else None,
+        }
+        for key, each in found.items():
+            if each is not None:
+                tables[key][name] = each
+    out = {
+        key: xr.concat(list(of.values()), xr.Variable("test", list(of)), join="outer")
+        for key, of in tables.items()
+    }
+    if (lost := lost_forecasts(groups, settings.tests)) is not None:
+        out["lost"] = lost
     name = settings.statistics.densities_of or next(iter(settings.tests))
-    densities = density_tables(groups[f"tests/{name}"], channels, settings, name, executor)
-    return out | {f"statistics/{key}": each for key, each in densities.items()}
+    out |= density_tables(groups[f"tests/{name}"], channels, settings, name, executor)
+    return {f"statistics/{key}": each for key, each in out.items()}
 
 
 def lost_forecasts(groups: Mapping[str, xr.Dataset], tests: Iterable[str]) -> xr.Dataset | None:
@@ -315,85 +318,74 @@ def box_table(test: xr.Dataset) -> xr.Dataset:
 
 
 COVERAGE = ("inside", "below", "above", "relative_width")
+PARTS = ("inside", "width", "relative_width", "winkler", "crps")
 
 
-def coverage_table(test: xr.Dataset, calibration: xr.Dataset | None = None) -> xr.Dataset:
-    """Fraction of the instants at which the band holds the measurement, and the truth where known.
+def band_tables(
+    test: xr.Dataset, calibration: xr.Dataset | None, level: float
+) -> dict[str, xr.Dataset]:
+    """How bands hold the measurement; empty without ensembles.
 
-    Over (model, against, channel), averages over all cells. With a calibration, the same of the
-    calibrated band: ``calibrated_inside`` and so on.
+    ``coverage`` over (model, against, channel) is the fraction of the instants at which a band
+    holds the measurement, and the truth where it is known, averages over all cells; with a
+    calibration the same of the calibrated band as ``calibrated_inside`` and so on. ``bands`` over
+    (model, band, part, channel) has coverage, width, Winkler score and CRPS of all instants, of
+    thirds by wave height, and of thirds of the horizon; it is left out where no band can be judged.
     """
-    sides = ["measured", *(["truth"] if "truth" in test else [])]
-    judged, ensembles = test["judged"].values, test["ensemble"].values
-    against = [np.broadcast_to(test[s].values, (*judged.shape, *test[s].shape[1:])) for s in sides]
-    coords = {"model": ensembles, "against": sides, "channel": _names(test)}
+    ensembles, judged = test["ensemble"].values, test["judged"].values
+    if not ensembles.size:
+        return {}
+
+    def cells(key: str) -> FloatArray:
+        values = test[key].values
+        out: FloatArray = np.broadcast_to(values, (*judged.shape, *values.shape[1:]))[judged]
+        return out
+
+    against = {key: cells(key) for key in ("measured", "truth") if key in test}
+    known = "wave_height" in test and np.isfinite(test["wave_height"]).all()
+    waves = cells("wave_height") if known else None
+    bands = {"members": None} | ({} if calibration is None else {"calibrated": calibration})
+    rows, parts = {}, {}
+    for cell in product(ensembles, bands):
+        lower, upper = (bound[judged] for bound in band_of(test, cell[0], bands[cell[1]]))
+        rows[cell] = [_coverage_row(lower, upper, each) for each in against.values()]
+        if not np.isnan(lower).any(axis=(1, 2)).all():  # lost, or nothing to calibrate on
+            parts[cell] = statistics.coverage_table(lower, upper, against["measured"], level, waves)
+    coords = {"model": ensembles, "against": list(against), "channel": _names(test)}
     tables = []
-    for band, found in _bands(calibration).items():
-        rows = []
-        for model in ensembles:
-            lower, upper = (bound[judged] for bound in band_of(test, model, found))
-            rows.append([_coverage_row(lower, upper, each, judged) for each in against])
-        keys = [f"{band}_{key}" if found is not None else key for key in COVERAGE]
-        tables.append(_table(rows, ("model", "against", "number", "channel"), keys, coords))
-    return xr.merge(tables)
+    for band in bands:
+        keys = [key if band == "members" else f"{band}_{key}" for key in COVERAGE]
+        values = [rows[model, band] for model in ensembles]
+        tables.append(_table(values, ("model", "against", "number", "channel"), keys, coords))
+    out = {"coverage": xr.merge(tables)}
+    if parts:
+        names = next(iter(parts.values())).parts
+        nothing = np.full((len(PARTS), len(names), test.sizes["channel"]), np.nan)
+        found = {
+            cell: np.stack([getattr(each, key) for key in PARTS]) for cell, each in parts.items()
+        }
+        values = [[found.get((model, band), nothing) for band in bands] for model in ensembles]
+        coords = {
+            "model": ensembles,
+            "band": list(bands),
+            "part": list(names),
+            "channel": test["channel"].values,
+        }
+        dims = ("model", "band", "number", "part", "channel")
+        out["bands"] = _table(values, dims, PARTS, coords)
+    return out
 
 
-def _coverage_row(
-    lower: FloatArray, upper: FloatArray, against: FloatArray, judged: npt.NDArray[np.bool_]
-) -> list[list[float]]:
+def _coverage_row(lower: FloatArray, upper: FloatArray, against: FloatArray) -> list[list[float]]:
     """Coverage over the judged cells, shape (number, 1 + channel): the average first."""
-    known = np.isfinite(against).all(axis=(0, 1, 2))
-    band = statistics.coverage(lower, upper, np.where(known, against, 0.0)[judged])
+    known = np.isfinite(against).all(axis=(0, 1))
+    band = statistics.coverage(lower, upper, np.where(known, against, 0.0))
     rows = []
     for number in COVERAGE:
         each = getattr(band, number)
         each = np.where(known & np.isfinite(each), each, np.nan)
         rows.append([float(average_of(average_of(each))), *average_of(each.T)])
     return rows
-
-
-PARTS = ("inside", "width", "relative_width", "winkler", "crps")
-
-
-def band_parts(test: xr.Dataset, calibration: xr.Dataset | None, level: float) -> xr.Dataset | None:
-    """Coverage, width, Winkler score and CRPS of bands over (model, band, part, channel).
-
-    Parts are all instants, thirds by wave height, and thirds of the horizon; None where no band
-    can be judged.
-    """
-    judged, ensembles = test["judged"].values, test["ensemble"].values
-    shape = (*judged.shape, *test["measured"].shape[1:])
-    measured = np.broadcast_to(test["measured"].values, shape)[judged]
-    waves = None
-    if "wave_height" in test and np.isfinite(test["wave_height"]).all():
-        waves = np.broadcast_to(test["wave_height"].values, shape[:-1])[judged]
-    bands = _bands(calibration)
-    tables: dict[tuple[str, str], CoverageTable] = {}
-    for model in ensembles:
-        for band, found in bands.items():
-            lower, upper = (bound[judged] for bound in band_of(test, model, found))
-            if not np.isnan(lower).any(axis=(1, 2)).all():  # lost, or nothing to calibrate on
-                tables[model, band] = statistics.coverage_table(
-                    lower, upper, measured, level, waves
-                )
-    if not tables:
-        return None
-    parts = next(iter(tables.values())).parts
-    nothing = np.full((len(PARTS), len(parts), shape[-1]), np.nan)
-    rows = {cell: [getattr(table, number) for number in PARTS] for cell, table in tables.items()}
-    values = [[rows.get((model, band), nothing) for band in bands] for model in ensembles]
-    coords = {
-        "model": ensembles,
-        "band": list(bands),
-        "part": list(parts),
-        "channel": test["channel"].values,
-    }
-    return _table(values, ("model", "band", "number", "part", "channel"), PARTS, coords)
-
-
-def _bands(calibration: xr.Dataset | None) -> dict[str, xr.Dataset | None]:
-    """Bands by name, and what widens each."""
-    return {"members": None} | ({} if calibration is None else {"calibrated": calibration})
 
 
 def band_of(
