@@ -20,7 +20,6 @@ from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_at_clock
-from seakeep.models.training import is_constant
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, froude_factor
 from seakeep.signals.time_axis import span_text
@@ -326,7 +325,8 @@ def compare_models(
             if is_ensemble(model):
                 tell = named(members, f"{name}, ")
                 how = {"level": level, "band": band, "executor": executor, "progress": tell}
-            each = _compare_run(model, run, name, first, count, history, lead, how)
+            begin, most = _default_window(run, first, history, lead)
+            each = _compare_run(model, run, name, begin, count or most, how)
             found[label].append(each)
             _warn_of_known(model, each)
             warn_of_waves(model, run, name, each.start, each.measured.sizes["time"])
@@ -335,9 +335,6 @@ def compare_models(
                     f"the forecast of {name} reads the waves up to {until:.3g} s after the instant "
                     "that it forecasts: the model needs these waves ahead of time."
                 )
-    for of_run in zip(*found.values(), strict=True):
-        parts = [part for each in of_run for part in (each.measured, each.inputs)]
-        _warn_of_dead(xr.merge(parts, compat="override"), of_run[0].run)
     return found
 
 
@@ -368,27 +365,24 @@ def _warn_of_known(model: Model, compared: Comparison) -> None:
             )
 
 
-def _compare_run(
-    model: Model,
-    run: xr.Dataset,
-    name: str,
-    start: float | None,
-    steps: int | None,
-    history: int,
-    lead: int,
-    how: Mapping[str, Any],
-) -> Comparison:
+def _default_window(
+    run: xr.Dataset, start: float | None, history: int, lead: int
+) -> tuple[float, int]:
+    """Start and steps of a forecast of all of a test span, from `start` if it is stated."""
     time = run["time"].values
     begin, end = run.attrs.get("test_span", (time[0], time[-1]))
     if start is None:
-        first = min(history - 1, time.size - 1)
-        start = max(float(begin), float(time[first]))
-    if steps is None:
-        last = int(np.searchsorted(time, float(end) + 0.5 * model.dt)) - 1
-        # The last step reads the input `lead` samples after the instant that it starts from.
-        last = min(last, time.size - max(lead, 1))
-        at = int(np.argmin(np.abs(time - start)))
-        steps = max(last - at, 1)
+        start = max(float(begin), float(time[min(history, time.size) - 1]))
+    last = int(np.searchsorted(time, float(end) + 0.5 * float(run.attrs["dt"]))) - 1
+    # The last step reads the input `lead` samples after the instant that it starts from.
+    last = min(last, time.size - max(lead, 1))
+    return start, max(last - int(np.argmin(np.abs(time - start))), 1)
+
+
+def _compare_run(
+    model: Model, run: xr.Dataset, name: str, start: float, steps: int, how: Mapping[str, Any]
+) -> Comparison:
+    time = run["time"].values
     forecast = model.forecast_summary if is_ensemble(model) else model.forecast
     found = forecast(run, start, steps, **how)
     # The last instant may lie a step beyond the record: the input before it is known.
@@ -409,16 +403,6 @@ def _compare_run(
         inputs=run.sel(instants)[model.inputs],
         band=inside.sel(statistic=["lower", "upper"]) if has_band else None,
     )
-
-
-def _warn_of_dead(run: xr.Dataset, name: str) -> None:
-    for channel, each in run.data_vars.items():
-        if is_constant(each.values[:, None])[0]:
-            warn(
-                f"channel '{channel}' of {name} is constant ({each.values[0]:.6g}) over the "
-                "forecast. Look for a dead sensor: a state that stands still is not judged, and an "
-                "input that does gives a forecast without waves."
-            )
 
 
 def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = True) -> xr.Dataset:
@@ -580,7 +564,7 @@ def instant_of(
     try:
         return float(stated)
     except (ValueError, OverflowError):
-        return _count(str(stated), name, "seconds such as 20") * _period(campaign, runs)
+        return _seconds(str(stated), campaign, runs, name, "seconds such as 20")
 
 
 def samples_of(
@@ -590,12 +574,14 @@ def samples_of(
     try:
         count = int(stated) if isinstance(stated, str) else stated
     except ValueError:
-        length = _count(str(stated), name, "a whole number such as 400")
-        return round(length * _period(campaign, runs) / dt)
+        return round(_seconds(str(stated), campaign, runs, name, "a whole number such as 400") / dt)
     return whole_number(count, name)
 
 
-def _count(stated: str, name: str, otherwise: str) -> float:
+def _seconds(
+    stated: str, campaign: Campaign, runs: Iterable[xr.Dataset], name: str, otherwise: str
+) -> float:
+    """A length in encounter periods, those that the runs were prepared with."""
     try:
         length = parse_length(stated)
     except RequestError:
@@ -606,9 +592,5 @@ def _count(stated: str, name: str, otherwise: str) -> float:
             f"{name}: received {reprlib.repr(stated)}. Give {otherwise}, or encounter periods such "
             f"as '15 T'.{comma}"
         )
-    return length.value
-
-
-def _period(campaign: Campaign, runs: Iterable[xr.Dataset]) -> float:
-    known = [float(r.attrs["encounter_period"]) for r in runs if "encounter_period" in r.attrs]
-    return known[0] if known else campaign.encounter_period()
+    known = (float(r.attrs["encounter_period"]) for r in runs if "encounter_period" in r.attrs)
+    return length.value * (next(known, None) or campaign.encounter_period())

@@ -364,7 +364,7 @@ def band_tables(
         found = {
             cell: np.stack([getattr(each, key) for key in PARTS]) for cell, each in parts.items()
         }
-        values = [[found.get((model, band), nothing) for band in bands] for model in ensembles]
+        grid = [[found.get((model, band), nothing) for band in bands] for model in ensembles]
         coords = {
             "model": ensembles,
             "band": list(bands),
@@ -372,7 +372,7 @@ def band_tables(
             "channel": test["channel"].values,
         }
         dims = ("model", "band", "number", "part", "channel")
-        out["bands"] = _table(values, dims, PARTS, coords)
+        out["bands"] = _table(grid, dims, PARTS, coords)
     return out
 
 

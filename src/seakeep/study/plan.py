@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign import load_prepared
@@ -120,33 +119,58 @@ def choose_training(
     inputs: Sequence[str],
 ) -> tuple[TrainingSet, ...]:
     """Choose what the models learn from."""
-    training = settings.training
+    training, groups = settings.training, dict[str, list[str]]()
     if training.scheme == "leave_out":
-        return _folds(settings, runs, names, needs, inputs)
-    if missing := [name for name in names if "train_span" not in runs[name].attrs]:
+        of_run = groups_of({n: runs[n] for n in names}, training.leave_out, inputs)
+        for name, group in of_run.items():
+            groups.setdefault(group, []).append(name)
+        if len(groups) < 2:
+            what = training.leave_out.replace("_", " ")
+            what = "run with its repetitions" if what == "auto" else what
+            raise RequestError(
+                f"training: leaving out a {what} of {', '.join(names)} leaves no run to learn "
+                "from. Give more runs, or use scheme = 'halves'."
+            )
+    elif missing := [name for name in names if "train_span" not in runs[name].attrs]:
         raise RequestError(
             f"training: the run '{missing[0]}' has no training span in the campaign. Give it "
             "role = 'train' or a span train = [start, end], or use scheme = 'leave_out'."
         )
-    spans = {name: _samples(runs[name], runs[name].attrs["train_span"]) for name in names}
-    pooled = training.scheme == "pooled"
+    times = {n: whole_span(runs[n]) if groups else runs[n].attrs["train_span"] for n in names}
+    spans = {name: _samples(runs[name], span) for name, span in times.items()}
     longest = max(spans, key=lambda name: spans[name][1] - spans[name][0])
-    for name in spans if pooled else [longest]:
-        _check_span(name, spans[name], needs, runs[name])
-    if pooled:
-        return (TrainingSet("pooled", tuple(_of_samples(runs, n, *s) for n, s in spans.items())),)
-    rng = random_stream(settings.study.seed, "training")
-    needed, remedy = training_samples(needs), "shorten the training length"
+    needed = training_samples(needs)
+    for name in [longest] if training.scheme == "halves" else names:
+        samples, dt = spans[name][1] - spans[name][0] + 1, float(runs[name].attrs["dt"])
+        if samples < needed:
+            raise RequestError(
+                f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
+                f"({samples * dt:g} s), and the largest draw of all models needs {needed} "
+                f"({needs.snapshots} snapshots and {needs.history} of delay history, "
+                f"{needed * dt:g} s). Shorten window or the delays, or give longer runs."
+            )
+    if groups:
+        return tuple(
+            TrainingSet(
+                f"without {group[0]}" + (f" (+{len(group) - 1})" if len(group) > 1 else ""),
+                tuple((name, *times[name]) for name in names if name not in group),
+                tuple(group),
+            )
+            for group in groups.values()
+        )
+
+    def part(name: str, first: int, last: int) -> tuple[str, float, float]:
+        time = runs[name]["time"].values
+        return name, float(time[first]), float(time[last])
+
+    if training.scheme == "pooled":
+        return (TrainingSet("pooled", tuple(part(name, *span) for name, span in spans.items())),)
+    rng, remedy = random_stream(settings.study.seed, "training"), "shorten the training length"
     places = _places("training", training, spans, needed, needs.snapshots, rng, remedy)
     return tuple(
-        TrainingSet(f"t{number:02d}", (_of_samples(runs, name, spans[name][0], stop),))
+        TrainingSet(f"t{number:02d}", (part(name, spans[name][0], stop),))
         for number, (name, stop) in enumerate(places)
     )
-
-
-def _of_samples(runs: Runs, name: str, first: int, last: int) -> tuple[str, float, float]:
-    time = runs[name]["time"].values
-    return name, float(time[first]), float(time[last])
 
 
 def _places(
@@ -160,15 +184,11 @@ def _places(
 ) -> list[tuple[str, int]]:
     """Feasible last samples in random order; with 'apart' no two within `width` samples."""
     drawn = asked.placement == "random"
-    every = [
-        (name, stop)
-        for name, (first, last) in spans.items()
-        for stop in (
-            range(first + needed - 1, last + 1)
-            if drawn
-            else range(last, first + needed - 2, -max(width, 1))
-        )
-    ]
+    step = 1 if drawn else max(width, 1)
+    every: list[tuple[str, int]] = []
+    for name, (first, last) in spans.items():
+        stops = range(last, first + needed - 2, -step)
+        every += [(name, stop) for stop in (reversed(stops) if drawn else stops)]
     count = len(every) if asked.windows is None else asked.windows
     if drawn and count > len(every):
         raise RequestError(
@@ -176,48 +196,6 @@ def _places(
             f"for fewer, or {remedy}."
         )
     return [every[i] for i in rng.permutation(len(every))[:count]]
-
-
-def _check_span(name: str, span: tuple[int, int], needs: Needs, run: xr.Dataset) -> None:
-    samples, needed = span[1] - span[0] + 1, training_samples(needs)
-    if samples < needed:
-        dt = float(run.attrs["dt"])
-        raise RequestError(
-            f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
-            f"({samples * dt:g} s), and the largest draw of all models needs {needed} "
-            f"({needs.snapshots} snapshots and {needs.history} of delay history, "
-            f"{needed * dt:g} s). Shorten window or the delays, or give longer runs."
-        )
-
-
-def _folds(
-    settings: StudySettings,
-    runs: Runs,
-    names: Sequence[str],
-    needs: Needs,
-    inputs: Sequence[str],
-) -> tuple[TrainingSet, ...]:
-    groups: dict[str, list[str]] = {}
-    left_out = settings.training.leave_out
-    for name, group in groups_of({n: runs[n] for n in names}, left_out, inputs).items():
-        groups.setdefault(group, []).append(name)
-    if len(groups) < 2:
-        what = "run with its repetitions" if left_out == "auto" else left_out.replace("_", " ")
-        raise RequestError(
-            f"training: leaving out a {what} of {', '.join(names)} leaves no run to learn "
-            "from. Give more runs, or use scheme = 'halves'."
-        )
-    spans = {name: whole_span(runs[name]) for name in names}
-    for name in names:
-        _check_span(name, _samples(runs[name], spans[name]), needs, runs[name])
-    return tuple(
-        TrainingSet(
-            f"without {group[0]}" + (f" (+{len(group) - 1})" if len(group) > 1 else ""),
-            tuple((name, *spans[name]) for name in names if name not in group),
-            tuple(group),
-        )
-        for group in groups.values()
-    )
 
 
 def choose_tests(
@@ -278,13 +256,10 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
     """
     shares = []
     for i, (run, begin, end) in enumerate(spans):
-        edges: npt.NDArray[np.float64] = np.linspace(begin, end, 201)
-        middle = 0.5 * (edges[1:] + edges[:-1])
-        covered = np.zeros(middle.size, dtype=bool)
-        for k, (other, first, last) in enumerate(spans):
-            if k != i and other == run:
-                covered |= (middle >= first) & (middle <= last)
-        shares.append(covered.mean())
+        middle = begin + (end - begin) * (np.arange(200) + 0.5) / 200
+        others = [span[1:] for k, span in enumerate(spans) if k != i and span[0] == run]
+        covered = [(first <= middle) & (middle <= last) for first, last in others]
+        shares.append(np.any([np.zeros(200, bool), *covered], axis=0).mean())
     return float(np.mean(shares)) if shares else 0.0
 
 
