@@ -265,13 +265,15 @@ def repeats_of(
     Training runs that the campaign marks as regular waves are left out: regular waves repeat by
     their nature. So are runs that the campaign does not have.
     """
+    if not model.inputs:
+        return {}
     known = campaign.settings.runs
     spans = {
         name: span
         for name, span in model.training_spans.items()
         if name in known and known[name].waves != "regular"
     }
-    missing = [name for name in spans if name not in tested] if model.inputs else []
+    missing = [name for name in spans if name not in tested]
     prepared = dict(tested) | (load_prepared(campaign, names=missing) if missing else {})
     pieces = {name: between(prepared[name], span) for name, span in spans.items()}
     found: dict[str, Repeat] = {}
