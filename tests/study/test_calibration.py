@@ -5,7 +5,7 @@ import pytest
 
 from seakeep.study import read_study, run_study
 from seakeep.study.plan import make_plan
-from seakeep.study.units import Unit, compute, fit_training
+from seakeep.study.units import Unit, compute, facts_of, fit_training
 
 
 def edited(folder, *changes):
@@ -87,7 +87,8 @@ def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run
     (fold,) = (k for k, each in enumerate(plan.training) if each.left_out == ("unseen",))
 
     def margins(given):
-        return compute(plan, given, Unit("bayesian", fold))["calibration"]
+        facts = facts_of(study, plan, runs)
+        return compute(plan, given, facts, Unit("bayesian", fold))["calibration"]
 
     found = margins(runs)
     steps = plan.tests["unseen"][0].steps

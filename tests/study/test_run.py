@@ -23,7 +23,7 @@ from seakeep.study import StorageError, read_result, read_study, run, run_study,
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.store import LOCK, UNITS, UnitFolder
-from seakeep.study.units import compute, compute_task, tasks_of, units_of
+from seakeep.study.units import compute, compute_task, facts_of, tasks_of, units_of
 
 CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
 
@@ -332,12 +332,14 @@ length = 6
 
 def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(tmp_path):
     put_tutorial(tmp_path, OPEN)
-    plan, runs = make_plan(read_study(tmp_path / "study.toml"))
+    study = read_study(tmp_path / "study.toml")
+    plan, runs = make_plan(study)
+    facts = facts_of(study, plan, runs)
     single, ensemble, mean = units_of(plan)
     assert tasks_of(plan, [single, ensemble, mean]) == [(single, ensemble), (mean,)]
-    both = compute_task(plan, runs, (single, ensemble))
+    both = compute_task(plan, runs, facts, (single, ensemble))
     for unit, found in zip((single, ensemble), both, strict=True):
-        alone = compute(plan, runs, unit)
+        alone = compute(plan, runs, facts, unit)
         assert found.keys() == alone.keys()
         for name, group in found.items():
             xr.testing.assert_identical(group, alone[name])

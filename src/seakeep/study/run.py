@@ -27,7 +27,10 @@ from seakeep.study.store import (
     versions,
     write_result,
 )
-from seakeep.study.units import Unit, collect, compute_task, tasks_of, units_of
+from seakeep.study.units import Unit, collect, compute_task, facts_of, tasks_of, units_of
+
+Data = tuple[Plan, dict[str, xr.Dataset], Groups]
+"""What workers read: the plan, the runs, and facts of the windows."""
 
 
 def run_study(
@@ -103,12 +106,13 @@ def run_study(
         found = _finished(study, out, report)  # by another process, meanwhile
         if found is None:
             units = units_of(plan)
-            _compute_all(plan, runs, folder, units, executor, report, taken)
+            facts = facts_of(study, plan, runs)
+            _compute_all((plan, runs, facts), folder, units, executor, report, taken)
             report(len(units), len(units), "statistics and densities")
             groups = describe_study(study, plan, runs)
             if "repeats" in groups:
                 warn(words_of_repeats(groups["repeats"]))
-            groups |= collect(study, plan, runs, lambda unit: _groups(folder, unit))
+            groups |= collect(plan, facts, lambda unit: _groups(folder, unit))
             groups |= judge(groups, study.settings, list(plan.states), executor)
             if "statistics/lost" in groups:
                 warn(words_of_lost(groups["statistics/lost"]))
@@ -189,19 +193,19 @@ def _taken(plan: Plan) -> str:
 
 
 def _compute_all(
-    plan: Plan,
-    runs: Mapping[str, xr.Dataset],
+    data: Data,
     folder: UnitFolder,
     units: list[Unit],
     executor: Executor | None,
     report: Progress,
     taken: str,
 ) -> None:
+    plan, *_ = data
     left = [unit for unit in units if folder.read(unit.name) is None]
     done, items = len(units) - len(left), deque(tasks_of(plan, left))
     report(done, len(units), f"fitting and forecasting, {taken}")
     try:
-        for task, found in as_finished(_work, (plan, dict(runs)), items, executor):
+        for task, found in as_finished(_work, data, items, executor):
             for unit, groups in zip(task, found, strict=True):
                 folder.write(unit.name, groups)
                 done += 1
@@ -213,6 +217,6 @@ def _compute_all(
         ) from None
 
 
-def _work(data: tuple[Plan, dict[str, xr.Dataset]], task: tuple[Unit, ...]) -> list[Groups]:
+def _work(data: Data, task: tuple[Unit, ...]) -> list[Groups]:
     """Groups of some units, which come back to be written: a worker may have another disk."""
     return compute_task(*data, task)

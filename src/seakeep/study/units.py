@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -93,7 +94,7 @@ def _named_after(plan: Plan, unit: Unit) -> Iterator[None]:
         raise DataError(f"training set '{name}', model '{unit.model}': {error}") from error
 
 
-def compute_task(plan: Plan, runs: Runs, units: Sequence[Unit]) -> list[Groups]:
+def compute_task(plan: Plan, runs: Runs, facts: Groups, units: Sequence[Unit]) -> list[Groups]:
     """Compute units of :func:`tasks_of`, in their order."""
     selected, out = None, []
     for unit in units:
@@ -104,12 +105,16 @@ def compute_task(plan: Plan, runs: Runs, units: Sequence[Unit]) -> list[Groups]:
                 selected = spec.central(plan.dt).settled(
                     parts, list(plan.states), list(plan.inputs)
                 )
-        out.append(compute(plan, runs, unit, selected))
+        out.append(compute(plan, runs, facts, unit, selected))
     return out
 
 
 def compute(
-    plan: Plan, runs: Runs, unit: Unit, selected: Selected[HankelDMDc] | None = None
+    plan: Plan,
+    runs: Runs,
+    facts: Groups,
+    unit: Unit,
+    selected: Selected[HankelDMDc] | None = None,
 ) -> Groups:
     """Fit a model, with the settings that were chosen, and forecast all windows.
 
@@ -125,21 +130,16 @@ def compute(
     with _named_after(plan, unit):
         fitted = fit_training(plan, runs, unit.model, training, selected=selected)
     ahead = (max(fitted.signature.lead_samples, 1) - 1) * plan.dt
-    facts = {"units": "s", "long_name": "waves read after the instant that is forecast"}
-    chosen = {"words": getattr(fitted, "selection", ""), "look_ahead": ((), ahead, facts)}
+    words = {"units": "s", "long_name": "waves read after the instant that is forecast"}
+    chosen = {"words": getattr(fitted, "selection", ""), "look_ahead": ((), ahead, words)}
     out = {"chosen": xr.Dataset(chosen)}
     is_ensemble = plan.models[unit.model].is_ensemble
-    spread = training_moments(plan, runs, training)[1]
     frequency = 1.0 / (settings.statistics.split_period * plan.encounter_period)
     tested = tested_windows(plan, unit.training)
     for test, series, lost, envelope in _series(plan, runs, fitted, tested):
-        windows = [plan.tests[test][k] for k in tested[test]]
-        pair = {
-            "measured": measured_windows(plan, runs, windows),
-            "training_std": spread,
-            "noise_std": noise_of(plan, runs, windows),
-        }
         at = {"window": tested[test]}
+        known = facts[test].isel(at | {"training": unit.training})
+        pair = {key: known[key].values for key in ("measured", "training_std", "noise_std")}
         mean = np.array(series[0])
         if is_ensemble:
             reduced = reduce_members(series, lost, settings.statistics.level)
@@ -224,29 +224,6 @@ def _series(
                 first = mine.stop
 
 
-def _after(run: xr.Dataset, window: TestWindow) -> slice:
-    """Samples that a window forecasts."""
-    at = int(np.argmin(np.abs(run["time"].values - window.start)))
-    return slice(at + 1, at + 1 + window.steps)
-
-
-def measured_windows(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray:
-    """Measured states of windows, shape (window, steps, N)."""
-    out = []
-    for window in windows:
-        run = runs[window.run]
-        each = [run[name].values[_after(run, window)] for name in plan.states]
-        out.append(np.stack(each, axis=-1).astype(float))
-    return np.stack(out)
-
-
-def noise_of(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray:
-    """SD of the noise of each channel in the run of each window."""
-    return np.array(
-        [[runs[w.run][c].attrs.get("noise_std", 0.0) for c in plan.states] for w in windows]
-    )
-
-
 def training_parts(runs: Runs, training: TrainingSet) -> dict[str, xr.Dataset]:
     """The runs of a training set, cut to what may be read."""
     return {name: between(runs[name], (begin, stop)) for name, begin, stop in training.spans}
@@ -269,16 +246,6 @@ def fit_training(
     if selected is not None and (open_spec := left_open(spec)) is not None:
         return open_spec.fit(parts, states, inputs, selected=selected)
     return spec.fit(parts, states, inputs)
-
-
-def training_moments(plan: Plan, runs: Runs, training: TrainingSet) -> FloatArray:
-    """Mean and standard deviation of the states over what a training set may read, shape (2, N).
-
-    The same for all models, so that all are judged on the same channels.
-    """
-    parts = training_parts(runs, training).values()
-    pooled = np.concatenate([[part[n].values for n in plan.states] for part in parts], axis=1)
-    return np.stack([pooled.mean(axis=1), pooled.std(axis=1, ddof=1)])
 
 
 def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
@@ -320,10 +287,8 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
     return xr.Dataset(out, attrs={"level": statistics.level})
 
 
-def collect(
-    study: Study, plan: Plan, runs: Runs, read: Callable[[Unit], Groups]
-) -> dict[str, xr.Dataset]:
-    """Put all units together."""
+def collect(plan: Plan, facts: Groups, read: Callable[[Unit], Groups]) -> Groups:
+    """Put all units together, with the facts of their windows."""
     units = units_of(plan)
     found = {unit: read(unit) for unit in units}
     sets = [each.name for each in plan.training]
@@ -350,7 +315,7 @@ def collect(
             if any(shown.values()):
                 drawn = {m: xr.concat(each, "shown") for m, each in shown.items()}
                 parts.append(_along("ensemble", drawn).sortby("shown"))
-        data = xr.merge([*parts, _of_windows(study, plan, runs, test)], join="outer")
+        data = xr.merge([*parts, facts[test]], join="outer")
         out[f"tests/{test}"] = data.drop_vars("member", errors="ignore")
     out["chosen"] = stacked(list(plan.models), "chosen", "model")
     if plan.calibrated_on and plan.ensembles:
@@ -370,72 +335,104 @@ def _along(dim: str, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:
     return xr.concat(list(parts.values()), names, join="outer", fill_value=FILL)
 
 
-def _of_windows(study: Study, plan: Plan, runs: Runs, test: str) -> xr.Dataset:
-    """What is known of the windows of a test set without any model."""
-    windows, training = plan.tests[test], plan.training
-    moments = np.stack([training_moments(plan, runs, each) for each in training])
-    judged = [[each.may_test(w.run) for w in windows] for each in training]
-    dims = ("window", "time", "channel")
-    variables: dict[str, Any] = {
-        "measured": (dims, measured_windows(plan, runs, windows)),
-        "judged": (("training", "window"), np.array(judged)),
-        "start": ("window", np.array([w.start for w in windows])),
-        "run": ("window", np.array([w.run for w in windows], dtype=object)),
-        "training_mean": (("training", "channel"), moments[:, 0]),
-        "training_std": (("training", "channel"), moments[:, 1]),
-        "noise_std": (("window", "channel"), noise_of(plan, runs, windows)),
-    }
-    if (heights := wave_heights(plan, runs, windows)) is not None:
-        variables["wave_height"] = (("window", "time"), heights)
-    if (folder := study.truth_folder) is not None:
-        names = dict.fromkeys(window.run for window in windows)
-        truth = {name: _opened_truth(folder / f"{name}.nc") for name in names}
-        values = np.full(variables["measured"][1].shape, np.nan)
-        for row, window in zip(values, windows, strict=True):
-            time = window.start + plan.dt * np.arange(1, window.steps + 1)
-            true = truth[window.run]
-            for k, name in enumerate(plan.states):
-                if name in true:
-                    row[:, k] = np.interp(time, true["time"].values, true[name].values)
-        variables["truth"] = (dims, values)
-    time = plan.dt * np.arange(1, windows[0].steps + 1)
-    return xr.Dataset(
-        variables,
-        coords={
-            "model": list(plan.models),
-            "ensemble": plan.ensembles,
-            "measure": list(MEASURES),
-            "band": list(BANDS),
-            "training": [each.name for each in training],
-            "window": list(range(len(windows))),
-            "time": ("time", time, {"units": "s"}),
-            "channel": list(plan.states),
-            "shown": list(plan.shown(test)),
-        },
-    )
+def facts_of(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
+    """What is known of the windows of each test set without any model.
 
-
-def _opened_truth(path: Any) -> xr.Dataset:
-    if not path.exists():
-        raise DataError(
-            f"the study names the folder {path.parent} of true channels, and {path.name} is not in "
-            "it. Play the tank again, or leave study.truth out."
+    Returns
+    -------
+    dict of str to Dataset
+        ``measured`` and, where a study names a folder of them, ``truth`` over (window, time,
+        channel), ``judged``, ``start``, ``run``, moments of the training, ``noise_std`` and, with
+        an elevation among the inputs, ``wave_height``.
+    """
+    measured = {name: _columns(plan, run) for name, run in runs.items()}
+    waves = next(filter(is_elevation, plan.inputs), None)
+    heights = {} if waves is None else {n: _heights(r[waves], plan.dt) for n, r in runs.items()}
+    means, spreads = [], []
+    for training in plan.training:
+        parts = training_parts(runs, training).values()
+        pooled = np.concatenate([_columns(plan, part) for part in parts]).T.copy()
+        means.append(pooled.mean(axis=1))
+        spreads.append(pooled.std(axis=1, ddof=1))
+    out, dims = {}, ("window", "time", "channel")
+    for test, windows in plan.tests.items():
+        noise = [
+            [runs[each.run][name].attrs.get("noise_std", 0.0) for name in plan.states]
+            for each in windows
+        ]
+        variables: dict[str, Any] = {
+            "measured": (dims, _cut(runs, measured, windows)),
+            "judged": (
+                ("training", "window"),
+                [[each.may_test(w.run) for w in windows] for each in plan.training],
+            ),
+            "start": ("window", [each.start for each in windows]),
+            "run": ("window", [each.run for each in windows]),
+            "training_mean": (("training", "channel"), means),
+            "training_std": (("training", "channel"), spreads),
+            "noise_std": (("window", "channel"), noise),
+        }
+        if heights:
+            variables["wave_height"] = (dims[:2], _cut(runs, heights, windows))
+        if (folder := study.truth_folder) is not None:
+            variables["truth"] = (dims, _true_windows(folder, plan, windows))
+        time = plan.dt * np.arange(1, windows[0].steps + 1)
+        out[test] = xr.Dataset(
+            variables,
+            coords={
+                "model": list(plan.models),
+                "ensemble": plan.ensembles,
+                "measure": list(MEASURES),
+                "band": list(BANDS),
+                "training": [each.name for each in plan.training],
+                "window": range(len(windows)),
+                "time": ("time", time, {"units": "s"}),
+                "channel": list(plan.states),
+                "shown": list(plan.shown(test)),
+            },
         )
-    return opened_netcdf(path)
+    return out
 
 
-def wave_heights(plan: Plan, runs: Runs, windows: Sequence[TestWindow]) -> FloatArray | None:
-    """Twice the envelope of the first elevation in windows, (window, time), or None."""
-    name = next((name for name in plan.inputs if is_elevation(name)), None)
-    if name is None:
-        return None
-    out = []
-    for window in windows:
-        run = runs[window.run]
-        elevation = run[name].values.astype(float)
-        known = np.flatnonzero(np.isfinite(elevation))  # gaps at the ends of a record
-        heights = np.full(elevation.size, np.nan)
-        part = slice(known[0], known[-1] + 1)
-        heights[part] = 2.0 * np.sqrt(envelope_squared(elevation[part], plan.dt))
-        out.append(heights[_after(run, window)])
-    return np.stack(out)
+def _cut(runs: Runs, whole: Mapping[str, FloatArray], windows: Sequence[TestWindow]) -> FloatArray:
+    """Samples of arrays over the time of runs that windows forecast."""
+    parts = []
+    for each in windows:
+        at = int(np.argmin(np.abs(runs[each.run]["time"].values - each.start))) + 1
+        parts.append(whole[each.run][at : at + each.steps])
+    return np.stack(parts)
+
+
+def _columns(plan: Plan, run: xr.Dataset) -> FloatArray:
+    """States of a run, (time, channel)."""
+    return np.stack([run[name].values for name in plan.states], axis=-1).astype(float)
+
+
+def _heights(elevation: xr.DataArray, dt: float) -> FloatArray:
+    """Twice the envelope of an elevation; NaN in gaps at the ends of the record."""
+    known = np.flatnonzero(np.isfinite(elevation.values))
+    part = slice(known[0], known[-1] + 1)
+    heights = np.full(elevation.size, np.nan)
+    heights[part] = 2.0 * np.sqrt(envelope_squared(elevation.values[part].astype(float), dt))
+    return heights
+
+
+def _true_windows(folder: Path, plan: Plan, windows: Sequence[TestWindow]) -> FloatArray:
+    """True states at the instants of windows; NaN of a channel that has no truth."""
+    truth = {}
+    for name in dict.fromkeys(window.run for window in windows):
+        path = folder / f"{name}.nc"
+        if not path.exists():
+            raise DataError(
+                f"the study names the folder {folder} of true channels, and {path.name} is not in "
+                "it. Play the tank again, or leave study.truth out."
+            )
+        truth[name] = opened_netcdf(path)
+    values = np.full((len(windows), windows[0].steps, len(plan.states)), np.nan)
+    for row, window in zip(values, windows, strict=True):
+        time = window.start + plan.dt * np.arange(1, window.steps + 1)
+        true = truth[window.run]
+        for k, name in enumerate(plan.states):
+            if name in true:
+                row[:, k] = np.interp(time, true["time"].values, true[name].values)
+    return values
