@@ -42,6 +42,7 @@ __all__ = [
     "read_off",
     "reference_probe",
     "regressors",
+    "samples_in",
     "single_model",
     "units_of",
     "used_parts",
@@ -262,20 +263,33 @@ def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
     DataError
         If the test part ends before.
     """
-    time = np.asarray(run["time"].values, dtype=float)
-    begin, end = whole_span(run)
-    if time.size <= model.history_samples:
+    history, lead = model.history_samples, model.signature.lead_samples
+    if run.sizes["time"] <= history:
         raise DataError(
-            f"the run has {time.size} samples and a forecast reads {model.history_samples} before "
+            f"the run has {run.sizes['time']} samples and a forecast reads {history} before "
             "its first. Give a longer run."
         )
-    start = max(begin, float(time[model.history_samples - 1]))
-    last = int(np.searchsorted(time, end + 0.5 * model.dt)) - 1
-    last = min(last, time.size - max(model.signature.lead_samples, 1))
-    at = int(np.argmin(np.abs(time - start)))
+    at, last = samples_in(run, whole_span(run), model.dt, history, lead)
     if last - at < 2:
         raise DataError("its test part ends before the first forecast. Give a longer run.")
     return at, last
+
+
+def samples_in(
+    run: xr.Dataset,
+    span: tuple[float, float],
+    dt: float,
+    history: int,
+    lead: int,
+    start: float | None = None,
+) -> tuple[int, int]:
+    """First sample that a forecast of a span may start from, or that of `start`, and the last."""
+    time = np.asarray(run["time"].values, dtype=float)
+    if start is None:
+        start = max(float(span[0]), float(time[min(history, time.size) - 1]))
+    last = int(np.searchsorted(time, float(span[1]) + 0.5 * dt)) - 1
+    # The last step reads the input `lead` samples after the instant that it starts from.
+    return int(np.argmin(np.abs(time - start))), min(last, time.size - max(lead, 1))
 
 
 def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:

@@ -15,6 +15,7 @@ from seakeep import metrics, statistics
 from seakeep.arrays import whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
+from seakeep.check.parts import samples_in
 from seakeep.conventions import displayed, is_elevation
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Model, is_ensemble
@@ -325,8 +326,11 @@ def compare_models(
             if is_ensemble(model):
                 tell = named(members, f"{name}, ")
                 how = {"level": level, "band": band, "executor": executor, "progress": tell}
-            begin, most = _default_window(run, first, history, lead)
-            each = _compare_run(model, run, name, begin, count or most, how)
+            time = run["time"].values
+            span = run.attrs.get("test_span", (time[0], time[-1]))
+            at, last = samples_in(run, span, dt, history, lead, first)
+            begin = float(time[at]) if first is None else first
+            each = _compare_run(model, run, name, begin, count or max(last - at, 1), how)
             found[label].append(each)
             _warn_of_known(model, each)
             warn_of_waves(model, run, name, each.start, each.measured.sizes["time"])
@@ -363,20 +367,6 @@ def _warn_of_known(model: Model, compared: Comparison) -> None:
                 f"{words} ({span_text(begin, end, model.dt)}): this shows memory, not skill. Test "
                 "elsewhere (--run, --start, --steps)."
             )
-
-
-def _default_window(
-    run: xr.Dataset, start: float | None, history: int, lead: int
-) -> tuple[float, int]:
-    """Start and steps of a forecast of all of a test span, from `start` if it is stated."""
-    time = run["time"].values
-    begin, end = run.attrs.get("test_span", (time[0], time[-1]))
-    if start is None:
-        start = max(float(begin), float(time[min(history, time.size) - 1]))
-    last = int(np.searchsorted(time, float(end) + 0.5 * float(run.attrs["dt"]))) - 1
-    # The last step reads the input `lead` samples after the instant that it starts from.
-    last = min(last, time.size - max(lead, 1))
-    return start, max(last - int(np.argmin(np.abs(time - start))), 1)
 
 
 def _compare_run(
