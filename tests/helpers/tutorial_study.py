@@ -23,6 +23,8 @@ def assert_cells_are_what_the_models_say(found, plan, runs, **near) -> None:
     """Compare the forecasts of every window of a study with those of its models alone."""
     for number, training in enumerate(plan.training):
         single, ensemble = (fit_training(plan, runs, name, training) for name in plan.models)
+        ((name, begin, stop),) = training.spans
+        part = runs[name].sel(time=slice(begin - 1e-6, stop + 1e-6))
         for test, windows in plan.tests.items():
             for k, window in enumerate(windows):
                 run = runs[window.run]
@@ -32,6 +34,8 @@ def assert_cells_are_what_the_models_say(found, plan, runs, **near) -> None:
                 at = nearest_sample(run["time"].values, window.start, window.run) + 1
                 for channel in plan.states:
                     ours = cell.sel(channel=channel)
+                    spread = part[channel].values.std(ddof=1)
+                    np.testing.assert_allclose(ours["training_std"], spread, rtol=1e-9)
                     mean = ours["mean"].sel(model="deterministic")
                     np.testing.assert_allclose(mean, alone[channel], **near)
                     ours = ours.sel(model="bayesian", ensemble="bayesian")
