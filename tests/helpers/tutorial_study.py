@@ -29,6 +29,7 @@ def assert_cells_are_what_the_models_say(found, plan, runs, **near) -> None:
             for k, window in enumerate(windows):
                 run = runs[window.run]
                 cell = found.tests[test].isel(training=number, window=k)
+                assert (cell["lost"] == -1).all()  # no member is lost
                 alone = single.forecast(run, window.start, window.steps)
                 band = ensemble.forecast_summary(run, window.start, window.steps, level=0.95)
                 at = nearest_sample(run["time"].values, window.start, window.run) + 1

@@ -24,8 +24,8 @@ LONGEST, SHORTEST = 20000, 200
 
 def _motions(model: Model) -> list[str]:
     """States that are rigid motions."""
-    found = [name for name in model.states if name in MOTIONS]
-    if not found:
+    motions = [name for name in model.states if name in MOTIONS]
+    if not motions:
         free = [name for name in model.states if canonical_channel(name) is None]
         meant = [(name, motion) for name in free for motion in MOTIONS if motion in name]
         state, motion = meant[0] if meant else (model.states[0], MOTIONS[2])
@@ -35,7 +35,7 @@ def _motions(model: Model) -> list[str]:
             f"the campaign file ([channels.{motion}], with column = …, and in states), and fit "
             "again."
         )
-    return found
+    return motions
 
 
 def modes(model: Model) -> xr.Dataset:
@@ -114,14 +114,14 @@ def decay(model: Model) -> xr.Dataset:
         moved[:, column] += offset
         run = single.forecast_arrays(moved, still, ahead, steps)
         left = np.concatenate([[1.0], (run - rest)[:, column] / offset])
-        found = free_decay(left[np.isfinite(left)], single.dt)
-        linear = found.decrements.mean() if found.cycles else np.nan
+        released = free_decay(left[np.isfinite(left)], single.dt)
+        linear = released.decrements.mean() if released.cycles else np.nan
         parts.append(
             xr.Dataset(
                 {
                     "displacement": ("time", left),
                     "offset": offset,
-                    "period": ((), found.period, {"units": "s"}),
+                    "period": ((), released.period, {"units": "s"}),
                     "damping_ratio": linear / np.hypot(2 * np.pi, linear),
                     "p": linear,
                 },
@@ -171,13 +171,13 @@ def measured_decay(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
         moved = (values - values[-1]) / [spread[each] for each in motions]
         column = int(np.argmax(np.abs(moved).max(axis=0)))
         first = int(np.argmax(np.abs(moved[:, column])))
-        found = free_decay(values[first:, column], model.dt)
-        numbers = {key: getattr(found, key) for key in ("period", "damping_ratio", "p", "q")}
+        released = free_decay(values[first:, column], model.dt)
+        numbers = {key: getattr(released, key) for key in ("period", "damping_ratio", "p", "q")}
         cycles = {
-            "amplitude": ("cycle", found.amplitudes),
-            "decrement": ("cycle", found.decrements),
+            "amplitude": ("cycle", released.amplitudes),
+            "decrement": ("cycle", released.decrements),
         }
-        each = {"motion": motions[column], **numbers, "cycles": found.cycles, **cycles}
-        parts.append(xr.Dataset(each, {"cycle": range(len(found.decrements))}))
+        each = {"motion": motions[column], **numbers, "cycles": released.cycles, **cycles}
+        parts.append(xr.Dataset(each, {"cycle": range(len(released.decrements))}))
     names = xr.Variable("run", list(still))
     return xr.concat(parts, names, join="outer").drop_vars("cycle")

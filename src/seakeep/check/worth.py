@@ -93,38 +93,38 @@ def worth(
         [xr.concat([each.drop_dims("run") for each in row], "state") for row in tables], "waves"
     )
     ends = ("", "_lower", "_upper")
-    found = xr.Dataset({f"nrmse{end}": both[f"all_anrmse{end}"] for end in ends})
+    out = xr.Dataset({f"nrmse{end}": both[f"all_anrmse{end}"] for end in ends})
     # Of the model from a baseline: the other way round, so that the bounds change places.
     for key, other in {"": "change", "_lower": "upper", "_upper": "lower"}.items():
-        found[f"change{key}"] = 1 / (1 + both[f"all_{other}"]) - 1
-    found = found.assign_coords(model=list(every), state=list(groups), waves=list(of_kind))
-    upper, baseline = found["nrmse_upper"], found.isel(model=slice(1, None))
-    most = upper.where(np.isfinite(upper), found["nrmse"]).sel(model="model", drop=True)
+        out[f"change{key}"] = 1 / (1 + both[f"all_{other}"]) - 1
+    out = out.assign_coords(model=list(every), state=list(groups), waves=list(of_kind))
+    upper, baseline = out["nrmse_upper"], out.isel(model=slice(1, None))
+    most = upper.where(np.isfinite(upper), out["nrmse"]).sel(model="model", drop=True)
     limits = [most < each for each in LIMITS]
     known = baseline["nrmse"].notnull()  # a baseline that is lost does not count
     whole = [
         [True, *np.all([np.isfinite(own[r].forecast).all(axis=0) for r in of], axis=0)]
         for of in of_kind.values()
     ]
-    found["limit"] = most.dims, np.select([~np.isfinite(most), *limits], [np.nan, *LIMITS], np.inf)
-    found["still"] = np.isnan(found["limit"]) & whole
+    out["limit"] = most.dims, np.select([~np.isfinite(most), *limits], [np.nan, *LIMITS], np.inf)
+    out["still"] = np.isnan(out["limit"]) & whole
     ranks = {"best": -baseline["nrmse"], "rival": baseline["change_upper"].fillna(np.inf)}
     for key, rank in ranks.items():
         none = xr.full_like(most, "", dtype=object)
         label = rank.where(known, -np.inf).idxmax("model") if known.size else none
-        found[key] = label.where(known.any("model"), "")
+        out[key] = label.where(known.any("model"), "")
     is_better = (baseline["change_upper"] < 0) | ~known
-    found["better"] = known.any("model") & is_better.all("model")
+    out["better"] = known.any("model") & is_better.all("model")
     of_runs = xr.concat([row[0][[f"anrmse{end}" for end in ends]] for row in tables], "run")
-    found = found.assign({key: (each.dims, each.values) for key, each in of_runs.items()})
-    found["run_nrmse"] = (
+    out = out.assign({key: (each.dims, each.values) for key, each in of_runs.items()})
+    out["run_nrmse"] = (
         ("channel", "run"),
         np.hstack([[table["anrmse"].values[0] for table in row[1:]] for row in tables]),
     )
     signature = model.signature
     ahead = [signature.input_map.look_ahead(runs[r], model.dt) - model.dt for r in names]
     reads = [signature.input_map.notes(runs[r]).get("conditional_on", "") for r in names]
-    return found.assign_coords(
+    return out.assign_coords(
         run=names,
         channel=list(model.states),
         kind=("run", [waves[r] for r in names]),
@@ -139,8 +139,10 @@ def worth(
 
 def _lost(every: Mapping[str, Mapping[str, FreeRun]], baselines: Mapping[str, Model]) -> list[str]:
     """Baselines that do not count in all runs, each with the reason."""
-    told = [f"{label}: not all runs can be forecast" for label in baselines if label not in every]
+    reasons = [
+        f"{label}: not all runs can be forecast" for label in baselines if label not in every
+    ]
     for label, free in list(every.items())[1:]:
         if bad := [r for r, each in free.items() if not np.isfinite(each.forecast).all()]:
-            told.append(f"{label}: its forecast of {', '.join(bad)} diverges")
-    return told
+            reasons.append(f"{label}: its forecast of {', '.join(bad)} diverges")
+    return reasons

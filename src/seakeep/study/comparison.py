@@ -163,9 +163,9 @@ def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     out = to_full_scale(forecast.drop_vars("status", errors="ignore"), scale)
     out.attrs["status"] = status_at_clock(str(forecast.attrs["status"]), clock)
     if "status" in forecast:
-        told = forecast["status"]
-        words = [status_at_clock(str(each), clock) for each in told.values]
-        out["status"] = (told.dims, words, told.attrs)
+        status = forecast["status"]
+        words = [status_at_clock(str(each), clock) for each in status.values]
+        out["status"] = (status.dims, words, status.attrs)
     return out
 
 
@@ -315,12 +315,12 @@ def compare_models(
     first = None if start is None else instant_of(start, campaign, known_runs, "start")
     history = max(model.history_samples for model in models.values())
     lead = max(model.signature.lead_samples for model in models.values())
-    found: dict[str, list[Comparison]] = {}
+    compared: dict[str, list[Comparison]] = {}
     for label, model in models.items():
         warn_of_repeats(model, campaign, prepared)
         dt = model.dt
         count = None if steps is None else samples_of(steps, campaign, known_runs, dt, "steps")
-        found[label] = []
+        compared[label] = []
         for name, run in prepared.items():
             how: dict[str, Any] = {}
             if is_ensemble(model):
@@ -331,7 +331,7 @@ def compare_models(
             at, last = samples_in(run, span, dt, history, lead, first)
             begin = float(time[at]) if first is None else first
             each = _compare_run(model, run, name, begin, count or max(last - at, 1), how)
-            found[label].append(each)
+            compared[label].append(each)
             _warn_of_known(model, each)
             warn_of_waves(model, run, name, each.start, each.measured.sizes["time"])
             if (until := float(each.forecast.attrs.get("reads_input_until", -1.0))) > 0.0:
@@ -339,7 +339,7 @@ def compare_models(
                     f"the forecast of {name} reads the waves up to {until:.3g} s after the instant "
                     "that it forecasts: the model needs these waves ahead of time."
                 )
-    return found
+    return compared
 
 
 def check_alike(models: Mapping[str, Model]) -> None:
@@ -374,9 +374,9 @@ def _compare_run(
 ) -> Comparison:
     time = run["time"].values
     forecast = model.forecast_summary if is_ensemble(model) else model.forecast
-    found = forecast(run, start, steps, **how)
+    result = forecast(run, start, steps, **how)
     # The last instant may lie a step beyond the record: the input before it is known.
-    inside = found[model.states].sel(time=slice(None, time[-1])).assign_attrs(found.attrs)
+    inside = result[model.states].sel(time=slice(None, time[-1])).assign_attrs(result.attrs)
     if (known := inside.sizes["time"]) < 2:
         raise RequestError(
             f"the forecast of {name} from {start:g} s has {known} measured instant(s), and errors "
@@ -434,12 +434,12 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
     return table
 
 
-def difference_table(found: Mapping[str, Sequence[Comparison]]) -> xr.Dataset:
+def difference_table(compared: Mapping[str, Sequence[Comparison]]) -> xr.Dataset:
     """Compare the errors of several models, run by run and over all runs.
 
     Parameters
     ----------
-    found : mapping of str to sequence of Comparison
+    compared : mapping of str to sequence of Comparison
         From :func:`compare_models`.
 
     Returns
@@ -449,16 +449,16 @@ def difference_table(found: Mapping[str, Sequence[Comparison]]) -> xr.Dataset:
         and ``wave_period`` over ``run``: the mean zero-up-crossing period of the first wave input
         over the forecast, s; NaN without one.
     """
-    first = next(iter(found.values()))
+    first = next(iter(compared.values()))
     out = metrics.anrmse_differences(
-        [[each.forecast for each in of] for of in found.values()],
+        [[each.forecast for each in of] for of in compared.values()],
         [each.measured for each in first],
         INTERVAL,
     )
     runs = [each.run for each in first]
     periods = [_wave_period(each.inputs) for each in first]
     return out.assign(wave_period=("run", periods, {"units": "s"})).assign_coords(
-        model=list(found), run=runs
+        model=list(compared), run=runs
     )
 
 
@@ -527,10 +527,10 @@ def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
             into |= {f"{key}_lower": lower, f"{key}_upper": upper}
     if comparison.band is not None:
         lower, upper = (comparison.band.sel(statistic=key, drop=True) for key in metrics.BOUNDS)
-        found = statistics.coverage(lower, upper, comparison.measured)
-        columns["coverage"] = inside = 100.0 * found["inside"].values
-        columns["band_width"] = found["width"].values
-        columns["relative_band_width"] = found["relative_width"].values
+        coverage = statistics.coverage(lower, upper, comparison.measured)
+        columns["coverage"] = inside = 100.0 * coverage["inside"].values
+        columns["band_width"] = coverage["width"].values
+        columns["relative_band_width"] = coverage["relative_width"].values
         row |= {key: facts[key] for key in ("members", "diverged", "level")}
         row["mean_coverage"] = inside[~slack].mean() if not slack.all() else np.nan
         row["band"] = str(facts.get("band", "members"))

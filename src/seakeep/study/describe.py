@@ -58,7 +58,7 @@ def _repeats(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset | None:
     """Runs whose test windows repeat input of their training set; None if there are none."""
     regular = {name for name, run in campaign.settings.runs.items() if run.waves == "regular"}
     windows = [each for of_test in plan.tests.values() for each in of_test]
-    found = {}
+    repeats = {}
     for name in dict.fromkeys(each.run for each in windows if each.run not in regular):
         starts = [each.start for each in windows if each.run == name]
         ends = [each.start + each.steps * plan.dt for each in windows if each.run == name]
@@ -66,9 +66,9 @@ def _repeats(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset | None:
         pieces = {run: part for run, part in learnt.items() if run not in regular}
         test = between(runs[name], (min(starts), max(ends)))
         if (repeat := find_repeat(plan.inputs, pieces, name, test, plan.dt)) is not None:
-            found[name] = {**asdict(repeat), "words": str(repeat)}
-    rows = [{key: value for key, value in row.items() if key != "run"} for row in found.values()]
-    return _table(rows, "run", found) if found else None
+            repeats[name] = {**asdict(repeat), "words": str(repeat)}
+    rows = [{key: value for key, value in row.items() if key != "run"} for row in repeats.values()]
+    return _table(rows, "run", repeats) if repeats else None
 
 
 def words_of_repeats(repeats: xr.Dataset) -> str:
@@ -107,13 +107,15 @@ def _source(campaign: Campaign, name: str) -> str:
         known = each.unit is None or (each.column or "").endswith(f"[{each.unit}]")
         unit = "" if known else f" [{each.unit}]"
         return f"{sign}column {each.column or name}{unit}{offset}"
-    made = settings.derived.get(name)
-    if made is None:
+    derived = settings.derived.get(name)
+    if derived is None:
         return ""
-    if made.expression is not None:
-        return made.expression
+    if derived.expression is not None:
+        return derived.expression
     words = {"integrate": "integral", "differentiate": "derivative"}
-    return f"{words.get(str(made.step), str(made.step))} of {made.source}".replace("_", " ")
+    return f"{words.get(str(derived.step), str(derived.step))} of {derived.source}".replace(
+        "_", " "
+    )
 
 
 def _positive(name: str) -> str:

@@ -106,7 +106,7 @@ def judge(
         test = groups[f"tests/{name}"]
         boxes, rng = box_table(test), random_stream(seed, f"differences.{name}")
         differences = difference_table(test, groups["training"], rng)
-        found = {
+        of_test = {
             "boxes": boxes,
             "differences": differences,
             "skill": skill_table(boxes, differences, kinds),
@@ -114,7 +114,7 @@ def judge(
             "trend": trend_table(test, random_stream(seed, f"trend.{name}")),
             "response": regular_response(groups, name) if is_regular(groups, name) else None,
         }
-        for key, each in found.items():
+        for key, each in of_test.items():
             if each is not None:
                 tables[key][name] = each
     out = {
@@ -306,10 +306,10 @@ def box_table(test: xr.Dataset) -> xr.Dataset:
 
     def box(column: FloatArray) -> list[float]:
         try:
-            found = statistics.box_statistics(column)
+            numbers = statistics.box_statistics(column)
         except DataError:  # never judged: a line that is slack in all windows
             return [np.nan] * (len(BOX) - 2) + [0, column.size]
-        return [getattr(found, number) for number in BOX]
+        return [getattr(numbers, number) for number in BOX]
 
     cells = with_average(test["error"].values[:, :, test["judged"].values])
     coords = {"model": test["model"], "measure": test["measure"], "channel": _names(test)}
@@ -361,10 +361,10 @@ def band_tables(
     if parts:
         names = next(iter(parts.values())).parts
         nothing = np.full((len(PARTS), len(names), test.sizes["channel"]), np.nan)
-        found = {
+        values_of = {
             cell: np.stack([getattr(each, key) for key in PARTS]) for cell, each in parts.items()
         }
-        grid = [[found.get((model, band), nothing) for band in bands] for model in ensembles]
+        grid = [[values_of.get((model, band), nothing) for band in bands] for model in ensembles]
         coords = {
             "model": ensembles,
             "band": list(bands),
@@ -396,15 +396,15 @@ def band_of(
     lower, upper = own["lower"].values, own["upper"].values
     if calibration is None:
         return lower, upper
-    found = calibration.sel(ensemble=model)
+    margins = calibration.sel(ensemble=model)
     scale = None
-    if "floor" in found:
-        keys = [(own, "std"), (found, "floor")]
-        keys += [(found, "law"), (own, "envelope")] if "law" in found else []
+    if "floor" in margins:
+        keys = [(own, "std"), (margins, "floor")]
+        keys += [(margins, "law"), (own, "envelope")] if "law" in margins else []
         each = zip(*(data[key].values for data, key in keys), strict=True)
         scale = np.stack([band_scale(*of_training) for of_training in each])
     mean = test["mean"].sel(model=model).values
-    return calibrated_bounds(mean, lower, upper, found["margin"].values[:, None, None], scale)
+    return calibrated_bounds(mean, lower, upper, margins["margin"].values[:, None, None], scale)
 
 
 TREND = ("slope", "lower", "upper", "change", "kendall_tau", "p_value", "block_length")
@@ -414,7 +414,7 @@ TREND_LINES = ("error_mean", "lower_quartile", "upper_quartile")
 def trend_table(test: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
     """Test whether ε(t), averaged over all cells, grows with the age of the forecast."""
     time, shape = test["time"].values, (test.sizes["band"], test.sizes["model"])
-    found = np.full((*shape, len(TREND)), np.nan)
+    tests = np.full((*shape, len(TREND)), np.nan)
     series = np.full((*shape, len(TREND_LINES), time.size), np.nan)
     errors = test["error_over_time"].transpose("band", "model", ...).values
     errors = errors[:, :, test["judged"].values]
@@ -428,10 +428,10 @@ def trend_table(test: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
             trend = statistics.trend_test(
                 series[place][0], rng=rng, time=time, n_series=TREND_SERIES
             )
-        found[place] = [getattr(trend, number) for number in TREND]
+        tests[place] = [getattr(trend, number) for number in TREND]
     coords = {"band": test["band"].values, "model": test["model"].values}
     lines = _table(series, (*coords, "number", "time"), TREND_LINES, {**coords, "time": time})
-    return xr.merge([_table(found, (*coords, "number"), TREND, coords), lines])
+    return xr.merge([_table(tests, (*coords, "number"), TREND, coords), lines])
 
 
 def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
@@ -483,7 +483,7 @@ def density_tables(
             if moves.all() and np.ptp(m) > 0:  # what stands still has no density
                 items[model, channel] = channel, p, m
     data = settings, name, [steps] * windows
-    found = {}
+    known = {}
     rows = in_order(_channel_densities, data, list(items.values()), executor)
     for (model, channel), each in zip(items, rows, strict=True):
         if isinstance(each, str):
@@ -492,10 +492,10 @@ def density_tables(
                 f"the windows of '{name}', cannot be compared and are left out: {each}"
             )
         else:
-            found[model, channel] = each
+            known[model, channel] = each
     nothing = np.full((len(VARIANTS), len(DIVERGENCE)), np.nan), np.full((len(CURVES), 512), np.nan)
     table, curves = (
-        [[found.get((m, c), nothing)[part] for c in channels] for m in settings.models]
+        [[known.get((m, c), nothing)[part] for c in channels] for m in settings.models]
         for part in (0, 1)
     )
     coords = {"model": list(settings.models), "channel": list(channels)}
@@ -515,13 +515,13 @@ def _channel_densities(
     """Divergences and densities of one channel of one model, or why there are none."""
     settings, name, segments = data
     channel, p, m = item
-    found = {}
+    variants = {}
     try:
         with warnings.catch_warnings():
             # Caps of the block length and coarse grids: the table prints the length.
             warnings.simplefilter("ignore", SeakeepWarning)
             for variant, choice in VARIANTS.items():
-                found[variant] = statistics.jsd_interval(
+                variants[variant] = statistics.jsd_interval(
                     p,
                     m,
                     block_length=choice["block_length"],
@@ -532,11 +532,11 @@ def _channel_densities(
                 )
     except (DataError, RequestError) as error:
         return str(error)
-    paper, beyond = found["paper"], (1 - settings.statistics.level) / 2
+    paper, beyond = variants["paper"], (1 - settings.statistics.level) / 2
     curves = [paper.grid]
     for drawn in (paper.measured, paper.predicted.reshape(-1, paper.grid.size)):
         curves += [drawn.mean(axis=0), *np.quantile(drawn, [beyond, 1 - beyond], axis=0)]
-    table = [[getattr(each, number) for number in DIVERGENCE] for each in found.values()]
+    table = [[getattr(each, number) for number in DIVERGENCE] for each in variants.values()]
     return np.array(table), np.stack(curves)
 
 
@@ -576,8 +576,8 @@ def is_regular(groups: Mapping[str, xr.Dataset], test: str) -> bool:
 def _frequencies(groups: Mapping[str, xr.Dataset], test: str) -> FloatArray:
     """Frequency of the regular wave in each window, Hz; NaN in other waves."""
     runs = groups[f"tests/{test}"]["run"].values.astype(str)
-    found: FloatArray = groups["runs"]["wave_frequency"].sel(run=runs).values
-    return found
+    out: FloatArray = groups["runs"]["wave_frequency"].sel(run=runs).values
+    return out
 
 
 RESPONSE = ("error_offset", "error_wave", "error_rest", "amplitude_ratio", "phase_lead")

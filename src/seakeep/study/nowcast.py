@@ -136,8 +136,8 @@ def nowcast(
     for at in range(last + 1):
         live.step(u[at], y[at])
         if at in starts:
-            found = live.forecast(steps, level=level)
-            statistics = np.stack([found[each].values for each in signature.states], axis=-1)
+            forecast = live.forecast(steps, level=level)
+            statistics = np.stack([forecast[each].values for each in signature.states], axis=-1)
             mean, std, lower, upper = statistics
             truth = y[at + 1 : at + steps + 1]
             squares += ((mean - truth) / spread) ** 2

@@ -92,19 +92,19 @@ def run_study(
     hand_on = finished or (lambda result: None)
     folder = UnitFolder(out, study.digest)
     folder.check()
-    if (found := _finished(study, out, report)) is not None:
+    if (result := _finished(study, out, report)) is not None:
         labels = _labels(study)
-        if any(found.attrs[key] != value for key, value in labels.items()):
-            return write_result(out, {**found.attrs, **labels}, found.groups, hand_on)
-        hand_on(found)
-        return found
+        if any(result.attrs[key] != value for key, value in labels.items()):
+            return write_result(out, {**result.attrs, **labels}, result.groups, hand_on)
+        hand_on(result)
+        return result
     plan, runs = make_plan(study, named(report, "preparing "))
     warn_of_slow_study(plan, runs)
     taken = _taken(plan)
     folder.open(study.name)
     with folder.alone():
-        found = _finished(study, out, report)  # by another process, meanwhile
-        if found is None:
+        result = _finished(study, out, report)  # by another process, meanwhile
+        if result is None:
             units = units_of(plan)
             facts = facts_of(study, plan, runs)
             _compute_all((plan, runs, facts), folder, units, executor, report, taken)
@@ -118,32 +118,32 @@ def run_study(
                 warn(words_of_lost(groups["statistics/lost"]))
             groups |= extra or {}
             attributes = {**_labels(study), **_attributes(study, plan), **(notes or {})}
-            found = write_result(out, attributes, groups, hand_on)
+            result = write_result(out, attributes, groups, hand_on)
         else:
-            hand_on(found)
+            hand_on(result)
         folder.clear()
-    return found
+    return result
 
 
 def _groups(folder: UnitFolder, unit: Unit) -> Groups:
-    found = folder.read(unit.name)
-    if found is None:
+    groups = folder.read(unit.name)
+    if groups is None:
         raise SeakeepError(
             f"the file {unit.name}.nc in {folder.folder} is missing or damaged. Run the study "
             "again."
         )
-    return found
+    return groups
 
 
 def _finished(study: Study, out: Path, report: Progress) -> StudyResult | None:
     """The result of an earlier run, if there is one of the same study."""
     if not (out / RESULT).exists():
         return None
-    found = read_result(out)
-    if found.attrs.get("digest") != study.digest:
+    result = read_result(out)
+    if result.attrs.get("digest") != study.digest:
         return None
     report(1, 1, "finished before")
-    return found
+    return result
 
 
 def _labels(study: Study) -> dict[str, str]:
@@ -205,8 +205,8 @@ def _compute_all(
     done, items = len(units) - len(left), deque(tasks_of(plan, left))
     report(done, len(units), f"fitting and forecasting, {taken}")
     try:
-        for task, found in as_finished(_work, data, items, executor):
-            for unit, groups in zip(task, found, strict=True):
+        for task, computed in as_finished(_work, data, items, executor):
+            for unit, groups in zip(task, computed, strict=True):
                 folder.write(unit.name, groups)
                 done += 1
                 name = plan.training[unit.training].name

@@ -100,8 +100,8 @@ def write_groups(path: Path, attrs: Mapping[str, Any], groups: Mapping[str, xr.D
         name: [{str(k): each.dims for k, each in part.items()} for part in (group, group.coords)]
         for name, group in groups.items()
     }
-    made = io.BytesIO()
-    with h5py.File(made, "w", libver="latest", track_order=True) as file:
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w", libver="latest", track_order=True) as file:
         file.attrs.update({**attrs, "layout": json.dumps(layout)})
         for name, group in groups.items():
             place = file.create_group(name, track_order=True)
@@ -114,15 +114,17 @@ def write_groups(path: Path, attrs: Mapping[str, Any], groups: Mapping[str, xr.D
                 packing: dict[str, Any] = {"dtype": h5py.string_dtype()} if text else {}
                 if each.size > 4096 and each.dtype.kind == "f":
                     packing = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-                made_of = {"b": "i1", "U": "O"}.get(each.dtype.kind, each.dtype)
-                kept = place.create_dataset(key, data=x.astype(made_of), **packing)
-                kept.attrs.update(each.attrs | ({"dtype": "bool"} if x.dtype.kind == "b" else {}))
+                as_type = {"b": "i1", "U": "O"}.get(each.dtype.kind, each.dtype)
+                variable = place.create_dataset(key, data=x.astype(as_type), **packing)
+                variable.attrs.update(
+                    each.attrs | ({"dtype": "bool"} if x.dtype.kind == "b" else {})
+                )
                 if each.dims == (key,):
-                    kept.make_scale(key)
+                    variable.make_scale(key)
             for key, each in group.variables.items():
                 for number, dim in enumerate(each.dims if each.dims != (key,) else ()):
                     place[key].dims[number].attach_scale(place[dim])
-    content = made.getvalue()
+    content = buffer.getvalue()
     with storing(path.parent), replacing(path) as temporary:
         temporary.write_bytes(content + SEAL + hashlib.sha256(content).hexdigest().encode())
 
@@ -157,9 +159,9 @@ def read_groups(path: Path) -> tuple[dict[str, Any], Groups]:
     return attrs, groups
 
 
-def _variable(kept: Any, dims: list[str]) -> xr.Variable:
-    attrs = {key: _plain(value) for key, value in kept.attrs.items() if key not in OF_HDF5}
-    values = (kept.asstr() if kept.dtype.kind == "O" else kept)[()]
+def _variable(stored: Any, dims: list[str]) -> xr.Variable:
+    attrs = {key: _plain(value) for key, value in stored.attrs.items() if key not in OF_HDF5}
+    values = (stored.asstr() if stored.dtype.kind == "O" else stored)[()]
     return xr.Variable(dims, np.asarray(values, attrs.pop("dtype", None)), attrs)
 
 
@@ -199,27 +201,27 @@ class UnitFolder:
         with storing(self.folder):
             units.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=units).close()
-        found = _read_header(header) if header.exists() else None
+        started = _read_header(header) if header.exists() else None
         is_finished = (self.folder / RESULT).exists()
-        if found is not None and (is_finished or any(units.glob("*.nc"))):
-            self._check_header(found)
+        if started is not None and (is_finished or any(units.glob("*.nc"))):
+            self._check_header(started)
         elif not is_finished:
             check_report(self.folder)
-            if found is None and any(units.iterdir()):
+            if started is None and any(units.iterdir()):
                 raise RequestError(
                     f"{units} holds files, and {header} does not say of which study. "
                     "Choose another folder (-o), or remove this one."
                 )
 
-    def _check_header(self, found: Mapping[str, Any]) -> None:
-        if found["digest"] != self.digest:
+    def _check_header(self, started: Mapping[str, Any]) -> None:
+        if started["digest"] != self.digest:
             raise RequestError(
                 f"{self.folder} holds the results of another study: its digest starts with "
-                f"{str(found['digest'])[:12]} and this study's with {self.digest[:12]}. "
+                f"{str(started['digest'])[:12]} and this study's with {self.digest[:12]}. "
                 "Settings, campaign or raw files have changed since. Give another folder with -o, "
                 "or remove this one."
             )
-        before, now = found.get("versions", {}), versions()
+        before, now = started.get("versions", {}), versions()
         changed = [f"{k} {before.get(k)} (now {v})" for k, v in now.items() if before.get(k) != v]
         if changed:
             raise RequestError(
@@ -293,15 +295,15 @@ class UnitFolder:
 
 def _read_header(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(read_bytes(path))
+        content = json.loads(read_bytes(path))
     except (RequestError, ValueError, RecursionError):
-        found = None
-    if not isinstance(found, dict) or "digest" not in found:
+        content = None
+    if not isinstance(content, dict) or "digest" not in content:
         raise RequestError(
             f"{path} is damaged or belongs to no study. Give another folder with -o, or remove "
             "this one."
         )
-    return found
+    return content
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,8 +338,8 @@ class StudyResult:
         ``settings`` gives for each key its ``value`` (a JSON value) and its ``source``: "stated",
         "preset", "study" (the study's seed) or "default".
         """
-        found: dict[str, Any] = json.loads(self.attrs["models"])
-        return found
+        out: dict[str, Any] = json.loads(self.attrs["models"])
+        return out
 
     @property
     def models(self) -> list[str]:
@@ -396,11 +398,11 @@ def write_result(
 ) -> StudyResult:
     """Write a result into its folder, once it was handed to `finished`; errors as there."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    found = StudyResult(folder, {"format": FORMAT, "created": created, **attrs}, dict(groups))
+    result = StudyResult(folder, {"format": FORMAT, "created": created, **attrs}, dict(groups))
     if finished is not None:
-        finished(found)
-    write_groups(folder / RESULT, found.attrs, found.groups)
-    return found
+        finished(result)
+    write_groups(folder / RESULT, result.attrs, result.groups)
+    return result
 
 
 def read_result(folder: Path | str) -> StudyResult:

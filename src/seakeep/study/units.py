@@ -163,8 +163,8 @@ def compute(
                 values = np.stack([series[:, row] for row in rows]).astype(np.float32)
                 drawn = {"members": (("shown", "member", "time", "channel"), values)}
                 out[f"shown/{test}"] = xr.Dataset(drawn, {"shown": numbers, **members})
-        found = judge_windows(predicted=mean, **pair, dt=plan.dt, frequency=frequency)
-        out[f"tests/{test}"] = found.assign_coords(at)
+        judged = judge_windows(predicted=mean, **pair, dt=plan.dt, frequency=frequency)
+        out[f"tests/{test}"] = judged.assign_coords(at)
     if is_ensemble and plan.calibrated_on:
         out["calibration"] = band_margins(plan, runs, unit, fitted)
     if unit.training == units_of(plan)[0].training:
@@ -192,9 +192,9 @@ def _of_first(plan: Plan, runs: Runs, unit: Unit, fitted: Any, test: str) -> Gro
         numbers = tested_windows(plan, unit.training)[test]
         names = list(dict.fromkeys(plan.tests[test][k].run for k in numbers))
         with _named_after(plan, unit):
-            found = [nowcast(model, runs[name], steps, level=level) for name in names]
-        starts = min(each.attrs["starts"] for each in found)
-        out["nowcast"] = xr.concat(found, xr.Variable("run", names)).assign_attrs(starts=starts)
+            skill = [nowcast(model, runs[name], steps, level=level) for name in names]
+        starts = min(each.attrs["starts"] for each in skill)
+        out["nowcast"] = xr.concat(skill, xr.Variable("run", names)).assign_attrs(starts=starts)
     return out
 
 
@@ -214,8 +214,8 @@ def _series(
         for steps, tests in batches.items()
     ]
     windows = read_groups(fitted.signature, runs, groups)
-    with group_series(fitted, windows) as found:
-        for (series, lost), tests, each in zip(found, batches.values(), windows, strict=True):
+    with group_series(fitted, windows) as series_of:
+        for (series, lost), tests, each in zip(series_of, batches.values(), windows, strict=True):
             envelope = envelope_of(fitted.signature, each)
             first = 0
             for test in tests:
@@ -263,11 +263,11 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
         spec = plan.specs[unit.model].from_json(fitted.origin)
         for group in groups or [(run,) for run in training.runs]:
             rest = tuple(span for span in training.spans if span[0] not in group)
-            held = {n: between(runs[n], (b, e)) for n, b, e in training.spans if n in group}
-            if rest and held:
+            tests = {n: between(runs[n], (b, e)) for n, b, e in training.spans if n in group}
+            if rest and tests:
                 others = TrainingSet(f"{training.name}, calibration", rest)
                 ensemble = fit_training(plan, runs, unit.model, others, spec)
-                judged += held_out(ensemble, held, steps, statistics.level).values()
+                judged += held_out(ensemble, tests, steps, statistics.level).values()
     else:
         parts = {n: between(runs[n], runs[n].attrs["train_span"]) for n in plan.calibrated_on}
         judged += held_out(fitted, parts, steps, statistics.level).values()
@@ -277,8 +277,8 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
     floor: FloatArray | None = nothing
     law: FloatArray | None = np.tile(nothing, (4, 1))
     if judged:
-        found, floor, law = found_margin(judged, statistics.level, statistics.scale)
-        out = {key: ("channel", getattr(found, key)) for key in keys}
+        margin, floor, law = found_margin(judged, statistics.level, statistics.scale)
+        out = {key: ("channel", getattr(margin, key)) for key in keys}
     out["windows"] = sum(len(each.measured) for each in judged)
     if statistics.scale != "constant":
         out["floor"] = ("channel", floor)
@@ -290,12 +290,12 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
 def collect(plan: Plan, facts: Groups, read: Callable[[Unit], Groups]) -> Groups:
     """Put all units together, with the facts of their windows."""
     units = units_of(plan)
-    found = {unit: read(unit) for unit in units}
+    computed = {unit: read(unit) for unit in units}
     sets = [each.name for each in plan.training]
 
     def of(model: str, group: str) -> dict[str, xr.Dataset]:
         """A group of a model, by training set."""
-        mine = {sets[u.training]: found[u] for u in units if u.model == model}
+        mine = {sets[u.training]: computed[u] for u in units if u.model == model}
         return {name: each[group] for name, each in mine.items() if group in each}
 
     def stacked(models: Sequence[str], group: str, dim: str) -> xr.Dataset:
@@ -324,8 +324,8 @@ def collect(plan: Plan, facts: Groups, read: Callable[[Unit], Groups]) -> Groups
         out["calibration"] = margins.assign_coords(channel=list(plan.states))
     for unit in units:
         for key in ("nowcast", "eigenvalues", "draws"):
-            if key in found[unit]:
-                out[f"{key}/{unit.model}"] = found[unit][key]
+            if key in computed[unit]:
+                out[f"{key}/{unit.model}"] = computed[unit][key]
     return out
 
 
