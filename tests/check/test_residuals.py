@@ -6,7 +6,7 @@ import scipy
 import xarray as xr
 
 from seakeep import HankelDMDc, check
-from seakeep.check.parts import one_step
+from seakeep.check.parts import free_windows
 from seakeep.core.whiteness import autocorrelation, input_correlation, ljung_box
 from seakeep.errors import DataError
 
@@ -47,14 +47,6 @@ def test_a_model_without_a_delay_is_found_out_by_past_inputs(run):
     assert float(found.probability[0]) < 1e-3
     worst = np.abs(found.input_correlation[0, 0]) / found.input_limit[0, 0]
     assert float(worst.max()) > 3
-
-
-def test_one_step_is_that_of_forecasts(run):
-    model = fitted(run, 3)
-    many = one_step(model, run, 100, 130)
-    each = model.forecast_windows(run, run.time.values[100:130].tolist(), 1)
-    # The same products, in matrices of other shapes.
-    np.testing.assert_allclose(many[:, 0], each.heave.values[:, 0], rtol=1e-12, atol=1e-14)
 
 
 def test_bands_and_ages_add_up(run):
@@ -111,7 +103,8 @@ def test_limits_and_past_inputs_are_those_of_the_errors_by_hand(run):
     found = check.residuals(model, {"run": run})
     assert float(found.limit) == pytest.approx(1.96 / np.sqrt(1499), rel=1e-12)
     first, last = 1500, 2999  # the last measured state before each step of the test part
-    error = one_step(model, run, first, last)[:, 0] - run.heave.values[first + 1 : last + 1]
+    made = free_windows(model, run, run.time.values[first:last], 1)[:, 0, 0]
+    error = made - run.heave.values[first + 1 : last + 1]
     inputs = run.eta.values[first + 1 : last + 1]
     e, u = error - error.mean(), inputs - inputs.mean()
     for lag in (0, 1, 2):

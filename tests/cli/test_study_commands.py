@@ -102,7 +102,7 @@ def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(folder, ctrl_c):
     out = folder / "out"
     command = [sys.executable, "-m", "seakeep", "study", "study.toml", "-o", str(out)]
     with started([*command, "--workers", "1"], folder, stderr=subprocess.PIPE) as process:
-        while not list((out / "units").glob("*.npz")):
+        while not list((out / "units").glob("*.nc")):
             assert process.poll() is None, process.stderr.read()
             time.sleep(0.002)
         process.send_signal(signal.SIGINT)
@@ -112,7 +112,7 @@ def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(folder, ctrl_c):
     assert told.count("kept") == 1
     assert f"Interrupted. What was finished is kept in {out}" in told
     assert "Traceback" not in told
-    assert list((out / "units").glob("*.npz"))
+    assert list((out / "units").glob("*.nc"))
 
 
 def test_output_in_a_code_page_without_greek_letters_is_no_error(monkeypatch):

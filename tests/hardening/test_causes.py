@@ -24,7 +24,7 @@ def test_what_the_system_refuses_is_no_fault_of_seakeep(monkeypatch, capsys):
 
 def test_a_study_clears_what_a_killed_run_left_and_says_so(tmp_path):
     (tmp_path / "units").mkdir()
-    (tmp_path / "units" / ".cell.npz.12.ab.tmp").touch()
+    (tmp_path / "units" / ".cell.nc.12.ab.tmp").touch()
     (tmp_path / "notes.tmp").touch()
     with (
         pytest.warns(SeakeepWarning, match=r"removed 1 unfinished file\(s\) of a killed run"),

@@ -3,6 +3,11 @@
 import shutil
 from pathlib import Path
 
+import numpy as np
+
+from seakeep.models.labelled import nearest_sample
+from seakeep.study.units import fit_training
+
 TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
 
 
@@ -12,3 +17,31 @@ def put_tutorial(folder: Path, study: str) -> None:
         if path.suffix in (".toml", ".csv"):
             shutil.copy(path, folder)
     (folder / "study.toml").write_text(study, encoding="utf-8")
+
+
+def assert_cells_are_what_the_models_say(found, plan, runs, **near) -> None:
+    """Compare the forecasts of every window of a study with those of its models alone."""
+    for number, training in enumerate(plan.training):
+        single, ensemble = (fit_training(plan, runs, name, training) for name in plan.models)
+        ((name, begin, stop),) = training.spans
+        part = runs[name].sel(time=slice(begin - 1e-6, stop + 1e-6))
+        for test, windows in plan.tests.items():
+            for k, window in enumerate(windows):
+                run = runs[window.run]
+                cell = found.tests[test].isel(training=number, window=k)
+                assert (cell["lost"] == -1).all()  # no member is lost
+                alone = single.forecast(run, window.start, window.steps)
+                band = ensemble.forecast_summary(run, window.start, window.steps, level=0.95)
+                at = nearest_sample(run["time"].values, window.start, window.run) + 1
+                for channel in plan.states:
+                    ours = cell.sel(channel=channel)
+                    spread = part[channel].values.std(ddof=1)
+                    np.testing.assert_allclose(ours["training_std"], spread, rtol=1e-9)
+                    mean = ours["mean"].sel(model="deterministic")
+                    np.testing.assert_allclose(mean, alone[channel], **near)
+                    ours = ours.sel(model="bayesian", ensemble="bayesian")
+                    for key in ("mean", "std", "lower", "upper"):
+                        expected = band[channel].sel(statistic=key)
+                        np.testing.assert_allclose(ours[key], expected, **near)
+                    measured = run[channel].values[at : at + window.steps]
+                    np.testing.assert_array_equal(ours["measured"], measured)

@@ -7,24 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import stats
 
 import seakeep
-from seakeep import BayesianHankelDMDc, Fixed, LogUniform, ProbeAlignment, Uniform
-from seakeep.campaign import ModelSettings
+from seakeep import BayesianHankelDMDc, Uniform
 from seakeep.campaign.store import write_prepared
 from seakeep.cli import main
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import KINDS
 from seakeep.study import (
-    build_spec,
     compare,
     comparison_table,
     fit_baselines,
     fit_campaign,
-    training_runs,
 )
-from seakeep.study.resolve import resolve_model
 
 RATE = 10.0
 
@@ -92,65 +87,35 @@ def test_a_dead_probe_in_a_test_run_is_told(halves):
     with (
         pytest.warns(SeakeepWarning, match="eta_fwd stuck"),
         pytest.warns(SeakeepWarning, match="eta_fwd level drifts"),
-        pytest.warns(SeakeepWarning, match=r"channel 'eta_fwd' of all is constant \(0\) over the"),
     ):
         compare(model, whole)
 
 
-def test_a_run_that_only_tests_starts_when_its_history_is_full(halves):
-    runs = (
-        '[runs.a]\nfile = "run.csv"\nspan = [0.0, 100.0]\nrole = "train"\n'
-        '[runs.b]\nfile = "run.csv"\nspan = [100.0, 200.0]\nrole = "test"\n'
-    )
-    whole = campaign(halves, "state_delays = 2\ninput_delays = 60\nridge = 1e-9", runs)
-    (judged,) = compare(fit_campaign(whole), whole)
-    assert judged.run == "b"
-    assert judged.start == pytest.approx(106.0)
-
-
 def test_start_and_steps_of_the_user_are_taken(halves):
     whole = campaign(halves, EXACT)
-    (judged,) = compare(fit_campaign(whole), whole, ["all"], start=150.0, steps=20)
+    model = fit_campaign(whole)
+    (judged,) = compare(model, whole, ["all"], start=150.0, steps=20)
     assert judged.forecast.sizes["time"] == 20
     assert float(judged.forecast.time[0]) == pytest.approx(150.1)
+    # One past the record: judged where there is a measurement.
+    (judged,) = compare(model, whole, ["all"], start=199.0, steps=11)
+    assert (judged.forecast.sizes["time"], judged.status) == (10, "ok")
     with pytest.raises(RequestError, match=r"steps must be a whole number of .* received 4\.7"):
-        compare(fit_campaign(whole), whole, ["all"], start=150.0, steps=4.7)
+        compare(model, whole, ["all"], start=150.0, steps=4.7)
 
 
-def test_steps_one_past_the_record_are_judged_where_there_is_a_measurement(halves):
-    whole = campaign(halves, EXACT)
-    (judged,) = compare(fit_campaign(whole), whole, ["all"], start=199.0, steps=11)
-    assert judged.forecast.sizes["time"] == 10
-    assert judged.status == "ok"
-
-
-def test_a_preset_counts_in_encounter_periods_and_keys_override_it():
-    settings = ModelSettings(states=("heave",), inputs=("eta_fwd",), preset="paper", ridge=7.0)
-    spec = build_spec(settings, encounter_period=2.0, dt=0.1)
-    assert (spec.state_delays, spec.input_delays, spec.window) == (20, 100, 400)
-    assert spec.ridge == 7.0
-    assert spec.delay_rows == "ridge"
-
-
-def test_a_window_of_a_preset_gives_way_to_all_of_the_run():
-    stated = ModelSettings(states=("heave",), inputs=("eta_fwd",), window="inf T")
-    found = resolve_model(stated, encounter_period=2.0, dt=0.1, preset="paper")
-    assert found.spec.window is None
-    assert found.sources["window"] == "stated"
-
-
-def test_a_preset_without_period_says_where_to_state_it():
-    settings = ModelSettings(states=("heave",), preset="recommended")
-    with pytest.raises(RequestError, match=r"State encounter_period \(s\) in \[campaign\]"):
-        build_spec(settings, encounter_period=None, dt=0.1)
-
-
-def test_a_missing_key_is_named_with_the_preset_as_a_way_out():
-    settings = ModelSettings(states=("heave",), state_delays=3)
-    with pytest.raises(
-        RequestError, match=r"no input_delays\. Add input_delays, ridge, or a preset"
-    ):
-        build_spec(settings, encounter_period=1.0, dt=0.1)
+def test_runs_that_train_and_test_apart(halves):
+    train = '[runs.a]\nfile = "run.csv"\nspan = [0.0, 100.0]\nrole = "train"\n'
+    test = '[runs.b]\nfile = "run.csv"\nspan = [100.0, 200.0]\nrole = "test"\n'
+    whole = campaign(halves, "state_delays = 2\ninput_delays = 60\nridge = 1e-9", train + test)
+    (judged,) = compare(fit_campaign(whole), whole)
+    assert judged.run == "b"
+    assert judged.start == pytest.approx(106.0)  # its history is full
+    with pytest.raises(RequestError, match="no run of the campaign trains a model"):
+        fit_campaign(campaign(halves, EXACT, test))
+    alone = campaign(halves, EXACT, train)
+    with pytest.raises(RequestError, match="no run of the campaign tests a model"):
+        compare(fit_campaign(alone), alone)
 
 
 ENSEMBLE = """
@@ -158,61 +123,6 @@ kind = "bayesian_hankel_dmdc"
 n_members = 4
 seed = 7
 """
-
-
-def table(**keys):
-    channels = {"states": ("heave",), "inputs": ("eta_fwd",)}
-    return ModelSettings.model_validate({**channels, "kind": "bayesian_hankel_dmdc", **keys})
-
-
-def test_one_function_makes_the_spec_of_an_ensemble_too():
-    stated = table(
-        window={"fixed": "12 T"},
-        state_delays="0.5 T",
-        input_delays={"uniform": ["1 T", "2 T"]},
-        ridge={"log_uniform": [0.1, 10]},
-        n_members=9,
-        seed=3,
-        sampling="sobol",
-        train_on="windows",
-        delay_rows="exact",
-        alignment={"surge": "none"},
-    )
-    assert build_spec(stated, encounter_period=2.0, dt=0.1) == BayesianHankelDMDc(
-        encounter_period=2.0,
-        dt=0.1,
-        window=Fixed("12 T"),
-        state_delays=10,
-        input_delays=Uniform("1 T", "2 T"),
-        ridge=LogUniform(0.1, 10),
-        n_members=9,
-        seed=3,
-        sampling="sobol",
-        train_on="windows",
-        delay_rows="exact",
-        alignment=seakeep.ProbeAlignment(surge="none"),
-    )
-
-
-def test_a_preset_of_an_ensemble_is_overridden_key_by_key():
-    stated = table(preset="paper", n_members=5, ridge=80.0, train_on="runs")
-    expected = dataclasses.replace(
-        BayesianHankelDMDc.paper(encounter_period=2.0, dt=0.1, n_members=5),
-        ridge=80.0,
-        train_on="runs",
-    )
-    assert build_spec(stated, encounter_period=2.0, dt=0.1) == expected
-
-
-def test_distributions_of_scipy_are_named_in_the_table():
-    stated = {
-        "distribution": "truncnorm",
-        "parameters": {"a": -2, "b": 2, "loc": 1, "scale": 0.1},
-        "unit": "T",
-    }
-    spec = build_spec(table(preset="paper", state_delays=stated), encounter_period=2.0, dt=0.1)
-    expected = stats.truncnorm(-2, 2, loc=1, scale=0.1).ppf([0.0, 0.3, 1.0])
-    np.testing.assert_array_equal([spec.state_delays.ppf(q) for q in (0.0, 0.3, 1.0)], expected)
 
 
 @pytest.mark.parametrize(
@@ -253,21 +163,6 @@ def test_wrong_keys_of_a_model_are_named_before_its_runs_are_prepared(halves, te
         fit_campaign(wrong)
 
 
-def test_keys_of_an_ensemble_in_a_single_model_are_named(halves):
-    with pytest.raises(RequestError, match="kind = 'hankel_dmdc' has no key 'train_on'"):
-        fit_campaign(campaign(halves, EXACT + '\ntrain_on = "runs"'))
-
-
-def test_an_ensemble_without_period_or_priors_says_where_to_state_them():
-    with pytest.raises(RequestError, match=r"an ensemble counts in .* State encounter_period"):
-        build_spec(table(state_delays=1, input_delays=1, ridge=1), encounter_period=None, dt=0.1)
-    with pytest.raises(
-        RequestError,
-        match=r"no input_delays\. Add input_delays, ridge as priors, such as { uniform",
-    ):
-        build_spec(table(state_delays=1), encounter_period=2.0, dt=0.1)
-
-
 WINDOWED = (
     ENSEMBLE + "state_delays = '0.2 T'\ninput_delays = { uniform = ['1 T', '3 T'] }\nridge = 1e-9"
 )
@@ -289,17 +184,6 @@ def test_an_ensemble_learns_inside_the_training_span(halves, train_on):
         assert (first, stop) == (pytest.approx(150.0 - longest), pytest.approx(150.0))
 
 
-def test_the_history_of_an_ensemble_may_come_from_before_the_span(halves):
-    # The span holds 501 samples: beside a window of 495 there is no room for the delays.
-    snapshots = 495
-    model = f"{WINDOWED}\nwindow = {snapshots}"
-    ensemble = fit_campaign(campaign(halves, model, LATE))
-    assert set(ensemble.draws.window_samples.values) == {snapshots}
-    assert ensemble.draws.attrs["redrawn"] == 0
-    for number in range(4):
-        assert ensemble.member(number).training.columns == (snapshots - 1,)
-
-
 def test_the_same_table_gives_the_members_that_python_gives(halves):
     model = f"{WINDOWED}\nwindow = {{ uniform = ['10 T', '20 T'] }}"
     whole = campaign(halves, model)
@@ -317,25 +201,6 @@ def test_the_same_table_gives_the_members_that_python_gives(halves):
     expected = spec.fit({"all": run}, ["heave"], ["eta_fwd"])
     assert expected.members == ensemble.members
     np.testing.assert_array_equal(ensemble.member(2).A, expected.member(2).A)
-
-
-def test_repeats_of_an_ensemble_are_warned_of(repeating):
-    delays = "state_delays = '0.2 T'\ninput_delays = '0.2 T'\n"
-    whole = campaign(repeating, f"{ENSEMBLE}{delays}ridge = 1")
-    with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):
-        fit_campaign(whole)
-
-
-def test_a_campaign_without_training_run_is_refused(halves):
-    whole = campaign(halves, EXACT, '[runs.b]\nfile = "run.csv"\nrole = "test"\n')
-    with pytest.raises(RequestError, match="no run of the campaign trains a model"):
-        training_runs(whole.prepare())
-
-
-def test_a_campaign_without_test_run_is_told_to_name_one(halves):
-    whole = campaign(halves, EXACT, '[runs.a]\nfile = "run.csv"\nrole = "train"\n')
-    with pytest.raises(RequestError, match="no run of the campaign tests a model"):
-        compare(fit_campaign(whole), whole)
 
 
 @pytest.fixture
@@ -405,102 +270,6 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
         found = comparison_table(compare(model, whole)).isel(run=0)
     assert str(found["conditional_on"].values) == "surge"
     assert float(found["probe_offset"]) == 0.1
-
-
-def test_a_preset_fills_in_what_is_not_stated_key_by_key_and_says_so():
-    stated = {"state_delays": 4, "input_delays": 20, "ridge": 0.15, "alignment": {"surge": "none"}}
-    settings = ModelSettings(states=("heave",), inputs=("eta_fwd",), **stated)
-    found = resolve_model(settings, 2.0, 0.1, preset="recommended")
-    assert (found.spec.ridge_scale, found.spec.delay_rows) == ("per_snapshot", "exact")
-    assert (found.spec.state_delays, found.spec.ridge) == (4, 0.15)
-    kept = json.loads(json.dumps(found.to_json()))
-    assert (kept["kind"], kept["preset"], kept["ensemble"]) == (
-        "hankel_dmdc",
-        "recommended",
-        False,
-    )
-    sources = {key: each["source"] for key, each in kept["settings"].items()}
-    assert kept["settings"]["ridge_scale"] == {"value": "per_snapshot", "source": "preset"}
-    assert kept["settings"]["alignment.surge"] == {"value": "none", "source": "stated"}
-    assert sources["alignment.mode"] == sources["select.observables"] == "preset"
-    assert sources["rank"] == sources["stable"] == "default"
-    assert sources["ridge"] == "stated"
-
-
-@pytest.mark.parametrize(
-    ("horizon", "found"), [("15 T", (15.0,)), (["5 T", 10], (5.0, 10.0)), (7.5, (7.5,))]
-)
-def test_the_horizon_of_free_runs_is_stated_in_encounter_periods(horizon, found):
-    table = {"states": ("heave",), "inputs": ("eta_fwd",), "select": {"horizon": horizon}}
-    settings = ModelSettings.model_validate(table)
-    assert resolve_model(settings, 2.0, 0.1, preset="recommended").spec.select.horizon == found
-
-
-def test_a_study_that_leaves_sea_states_out_chooses_so_too():
-    settings = ModelSettings(states=("heave",), inputs=("eta_fwd",))
-    found = resolve_model(settings, 2.0, 0.1, preset="recommended", folds="sea_state")
-    assert (found.spec.select.folds, found.sources["select.folds"]) == ("sea_state", "study")
-    assert found.spec.select.observables
-    stated = ModelSettings(states=("heave",), inputs=("eta_fwd",), select={"folds": "run"})
-    found = resolve_model(stated, 2.0, 0.1, preset="recommended", folds="sea_state")
-    assert (found.spec.select.folds, found.sources["select.folds"]) == ("run", "stated")
-    numbers = ModelSettings(states=("heave",), inputs=("eta_fwd",), kind="mean")
-    assert not hasattr(resolve_model(numbers, 2.0, 0.1, folds="sea_state").spec, "select")
-
-
-def test_the_paper_s_alignment_is_taken_where_the_campaign_can_align():
-    settings = ModelSettings(states=("heave",), inputs=("eta_fwd",), preset="paper")
-    assert resolve_model(settings, 2.0, 0.1).spec.alignment is None
-    found = resolve_model(settings, 2.0, 0.1, aligned=True)
-    assert found.spec.alignment == ProbeAlignment(mode="effective", surge="measured")
-    assert found.sources["alignment.mode"] == "preset"
-    stated = ModelSettings(
-        states=("heave",), inputs=("eta_fwd",), preset="paper", alignment={"surge": "none"}
-    )
-    assert resolve_model(stated, 2.0, 0.1, aligned=True).spec.alignment.surge == "none"
-    baseline = ModelSettings(states=("heave",), inputs=("eta_fwd",), kind="fir")
-    found = resolve_model(baseline, 2.0, 0.1, preset="paper", aligned=True)
-    assert (found.preset, found.spec.alignment.surge) == ("recommended", "measured")
-    still = ModelSettings(states=("heave",), kind="mean")
-    assert resolve_model(still, 2.0, 0.1, preset="paper", aligned=True).spec.alignment is None
-
-
-def test_priors_and_seed_of_a_study_are_kept_as_json_values_with_their_source():
-    found = resolve_model(
-        table(ridge={"log_uniform": [0.1, 10]}), 2.0, 0.1, preset="paper", seed=7
-    ).to_json()
-    assert found["n_members"] == 100
-    settings = found["settings"]
-    assert settings["ridge"] == {
-        "value": {"log_uniform": [0.1, 10.0]},
-        "source": "stated",
-    }
-    assert settings["window"] == {
-        "value": {"uniform": ["10 T", "30 T"]},
-        "source": "preset",
-    }
-    assert settings["seed"] == {"value": 7, "source": "study"}
-
-
-@pytest.mark.parametrize("kind", ["hankel_dmdc", "bayesian_hankel_dmdc"])
-def test_read_outs_are_kept_as_json_values_with_their_source(kind):
-    read = {"heave": {"of": ["pitch"], "kind": "stacked"}}
-    stated = ModelSettings(states=("heave", "pitch"), kind=kind, readouts=read)
-    told = resolve_model(stated, 2.0, 0.1, preset="recommended").to_json()["settings"]
-    expected = [{"channel": "heave", "of": ["pitch"], "kind": "stacked"}]
-    assert told["readouts"] == {"value": expected, "source": "stated"}
-    with pytest.raises(RequestError, match="received delay_rows = 'ridge', rank = None"):
-        resolve_model(stated, 2.0, 0.1, preset="paper")
-    read_by_fir = ModelSettings(states=("heave", "pitch"), kind="fir", readouts="auto")
-    with pytest.raises(RequestError, match="kind = 'fir' has no key 'readouts'"):
-        resolve_model(read_by_fir, 2.0, 0.1)
-
-
-def test_an_unknown_kind_or_key_is_named():
-    with pytest.raises(RequestError, match=r"no kind of model 'hankel'.*Kinds: hankel_dmdc"):
-        build_spec(ModelSettings(states=("heave",), kind="hankel"), 2.0, 0.1)
-    with pytest.raises(RequestError, match=r"has no key 'riddge'.*mean 'ridge'"):
-        build_spec(ModelSettings(states=("heave",), preset="paper", riddge=1.0), 2.0, 0.1)
 
 
 def sines(folder: Path, periods: dict[str, tuple[float, ...]]) -> str:

@@ -50,7 +50,7 @@ def test_a_study_judges_its_models_in_service(study, result):
     assert found["lead"][-1] == pytest.approx(5 * plan.encounter_period, abs=plan.dt)
 
 
-def test_the_report_shows_it_and_the_key_leaves_other_studies_as_they_were(study, result):
+def test_the_report_shows_it(result):
     pytest.importorskip("matplotlib")
     from seakeep.report.nowcast import nowcast_blocks
     from seakeep.report.sections.judgements import service
@@ -67,8 +67,3 @@ def test_the_report_shows_it_and_the_key_leaves_other_studies_as_they_were(study
         assert [row[1].startswith(words) and float(row[1][len(words) :]) for row in table.rows] == (
             pytest.approx([lead_time] * len(table.rows), rel=1e-3)  # as many digits are printed
         )
-    other = study.path.with_name("other.toml")
-    other.write_text(STUDY.replace("nowcast = true", ""), "utf-8")
-    stated = study.path.with_name("stated.toml")
-    stated.write_text(STUDY.replace("nowcast = true", "nowcast = false"), "utf-8")
-    assert read_study(other).digest == read_study(stated).digest != study.digest

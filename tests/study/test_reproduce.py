@@ -99,9 +99,9 @@ def results(tmp_path_factory):
 STAGES = (
     "campaign/played.txt",
     "campaign/prepared/*.nc",
-    "paper/units/*.npz",
+    "paper/units/*.nc",
     "paper/study.nc",
-    "raw/units/*.npz",
+    "raw/units/*.nc",
     "paper/report.html",
 )
 """What a killed run had written last."""
@@ -155,15 +155,6 @@ def test_a_command_that_is_killed_at_any_stage_goes_on_and_ends_the_same(tmp_pat
 @pytest.fixture(scope="module")
 def played(results):
     return results["paper"].folder.parent
-
-
-def test_the_acts_are_read_back_as_they_were_found(played, results):
-    found = read_reproduction(played)
-    assert list(found) == list(results)
-    for act, result in results.items():
-        assert found[act].groups.keys() == result.groups.keys()
-        for name, group in result.groups.items():
-            xr.testing.assert_identical(group, found[act].groups[name])
 
 
 def test_the_acts_of_the_paper_have_the_same_windows(results):
@@ -240,9 +231,9 @@ def test_an_interval_that_few_cells_do_not_give_is_not_printed(results):
     assert "% with too few cells)" in said
 
 
-def test_the_page_over_the_acts_links_to_theirs(played, results):
+def test_the_page_over_the_acts_links_to_theirs(played):
     pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
-    page = write_reproduction(played, results).read_text("utf-8")
+    page = write_reproduction(played, read_reproduction(played)).read_text("utf-8")
     for act in ACTS[:2]:
         assert f'href="{act.name}/report.html"' in page
         assert act.title in page

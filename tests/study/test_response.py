@@ -12,37 +12,22 @@ TIME = DT * np.arange(1, 161)
 
 def groups(shift=0.9, offset=0.3, ratio=0.8, lead=40.0):
     """Two training sets, three windows, of one channel named surge."""
-    turn = 2 * np.pi * FREQUENCY * TIME
-    phases = np.array([0.0, 1.0, 2.0])[:, None]
-    measured = shift + 0.1 * np.cos(turn + phases)
-    forecast = shift + offset + 0.1 * ratio * np.cos(turn + phases + np.radians(lead))
-    shape = (2, 3, TIME.size, 1)
+    turn = 2 * np.pi * FREQUENCY * TIME + np.array([0.0, 1.0, 2.0])[:, None]
+    measured = shift + 0.1 * np.cos(turn)
+    forecast = shift + offset + 0.1 * ratio * np.cos(turn + np.radians(lead))
+    over = ("training", "window", "time", "channel")
     test = xr.Dataset(
         {
-            "measured": (("window", "time", "channel"), measured[..., None]),
-            "judged": (("training", "window"), np.ones((2, 3), dtype=bool)),
-            "run": ("window", np.array(["wave"] * 3, dtype=object)),
-            "training_mean": (("training", "channel"), np.zeros((2, 1))),
-            "training_std": (("training", "channel"), np.full((2, 1), 0.25)),
-            "mean": (
-                ("model", "training", "window", "time", "channel"),
-                np.broadcast_to(forecast[None, ..., None], shape)[None].copy(),
-            ),
-            "error": (
-                ("model", "measure", "training", "window", "channel"),
-                np.ones((1, 1, 2, 3, 1)),
-            ),
+            "measured": (over[1:], measured[..., None]),
+            "judged": (over[:2], np.ones((2, 3), dtype=bool)),
+            "run": ("window", ["wave"] * 3),
+            "mean": (("model", *over), np.tile(forecast[..., None], (1, 2, 1, 1, 1))),
+            "error": (("model", "measure", *over[:2], "channel"), np.ones((1, 1, 2, 3, 1))),
         },
         coords={"time": TIME, "channel": ["surge"], "model": ["m"], "measure": ["nrmse"]},
     )
-    runs = xr.Dataset(
-        {
-            "wave_frequency": ("run", [FREQUENCY, np.nan]),
-            "water_depth": ("run", [3.6, 3.6]),
-            "trains": ("run", [False, True]),
-        },
-        coords={"run": ["wave", "sea"]},
-    )
+    frequencies = ("run", [FREQUENCY, np.nan])
+    runs = xr.Dataset({"wave_frequency": frequencies}, {"run": ["wave", "sea"]})
     return {"tests/t": test, "runs": runs}
 
 

@@ -9,23 +9,23 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from started import started
-from tutorial_study import put_tutorial
+from tutorial_study import assert_cells_are_what_the_models_say, put_tutorial
 
 from seakeep.errors import DataError, RequestError
 from seakeep.models.executor import processes
-from seakeep.models.labelled import nearest_sample
 from seakeep.statistics import band_error_over_time
 from seakeep.study import StorageError, read_result, read_study, run, run_study, store
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.store import LOCK, UNITS, UnitFolder
-from seakeep.study.units import choice_of, choose, compute, units_of
+from seakeep.study.units import compute, compute_task, facts_of, tasks_of, units_of
+
+CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
 
 
 def change(folder, old, new):
@@ -77,56 +77,28 @@ def test_files_of_others_in_the_folder_stay(name, words, tmp_path):
 
 
 def test_cells_are_what_the_models_say(study_folder, finished):
-    study = read_study(study_folder / "study.toml")
-    plan, runs = make_plan(study)
-    test = finished.tests["unseen"]
-    for number, training in enumerate(plan.training):
-        (name, begin, stop) = training.spans[0]
-        part = runs[name].sel(time=slice(begin - 1e-6, stop + 1e-6))
-        single = plan.specs["deterministic"].fit(part, list(plan.states), list(plan.inputs))
-        ensemble = plan.specs["bayesian"].fit(part, list(plan.states), list(plan.inputs))
-        for k, window in enumerate(plan.tests["unseen"]):
-            run = runs[window.run]
-            alone = single.forecast(run, window.start, window.steps)
-            band = ensemble.forecast_summary(run, window.start, window.steps, level=0.95)
-            cell = test.isel(training=number, window=k)
-            at = nearest_sample(run["time"].values, window.start, window.run) + 1
-            for channel in plan.states:
-                column = cell.sel(channel=channel)
-                # Windows side by side are one product: sums in another order, about 1e-13.
-                kwargs = {"rtol": 1e-9, "atol": 1e-11}
-                ours = column["mean"].sel(model="deterministic")
-                np.testing.assert_allclose(ours, alone[channel], **kwargs)
-                ours = column.sel(model="bayesian", ensemble="bayesian")
-                for statistic in ("mean", "lower", "upper"):
-                    expected = band[channel].sel(statistic=statistic)
-                    np.testing.assert_allclose(ours[statistic], expected, **kwargs)
-                measured = run[channel].values[at : at + window.steps]
-                np.testing.assert_array_equal(column["measured"], measured)
+    planned = make_plan(read_study(study_folder / "study.toml"))
+    # Windows side by side are one product: sums in another order, about 1e-13.
+    assert_cells_are_what_the_models_say(finished, *planned, rtol=1e-9, atol=1e-11)
 
 
 def test_the_error_over_time_is_kept_in_bands_and_each_is_tested_for_a_trend(finished):
     test, trend = finished.tests["unseen"], finished.groups["statistics/trend"].sel(test="unseen")
-    split = 1 / (3.0 * finished.attrs["encounter_period"])  # the default: three periods
     cell = test.isel(training=1, window=2)
     found = band_error_over_time(
         predicted=cell["mean"].sel(model="bayesian").values,
         measured=cell["measured"].values,
         dt=finished.attrs["dt"],
-        frequency=split,
+        frequency=1 / (3.0 * finished.attrs["encounter_period"]),  # the default: three periods
         training_std=cell["training_std"].values,
     )
     bands = cell["error_over_time"].sel(model="bayesian", band=["low", "wave"])
     np.testing.assert_array_equal(bands, found)
-    assert list(trend["band"].values) == ["all", "low", "wave"]
-    for band in ("all", "low", "wave"):
-        at = trend.sel(model="deterministic", band=band)
-        errors = test["error_over_time"].sel(model="deterministic", band=band)
-        mean = errors.mean(("training", "window"))
-        np.testing.assert_allclose(at["error_mean"], mean, rtol=1e-12)
-        slope = np.polyfit(test["time"], mean, 1)[0]
-        assert float(at["slope"]) == pytest.approx(slope, rel=1e-9)
-        assert 0 < float(at["p_value"]) <= 1
+    mean = test["error_over_time"].mean(("training", "window"))
+    np.testing.assert_allclose(*xr.align(trend["error_mean"].transpose(*mean.dims), mean))
+    slope = np.polyfit(test["time"], mean.sel(model="deterministic", band="wave"), 1)[0]
+    at = trend.sel(model="deterministic", band="wave")
+    assert float(at["slope"]) == pytest.approx(slope, rel=1e-9)  # sums in another order
 
 
 def test_arrays_do_not_depend_on_workers(study_folder, finished):
@@ -174,7 +146,7 @@ def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished
         assert process.stdout.readline() == "half a unit\n", "the study ended before it was killed"
         process.send_signal(signal.SIGKILL)
         process.wait()
-    assert len(list((out / "units").glob("*.npz"))) == WHOLE
+    assert len(list((out / "units").glob("*.nc"))) == WHOLE
     assert len(list((out / "units").iterdir())) == WHOLE + 1
     assert not (out / "study.nc").exists()
     told = []
@@ -191,7 +163,7 @@ def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished
 def test_files_of_others_among_the_units_stay(tmp_path):
     units = UnitFolder(tmp_path, "digest")
     units.open("study")
-    units.write("one", {"mean": np.arange(3.0)})
+    units.write("one", CELL)
     (tmp_path / UNITS / "mine").mkdir()
     units.check()
     units.clear()
@@ -227,11 +199,11 @@ def test_one_process_works_in_a_folder_and_who_waited_takes_its_result(
 def test_a_damaged_unit_is_computed_again(change, tmp_path):
     units = UnitFolder(tmp_path, "digest")
     units.open("study")
-    units.write("one", {"mean": np.arange(3.0)})
-    assert units.has("one")
-    path = tmp_path / UNITS / "one.npz"
+    units.write("one", CELL)
+    xr.testing.assert_identical(units.read("one")["cell"], CELL["cell"])
+    path = tmp_path / UNITS / "one.nc"
     path.write_bytes(change(path.read_bytes()))
-    assert not units.has("one")
+    assert units.read("one") is None
 
 
 def test_a_finished_study_is_not_run_again(study_folder, finished):
@@ -271,21 +243,12 @@ def test_a_folder_of_another_study_is_refused(study_folder, finished):
         run_study(read_study(study_folder / "study.toml"), study_folder / "out")
 
 
-def test_a_plan_that_failed_leaves_the_folder_free(study_folder):
-    change(study_folder, '["unseen"]', '["first"]')
-    with pytest.raises(RequestError, match="the run 'first' trains"):
-        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-    change(study_folder, '["first"]', '["unseen"]')
-    study = read_study(study_folder / "study.toml")
-    assert run_study(study, study_folder / "out").attrs["digest"] == study.digest
-
-
 def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):
     store.UnitFolder(tmp_path, "one").open("first")
     second = store.UnitFolder(tmp_path, "two")
     second.open("second")
     assert json.loads((tmp_path / "study.json").read_text("utf-8"))["digest"] == "two"
-    second.write("cell", {"mean": np.arange(3.0)})
+    second.write("cell", CELL)
     with pytest.raises(RequestError, match="holds the results of another study"):
         store.UnitFolder(tmp_path, "one").open("first")
 
@@ -318,85 +281,19 @@ def test_a_write_that_fails_names_the_mend_of_its_cause(number, kind, status, me
     assert os.strerror(number) in str(caught.value)
 
 
-def test_no_feasible_training_window(study_folder):
-    change(study_folder, '["10 T", "20 T"]', '["1000 T", "2000 T"]')
-    with pytest.raises(RequestError, match=r"no window is feasible.*Shorten window"):
-        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-
-
-def test_no_feasible_test_window(study_folder):
-    change(study_folder, "length = 6", "length = 6000")
-    with pytest.raises(RequestError, match=r"tests.unseen: no window is feasible.*Reduce length"):
-        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-
-
-def test_a_full_disk_is_told_and_what_is_finished_is_kept(study_folder, monkeypatch):
-    study = read_study(study_folder / "study.toml")
-    folder = store.UnitFolder(study_folder / "out", study.digest)
-    folder.open("name")
-    folder.write("first", {"mean": np.arange(3.0)})
-
-    def full(*args, **kwargs):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(StorageError, match=r"No space left.*kept.*continues") as caught:
-        folder.write("second", {"mean": np.arange(3.0)})
-    assert caught.value.exit_status == 1
-    assert folder.has("first")
-    assert not folder.has("second")
-    assert [path.name for path in (study_folder / "out" / "units").iterdir()] == ["first.npz"]
-
-
-def test_a_result_of_another_format_is_told(finished, monkeypatch):
+def test_a_result_that_cannot_be_read_is_told(finished, monkeypatch):
     monkeypatch.setattr(store, "FORMAT", store.FORMAT + 1)
     with pytest.raises(
         RequestError, match=rf"written in format {store.FORMAT - 1}.*another folder"
     ):
         read_result(finished.folder)
-
-
-def test_words_of_a_result_come_back_in_any_alphabet(finished):
-    groups = dict(finished.groups)
-    name = "chosen"
-    words = np.full(groups[name]["words"].shape, "the best λ of run Åsgård 試験")
-    groups[name] = groups[name].assign(words=(groups[name]["words"].dims, words))
-    store.write_result(finished.folder, finished.attrs, groups)
-    found = read_result(finished.folder).groups[name]["words"].values
-    np.testing.assert_array_equal(found, words)
-
-
-def test_a_damaged_result_is_told(tmp_path):
-    (tmp_path / "study.nc").write_bytes(b"no NetCDF")
-    with pytest.raises(DataError, match=r"study.nc was cut off, altered.* it has no checksum"):
-        read_result(tmp_path)
-
-
-@pytest.mark.parametrize("part", [0.1, 0.3, 0.5, 0.7, 0.9])
-def test_an_altered_result_is_refused(finished, part):
+    monkeypatch.undo()
     path = finished.folder / "study.nc"
     content = bytearray(path.read_bytes())
-    content[int(part * len(content))] ^= 1
+    content[len(content) // 2] ^= 1
     path.write_bytes(content)
     with pytest.raises(DataError, match=r"study\.nc was cut off, altered or damaged"):
         read_result(finished.folder)
-
-
-def test_a_folder_without_a_study_is_told(tmp_path):
-    with pytest.raises(RequestError, match="holds no finished study"):
-        read_result(tmp_path)
-
-
-def test_leaving_runs_out_tests_no_run_that_trains(study_folder):
-    path = study_folder / "study.toml"
-    text = path.read_text("utf-8").replace("windows = 2\n", 'scheme = "leave_out"\n', 1)
-    path.write_text(text.replace('runs = ["unseen"]', 'runs = ["first", "second"]'), "utf-8")
-    plan, _ = make_plan(read_study(path))
-    assert [each.left_out for each in plan.training] == [("first",), ("second",)]
-    for window in plan.tests["unseen"]:
-        learners = [each for each in plan.training if each.may_test(window.run)]
-        assert learners
-        assert all(window.run not in each.runs for each in learners)
 
 
 def test_joined_series_are_the_windows_end_to_end(finished):
@@ -406,16 +303,6 @@ def test_joined_series_are_the_windows_end_to_end(finished):
     assert predicted.shape == (2, 3 * test.sizes["time"], test.sizes["channel"])
     np.testing.assert_array_equal(measured[: test.sizes["time"]], test["measured"][0])
     np.testing.assert_array_equal(predicted[1, -1], test["mean"].sel(model="bayesian")[1, -1, -1])
-
-
-@pytest.mark.parametrize("name", ["report.html", "figures/photo.png", "tables/lines.csv"])
-def test_a_report_is_never_written_among_files_of_others(name, study_folder):
-    mine = study_folder / "out" / name
-    mine.parent.mkdir(parents=True)
-    mine.write_text("mine")
-    with pytest.raises(RequestError, match=r"(not a report that|no report of) seakeep"):
-        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-    assert mine.read_text() == "mine"
 
 
 OPEN = """
@@ -445,15 +332,14 @@ length = 6
 
 def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(tmp_path):
     put_tutorial(tmp_path, OPEN)
-    plan, runs = make_plan(read_study(tmp_path / "study.toml"))
+    study = read_study(tmp_path / "study.toml")
+    plan, runs = make_plan(study)
+    facts = facts_of(study, plan, runs)
     single, ensemble, mean = units_of(plan)
-    choice = choice_of(plan, single)
-    assert choice == choice_of(plan, ensemble)
-    assert choice.name == "deterministic.t00.choice"
-    assert choice_of(plan, mean) is None
-    chosen = choose(plan, runs, choice)
-    for unit in (single, ensemble):
-        found, alone = compute(plan, runs, unit, chosen), compute(plan, runs, unit)
+    assert tasks_of(plan, [single, ensemble, mean]) == [(single, ensemble), (mean,)]
+    both = compute_task(plan, runs, facts, (single, ensemble))
+    for unit, found in zip((single, ensemble), both, strict=True):
+        alone = compute(plan, runs, facts, unit)
         assert found.keys() == alone.keys()
-        for key, values in found.items():
-            np.testing.assert_array_equal(values, alone[key])
+        for name, group in found.items():
+            xr.testing.assert_identical(group, alone[name])

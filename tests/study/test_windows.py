@@ -159,12 +159,6 @@ def test_leaving_out_a_run_leaves_out_those_that_repeat_its_waves():
         training(runs=runs, inputs=inputs, scheme="leave_out")
 
 
-def test_nothing_is_left_to_learn_from_where_one_sea_state_is_all():
-    runs = {"a1": recorded(400, sea_state="A"), "a2": recorded(400, sea_state="A")}
-    with pytest.raises(RequestError, match="leaving out a sea state of a1, a2 leaves no run"):
-        training(runs=runs, scheme="leave_out", leave_out="sea_state")
-
-
 def test_the_papers_windows_hold_37_5_periods():
     # 30 periods of 32 samples, and the longest delay of 7.5 before them.
     needs = Needs(periods_to_samples(30, 1.64, 1.64 / 32), periods_to_samples(7.5, 1.64, 1.64 / 32))

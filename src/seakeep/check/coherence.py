@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray
+from seakeep.arrays import FloatArray
 from seakeep.check.parts import (
     FreeRun,
     Known,
@@ -134,16 +134,15 @@ def coherence(
         "still": ("state", still),
         "period": ("state", slow, {"units": "s"}),
     }
-    named = [("linear_bound", "multiple", spectra, len(references) + linear)]
+    bounds = {"linear_bound": ("multiple", spectra, len(references) + linear)}
     if names:
-        named.append(("observables_bound", "multiple_observables", further, len(references) + 1))
-    for bound, multiple, of_all, count in named:
-        found[bound], found[f"{bound}_lower"], found[f"{bound}_upper"], found[multiple] = _bound(
-            of_all, spreads, size, count, unjudged
-        )
+        bounds["observables_bound"] = ("multiple_observables", further, len(references) + 1)
     least: FloatArray = spectra.ordinary()[..., :size].max(axis=1).T
-    for _, multiple, *_ in named:
-        least = np.maximum(np.asarray(found[multiple][1], dtype=float), least)
+    for bound, (multiple, of_all, count) in bounds.items():
+        ends, alike = _bound(of_all, spreads, size, count)
+        for key, values in zip(("", "_lower", "_upper"), ends, strict=True):
+            found[f"{bound}{key}"] = ("state", np.where(unjudged, np.nan, values))
+        least = np.maximum(alike, least)
         found[multiple] = (over, least)
     return xr.Dataset(
         found,
@@ -166,9 +165,9 @@ def coherence(
 
 
 def _bound(
-    spectra: Spectra, spreads: FloatArray, size: int, count: int, unjudged: BoolArray
-) -> list[Any]:
-    """Bound with its interval, over state, and multiple coherence over (state, frequency).
+    spectra: Spectra, spreads: FloatArray, size: int, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Bound with its interval, (3, state), and multiple coherence, (state, frequency).
 
     Outputs are the states and what `count` - 1 references leave of them, one after the other;
     `spreads` are their squares.
@@ -177,17 +176,15 @@ def _bound(
     with np.errstate(divide="ignore", invalid="ignore"):
         error = np.sqrt(share * spreads.reshape(-1, size)[:count] / spreads[:size])
     best = np.argmin(np.where(np.isfinite(error[0]), error[0], np.inf), axis=0), np.arange(size)
-    bounds = np.where(unjudged, np.nan, np.minimum(error[:, *best], 1.0))
     rest = spectra.unexplained().reshape(len(spectra.frequency), -1, size)[:, *best]
     power = spectra.outputs[:, :size]
     alike = 1 - np.divide(rest, power, out=np.ones_like(power), where=power > 0)
-    over = ("state", "frequency")
-    return [("state", each) for each in bounds] + [(over, np.clip(alike, 0, 1).T)]
+    return np.minimum(error[:, *best], 1.0), np.clip(alike, 0, 1).T
 
 
 def pooled_nrmse(runs: Mapping[str, FreeRun]) -> FloatArray:
     """NRMSE of each state over all free runs, deviations from the mean of each run."""
-    squares = sum(((r.forecast - r.measured) ** 2).sum(axis=0) for r in runs.values())
-    spread = sum(((r.measured - r.measured.mean(axis=0)) ** 2).sum(axis=0) for r in runs.values())
-    result: FloatArray = np.sqrt(ratio(np.asarray(squares), np.asarray(spread)))
+    errors = np.concatenate([run.forecast - run.measured for run in runs.values()])
+    moved = np.concatenate([run.measured - run.measured.mean(axis=0) for run in runs.values()])
+    result: FloatArray = np.sqrt(ratio((errors**2).sum(axis=0), (moved**2).sum(axis=0)))
     return result

@@ -45,6 +45,14 @@ CHECKS: dict[str, Check] = {
     "drift": drift,
 }
 """Checks by name: each takes a model and prepared runs by name."""
+SHARES = {
+    "worth": ("free", "baselines"),
+    "validation": ("measured",),
+    "coherence": ("free", "baselines"),
+    "residuals": ("free",),
+    "statistics": ("free",),
+}
+"""What checks take of the others: free runs of model and baselines, and results."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,30 +110,26 @@ def check_model(
         check_channels(run, [*model.states, *model.inputs], name)
     found: dict[str, xr.Dataset] = {}
     refused, notes = {}, {}
-    free: Known = {}
-    shared: dict[str, dict[str, Any]] = {
-        key: {"free": free} for key in ("worth", "coherence", "residuals", "statistics")
-    }
-    shared["worth"]["baselines"] = shared["coherence"]["baselines"] = baselines
+    shared: dict[str, Any] = {"free": {}, "baselines": baselines}
     for number, (name, check) in enumerate(CHECKS.items()):
         if progress is not None:
             progress(number, len(CHECKS), name)
+        how = {key: shared[key] for key in SHARES.get(name, ())}
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                found[name] = check(model, runs, **shared.get(name, {}))
+                found[name] = check(model, runs, **how)
             except SeakeepError as error:
                 refused[name] = str(error)
         if name == "measured_response":
-            shared["validation"] = {"measured": found.get(name)}
+            shared["measured"] = found.get(name)
         ours = [str(each.message) for each in caught if issubclass(each.category, SeakeepWarning)]
         notes[name] = tuple(dict.fromkeys(ours))
     trained = of_part(runs, "train")
     if trained and of_part(runs, "test"):
-        free = {}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SeakeepWarning)
-            for name in ("coherence", "residuals"):
-                with suppress(SeakeepError):
-                    found[f"training_{name}"] = CHECKS[name](model, trained, free=free)
+        free: Known = {}
+        for name in ("coherence", "residuals"):
+            with warnings.catch_warnings(), suppress(SeakeepError):
+                warnings.simplefilter("ignore", SeakeepWarning)
+                found[f"training_{name}"] = CHECKS[name](model, trained, free=free)
     return Checked(found, refused, notes)

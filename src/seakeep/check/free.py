@@ -8,7 +8,6 @@ import numpy as np
 import scipy
 import xarray as xr
 
-from seakeep.arrays import FloatArray
 from seakeep.check.parts import single_model
 from seakeep.conventions import MOTIONS, canonical_channel
 from seakeep.core.decay import free_decay
@@ -25,8 +24,8 @@ LONGEST, SHORTEST = 20000, 200
 
 def _motions(model: Model) -> list[str]:
     """States that are rigid motions."""
-    found = [name for name in model.states if name in MOTIONS]
-    if not found:
+    motions = [name for name in model.states if name in MOTIONS]
+    if not motions:
         free = [name for name in model.states if canonical_channel(name) is None]
         meant = [(name, motion) for name in free for motion in MOTIONS if motion in name]
         state, motion = meant[0] if meant else (model.states[0], MOTIONS[2])
@@ -36,7 +35,7 @@ def _motions(model: Model) -> list[str]:
             f"the campaign file ([channels.{motion}], with column = …, and in states), and fit "
             "again."
         )
-    return found
+    return motions
 
 
 def modes(model: Model) -> xr.Dataset:
@@ -106,7 +105,8 @@ def decay(model: Model) -> xr.Dataset:
     still = np.zeros((before, len(single.inputs)))
     ahead = np.zeros((steps - 1 + single.lead_samples, len(single.inputs)))
     rest = single.forecast_arrays(history, still, ahead, steps)
-    offsets, rows, found = [], [], []
+    units = {each.name: each.units for each in single.state_labels}
+    parts = []
     for motion in motions:
         column = single.states.index(motion)
         offset = float(single.state_scale.spread[column])
@@ -114,25 +114,22 @@ def decay(model: Model) -> xr.Dataset:
         moved[:, column] += offset
         run = single.forecast_arrays(moved, still, ahead, steps)
         left = np.concatenate([[1.0], (run - rest)[:, column] / offset])
-        offsets.append(offset)
-        rows.append(left)
-        found.append(free_decay(left[np.isfinite(left)], single.dt))
-    units = {each.name: each.units for each in single.state_labels}
-    linear = np.array([each.decrements.mean() if each.cycles else np.nan for each in found])
-    return xr.Dataset(
-        {
-            "displacement": (("motion", "time"), np.array(rows)),
-            "offset": ("motion", offsets),
-            "period": ("motion", [each.period for each in found], {"units": "s"}),
-            "damping_ratio": ("motion", linear / np.hypot(2 * np.pi, linear)),
-            "p": ("motion", linear),
-        },
-        coords={
-            "motion": motions,
-            "time": ("time", single.dt * np.arange(steps + 1), {"units": "s"}),
-            "units": ("motion", [units[name] for name in motions]),
-        },
-    )
+        released = free_decay(left[np.isfinite(left)], single.dt)
+        linear = released.decrements.mean() if released.cycles else np.nan
+        parts.append(
+            xr.Dataset(
+                {
+                    "displacement": ("time", left),
+                    "offset": offset,
+                    "period": ((), released.period, {"units": "s"}),
+                    "damping_ratio": linear / np.hypot(2 * np.pi, linear),
+                    "p": linear,
+                },
+                {"units": units[motion]},
+            )
+        )
+    time = ("time", single.dt * np.arange(steps + 1), {"units": "s"})
+    return xr.concat(parts, xr.Variable("motion", motions)).assign_coords(time=time)
 
 
 def measured_decay(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
@@ -166,7 +163,7 @@ def measured_decay(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
             "no run is a free decay in still water. State waves = 'still' of such runs, and the "
             "model's decay stands beside theirs."
         )
-    rows = []
+    parts = []
     for name, run in still.items():
         values = channel_matrix(run, motions, name)
         values = values[np.isfinite(values).all(axis=1)]
@@ -174,22 +171,13 @@ def measured_decay(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
         moved = (values - values[-1]) / [spread[each] for each in motions]
         column = int(np.argmax(np.abs(moved).max(axis=0)))
         first = int(np.argmax(np.abs(moved[:, column])))
-        found = free_decay(values[first:, column], model.dt)
-        rows.append((name, motions[column], found))
-    most = max(each.cycles for _, _, each in rows)
-
-    def padded(values: FloatArray) -> FloatArray:
-        return np.pad(values, (0, most - len(values)), constant_values=np.nan)
-
-    return xr.Dataset(
-        {
-            "motion": ("run", [motion for _, motion, _ in rows]),
-            **{
-                key: ("run", [getattr(each, key) for _, _, each in rows])
-                for key in ("period", "damping_ratio", "p", "q", "cycles")
-            },
-            "amplitude": (("run", "cycle"), np.array([padded(e.amplitudes) for *_, e in rows])),
-            "decrement": (("run", "cycle"), np.array([padded(e.decrements) for *_, e in rows])),
-        },
-        coords={"run": [name for name, _, _ in rows]},
-    )
+        released = free_decay(values[first:, column], model.dt)
+        numbers = {key: getattr(released, key) for key in ("period", "damping_ratio", "p", "q")}
+        cycles = {
+            "amplitude": ("cycle", released.amplitudes),
+            "decrement": ("cycle", released.decrements),
+        }
+        each = {"motion": motions[column], **numbers, "cycles": released.cycles, **cycles}
+        parts.append(xr.Dataset(each, {"cycle": range(len(released.decrements))}))
+    names = xr.Variable("run", list(still))
+    return xr.concat(parts, names, join="outer").drop_vars("cycle")

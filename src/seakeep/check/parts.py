@@ -14,7 +14,6 @@ from seakeep.arrays import BoolArray, FloatArray
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, SlowSquares, is_ensemble
-from seakeep.models.engine import Windows
 from seakeep.models.following import Following
 from seakeep.models.inputs import Chain, Lead, Measured
 from seakeep.models.interface import Span
@@ -39,15 +38,16 @@ __all__ = [
     "judged",
     "no_energy",
     "of_part",
-    "one_step",
     "ratio",
     "read_off",
     "reference_probe",
     "regressors",
+    "samples_in",
     "single_model",
     "units_of",
     "used_parts",
     "wave_turns",
+    "whole_span",
     "window_of",
 ]
 
@@ -144,7 +144,7 @@ def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
         except DataError as error:
             warn(f"{name} is left out: {error}")
             continue
-        begin, end = _span(run)
+        begin, end = whole_span(run)
         whole = np.isfinite(states).all(axis=1) & np.isfinite(inputs).all(axis=1)
         inside = whole & (time >= begin - 1e-6) & (time <= end + 1e-6)
         pieces = stretches(inside)
@@ -263,20 +263,33 @@ def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
     DataError
         If the test part ends before.
     """
-    time = np.asarray(run["time"].values, dtype=float)
-    begin, end = _span(run)
-    if time.size <= model.history_samples:
+    history, lead = model.history_samples, model.signature.lead_samples
+    if run.sizes["time"] <= history:
         raise DataError(
-            f"the run has {time.size} samples and a forecast reads {model.history_samples} before "
+            f"the run has {run.sizes['time']} samples and a forecast reads {history} before "
             "its first. Give a longer run."
         )
-    start = max(begin, float(time[model.history_samples - 1]))
-    last = int(np.searchsorted(time, end + 0.5 * model.dt)) - 1
-    last = min(last, time.size - max(model.signature.lead_samples, 1))
-    at = int(np.argmin(np.abs(time - start)))
+    at, last = samples_in(run, whole_span(run), model.dt, history, lead)
     if last - at < 2:
         raise DataError("its test part ends before the first forecast. Give a longer run.")
     return at, last
+
+
+def samples_in(
+    run: xr.Dataset,
+    span: tuple[float, float],
+    dt: float,
+    history: int,
+    lead: int,
+    start: float | None = None,
+) -> tuple[int, int]:
+    """First sample that a forecast of a span may start from, or that of `start`, and the last."""
+    time = np.asarray(run["time"].values, dtype=float)
+    if start is None:
+        start = max(float(span[0]), float(time[min(history, time.size) - 1]))
+    last = int(np.searchsorted(time, float(span[1]) + 0.5 * dt)) - 1
+    # The last step reads the input `lead` samples after the instant that it starts from.
+    return int(np.argmin(np.abs(time - start))), min(last, time.size - max(lead, 1))
 
 
 def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:
@@ -303,54 +316,12 @@ def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) 
     return values
 
 
-def one_step(model: Model, run: xr.Dataset, first: int, last: int) -> FloatArray:
-    """States one step after each sample from `first` to before `last`, (sample, N).
-
-    Regressors of the run are made once; for an ensemble the members' mean.
-    """
-    signature, name = model.signature, str(run.attrs.get("run", "the run"))
-    z, s, count = signature.input_delays, signature.state_delays, last - first
-    values = channel_matrix(run, model.inputs, name)
-    spans = [Span(first - z, first, first + 1), Span(first - z, last - 1, last)]
-    surge = _surge(model, run)
-    drive = signature.input_map.wrap(Measured(values, 0, surge), run, spans)
-    rows = drive.rows(first - z, last)
-    states = channel_matrix(run, model.states, name)[first - s : last]
-    made = model.free_runs(  # type: ignore[attr-defined]
-        [
-            Windows(
-                places=((name, 0.0),) * count,
-                steps=1,
-                time=(run.variables["time"][:1],) * count,
-                histories=_windowed(states, s + 1),
-                delayed=_windowed(rows.delayed, z + 1),
-                direct=rows.direct[z:, None],
-            )
-        ],
-        range(model.n_members),
-    )[0]
-    result: FloatArray = made[:, :, 0].mean(axis=0)
-    return result
-
-
-def _surge(model: Model, run: xr.Dataset) -> FloatArray | None:
-    """Surge of a run, where the model follows it."""
-    if (follows := model.signature.input_map.follows) is None:
-        return None
-    return channel_matrix(run, [model.states[follows.column]], "the run")[:, 0]
-
-
-def _windowed(values: FloatArray, length: int) -> FloatArray:
-    """Stretches of `length` samples, one sample apart, (window, length, channel)."""
-    return np.lib.stride_tricks.sliding_window_view(values, length, axis=0).swapaxes(1, 2)
-
-
-def _span(run: xr.Dataset) -> tuple[float, float]:
-    """Span that holds what trains and what tests; all of a run that states neither."""
+def whole_span(run: xr.Dataset) -> tuple[float, float]:
+    """Span of a run that may be used at all: what trains and what tests, or all of it."""
     time = run["time"].values
     known = [run.attrs[key] for key in ("train_span", "test_span") if key in run.attrs]
-    spans = known or [(time[0], time[-1])]
-    return float(min(each[0] for each in spans)), float(max(each[1] for each in spans))
+    begins, ends = zip(*(known or [(time[0], time[-1])]), strict=True)
+    return float(min(begins)), float(max(ends))
 
 
 def regressors(model: Model, part: Part) -> FloatArray:
@@ -371,8 +342,9 @@ def regressors(model: Model, part: Part) -> FloatArray:
     width = sum(map(len, chain.regressors(model.signature.input_labels)))
     out = np.full((size, width), np.nan)
     if stop > first:
-        values = channel_matrix(run, model.inputs, "the run")
-        surge = _surge(model, run)
+        values, surge = channel_matrix(run, model.inputs, "the run"), None
+        if (follows := model.signature.input_map.follows) is not None:
+            surge = channel_matrix(run, [model.states[follows.column]], "the run")[:, 0]
         out[first:stop] = driven(chain, values, run, first, stop, surge)
     return out
 

@@ -68,39 +68,19 @@ def statistics(
     if duration is None:
         scale = float(next(iter(waves.values())).attrs.get("scale_factor", 1.0))
         duration = 3600 * HOURS / np.sqrt(scale)
-    rows: dict[tuple[str, str], dict[str, float]] = {}
-    peaks: dict[tuple[str, str], FloatArray] = {}
-    for column, state in enumerate(model.states):
-        for kind in KINDS:
-            series = [getattr(each, kind)[:, column] for each in known.values()]
-            peaks[state, kind], periods = _peaks(series, model.dt)
-            rows[state, kind] = _row(series, peaks[state, kind], periods, duration)
-    most = max(each.size for each in peaks.values())
-    padded = [
-        np.pad(each, (0, most - each.size), constant_values=np.nan) for each in peaks.values()
-    ]
-    sorted_peaks = -np.sort(-np.reshape(padded, (-1, len(KINDS), most)))  # NaN last
-    count = np.isfinite(sorted_peaks).sum(axis=-1, keepdims=True)
-    rank = np.arange(1, most + 1)
-    exceedance = np.where(rank <= count, rank / (count + 1), np.nan)
+    parts = []
+    for column in range(len(model.states)):
+        series = {kind: [getattr(r, kind)[:, column] for r in known.values()] for kind in KINDS}
+        laws = [_law(each, model.dt, duration) for each in series.values()]
+        parts.append(xr.concat(laws, xr.Variable("kind", list(series)), join="outer"))
+    names = xr.Variable("state", model.states)
+    out = xr.concat(parts, names, join="outer").drop_vars("rank").transpose("state", ...)
     deviation, density = _densities(list(known.values()), len(model.states))
-    names = next(iter(rows.values()))
+    out["deviation"] = (("state", "place"), deviation)
+    out["density"] = (("state", "kind", "place"), density)
+    out["divergence"] = ("state", [_divergence(*each) for each in density])
     units = [label.units for label in model.signature.state_labels]
-    return xr.Dataset(
-        {
-            **{
-                key: (("state", "kind"), [[rows[s, k][key] for k in KINDS] for s in model.states])
-                for key in names
-            },
-            "peak": (("state", "kind", "rank"), sorted_peaks),
-            "exceedance": (("state", "kind", "rank"), exceedance),
-            "deviation": (("state", "place"), deviation),
-            "density": (("state", "kind", "place"), density),
-            "divergence": ("state", [_divergence(*each) for each in density]),
-        },
-        coords={"state": model.states, "kind": list(KINDS), "units": ("state", units)},
-        attrs={"duration": duration, "of": of},
-    )
+    return out.assign_coords(units=("state", units)).assign_attrs(duration=duration, of=of)
 
 
 def _densities(free: list[FreeRun], states: int) -> tuple[FloatArray, FloatArray]:
@@ -145,21 +125,28 @@ def _peaks(series: list[FloatArray], dt: float) -> tuple[FloatArray, FloatArray]
     return np.concatenate(peaks), np.concatenate(periods)
 
 
-def _row(
-    series: list[FloatArray], peaks: FloatArray, periods: FloatArray, duration: float
-) -> dict[str, float]:
+def _law(series: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
+    """Statistics of several records of a state, and their peaks, largest first."""
+    peaks, periods = _peaks(series, dt)
+    ranked = -np.sort(-peaks)
+    rank = np.arange(1, peaks.size + 1)
     spread = float(np.sqrt(np.mean(np.concatenate([x - x.mean() for x in series]) ** 2)))
     period = float(periods.mean()) if periods.size else np.nan
     law = fit_weibull(peaks)
     extreme, lower, upper = most_probable_extreme(law, duration / period if period else np.nan)
-    return {
-        "significant_double_amplitude": 4 * spread,
-        "zero_crossing_period": period,
-        "peaks": float(peaks.size),
-        "rayleigh_scale": spread,
-        "weibull_shape": law.shape,
-        "weibull_scale": law.scale,
-        "extreme": extreme,
-        "extreme_lower": lower,
-        "extreme_upper": upper,
-    }
+    return xr.Dataset(
+        {
+            "significant_double_amplitude": 4 * spread,
+            "zero_crossing_period": period,
+            "peaks": float(peaks.size),
+            "rayleigh_scale": spread,
+            "weibull_shape": law.shape,
+            "weibull_scale": law.scale,
+            "extreme": extreme,
+            "extreme_lower": lower,
+            "extreme_upper": upper,
+            "peak": ("rank", ranked),
+            "exceedance": ("rank", rank / (peaks.size + 1)),
+        },
+        {"rank": rank},
+    )

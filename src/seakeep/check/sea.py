@@ -45,40 +45,35 @@ def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """
     reference = reference_probe(model, runs)
     surge = model.states.index("surge") if "surge" in model.states else None
-    keys = ("height", "period", "steepness", "drift")
     rows = {}
     for name, part in used_parts(model, runs).items():
         trained = model.training_spans.get(name)
         tested = part.run.attrs.get("test_span")
         if tested is None and trained is None:
             tested = (part.time[0], part.time[-1])
-        values = np.full((2, len(keys)), np.nan)
-        for number, span in enumerate((trained, tested)):
-            if span is None:
-                continue
-            inside = (part.time >= span[0] - 1e-6) & (part.time <= span[1] + 1e-6)
-            if inside.sum() < 16:
-                continue
-            wave = part.inputs[inside, reference]
-            values[number, :3] = _sea(wave, model.dt, part.run)
-            if surge is not None:
-                values[number, 3] = part.states[inside, surge].mean()
-        rows[name] = (part.run, values)
+        facts = np.full((2, 4), np.nan)
+        for row, span in zip(facts, (trained, tested), strict=True):
+            inside = np.zeros(len(part.time), dtype=bool)
+            if span is not None:
+                inside = (part.time >= span[0] - 1e-6) & (part.time <= span[1] + 1e-6)
+            if inside.sum() >= 16:
+                row[:3] = _sea(part.inputs[inside, reference], model.dt, part.run)
+                row[3] = np.nan if surge is None else part.states[inside, surge].mean()
+        keys = ("height", "period", "steepness", "drift")
+        rows[name] = xr.Dataset(
+            {key: ("part", column) for key, column in zip(keys, facts.T, strict=True)}
+            | {
+                "waves": str(part.run.attrs.get("waves") or ""),
+                "outside": _outside(model, part.run, np.isfinite(facts[1, 1])),
+            }
+        )
     if not rows:
         raise DataError("no run has all channels of the model: there are no waves to compare.")
-    table = np.stack([values for _, values in rows.values()])
-    if np.isnan(table[:, :, 0]).all():
+    out = xr.concat(list(rows.values()), xr.Variable("run", list(rows)))
+    if out["height"].isnull().all():
         raise no_energy(model.inputs[reference])
-    outside = [_outside(model, run, np.isfinite(values[1, 1])) for run, values in rows.values()]
-    return xr.Dataset(
-        {key: (("run", "part"), table[:, :, column]) for column, key in enumerate(keys)}
-        | {
-            "waves": ("run", [str(run.attrs.get("waves") or "") for run, _ in rows.values()]),
-            "outside": ("run", outside),
-        },
-        coords={"run": list(rows), "part": ["train", "test"]},
-        attrs={"reference": model.inputs[reference]},
-    )
+    out = out.assign_coords(part=["train", "test"])
+    return out.assign_attrs(reference=model.inputs[reference])
 
 
 def _sea(wave: np.ndarray, dt: float, run: xr.Dataset) -> tuple[float, float, float]:

@@ -80,79 +80,69 @@ def worth(
         )
 
     waves = {r: "regular" if is_regular(runs[r]) else "irregular" for r in own}
-    kinds = [kind for kind in ("irregular", "regular") if kind in waves.values()]
-    groups = [list(model.states), *([s] for s in model.states)]
+    of_kind: dict[str, list[str]] = {}
+    for r in sorted(own, key=lambda r: waves[r] == "regular"):
+        of_kind.setdefault(waves[r], []).append(r)
+    names = [r for of in of_kind.values() for r in of]
+    groups = {"all": list(model.states), **{state: [state] for state in model.states}}
     tables = [
-        [differences([r for r in own if waves[r] == kind], states) for states in groups]
-        for kind in kinds
+        [differences(of_waves, states) for states in groups.values()]
+        for of_waves in of_kind.values()
     ]
-
-    def of_all(key: str) -> FloatArray:
-        return np.array([[table[f"all_{key}"].values for table in of] for of in tables])
-
-    error, upper = of_all("anrmse"), of_all("anrmse_upper")
-    change = [1 / (1 + of_all(key)) - 1 for key in ("change", "upper", "lower")]
-    most = np.where(np.isfinite(upper), upper, error)[:, :, 0]
-    limit = np.select(
-        [~np.isfinite(most), *(most < each for each in LIMITS)], [np.nan, *LIMITS], np.inf
+    both = xr.concat(
+        [xr.concat([each.drop_dims("run") for each in row], "state") for row in tables], "waves"
     )
-    # A baseline that is lost does not count.
-    known = np.isfinite(error[:, :, 1:])
-    labels = np.array([*every][1:] or [""])
-    none = np.zeros(limit.shape, dtype=int)
-    least = np.where(known, error[:, :, 1:], np.inf).argmin(axis=2) if len(every) > 1 else none
-    above = np.where(known, change[2][:, :, 1:], -np.inf)
-    most_above = np.nan_to_num(above, nan=np.inf).argmax(axis=2) if len(every) > 1 else none
-    named = known.any(axis=2)
-    ends = np.array([
-        [True, *np.all([np.isfinite(own[r].forecast).all(0) for r in own if waves[r] == kind], 0)]
-        for kind in kinds
-    ])  # fmt: skip
-    still = np.isnan(limit) & ends
-    of_runs = np.hstack([[table["anrmse"].values[0] for table in of[1:]] for of in tables])
-    each = xr.concat([of[0][["anrmse", "anrmse_lower", "anrmse_upper"]] for of in tables], "run")
-    dims, signature = ("waves", "state", "model"), model.signature
-    names = [r for kind in kinds for r in own if waves[r] == kind]
+    ends = ("", "_lower", "_upper")
+    out = xr.Dataset({f"nrmse{end}": both[f"all_anrmse{end}"] for end in ends})
+    # Of the model from a baseline: the other way round, so that the bounds change places.
+    for key, other in {"": "change", "_lower": "upper", "_upper": "lower"}.items():
+        out[f"change{key}"] = 1 / (1 + both[f"all_{other}"]) - 1
+    out = out.assign_coords(model=list(every), state=list(groups), waves=list(of_kind))
+    upper, baseline = out["nrmse_upper"], out.isel(model=slice(1, None))
+    most = upper.where(np.isfinite(upper), out["nrmse"]).sel(model="model", drop=True)
+    limits = [most < each for each in LIMITS]
+    known = baseline["nrmse"].notnull()  # a baseline that is lost does not count
+    whole = [
+        [True, *np.all([np.isfinite(own[r].forecast).all(axis=0) for r in of], axis=0)]
+        for of in of_kind.values()
+    ]
+    out["limit"] = most.dims, np.select([~np.isfinite(most), *limits], [np.nan, *LIMITS], np.inf)
+    out["still"] = np.isnan(out["limit"]) & whole
+    ranks = {"best": -baseline["nrmse"], "rival": baseline["change_upper"].fillna(np.inf)}
+    for key, rank in ranks.items():
+        none = xr.full_like(most, "", dtype=object)
+        label = rank.where(known, -np.inf).idxmax("model") if known.size else none
+        out[key] = label.where(known.any("model"), "")
+    is_better = (baseline["change_upper"] < 0) | ~known
+    out["better"] = known.any("model") & is_better.all("model")
+    of_runs = xr.concat([row[0][[f"anrmse{end}" for end in ends]] for row in tables], "run")
+    out = out.assign({key: (each.dims, each.values) for key, each in of_runs.items()})
+    out["run_nrmse"] = (
+        ("channel", "run"),
+        np.hstack([[table["anrmse"].values[0] for table in row[1:]] for row in tables]),
+    )
+    signature = model.signature
     ahead = [signature.input_map.look_ahead(runs[r], model.dt) - model.dt for r in names]
     reads = [signature.input_map.notes(runs[r]).get("conditional_on", "") for r in names]
-    return xr.Dataset(
-        {
-            **{key: (("model", "run"), values.values) for key, values in each.data_vars.items()},
-            "nrmse": (dims, error),
-            "nrmse_lower": (dims, of_all("anrmse_lower")),
-            "nrmse_upper": (dims, upper),
-            "change": (dims, change[0]),
-            "change_lower": (dims, change[1]),
-            "change_upper": (dims, change[2]),
-            "run_nrmse": (("channel", "run"), of_runs),
-            "limit": (dims[:2], limit),
-            "still": (dims[:2], still),
-            "best": (dims[:2], np.where(named, labels[least], "")),
-            "rival": (dims[:2], np.where(named, labels[most_above], "")),
-            "better": (dims[:2], named & ((change[2][:, :, 1:] < 0) | ~known).all(axis=2)),
-        },
-        coords={
-            "model": [*every],
-            "run": names,
-            "state": ["all", *model.states],
-            "channel": list(model.states),
-            "waves": kinds,
-            "kind": ("run", [waves[r] for r in names]),
-            "sea_state": ("run", [str(runs[r].attrs.get("sea_state", "")) for r in names]),
-            "look_ahead": ("run", np.maximum(ahead, 0.0), {"units": "s"}),
-        },
-        attrs={
-            "of": of,
-            "conditional_on": str(next(filter(None, reads), "")),
-            "lost": "; ".join(_lost(every, baselines or {})),
-        },
+    return out.assign_coords(
+        run=names,
+        channel=list(model.states),
+        kind=("run", [waves[r] for r in names]),
+        sea_state=("run", [str(runs[r].attrs.get("sea_state", "")) for r in names]),
+        look_ahead=("run", np.maximum(ahead, 0.0), {"units": "s"}),
+    ).assign_attrs(
+        of=of,
+        conditional_on=str(next(filter(None, reads), "")),
+        lost="; ".join(_lost(every, baselines or {})),
     )
 
 
 def _lost(every: Mapping[str, Mapping[str, FreeRun]], baselines: Mapping[str, Model]) -> list[str]:
     """Baselines that do not count in all runs, each with the reason."""
-    told = [f"{label}: not all runs can be forecast" for label in baselines if label not in every]
+    reasons = [
+        f"{label}: not all runs can be forecast" for label in baselines if label not in every
+    ]
     for label, free in list(every.items())[1:]:
         if bad := [r for r, each in free.items() if not np.isfinite(each.forecast).all()]:
-            told.append(f"{label}: its forecast of {', '.join(bad)} diverges")
-    return told
+            reasons.append(f"{label}: its forecast of {', '.join(bad)} diverges")
+    return reasons

@@ -15,17 +15,18 @@ from seakeep import metrics, statistics
 from seakeep.arrays import whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
+from seakeep.check.parts import samples_in
 from seakeep.conventions import displayed, is_elevation
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_at_clock
-from seakeep.models.training import is_constant
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, froude_factor
 from seakeep.signals.time_axis import span_text
 from seakeep.study.fit import warn_of_repeats, warn_of_waves
 from seakeep.study.full_scale import times, to_full_scale
+from seakeep.study.judge import MEASURES, window_errors
 from seakeep.study.plan import named
 from seakeep.toml import parse_length
 
@@ -104,7 +105,7 @@ def _converted(
     comparison: Comparison, convert: Callable[[xr.Dataset], xr.Dataset], **changes: xr.Dataset
 ) -> Comparison:
     for part in {"forecast", "measured", "inputs", "band"} - set(changes):
-        if (data := getattr(comparison, part)) is not None:
+        if data := getattr(comparison, part):  # a model may have no inputs, and no band
             changes[part] = convert(data)
     return replace(comparison, **changes)  # type: ignore[arg-type]
 
@@ -162,9 +163,9 @@ def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     out = to_full_scale(forecast.drop_vars("status", errors="ignore"), scale)
     out.attrs["status"] = status_at_clock(str(forecast.attrs["status"]), clock)
     if "status" in forecast:
-        told = forecast["status"]
-        words = [status_at_clock(str(each), clock) for each in told.values]
-        out["status"] = (told.dims, words, told.attrs)
+        status = forecast["status"]
+        words = [status_at_clock(str(each), clock) for each in status.values]
+        out["status"] = (status.dims, words, status.attrs)
     return out
 
 
@@ -314,19 +315,23 @@ def compare_models(
     first = None if start is None else instant_of(start, campaign, known_runs, "start")
     history = max(model.history_samples for model in models.values())
     lead = max(model.signature.lead_samples for model in models.values())
-    found: dict[str, list[Comparison]] = {}
+    compared: dict[str, list[Comparison]] = {}
     for label, model in models.items():
         warn_of_repeats(model, campaign, prepared)
         dt = model.dt
         count = None if steps is None else samples_of(steps, campaign, known_runs, dt, "steps")
-        found[label] = []
+        compared[label] = []
         for name, run in prepared.items():
             how: dict[str, Any] = {}
             if is_ensemble(model):
                 tell = named(members, f"{name}, ")
                 how = {"level": level, "band": band, "executor": executor, "progress": tell}
-            each = _compare_run(model, run, name, first, count, history, lead, how)
-            found[label].append(each)
+            time = run["time"].values
+            span = run.attrs.get("test_span", (time[0], time[-1]))
+            at, last = samples_in(run, span, dt, history, lead, first)
+            begin = float(time[at]) if first is None else first
+            each = _compare_run(model, run, name, begin, count or max(last - at, 1), how)
+            compared[label].append(each)
             _warn_of_known(model, each)
             warn_of_waves(model, run, name, each.start, each.measured.sizes["time"])
             if (until := float(each.forecast.attrs.get("reads_input_until", -1.0))) > 0.0:
@@ -334,10 +339,7 @@ def compare_models(
                     f"the forecast of {name} reads the waves up to {until:.3g} s after the instant "
                     "that it forecasts: the model needs these waves ahead of time."
                 )
-    for of_run in zip(*found.values(), strict=True):
-        parts = [part for each in of_run for part in (each.measured, each.inputs)]
-        _warn_of_dead(xr.merge(parts, compat="override"), of_run[0].run)
-    return found
+    return compared
 
 
 def check_alike(models: Mapping[str, Model]) -> None:
@@ -368,30 +370,13 @@ def _warn_of_known(model: Model, compared: Comparison) -> None:
 
 
 def _compare_run(
-    model: Model,
-    run: xr.Dataset,
-    name: str,
-    start: float | None,
-    steps: int | None,
-    history: int,
-    lead: int,
-    how: Mapping[str, Any],
+    model: Model, run: xr.Dataset, name: str, start: float, steps: int, how: Mapping[str, Any]
 ) -> Comparison:
     time = run["time"].values
-    begin, end = run.attrs.get("test_span", (time[0], time[-1]))
-    if start is None:
-        first = min(history - 1, time.size - 1)
-        start = max(float(begin), float(time[first]))
-    if steps is None:
-        last = int(np.searchsorted(time, float(end) + 0.5 * model.dt)) - 1
-        # The last step reads the input `lead` samples after the instant that it starts from.
-        last = min(last, time.size - max(lead, 1))
-        at = int(np.argmin(np.abs(time - start)))
-        steps = max(last - at, 1)
     forecast = model.forecast_summary if is_ensemble(model) else model.forecast
-    found = forecast(run, start, steps, **how)
+    result = forecast(run, start, steps, **how)
     # The last instant may lie a step beyond the record: the input before it is known.
-    inside = found[model.states].sel(time=slice(None, time[-1])).assign_attrs(found.attrs)
+    inside = result[model.states].sel(time=slice(None, time[-1])).assign_attrs(result.attrs)
     if (known := inside.sizes["time"]) < 2:
         raise RequestError(
             f"the forecast of {name} from {start:g} s has {known} measured instant(s), and errors "
@@ -408,17 +393,6 @@ def _compare_run(
         inputs=run.sel(instants)[model.inputs],
         band=inside.sel(statistic=["lower", "upper"]) if has_band else None,
     )
-
-
-def _warn_of_dead(run: xr.Dataset, name: str) -> None:
-    names = [str(channel) for channel in run.data_vars]
-    values = np.stack([run[channel].values for channel in names], axis=-1)
-    for column in np.flatnonzero(is_constant(values)):
-        warn(
-            f"channel '{names[column]}' of {name} is constant ({values[0, column]:.6g}) over the "
-            "forecast. Look for a dead sensor: a state that stands still is not judged, and an "
-            "input that does gives a forecast without waves."
-        )
 
 
 def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = True) -> xr.Dataset:
@@ -455,17 +429,17 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
             "there is no comparison to tabulate. Give those of seakeep.study.compare."
         )
     table = xr.concat([_row(comparison, intervals) for comparison in comparisons], dim="run")
-    for name in set(table) & set(_COLUMNS):
-        table[name].attrs = dict(zip(("units", "long_name"), _COLUMNS[str(name)], strict=True))
+    for name in set(table) & set(UNITS):
+        table[name].attrs["units"] = UNITS[str(name)]
     return table
 
 
-def difference_table(found: Mapping[str, Sequence[Comparison]]) -> xr.Dataset:
+def difference_table(compared: Mapping[str, Sequence[Comparison]]) -> xr.Dataset:
     """Compare the errors of several models, run by run and over all runs.
 
     Parameters
     ----------
-    found : mapping of str to sequence of Comparison
+    compared : mapping of str to sequence of Comparison
         From :func:`compare_models`.
 
     Returns
@@ -475,16 +449,16 @@ def difference_table(found: Mapping[str, Sequence[Comparison]]) -> xr.Dataset:
         and ``wave_period`` over ``run``: the mean zero-up-crossing period of the first wave input
         over the forecast, s; NaN without one.
     """
-    first = next(iter(found.values()))
+    first = next(iter(compared.values()))
     out = metrics.anrmse_differences(
-        [[each.forecast for each in of] for of in found.values()],
+        [[each.forecast for each in of] for of in compared.values()],
         [each.measured for each in first],
         INTERVAL,
     )
     runs = [each.run for each in first]
     periods = [_wave_period(each.inputs) for each in first]
     return out.assign(wave_period=("run", periods, {"units": "s"})).assign_coords(
-        model=list(found), run=runs
+        model=list(compared), run=runs
     )
 
 
@@ -501,116 +475,76 @@ def _wave_period(inputs: xr.Dataset) -> float:
 
 INTERVAL = 0.95
 """Probability between the bounds of the measures."""
-_COLUMNS = {
-    "nrmse": ("1", "RMS error in measured standard deviations"),
-    "nrmse_lower": ("1", "lower bound of its 95 % interval over blocks of the forecast"),
-    "nrmse_upper": ("1", "upper bound of its 95 % interval over blocks of the forecast"),
-    "training_nrmse": ("1", "RMS error in standard deviations of the training"),
-    "fit": ("%", "fit as MATLAB's compare states it"),
-    "nammae": ("1", "error of minimum and maximum in measured standard deviations"),
-    "nammae_lower": ("1", "lower bound of its 95 % interval over blocks of the forecast"),
-    "nammae_upper": ("1", "upper bound of its 95 % interval over blocks of the forecast"),
-    "sd_ratio": ("1", "standard deviation, predicted over measured"),
-    "measured_min": ("channel's", "measured minimum"),
-    "measured_max": ("channel's", "measured maximum"),
-    "predicted_min": ("channel's", "predicted minimum"),
-    "predicted_max": ("channel's", "predicted maximum"),
-    "coverage": ("%", "measured instants in the band"),
-    "band_width": ("channel's", "mean width of the band"),
-    "relative_band_width": ("1", "mean width of the band in measured standard deviations"),
-    "look_ahead": ("s", "time after an instant up to which its forecast reads the waves"),
-}
+UNITS = {"fit": "%", "coverage": "%", "look_ahead": "s"}
+"""Of columns of the table that are neither pure numbers nor in the unit of the channel."""
 
 
 def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
-    p, m = comparison.forecast, comparison.measured
-    names, scale = [str(name) for name in p.data_vars], comparison.full_scale
-    slack = metrics.is_slack(predicted=p, measured=m)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        spread = m.std("time", ddof=1)
-        sd_ratio = p.std("time", ddof=1, skipna=False) / spread.where(~slack)
-    each = {
-        "nrmse": metrics.nrmse(predicted=p, measured=m),
-        "training_nrmse": _in_training_sd(p, m),
-        "fit": metrics.fit_percent(predicted=p, measured=m),
-        "nammae": metrics.normalised_extremes_error(predicted=p, measured=m),
-        "sd_ratio": sd_ratio,
-        "measured_min": m.min("time"),
-        "measured_max": m.max("time"),
-        "predicted_min": p.min("time", skipna=False),
-        "predicted_max": p.max("time", skipna=False),
+    forecast, facts = comparison.forecast, comparison.forecast.attrs
+    names = [str(name) for name in forecast.data_vars]
+    # Over (channel, time): a sum then runs along the samples of a channel.
+    p, m = (each[names].to_dataarray("channel") for each in (forecast, comparison.measured))
+    pair: dict[str, Any] = {
+        "predicted": p.values.T.copy(),
+        "measured": m.values.T.copy(),
+        "training_std": [forecast[n].attrs.get("training_std", np.nan) for n in names],
+        "noise_std": [comparison.measured[n].attrs.get("noise_std", 0.0) for n in names],
     }
-    return xr.Dataset(
-        {
-            name: ("channel", values[names].to_array().values.astype(float))
-            for name, values in each.items()
+    slack = metrics.is_slack(**pair)
+    errors = dict(zip(MEASURES, window_errors(**pair), strict=True))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = p.std("time", ddof=1, skipna=False) / m.std("time", ddof=1).where(~slack)
+    columns = {
+        **errors,
+        "fit": metrics.fit_percent(**pair),
+        "sd_ratio": ratio.values,
+        "measured_min": m.min("time").values,
+        "measured_max": m.max("time").values,
+        "predicted_min": p.min("time", skipna=False).values,
+        "predicted_max": p.max("time", skipna=False).values,
+    }
+    row: dict[str, Any] = {
+        "anrmse": metrics.anrmse(**pair),
+        "training_anrmse": errors["training_nrmse"].mean(),
+        "mean_nammae": metrics.nammae(**pair),
+        "slack_channels": int(slack.sum()),
+        "status": comparison.status,
+        "conditional_on": str(facts.get("conditional_on", "")),
+        "probe_offset": float(facts.get("probe_offset", np.nan)),
+        "probe_offset_spread": float(facts.get("probe_offset_spread", np.nan)),
+        "look_ahead": max(float(facts.get("reads_input_until", 0.0)), 0.0),
+        "start": comparison.start,
+    }
+    if intervals:
+        bounds = {
+            "nrmse": metrics.nrmse(**pair, interval=INTERVAL),
+            "nammae": metrics.normalised_extremes_error(**pair, interval=INTERVAL),
+            "anrmse": metrics.anrmse(**pair, interval=INTERVAL),
+            "mean_nammae": metrics.nammae(**pair, interval=INTERVAL),
         }
-        | (_interval_entries(p, m, names) if intervals else {})
-        | _band_entries(comparison, slack)
-        | ({} if scale is None else {"scale": "full", "scale_factor": scale})
-        | {
-            "anrmse": comparison.anrmse,
-            "training_anrmse": float(each["training_nrmse"].to_array().mean(skipna=False)),
-            "mean_nammae": float(metrics.nammae(predicted=p, measured=m)),
-            "slack_channels": int(slack.to_array().sum()),
-            "status": comparison.status,
-            "conditional_on": str(p.attrs.get("conditional_on", "")),
-            "probe_offset": float(p.attrs.get("probe_offset", np.nan)),
-            "probe_offset_spread": float(p.attrs.get("probe_offset_spread", np.nan)),
-            "look_ahead": max(float(p.attrs.get("reads_input_until", 0.0)), 0.0),
-            "start": comparison.start,
-        },
+        for key, (lower, upper) in bounds.items():
+            into = columns if key in errors else row
+            into |= {f"{key}_lower": lower, f"{key}_upper": upper}
+    if comparison.band is not None:
+        lower, upper = (comparison.band.sel(statistic=key, drop=True) for key in metrics.BOUNDS)
+        coverage = statistics.coverage(lower, upper, comparison.measured)
+        columns["coverage"] = inside = 100.0 * coverage["inside"].values
+        columns["band_width"] = coverage["width"].values
+        columns["relative_band_width"] = coverage["relative_width"].values
+        row |= {key: facts[key] for key in ("members", "diverged", "level")}
+        row["mean_coverage"] = inside[~slack].mean() if not slack.all() else np.nan
+        row["band"] = str(facts.get("band", "members"))
+    if comparison.full_scale is not None:
+        row |= {"scale": "full", "scale_factor": comparison.full_scale}
+    units = [str(forecast[name].attrs.get("units", "")) for name in names]
+    return xr.Dataset(
+        {key: ("channel", values) for key, values in columns.items()} | row,
         coords={
             "run": comparison.run,
             "channel": names,
-            "channel_units": ("channel", [str(p[name].attrs.get("units", "")) for name in names]),
+            "channel_units": ("channel", units),
         },
     )
-
-
-def _interval_entries(p: xr.Dataset, m: xr.Dataset, names: Sequence[str]) -> dict[str, Any]:
-    """Bounds of the measures over redrawn blocks of the forecast."""
-    pair = {"predicted": p, "measured": m}
-    out: dict[str, Any] = {}
-    for key, each in (("nrmse", metrics.nrmse), ("nammae", metrics.normalised_extremes_error)):
-        found = each(**pair, interval=INTERVAL)[names].to_array()
-        for bound in metrics.BOUNDS:
-            out[f"{key}_{bound}"] = ("channel", found.sel(bound=bound).values)
-    for key, average in (("anrmse", metrics.anrmse), ("mean_nammae", metrics.nammae)):
-        for bound, value in zip(metrics.BOUNDS, average(**pair, interval=INTERVAL), strict=True):
-            out[f"{key}_{bound}"] = float(value)
-    return out
-
-
-def _in_training_sd(p: xr.Dataset, m: xr.Dataset) -> xr.Dataset:
-    """RMS error of each channel over its standard deviation in training."""
-    return xr.Dataset(
-        {
-            name: np.sqrt(((each - m[name]) ** 2).mean(skipna=False))
-            / float(each.attrs.get("training_std", np.nan))
-            for name, each in p.data_vars.items()
-        }
-    )
-
-
-def _band_entries(comparison: Comparison, slack: xr.Dataset) -> dict[str, Any]:
-    if comparison.band is None:
-        return {}
-    lower, upper = (comparison.band.sel(statistic=key, drop=True) for key in ("lower", "upper"))
-    found = statistics.coverage(lower, upper, comparison.measured)
-    inside = 100.0 * found["inside"].values
-    judged = ~slack.to_array().values
-    attrs = comparison.forecast.attrs
-    return {
-        "coverage": ("channel", inside),
-        "band_width": ("channel", found["width"].values),
-        "relative_band_width": ("channel", found["relative_width"].values),
-        "mean_coverage": float(inside[judged].mean()) if judged.any() else np.nan,
-        "members": int(attrs["members"]),
-        "diverged": int(attrs["diverged"]),
-        "level": float(attrs["level"]),
-        "band": str(attrs.get("band", "members")),
-    }
 
 
 def instant_of(
@@ -620,7 +554,7 @@ def instant_of(
     try:
         return float(stated)
     except (ValueError, OverflowError):
-        return _count(str(stated), name, "seconds such as 20") * _period(campaign, runs)
+        return _seconds(str(stated), campaign, runs, name, "seconds such as 20")
 
 
 def samples_of(
@@ -630,12 +564,14 @@ def samples_of(
     try:
         count = int(stated) if isinstance(stated, str) else stated
     except ValueError:
-        length = _count(str(stated), name, "a whole number such as 400")
-        return round(length * _period(campaign, runs) / dt)
+        return round(_seconds(str(stated), campaign, runs, name, "a whole number such as 400") / dt)
     return whole_number(count, name)
 
 
-def _count(stated: str, name: str, otherwise: str) -> float:
+def _seconds(
+    stated: str, campaign: Campaign, runs: Iterable[xr.Dataset], name: str, otherwise: str
+) -> float:
+    """A length in encounter periods, those that the runs were prepared with."""
     try:
         length = parse_length(stated)
     except RequestError:
@@ -646,9 +582,5 @@ def _count(stated: str, name: str, otherwise: str) -> float:
             f"{name}: received {reprlib.repr(stated)}. Give {otherwise}, or encounter periods such "
             f"as '15 T'.{comma}"
         )
-    return length.value
-
-
-def _period(campaign: Campaign, runs: Iterable[xr.Dataset]) -> float:
-    known = [float(r.attrs["encounter_period"]) for r in runs if "encounter_period" in r.attrs]
-    return known[0] if known else campaign.encounter_period()
+    known = (float(r.attrs["encounter_period"]) for r in runs if "encounter_period" in r.attrs)
+    return length.value * (next(known, None) or campaign.encounter_period())

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.campaign import Campaign
-from seakeep.conventions import canonical_channel, is_elevation
+from seakeep.check.parts import whole_span
+from seakeep.conventions import is_elevation
 from seakeep.core.metrics import slack_share
 from seakeep.errors import RequestError
 from seakeep.signals import significant_height, wave_spectrum
 from seakeep.signals.waves import paper_welch
 from seakeep.study.fit import find_repeat
 from seakeep.study.judge import wave_frequency
-from seakeep.study.plan import Plan, between, training_samples, whole_span
+from seakeep.study.plan import Plan, between, trained_parts, training_samples
 from seakeep.study.settings import Study
 
 Runs = Mapping[str, xr.Dataset]
@@ -32,7 +33,6 @@ POSITIVE = {
     "yaw": "right-handed about z",
 }
 WELCH = ("paper", "recommended")
-WORDS = ("sea_state", "waves", "role", "file_sha256")
 
 
 def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
@@ -48,32 +48,27 @@ def describe_study(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset
     return {name: group for name, group in groups.items() if group is not None}
 
 
+def _table(rows: Sequence[Mapping[str, Any]], dim: str, names: Iterable[str]) -> xr.Dataset:
+    """Rows of the same keys as variables along a dimension."""
+    columns = {key: [row[key] for row in rows] for key in rows[0]}
+    return xr.Dataset({key: (dim, each) for key, each in columns.items()}, {dim: list(names)})
+
+
 def _repeats(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset | None:
     """Runs whose test windows repeat input of their training set; None if there are none."""
     regular = {name for name, run in campaign.settings.runs.items() if run.waves == "regular"}
-    spans: dict[str, list[float]] = {}
-    for window in (each for windows in plan.tests.values() for each in windows):
-        if window.run not in regular:
-            end = window.start + window.steps * plan.dt
-            spans.setdefault(window.run, []).extend((window.start, end))
-    found = []
-    for name, edges in spans.items():
-        learnt: dict[str, list[float]] = {}
-        for each in plan.training:
-            for run, *span in each.spans if each.may_test(name) else ():
-                if run not in regular:
-                    learnt.setdefault(run, []).extend(span)
-        pieces = {run: between(runs[run], (min(e), max(e))) for run, e in learnt.items()}
-        test = between(runs[name], (min(edges), max(edges)))
+    windows = [each for of_test in plan.tests.values() for each in of_test]
+    repeats = {}
+    for name in dict.fromkeys(each.run for each in windows if each.run not in regular):
+        starts = [each.start for each in windows if each.run == name]
+        ends = [each.start + each.steps * plan.dt for each in windows if each.run == name]
+        learnt = trained_parts([each for each in plan.training if each.may_test(name)], runs)
+        pieces = {run: part for run, part in learnt.items() if run not in regular}
+        test = between(runs[name], (min(starts), max(ends)))
         if (repeat := find_repeat(plan.inputs, pieces, name, test, plan.dt)) is not None:
-            found.append(asdict(repeat) | {"words": str(repeat)})
-    if not found:
-        return None
-    columns = {key: [each[key] for each in found] for key in found[0] if key != "run"}
-    return xr.Dataset(
-        {key: ("run", np.array(values)) for key, values in columns.items()},
-        coords={"run": [each["run"] for each in found]},
-    )
+            repeats[name] = {**asdict(repeat), "words": str(repeat)}
+    rows = [{key: value for key, value in row.items() if key != "run"} for row in repeats.values()]
+    return _table(rows, "run", repeats) if repeats else None
 
 
 def words_of_repeats(repeats: xr.Dataset) -> str:
@@ -92,19 +87,14 @@ def _channels(campaign: Campaign, plan: Plan, runs: Runs) -> xr.Dataset:
         {
             "units": str(first[name].attrs.get("units", "")),
             "long_name": str(first[name].attrs.get("long_name", name)),
-            "symbol": canonical.symbol if (canonical := canonical_channel(name)) else "",
             "source": _source(campaign, name),
             "positive": _positive(name),
             "use": "state" if name in plan.states else "input",
         }
         for name in names
     ]
-    return xr.Dataset(
-        {key: ("name", np.array([row[key] for row in rows], dtype=object)) for key in rows[0]}
-        | {"channel": ("channel", np.array(plan.states, dtype=object))},
-        coords={"name": names},
-        attrs={"frame": campaign.settings.rig.frame or ""},
-    )
+    out = _table(rows, "name", names).assign(channel=("channel", list(plan.states)))
+    return out.assign_attrs(frame=campaign.settings.rig.frame or "")
 
 
 def _source(campaign: Campaign, name: str) -> str:
@@ -117,13 +107,15 @@ def _source(campaign: Campaign, name: str) -> str:
         known = each.unit is None or (each.column or "").endswith(f"[{each.unit}]")
         unit = "" if known else f" [{each.unit}]"
         return f"{sign}column {each.column or name}{unit}{offset}"
-    made = settings.derived.get(name)
-    if made is None:
+    derived = settings.derived.get(name)
+    if derived is None:
         return ""
-    if made.expression is not None:
-        return made.expression
+    if derived.expression is not None:
+        return derived.expression
     words = {"integrate": "integral", "differentiate": "derivative"}
-    return f"{words.get(str(made.step), str(made.step))} of {made.source}".replace("_", " ")
+    return f"{words.get(str(derived.step), str(derived.step))} of {derived.source}".replace(
+        "_", " "
+    )
 
 
 def _positive(name: str) -> str:
@@ -144,7 +136,9 @@ def _prepared(run: xr.Dataset) -> xr.Dataset:
 
 
 def _training(plan: Plan, runs: Runs) -> xr.Dataset:
-    edges = np.full((2, len(plan.training), len(runs)), np.nan)
+    """Spans of each training set in each run; the run and the stop where each has one alone."""
+    names = [each.name for each in plan.training]
+    edges = np.full((2, len(names), len(runs)), np.nan)
     for number, each in enumerate(plan.training):
         for run, *span in each.spans:
             edges[:, number, list(runs).index(run)] = span
@@ -153,92 +147,74 @@ def _training(plan: Plan, runs: Runs) -> xr.Dataset:
         {
             "begin": (("training", "of_run"), edges[0], {"units": "s"}),
             "end": (("training", "of_run"), edges[1], {"units": "s"}),
-            "left_out": ("training", np.array(left_out, dtype=object)),
+            "left_out": ("training", left_out),
         },
-        coords={"training": [each.name for each in plan.training], "of_run": list(runs)},
+        coords={"training": names, "of_run": list(runs)},
     )
     if all(len(each.spans) == 1 for each in plan.training):
-        names, begins, stops = zip(*(each.spans[0] for each in plan.training), strict=True)
+        of_run, begins, stops = zip(*(each.spans[0] for each in plan.training), strict=True)
         lengths = np.subtract(stops, begins).clip(max=training_samples(plan.needs) * plan.dt)
-        out["run"] = ("training", np.array(names, dtype=object))
-        out["stop"] = ("training", np.array(stops))
+        out["run"] = ("training", list(of_run))
+        out["stop"] = ("training", list(stops))
         out["reads"] = ("training", lengths, {"units": "s"})
     return out
 
 
 def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
-    """Data quality, run by run and channel by channel."""
-    names = [*plan.states, *plan.inputs]
-    numbers = ("mean", "sd", "min", "max", "constant", "slack")
-    values = np.full((len(numbers), len(runs), len(names)), np.nan)
-    for r, run in enumerate(runs.values()):
-        for c, name in enumerate(names):
-            x = run[name].values
-            # A sample equal to both neighbours: a frozen sensor, or a limit that clips.
-            same = (np.diff(x)[1:] == 0) & (np.diff(x)[:-1] == 0)
-            noise = run[name].attrs.get("noise_std", 0.0)
-            slack = slack_share(x, noise) if name.startswith("mooring") else np.nan
-            spread = x.std(ddof=1)
-            values[:, r, c] = x.mean(), spread, x.min(), x.max(), same.mean(), slack
-    waves = [name for name in plan.inputs if is_elevation(name)]
-    trained = {run for each in plan.training for run in each.runs}
-    rows: list[dict[str, Any]] = []
-    for name, run in runs.items():
-        time, facts = run["time"].values, run.attrs
-        is_regular = bool(waves) and facts.get("waves") == "regular"
-        frequency = np.nan
-        if is_regular:
-            frequency = wave_frequency(between(run, whole_span(run))[waves[0]].values, plan.dt)
+    """Waves and spans of each run, and samples of its channels that stand still or are slack."""
+    waves = next(filter(is_elevation, plan.inputs), None)
+    rows = []
+    for run in runs.values():
+        facts, frequency, nowhere = run.attrs, np.nan, (np.nan, np.nan)
+        if waves is not None and facts.get("waves") == "regular":
+            frequency = wave_frequency(between(run, whole_span(run))[waves].values, plan.dt)
+        spans = {use: facts.get(f"{use}_span", nowhere) for use in ("train", "test")}
         rows.append(
             {
-                "trains": name in trained,
                 "water_depth": float(facts.get("water_depth", np.nan)),
                 "wave_frequency": frequency,
-                **{key: str(facts.get(key, "")) for key in WORDS},
-                **{
-                    f"{use}_{end}": facts.get(f"{use}_span", (np.nan, np.nan))[k]
-                    for use in ("train", "test")
-                    for k, end in enumerate(("begin", "end"))
-                },
-                "duration": float(time[-1] - time[0]),
-                "samples": time.size,
+                "sea_state": str(facts.get("sea_state", "")),
+                "waves": str(facts.get("waves", "")),
+                **{f"{use}_begin": span[0] for use, span in spans.items()},
+                **{f"{use}_end": span[1] for use, span in spans.items()},
             }
         )
-    return xr.Dataset(
-        {
-            **{
-                key: ("run", np.array([r[key] for r in rows], object if key in WORDS else None))
-                for key in rows[0]
-            },
-            **{n: (("run", "name"), values[i]) for i, n in enumerate(numbers)},
-        },
-        coords={"run": list(runs), "name": names},
-    )
+    names = [*plan.states, *plan.inputs]
+    idle = np.full((2, len(runs), len(names)), np.nan)
+    for r, run in enumerate(runs.values()):
+        for c, name in enumerate(names):
+            x, noise = run[name].values, run[name].attrs.get("noise_std", 0.0)
+            # A sample equal to both neighbours: a frozen sensor, or a limit that clips.
+            idle[0, r, c] = np.mean((np.diff(x)[1:] == 0) & (np.diff(x)[:-1] == 0))
+            if name.startswith("mooring"):
+                idle[1, r, c] = slack_share(x, noise)
+    out = _table(rows, "run", runs).assign_coords(name=names)
+    return out.assign(constant=(("run", "name"), idle[0]), slack=(("run", "name"), idle[1]))
 
 
 def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:
     """Spectra of the first wave elevation in all runs, as the paper and as recommended."""
-    waves = [name for name in plan.inputs if is_elevation(name)]
-    if not waves:
+    waves = next(filter(is_elevation, plan.inputs), None)
+    if waves is None:
         return None
-    curves, heights = {}, []
-    for r, run in enumerate(runs.values()):
-        x = run[waves[0]].sel(time=slice(whole_span(run)[0] - 1e-6, None)).values
-        heights.append(significant_height(x))
-        for k, kind in enumerate(WELCH):
-            with suppress(RequestError):  # a record shorter than one segment
-                welch = paper_welch(plan.dt) if kind == "paper" else ()
-                curves[r, k] = wave_spectrum(x, plan.dt, *welch)
-    bins = max((len(density) for _, density in curves.values()), default=0)
-    values = np.full((2, len(runs), len(WELCH), bins), np.nan)
-    for (r, k), curve in curves.items():
-        values[:, r, k, : len(curve[0])] = curve
-    return xr.Dataset(
-        {
-            "frequency": (("run", "kind", "bin"), values[0], {"units": "Hz"}),
-            "density": (("run", "kind", "bin"), values[1], {"units": "m^2/Hz"}),
-            "significant_height": ("run", np.array(heights), {"units": "m"}),
-        },
-        coords={"run": list(runs), "kind": list(WELCH)},
-        attrs={"channel": waves[0]},
-    )
+
+    def curve(x: FloatArray, kind: str) -> xr.Dataset:
+        try:
+            how = paper_welch(plan.dt) if kind == "paper" else ()
+            frequency, density = wave_spectrum(x, plan.dt, *how)
+        except RequestError:  # a record shorter than one segment
+            frequency, density = np.empty((2, 0))
+        each = {
+            "frequency": ("bin", frequency, {"units": "Hz"}),
+            "density": ("bin", density, {"units": "m^2/Hz"}),
+        }
+        return xr.Dataset(each, {"bin": range(len(frequency))})
+
+    records = [run[waves].sel(time=slice(whole_span(run)[0] - 1e-6, None)) for run in runs.values()]
+    kinds, names = xr.Variable("kind", list(WELCH)), xr.Variable("run", list(runs))
+    each = [
+        xr.concat([curve(x.values, kind) for kind in WELCH], kinds, join="outer") for x in records
+    ]
+    out = xr.concat(each, names, join="outer").drop_vars("bin").assign_attrs(channel=waves)
+    heights = [significant_height(x.values) for x in records]
+    return out.assign(significant_height=("run", heights, {"units": "m"}))

@@ -265,16 +265,17 @@ def repeats_of(
     Training runs that the campaign marks as regular waves are left out: regular waves repeat by
     their nature. So are runs that the campaign does not have.
     """
-    training = {
+    if not model.inputs:
+        return {}
+    known = campaign.settings.runs
+    spans = {
         name: span
         for name, span in model.training_spans.items()
-        if name in campaign.settings.runs and campaign.settings.runs[name].waves != "regular"
+        if name in known and known[name].waves != "regular"
     }
-    if not (model.inputs and training):
-        return {}
-    missing = [name for name in training if name not in tested]
+    missing = [name for name in spans if name not in tested]
     prepared = dict(tested) | (load_prepared(campaign, names=missing) if missing else {})
-    pieces = {name: between(prepared[name], span) for name, span in training.items()}
+    pieces = {name: between(prepared[name], span) for name, span in spans.items()}
     found: dict[str, Repeat] = {}
     for name, run in tested.items():
         part = run
@@ -283,8 +284,8 @@ def repeats_of(
         elif name in pieces:  # a test on the training part repeats by definition
             part = run.sel(time=slice(float(pieces[name]["time"][-1]) + 1e-6, None))
         # What a member leaves of a training run is too short to be judged.
-        enough = name not in training or part.sizes["time"] >= model.history_samples
-        if enough and campaign.settings.runs[name].waves != "regular":
+        enough = name not in spans or part.sizes["time"] >= model.history_samples
+        if enough and known[name].waves != "regular":
             repeat = find_repeat(model.inputs, pieces, name, part, model.dt)
             found |= {} if repeat is None else {name: repeat}
     return found

@@ -12,16 +12,18 @@ import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep import statistics
-from seakeep.arrays import FloatArray
+from seakeep import metrics, statistics
+from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.core.bands import band_error_over_time
 from seakeep.core.calibration import band_scale, calibrated_bounds
-from seakeep.core.coverage import CoverageTable
+from seakeep.core.metrics import root_mean_square
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
 from seakeep.models import KINDS
 from seakeep.models.executor import in_order
@@ -46,6 +48,50 @@ DIFFERENCES = 500
 """Redrawn tables of cells for the interval of a difference between models."""
 
 
+def window_errors(**pair: Any) -> FloatArray:
+    """Errors of forecasts, one row per entry of :data:`MEASURES`.
+
+    Parameters
+    ----------
+    predicted, measured : ndarray, shape (…, time, N)
+        In the same units.
+    training_std, noise_std : array_like, shape (N,) and (…, N)
+        As :func:`seakeep.metrics.nrmse`.
+
+    Returns
+    -------
+    ndarray, shape (3, …, N)
+        NaN where a channel is not judged, or the forecast is lost.
+    """
+    error = np.subtract(pair["predicted"], pair["measured"])
+    in_training_sd = root_mean_square(error) / np.asarray(pair["training_std"])
+    return np.stack(
+        [metrics.nrmse(**pair), metrics.normalised_extremes_error(**pair), in_training_sd]
+    )
+
+
+def judge_windows(*, dt: float, frequency: float, **pair: Any) -> xr.Dataset:
+    """(Mean) forecasts of windows (window, time, N) with their errors; bands meet at `frequency`.
+
+    The other arguments are those of :func:`window_errors`.
+
+    Returns
+    -------
+    Dataset
+        ``mean``; ``error`` over (measure, window, channel) and ``error_over_time`` over (band,
+        window, time).
+    """
+    bands = band_error_over_time(**pair, dt=dt, frequency=frequency)
+    over_time = np.stack([metrics.error_over_time(**pair), *bands])
+    return xr.Dataset(
+        {
+            "mean": (("window", "time", "channel"), pair["predicted"]),
+            "error": (("measure", "window", "channel"), window_errors(**pair)),
+            "error_over_time": (("band", "window", "time"), over_time),
+        }
+    )
+
+
 def judge(
     groups: Mapping[str, xr.Dataset],
     settings: StudySettings,
@@ -54,37 +100,32 @@ def judge(
 ) -> dict[str, xr.Dataset]:
     """All statistics of a study, as groups ``statistics/…``; the densities side by side."""
     kinds = {name: each.kind for name, each in settings.models.items()}
-    seed, level = settings.study.seed, settings.statistics.level
-    found: dict[str, dict[str, xr.Dataset | None]] = defaultdict(dict)
+    seed = settings.study.seed
+    tables: dict[str, dict[str, xr.Dataset]] = defaultdict(dict)
     for name in settings.tests:
         test = groups[f"tests/{name}"]
-        found["boxes"][name] = boxes = box_table(test)
-        rng = random_stream(seed, f"differences.{name}")
-        found["differences"][name] = changes = difference_table(test, groups["training"], rng)
-        found["skill"][name] = skill_table(boxes, changes, kinds)
-        if test.sizes["ensemble"]:
-            calibration = groups.get("calibration")
-            found["coverage"][name] = coverage_table(test, calibration)
-            found["bands"][name] = band_parts(test, calibration, level)
-        found["trend"][name] = trend_table(test, random_stream(seed, f"trend.{name}"))
-        if is_regular(groups, name):
-            found["response"][name] = regular_response(groups, name)
-    lost = lost_forecasts(groups, settings.tests)
-    out = {} if lost is None else {"statistics/lost": lost}
-    for key, tables in found.items():
-        if made := {name: each for name, each in tables.items() if each is not None}:
-            names = xr.Variable("test", list(made))
-            out[f"statistics/{key}"] = xr.concat(list(made.values()), names, join="outer")
+        boxes, rng = box_table(test), random_stream(seed, f"differences.{name}")
+        differences = difference_table(test, groups["training"], rng)
+        of_test = {
+            "boxes": boxes,
+            "differences": differences,
+            "skill": skill_table(boxes, differences, kinds),
+            **band_tables(test, groups.get("calibration"), settings.statistics.level),
+            "trend": trend_table(test, random_stream(seed, f"trend.{name}")),
+            "response": regular_response(groups, name) if is_regular(groups, name) else None,
+        }
+        for key, each in of_test.items():
+            if each is not None:
+                tables[key][name] = each
+    out = {
+        key: xr.concat(list(of.values()), xr.Variable("test", list(of)), join="outer")
+        for key, of in tables.items()
+    }
+    if (lost := lost_forecasts(groups, settings.tests)) is not None:
+        out["lost"] = lost
     name = settings.statistics.densities_of or next(iter(settings.tests))
-    test = groups[f"tests/{name}"]
-    models = list(settings.models)
-    pairs = [_divergences(test, model, channels, settings, name, executor) for model in models]
-    divergence, densities = (
-        xr.concat([pair[k] for pair in pairs], dim=xr.Variable("model", models)) for k in (0, 1)
-    )
-    out["statistics/divergence"] = divergence.assign_attrs(test=name)
-    out["statistics/densities"] = densities.assign_attrs(test=name)
-    return out
+    out |= density_tables(groups[f"tests/{name}"], channels, settings, name, executor)
+    return {f"statistics/{key}": each for key, each in out.items()}
 
 
 def lost_forecasts(groups: Mapping[str, xr.Dataset], tests: Iterable[str]) -> xr.Dataset | None:
@@ -92,16 +133,12 @@ def lost_forecasts(groups: Mapping[str, xr.Dataset], tests: Iterable[str]) -> xr
     rows = []
     for name in tests:
         test = groups[f"tests/{name}"]
-        runs, starts = test["run"].values.astype(str), test["start"].values
-        gone = np.isnan(test["mean"].values).any(axis=(3, 4)) & test["judged"].values
-        for m, k, w in zip(*np.nonzero(gone), strict=True):
-            model, training = str(test["model"].values[m]), str(test["training"].values[k])
-            rows.append((model, name, training, int(w), runs[w], float(starts[w])))
-    if not rows:
-        return None
-    keys = ("model", "test", "training", "window", "run", "start")
-    columns = dict(zip(keys, map(list, zip(*rows, strict=True)), strict=True))
-    return xr.Dataset({key: ("cell", values) for key, values in columns.items()})
+        gone = test["mean"].isnull().any(("time", "channel")) & test["judged"]
+        for model, training, window in zip(*np.nonzero(gone.values), strict=True):
+            at = test.isel(model=model, training=training, window=window)
+            cell = {key: at[key].item() for key in ("model", "training", "window", "run", "start")}
+            rows.append(cell | {"test": name})
+    return xr.Dataset({key: ("cell", [r[key] for r in rows]) for key in rows[0]}) if rows else None
 
 
 def words_of_lost(lost: xr.Dataset) -> str:
@@ -119,11 +156,11 @@ def words_of_lost(lost: xr.Dataset) -> str:
     )
 
 
-def _columns(
-    names: Sequence[str], dims: tuple[str, ...], values: Iterable[FloatArray]
-) -> dict[str, tuple[tuple[str, ...], FloatArray]]:
-    """Variables of a table, one per row of `values`."""
-    return {name: (dims, each) for name, each in zip(names, values, strict=True)}
+def _table(
+    values: npt.ArrayLike, dims: tuple[str, ...], numbers: Sequence[str], coords: Mapping[str, Any]
+) -> xr.Dataset:
+    """An array as a Dataset, one variable per entry of its dimension ``number``."""
+    return xr.DataArray(values, {"number": list(numbers), **coords}, dims).to_dataset("number")
 
 
 def difference_table(
@@ -139,11 +176,8 @@ def difference_table(
     """
     order, _ = training_order(training)
     blocks = blocks_of([test], training)
-    judged = test["judged"].values[order]
     errors = test["error"].transpose("training", "window", "model", "measure", "channel")
-    cells: FloatArray = errors.values[order]
-    cells = np.concatenate([average_of(cells)[..., None], cells], axis=-1)
-    cells = np.where(judged[..., None, None, None], cells, np.nan)
+    cells = with_average(errors.where(test["judged"]).values[order])
 
     def ratio(drawn: FloatArray) -> FloatArray:
         middle = median_of(drawn.reshape(len(drawn), -1, *drawn.shape[3:]))
@@ -151,19 +185,33 @@ def difference_table(
             out: FloatArray = middle[:, :, None] / middle[:, None]
         return out
 
-    found = ratio(cells[None])[0]
     bounds = statistics.two_way_interval(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES)
-    changes = [values - 1.0 for values in (found, *bounds)]
-    dims = ("model", "other", "measure", "channel")
-    return xr.Dataset(
-        _columns(("change", "lower", "upper"), dims, changes),
-        coords={
-            "model": test["model"].values,
-            "other": test["model"].values,
-            "measure": test["measure"].values,
-            "channel": ["average", *map(str, test["channel"].values)],
-        },
-    )
+    coords = {
+        "model": test["model"].values,
+        "other": test["model"].values,
+        "measure": test["measure"].values,
+        "channel": _names(test),
+    }
+    values = np.stack([ratio(cells[None])[0], *bounds]) - 1.0
+    return _table(values, ("number", *coords), ("change", "lower", "upper"), coords)
+
+
+def _names(test: xr.Dataset) -> list[str]:
+    """Channels of a table: their average first."""
+    return ["average", *map(str, test["channel"].values)]
+
+
+def average_of(cells: FloatArray) -> FloatArray:
+    """Average of cells (…, channel) over the judged channels; NaN where a forecast diverged."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, as wanted
+        out: FloatArray = np.nanmean(cells, axis=-1)
+    return out
+
+
+def with_average(cells: FloatArray) -> FloatArray:
+    """Cells (…, channel) with their average before the first channel."""
+    return np.concatenate([average_of(cells)[..., None], cells], axis=-1)
 
 
 def blocks_of(tests: Sequence[xr.Dataset], training: xr.Dataset) -> tuple[int, int]:
@@ -177,17 +225,15 @@ def blocks_of(tests: Sequence[xr.Dataset], training: xr.Dataset) -> tuple[int, i
 
 def training_order(training: xr.Dataset) -> tuple[npt.NDArray[np.intp], int]:
     """Training sets in the order of their instants, and how many neighbours overlap."""
-    count = training.sizes["training"]
     if "run" not in training:
-        return np.arange(count), 1
+        return np.arange(training.sizes["training"]), 1
     runs, stops = training["run"].values.astype(str), training["stop"].values
-    reads = training["reads"].values
-    spans = list(zip(runs, stops - reads, stops, strict=True))
+    spans = list(zip(runs, stops - training["reads"].values, stops, strict=True))
     return np.lexsort((stops, runs)), statistics.overlap_block(spans)
 
 
 def median_of(cells: FloatArray) -> FloatArray:
-    """Median along the second axis, NaN left out."""
+    """Median along the second axis, NaN left out: a tenth of the time of ``nanmedian``."""
     ordered = np.sort(cells, axis=1)  # NaN last
     count = np.isfinite(ordered).sum(axis=1, keepdims=True)
     low, high = np.maximum(count - 1, 0) // 2, count // 2
@@ -222,12 +268,12 @@ def skill_table(
     ``mean`` and ``best_linear``, the linear baseline of least median ANRMSE; None if there are
     none.
     """
-    median = boxes["median"].sel(channel="average", drop=True)
+    median = boxes["median"].sel(channel="average", measure="nrmse", drop=True)
     named = {}
     for name, among in references_of(kinds).items():
-        errors = {model: float(median.sel(model=model, measure="nrmse")) for model in among}
-        if known := {model: error for model, error in errors.items() if np.isfinite(error)}:
-            named[name] = min(known, key=known.__getitem__)
+        errors = median.sel(model=among).dropna("model")
+        if errors.size:
+            named[name] = str(errors.idxmin("model").item())
     if not named:
         return None
     out = differences.sel(channel="average", other=list(named.values()), drop=True)
@@ -244,6 +290,12 @@ def references_of(kinds: Mapping[str, str]) -> dict[str, list[str]]:
     return out
 
 
+BOX = (
+    "median", "lower_quartile", "upper_quartile", "lower_whisker", "upper_whisker", "mean",
+    "count", "left_out",
+)  # fmt: skip
+
+
 def box_table(test: xr.Dataset) -> xr.Dataset:
     """Quartiles of the errors over all cells of a test set, over (model, measure, channel).
 
@@ -251,165 +303,135 @@ def box_table(test: xr.Dataset) -> xr.Dataset:
     channels that can be judged. ``training_nrmse`` counts the error in SD of the training, also
     that of a channel that barely moves.
     """
-    numbers = (
-        "median",
-        "lower_quartile",
-        "upper_quartile",
-        "lower_whisker",
-        "upper_whisker",
-        "mean",
-        "count",
-        "left_out",
-    )
-    names = ["average", *map(str, test["channel"].values)]
-    errors = test["error"].values[:, :, test["judged"].values]  # (model, measure, cell, channel)
-    values = np.full((len(numbers), *errors.shape[:2], len(names)), np.nan)
-    for m, k in np.ndindex(errors.shape[:2]):
-        columns = [average_of(errors[m, k]), *errors[m, k].T]
-        for c, column in enumerate(columns):
-            try:
-                box = statistics.box_statistics(column)
-            except DataError:  # never judged: a line that is slack in all windows
-                values[-2:, m, k, c] = 0, column.size
-                continue
-            values[:, m, k, c] = [getattr(box, number) for number in numbers]
-    return xr.Dataset(
-        _columns(numbers, ("model", "measure", "channel"), values),
-        coords={"model": test["model"], "measure": test["measure"], "channel": names},
-    )
+
+    def box(column: FloatArray) -> list[float]:
+        try:
+            numbers = statistics.box_statistics(column)
+        except DataError:  # never judged: a line that is slack in all windows
+            return [np.nan] * (len(BOX) - 2) + [0, column.size]
+        return [getattr(numbers, number) for number in BOX]
+
+    cells = with_average(test["error"].values[:, :, test["judged"].values])
+    coords = {"model": test["model"], "measure": test["measure"], "channel": _names(test)}
+    values = np.apply_along_axis(box, 2, cells)  # (model, measure, number, channel)
+    return _table(values, ("model", "measure", "number", "channel"), BOX, coords)
 
 
-def average_of(cells: FloatArray) -> FloatArray:
-    """Average of cells (cell, channel) over the judged channels; NaN where a forecast diverged."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, as wanted
-        out: FloatArray = np.nanmean(cells, axis=-1)
+COVERAGE = ("inside", "below", "above", "relative_width")
+PARTS = ("inside", "width", "relative_width", "winkler", "crps")
+
+
+def band_tables(
+    test: xr.Dataset, calibration: xr.Dataset | None, level: float
+) -> dict[str, xr.Dataset]:
+    """How bands hold the measurement; empty without ensembles.
+
+    ``coverage`` over (model, against, channel) is the fraction of the instants at which a band
+    holds the measurement, and the truth where it is known, averages over all cells; with a
+    calibration the same of the calibrated band as ``calibrated_inside`` and so on. ``bands`` over
+    (model, band, part, channel) has coverage, width, Winkler score and CRPS of all instants, of
+    thirds by wave height, and of thirds of the horizon; it is left out where no band can be judged.
+    """
+    ensembles, judged = test["ensemble"].values, test["judged"].values
+    if not ensembles.size:
+        return {}
+
+    def cells(key: str) -> FloatArray:
+        values = test[key].values
+        out: FloatArray = np.broadcast_to(values, (*judged.shape, *values.shape[1:]))[judged]
+        return out
+
+    against = {key: cells(key) for key in ("measured", "truth") if key in test}
+    known = "wave_height" in test and np.isfinite(test["wave_height"]).all()
+    waves = cells("wave_height") if known else None
+    bands = {"members": None} | ({} if calibration is None else {"calibrated": calibration})
+    rows, parts = {}, {}
+    for cell in product(ensembles, bands):
+        lower, upper = (bound[judged] for bound in band_of(test, cell[0], bands[cell[1]]))
+        rows[cell] = [_coverage_row(lower, upper, each) for each in against.values()]
+        if not np.isnan(lower).any(axis=(1, 2)).all():  # lost, or nothing to calibrate on
+            parts[cell] = statistics.coverage_table(lower, upper, against["measured"], level, waves)
+    coords = {"model": ensembles, "against": list(against), "channel": _names(test)}
+    tables = []
+    for band in bands:
+        keys = [key if band == "members" else f"{band}_{key}" for key in COVERAGE]
+        values = [rows[model, band] for model in ensembles]
+        tables.append(_table(values, ("model", "against", "number", "channel"), keys, coords))
+    out = {"coverage": xr.merge(tables)}
+    if parts:
+        names = next(iter(parts.values())).parts
+        nothing = np.full((len(PARTS), len(names), test.sizes["channel"]), np.nan)
+        values_of = {
+            cell: np.stack([getattr(each, key) for key in PARTS]) for cell, each in parts.items()
+        }
+        grid = [[values_of.get((model, band), nothing) for band in bands] for model in ensembles]
+        coords = {
+            "model": ensembles,
+            "band": list(bands),
+            "part": list(names),
+            "channel": test["channel"].values,
+        }
+        dims = ("model", "band", "number", "part", "channel")
+        out["bands"] = _table(grid, dims, PARTS, coords)
     return out
 
 
-def coverage_table(test: xr.Dataset, calibration: xr.Dataset | None = None) -> xr.Dataset:
-    """Fraction of the instants at which the band holds the measurement, and the truth where known.
-
-    Over (model, against, channel), averages over all cells. With a calibration, the same of the
-    calibrated band: ``calibrated_inside`` and so on.
-    """
-    sides = ["measured", *(["truth"] if "truth" in test else [])]
-    numbers = ("inside", "below", "above", "relative_width")
-    names = ["average", *map(str, test["channel"].values)]
-    judged, ensembles = test["judged"].values, test["ensemble"].values
-    variables: dict[str, Any] = {}
-    bands = {"": None} if calibration is None else {"": None, "calibrated_": calibration}
-    for prefix, band in bands.items():
-        values = np.full((len(numbers), len(ensembles), len(sides), len(names)), np.nan)
-        for m, model in enumerate(ensembles):
-            lower, upper = (bound[judged] for bound in band_of(test, model, band))
-            for s, side in enumerate(sides):
-                values[:, m, s] = _coverage_row(test, side, lower, upper, numbers)
-        keys = [prefix + number for number in numbers]
-        variables |= _columns(keys, ("model", "against", "channel"), values)
-    return xr.Dataset(variables, coords={"model": ensembles, "against": sides, "channel": names})
-
-
-def band_parts(test: xr.Dataset, calibration: xr.Dataset | None, level: float) -> xr.Dataset | None:
-    """Coverage, width, Winkler score and CRPS of bands over (model, band, part, channel).
-
-    Parts are all instants, thirds by wave height, and thirds of the horizon; None where no band
-    can be judged.
-    """
-    judged, ensembles = test["judged"].values, test["ensemble"].values
-    shape = (*judged.shape, *test["measured"].shape[1:])
-    measured = np.broadcast_to(test["measured"].values, shape)[judged]
-    waves = None
-    if "wave_height" in test and np.isfinite(test["wave_height"]).all():
-        waves = np.broadcast_to(test["wave_height"].values, shape[:-1])[judged]
-    numbers = ("inside", "width", "relative_width", "winkler", "crps")
-    bands = ("members",) if calibration is None else ("members", "calibrated")
-    tables: dict[tuple[int, int], CoverageTable] = {}
-    for m, model in enumerate(ensembles):
-        for b, found in enumerate((None, calibration)[: len(bands)]):
-            lower, upper = (bound[judged] for bound in band_of(test, model, found))
-            if np.isnan(lower).any(axis=(1, 2)).all():
-                continue  # lost everywhere, or nothing to calibrate on
-            tables[m, b] = statistics.coverage_table(lower, upper, measured, level, waves)
-    if not tables:
-        return None
-    parts = next(iter(tables.values())).parts
-    names = list(test["channel"].values)
-    values = np.full((len(numbers), len(ensembles), len(bands), len(parts), len(names)), np.nan)
-    for (m, b), table in tables.items():
-        values[:, m, b] = [getattr(table, number) for number in numbers]
-    return xr.Dataset(
-        _columns(numbers, ("model", "band", "part", "channel"), values),
-        coords={
-            "model": ensembles,
-            "band": list(bands),
-            "part": list(parts),
-            "channel": names,
-        },
-    )
+def _coverage_row(lower: FloatArray, upper: FloatArray, against: FloatArray) -> list[list[float]]:
+    """Coverage over the judged cells, shape (number, 1 + channel): the average first."""
+    known = np.isfinite(against).all(axis=(0, 1))
+    band = statistics.coverage(lower, upper, np.where(known, against, 0.0))
+    rows = []
+    for number in COVERAGE:
+        each = getattr(band, number)
+        each = np.where(known & np.isfinite(each), each, np.nan)
+        rows.append([float(average_of(average_of(each))), *average_of(each.T)])
+    return rows
 
 
 def band_of(
     test: xr.Dataset, model: str, calibration: xr.Dataset | None
 ) -> tuple[FloatArray, FloatArray]:
     """Bounds of a band in a test set, (training, window, time, channel): calibrated, or not."""
-    test = test.sel(ensemble=model)
-    lower, upper = test["lower"].values, test["upper"].values
+    own = test.sel(ensemble=model)
+    lower, upper = own["lower"].values, own["upper"].values
     if calibration is None:
         return lower, upper
-    mean, std = test["mean"].sel(model=model).values, test["std"].values
-    calibration = calibration.sel(ensemble=model)
-    margin = calibration["margin"].values[:, None, None, :]
+    margins = calibration.sel(ensemble=model)
     scale = None
-    if "law" in calibration:
-        laws = (calibration["floor"].values, calibration["law"].values)
-        each = zip(std, *laws, test["envelope"].values, strict=True)
-        scale = np.stack([band_scale(*row) for row in each])
-    elif "floor" in calibration:
-        scale = band_scale(std, calibration["floor"].values[:, None, None, :])
-    return calibrated_bounds(mean, lower, upper, margin, scale)
+    if "floor" in margins:
+        keys = [(own, "std"), (margins, "floor")]
+        keys += [(margins, "law"), (own, "envelope")] if "law" in margins else []
+        each = zip(*(data[key].values for data, key in keys), strict=True)
+        scale = np.stack([band_scale(*of_training) for of_training in each])
+    mean = test["mean"].sel(model=model).values
+    return calibrated_bounds(mean, lower, upper, margins["margin"].values[:, None, None], scale)
 
 
-def _coverage_row(
-    test: xr.Dataset, side: str, lower: FloatArray, upper: FloatArray, numbers: Sequence[str]
-) -> FloatArray:
-    """Coverage over the judged cells, shape (number, 1 + channel): the average first."""
-    judged = test["judged"].values
-    against = np.broadcast_to(test[side].values, (*judged.shape, *test[side].shape[1:]))
-    known = np.isfinite(against).all(axis=(0, 1, 2))
-    band = statistics.coverage(lower, upper, np.where(known, against, 0.0)[judged])
-    rows = []
-    for number in numbers:
-        each = getattr(band, number)
-        each = np.where(known & np.isfinite(each), each, np.nan)
-        rows.append([average_of(average_of(each)), *average_of(each.T)])
-    return np.array(rows)
+TREND = ("slope", "lower", "upper", "change", "kendall_tau", "p_value", "block_length")
+TREND_LINES = ("error_mean", "lower_quartile", "upper_quartile")
 
 
 def trend_table(test: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
     """Test whether ε(t), averaged over all cells, grows with the age of the forecast."""
-    numbers = ("slope", "lower", "upper", "change", "kendall_tau", "p_value", "block_length")
-    names = ("error_mean", "lower_quartile", "upper_quartile")
     time, shape = test["time"].values, (test.sizes["band"], test.sizes["model"])
-    found = np.full((len(numbers), *shape), np.nan)
-    series = np.full((len(names), *shape, time.size), np.nan)
-    errors = test["error_over_time"].values[:, :, test["judged"].values]
-    for b, m in np.ndindex(shape):
-        cells = errors[m, b][np.isfinite(errors[m, b]).all(axis=1)]
+    tests = np.full((*shape, len(TREND)), np.nan)
+    series = np.full((*shape, len(TREND_LINES), time.size), np.nan)
+    errors = test["error_over_time"].transpose("band", "model", ...).values
+    errors = errors[:, :, test["judged"].values]
+    for place in np.ndindex(shape):
+        cells = errors[place][np.isfinite(errors[place]).all(axis=1)]
         if not len(cells):
             continue
-        series[:, b, m] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
+        series[place] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeakeepWarning)  # the block length is in the table
             trend = statistics.trend_test(
-                series[0, b, m], rng=rng, time=time, n_series=TREND_SERIES
+                series[place][0], rng=rng, time=time, n_series=TREND_SERIES
             )
-        found[:, b, m] = [getattr(trend, number) for number in numbers]
-    return xr.Dataset(
-        _columns(numbers, ("band", "model"), found)
-        | _columns(names, ("band", "model", "time"), series),
-        coords={"band": test["band"].values, "model": test["model"].values, "time": time},
-    )
+        tests[place] = [getattr(trend, number) for number in TREND]
+    coords = {"band": test["band"].values, "model": test["model"].values}
+    lines = _table(series, (*coords, "number", "time"), TREND_LINES, {**coords, "time": time})
+    return xr.merge([_table(tests, (*coords, "number"), TREND, coords), lines])
 
 
 def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
@@ -435,47 +457,56 @@ DIVERGENCE = (
     "mean", "lower", "upper", "uncertainty", "of_series", "noise_floor",
     "noise_floor_lower", "noise_floor_upper", "block_length",
 )  # fmt: skip
+CURVES = (
+    "value", "measured_mean", "measured_lower", "measured_upper", "predicted_mean",
+    "predicted_lower", "predicted_upper",
+)  # fmt: skip
 
 
-def _divergences(
+def density_tables(
     test: xr.Dataset,
-    model: str,
     channels: Sequence[str],
     settings: StudySettings,
     name: str,
-    executor: Executor | None,
-) -> tuple[xr.Dataset, xr.Dataset]:
-    predicted, measured, diverged = joined(test, model)
-    segments = [test.sizes["time"]] * test.sizes["window"]
-    table = np.full((len(DIVERGENCE), len(VARIANTS), len(channels)), np.nan)
-    curves = np.full((7, len(channels), 512), np.nan)
-    inside = predicted.reshape(len(predicted), len(segments), segments[0], len(channels))
-    moves = (np.ptp(inside, axis=2).max(axis=1) > 0).all(axis=0) & (np.ptp(measured, axis=0) > 0)
-    # What stands still has no density.
-    judged = np.flatnonzero(moves if len(predicted) else []).tolist()
-    # Contiguous, as they are in a worker: sums are then the same to the last bit.
-    items = [(channels[c], predicted[:, :, c].copy("C"), measured[:, c].copy()) for c in judged]
-    found = in_order(_channel_densities, (settings, name, segments), items, executor)
-    for c, each in zip(judged, found, strict=True):
-        if isinstance(each, str):  # a series that stands still has no density
+    executor: Executor | None = None,
+) -> dict[str, xr.Dataset]:
+    """Divergences of forecasts from the measurement, and the densities, per model and channel."""
+    windows, steps = test.sizes["window"], test.sizes["time"]
+    items, diverged = {}, []
+    for model in settings.models:
+        predicted, measured, lost = joined(test, model)
+        diverged.append(lost)
+        for c, channel in enumerate(channels if len(predicted) else ()):
+            # Contiguous, as they are in a worker: sums are then the same to the last bit.
+            p, m = predicted[:, :, c].copy("C"), measured[:, c].copy()
+            moves = np.ptp(p.reshape(-1, windows, steps), axis=2).max(axis=1) > 0
+            if moves.all() and np.ptp(m) > 0:  # what stands still has no density
+                items[model, channel] = channel, p, m
+    data = settings, name, [steps] * windows
+    known = {}
+    rows = in_order(_channel_densities, data, list(items.values()), executor)
+    for (model, channel), each in zip(items, rows, strict=True):
+        if isinstance(each, str):
             warn(
-                f"the densities of {channels[c]} as forecast by '{model}' and as measured, over "
+                f"the densities of {channel} as forecast by '{model}' and as measured, over "
                 f"the windows of '{name}', cannot be compared and are left out: {each}"
             )
         else:
-            table[:, :, c], curves[:, c] = each
-    divergence = xr.Dataset(
-        _columns(DIVERGENCE, ("variant", "channel"), table),
-        coords={"variant": list(VARIANTS), "channel": list(channels)},
+            known[model, channel] = each
+    nothing = np.full((len(VARIANTS), len(DIVERGENCE)), np.nan), np.full((len(CURVES), 512), np.nan)
+    table, curves = (
+        [[known.get((m, c), nothing)[part] for c in channels] for m in settings.models]
+        for part in (0, 1)
     )
-    divergence["diverged_series"] = diverged
-    keys = ("value", *(f"{side}_{k}" for side in ("measured", "predicted")
-                       for k in ("mean", "lower", "upper")))  # fmt: skip
-    densities = xr.Dataset(
-        _columns(keys, ("channel", "grid"), curves),
-        coords={"channel": list(channels)},
-    )
-    return divergence, densities
+    coords = {"model": list(settings.models), "channel": list(channels)}
+    both = {**coords, "variant": list(VARIANTS)}
+    divergence = _table(table, (*both, "number"), DIVERGENCE, both)
+    divergence["diverged_series"] = ("model", diverged)
+    densities = _table(curves, (*coords, "number", "grid"), CURVES, coords)
+    return {
+        "divergence": divergence.assign_attrs(test=name),
+        "densities": densities.assign_attrs(test=name),
+    }
 
 
 def _channel_densities(
@@ -484,13 +515,13 @@ def _channel_densities(
     """Divergences and densities of one channel of one model, or why there are none."""
     settings, name, segments = data
     channel, p, m = item
-    found = {}
+    variants = {}
     try:
         with warnings.catch_warnings():
             # Caps of the block length and coarse grids: the table prints the length.
             warnings.simplefilter("ignore", SeakeepWarning)
             for variant, choice in VARIANTS.items():
-                found[variant] = statistics.jsd_interval(
+                variants[variant] = statistics.jsd_interval(
                     p,
                     m,
                     block_length=choice["block_length"],
@@ -501,11 +532,11 @@ def _channel_densities(
                 )
     except (DataError, RequestError) as error:
         return str(error)
-    paper, beyond = found["paper"], (1 - settings.statistics.level) / 2
+    paper, beyond = variants["paper"], (1 - settings.statistics.level) / 2
     curves = [paper.grid]
     for drawn in (paper.measured, paper.predicted.reshape(-1, paper.grid.size)):
         curves += [drawn.mean(axis=0), *np.quantile(drawn, [beyond, 1 - beyond], axis=0)]
-    table = [[getattr(each, number) for each in found.values()] for number in DIVERGENCE]
+    table = [[getattr(each, number) for number in DIVERGENCE] for each in variants.values()]
     return np.array(table), np.stack(curves)
 
 
@@ -539,8 +570,17 @@ def wave_frequency(elevation: npt.ArrayLike, dt: float) -> float:
 
 def is_regular(groups: Mapping[str, xr.Dataset], test: str) -> bool:
     """Whether all windows of a test set lie in runs of regular waves of known frequency."""
-    names = [str(run) for run in groups[f"tests/{test}"]["run"].values]
-    return bool(np.isfinite(groups["runs"]["wave_frequency"].sel(run=names)).all())
+    return bool(np.isfinite(_frequencies(groups, test)).all())
+
+
+def _frequencies(groups: Mapping[str, xr.Dataset], test: str) -> FloatArray:
+    """Frequency of the regular wave in each window, Hz; NaN in other waves."""
+    runs = groups[f"tests/{test}"]["run"].values.astype(str)
+    out: FloatArray = groups["runs"]["wave_frequency"].sel(run=runs).values
+    return out
+
+
+RESPONSE = ("error_offset", "error_wave", "error_rest", "amplitude_ratio", "phase_lead")
 
 
 def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
@@ -551,62 +591,51 @@ def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
     the measurement, degrees.
     """
     data = groups[f"tests/{test}"]
-    parts = np.array([_parts(groups, test, model) for model in data["model"].values])
-    keys = ("error_offset", "error_wave", "error_rest", "amplitude_ratio", "phase_lead")
-    return xr.Dataset(
-        _columns(keys, ("model", "channel"), parts.swapaxes(0, 1)),
-        coords={"model": data["model"], "channel": data["channel"]},
-    )
-
-
-def _parts(groups: Mapping[str, xr.Dataset], test: str, model: str) -> list[FloatArray]:
-    """Errors and responses of a model, each of shape (channel,)."""
-    judged = groups[f"tests/{test}"]["judged"].values
-    squares, responses = _responses(groups, test, model)
-    known, answer = squares[:, judged], responses[judged]
-    lost = np.isnan(known).all(axis=(0, 1))
-    known[..., lost], answer[..., lost] = 0.0, 1.0
-    errors = np.sqrt(np.nanmean(np.maximum(known, 0.0), axis=1))
-    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
-        warnings.simplefilter("ignore", RuntimeWarning)  # a constant forecast has no phase
-        direction = np.nanmean(answer / np.abs(answer), axis=0)
-    columns_of = [*errors, np.nanmedian(np.abs(answer), axis=0), np.degrees(np.angle(direction))]
-    return [np.where(lost, np.nan, each) for each in columns_of]
+    parts = []
+    for model in data["model"].values:
+        squares, answer = (
+            each[..., data["judged"].values, :] for each in _responses(groups, test, model)
+        )
+        with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+            # A constant forecast has no phase, and nothing judged no mean.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            errors = np.sqrt(np.nanmean(np.maximum(squares, 0.0), axis=1))
+            phase = np.degrees(np.angle(np.nanmean(answer / np.abs(answer), axis=0)))
+            parts.append([*errors, np.nanmedian(np.abs(answer), axis=0), phase])
+    coords = {"model": data["model"], "channel": data["channel"]}
+    return _table(parts, ("model", "number", "channel"), RESPONSE, coords)
 
 
 def _responses(
     groups: Mapping[str, xr.Dataset], test: str, model: str
-) -> tuple[FloatArray, npt.NDArray[np.complex128]]:
-    """:func:`_in_waves` over (training, window, channel); NaN where one is not judged."""
-    data = groups[f"tests/{test}"]
-    frequencies = groups["runs"]["wave_frequency"].sel(run=data["run"].values.astype(str)).values
-    time, measured = data["time"].values, data["measured"].values
-    one = data.sel(model=model, measure="nrmse")
-    forecasts, slack = one["mean"].values, np.isnan(one["error"].values)
+) -> tuple[FloatArray, ComplexArray]:
+    """Squared error by parts, and forecast over measurement in the wave.
+
+    Returns
+    -------
+    squares : ndarray, shape (3, training, window, channel)
+        Of the offset, of the wave and of the rest; NaN where a cell or a channel is not judged.
+    answer : ndarray of complex, shape (training, window, channel)
+    """
+    data = groups[f"tests/{test}"].sel(model=model)
+    time, measured, mean = (data[key].values for key in ("time", "measured", "mean"))
+    slack = np.isnan(data["error"].sel(measure="nrmse").values)
     squares = np.full((3, *slack.shape), np.nan)
-    responses = np.full(slack.shape, np.nan, dtype=complex)
-    for cell in zip(*np.nonzero(data["judged"].values), strict=True):
-        place = frequencies[cell[1]], forecasts[cell], measured[cell[1]]
-        squares[:, *cell], responses[cell] = _in_waves(time, *place)
-    squares[:, slack], responses[slack] = np.nan, np.nan
-    return squares, responses
-
-
-def _in_waves(
-    time: FloatArray, frequency: float, predicted: FloatArray, truth: FloatArray
-) -> tuple[FloatArray, npt.NDArray[np.complex128]]:
-    """Squared error by parts, shape (3, channel), and forecast over measurement in the wave."""
-    turn = 2 * np.pi * frequency * time
-    basis = np.stack([np.ones_like(time), np.cos(turn), np.sin(turn)], axis=1)
-    orthonormal, triangle = np.linalg.qr(basis)
-    error = predicted - truth
-    inside = (orthonormal.T @ error) ** 2
-    total = np.sum(error**2, axis=0)
-    found = np.stack([inside[0], inside[1:].sum(axis=0), total - inside.sum(axis=0)])
-    found /= time.size * truth.var(axis=0, ddof=1)
-    # The first of an orthonormal basis of (1, cos, sin) is the mean; amplitudes need (1, …).
-    complex_of = [np.linalg.solve(triangle, orthonormal.T @ each) for each in (predicted, truth)]
-    return found, np.divide(*[each[1] - 1j * each[2] for each in complex_of])
+    answer = np.full(slack.shape, np.nan, dtype=complex)
+    for window, frequency in enumerate(_frequencies(groups, test)):
+        turn = 2 * np.pi * frequency * time
+        basis = np.stack([np.ones_like(time), np.cos(turn), np.sin(turn)], axis=1)
+        orthonormal, triangle = np.linalg.qr(basis)
+        truth, forecasts = measured[window], mean[:, window]
+        error = forecasts - truth
+        inside, total = (orthonormal.T @ error) ** 2, np.sum(error**2, axis=1)
+        parts = inside[:, 0], inside[:, 1:].sum(axis=1), total - inside.sum(axis=1)
+        squares[:, :, window] = np.stack(parts) / (time.size * truth.var(axis=0, ddof=1))
+        # The first of an orthonormal basis of (1, cos, sin) is the mean; amplitudes need (1, …).
+        own, known = (np.linalg.solve(triangle, orthonormal.T @ x) for x in (forecasts, truth))
+        answer[:, window] = (own[:, 1] - 1j * own[:, 2]) / (known[1] - 1j * known[2])
+    squares[:, slack], answer[slack] = np.nan, np.nan
+    return squares, answer
 
 
 def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> FloatArray:

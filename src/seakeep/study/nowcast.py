@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import cast
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, whole_number
+from seakeep.arrays import whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
@@ -66,19 +66,25 @@ def nowcasts(
     RequestError
         If a model cannot serve, or a run is too short.
     """
-    served = {name: _servable(name, model) for name, model in models.items()}
+    every = {}
+    for name, model in models.items():
+        if (follows := served(model)) is None:
+            raise RequestError(
+                f"{name} is a {model.kind} model, which cannot be put into service: it has no "
+                "delayed states to estimate. Name a Hankel or ARX model."
+            )
+        every[name] = follows
     prepared = load_prepared(campaign, names=list(runs) or campaign.test_runs)
     warn_of_runs(prepared.values(), {c for m in models.values() for c in (*m.states, *m.inputs)})
+    longest = steps or f"{PERIODS} T"
     out: dict[str, list[xr.Dataset]] = {name: [] for name in models}
-    every, longest = list(product(served, prepared)), steps or f"{PERIODS} T"
-    for done, (name, key) in enumerate(every, 1):
-        model = served[name]
-        count = samples_of(longest, campaign, prepared.values(), model.signature.dt, "steps")
-        found = nowcast(model, prepared[key], count, share=share, level=level)
-        out[name].append(found.assign_coords(run=key))
+    for done, (name, key) in enumerate(product(every, prepared), 1):
+        dt = every[name].signature.dt
+        count = samples_of(longest, campaign, prepared.values(), dt, "steps")
+        out[name].append(nowcast(every[name], prepared[key], count, share=share, level=level))
         if progress is not None:
-            progress(done, len(every), f"{name}, {key}")
-    return {name: xr.concat(each, "run") for name, each in out.items()}
+            progress(done, len(every) * len(prepared), f"{name}, {key}")
+    return {name: xr.concat(each, xr.Variable("run", list(prepared))) for name, each in out.items()}
 
 
 def nowcast(
@@ -130,50 +136,33 @@ def nowcast(
     for at in range(last + 1):
         live.step(u[at], y[at])
         if at in starts:
-            found = live.forecast(steps, level=level)
-            statistics = np.stack([found[each].values for each in signature.states], axis=-1)
+            forecast = live.forecast(steps, level=level)
+            statistics = np.stack([forecast[each].values for each in signature.states], axis=-1)
             mean, std, lower, upper = statistics
             truth = y[at + 1 : at + steps + 1]
             squares += ((mean - truth) / spread) ** 2
             claimed += (std / spread) ** 2
             inside += (lower <= truth) & (truth <= upper)
     error = np.sqrt(squares / len(starts))
-    skill = {
-        "error": error,
-        "claimed": np.sqrt(claimed / len(starts)),
-        "coverage": 100.0 * inside / len(starts),
-        "lead_time": signature.dt * held_samples(error <= share),
-    }
-    attrs = {"share": share, "level": level, "starts": len(starts)}
-    return labelled_skill(skill, signature.dt, signature.states).assign_attrs(attrs)
-
-
-def labelled_skill(
-    values: Mapping[str, FloatArray],
-    dt: float,
-    states: Sequence[str],
-    before: tuple[str, ...] = (),
-) -> xr.Dataset:
-    """Skill against lead time as a Dataset; `before` are dimensions before lead and channel."""
-    units = {"error": "training SD", "claimed": "training SD", "coverage": "%", "lead_time": "s"}
-    dims = dict.fromkeys(units, (*before, "lead", "channel"))
-    dims["lead_time"] = (*before, "channel")
-    leads = dt * np.arange(1, values["error"].shape[-2] + 1)
+    over, sd = ("lead", "channel"), {"units": "training SD"}
+    leads = signature.dt * np.arange(1, steps + 1)
     return xr.Dataset(
-        {key: (dims[key], values[key], {"units": unit}) for key, unit in units.items()},
+        {
+            "error": (over, error, sd),
+            "claimed": (over, np.sqrt(claimed / len(starts)), sd),
+            "coverage": (over, 100.0 * inside / len(starts), {"units": "%"}),
+            "lead_time": ("channel", signature.dt * held_samples(error <= share), {"units": "s"}),
+        },
         coords={
             "lead": ("lead", leads, {"units": "s", "long_name": "lead time"}),
-            "channel": list(states),
+            "channel": list(signature.states),
         },
+        attrs={"share": share, "level": level, "starts": len(starts)},
     )
 
 
-def _servable(name: str, model: Model) -> Servable:
+def served(model: Any) -> Servable | None:
+    """What follows a run sample by sample: the model, or its members held; None without states."""
     if is_ensemble(model):
         return model.hold()
-    if not hasattr(model, "live"):
-        raise RequestError(
-            f"{name} is a {model.kind} model, which cannot be put into service: it has no delayed "
-            "states to estimate. Name a Hankel or ARX model."
-        )
-    return cast("Servable", model)
+    return model if hasattr(model, "live") else None

@@ -6,18 +6,17 @@ Windows are drawn once and are the same for all models.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
 from seakeep.campaign import load_prepared
 from seakeep.campaign.prepare import Progress
+from seakeep.check.parts import whole_span
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Needs, Spec
-from seakeep.models.calibration import BandScale
 from seakeep.models.selection import groups_of
 from seakeep.models.settings import periods_to_samples
 from seakeep.models.slow import warn_of_slow_motions
@@ -103,12 +102,13 @@ def _samples(run: xr.Dataset, span: tuple[float, float]) -> tuple[int, int]:
     return first, last
 
 
-def whole_span(run: xr.Dataset) -> tuple[float, float]:
-    """Span of a run that may be used at all: training and test spans together."""
-    spans = [run.attrs[key] for key in ("train_span", "test_span") if key in run.attrs]
-    if not spans:
-        return float(run["time"].values[0]), float(run["time"].values[-1])
-    return min(float(s[0]) for s in spans), max(float(s[1]) for s in spans)
+def trained_parts(sets: Iterable[TrainingSet], runs: Runs) -> dict[str, xr.Dataset]:
+    """Part of each run from the first to the last instant that some training sets may read."""
+    spans: dict[str, list[float]] = {}
+    for each in sets:
+        for name, begin, stop in each.spans:
+            spans.setdefault(name, []).extend((begin, stop))
+    return {name: between(runs[name], (min(ends), max(ends))) for name, ends in spans.items()}
 
 
 def choose_training(
@@ -119,33 +119,58 @@ def choose_training(
     inputs: Sequence[str],
 ) -> tuple[TrainingSet, ...]:
     """Choose what the models learn from."""
-    training = settings.training
+    training, groups = settings.training, dict[str, list[str]]()
     if training.scheme == "leave_out":
-        return _folds(settings, runs, names, needs, inputs)
-    if missing := [name for name in names if "train_span" not in runs[name].attrs]:
+        of_run = groups_of({n: runs[n] for n in names}, training.leave_out, inputs)
+        for name, group in of_run.items():
+            groups.setdefault(group, []).append(name)
+        if len(groups) < 2:
+            what = training.leave_out.replace("_", " ")
+            what = "run with its repetitions" if what == "auto" else what
+            raise RequestError(
+                f"training: leaving out a {what} of {', '.join(names)} leaves no run to learn "
+                "from. Give more runs, or use scheme = 'halves'."
+            )
+    elif missing := [name for name in names if "train_span" not in runs[name].attrs]:
         raise RequestError(
             f"training: the run '{missing[0]}' has no training span in the campaign. Give it "
             "role = 'train' or a span train = [start, end], or use scheme = 'leave_out'."
         )
-    spans = {name: _samples(runs[name], runs[name].attrs["train_span"]) for name in names}
-    pooled = training.scheme == "pooled"
+    times = {n: whole_span(runs[n]) if groups else runs[n].attrs["train_span"] for n in names}
+    spans = {name: _samples(runs[name], span) for name, span in times.items()}
     longest = max(spans, key=lambda name: spans[name][1] - spans[name][0])
-    for name in spans if pooled else [longest]:
-        _check_span(name, spans[name], needs, runs[name])
-    if pooled:
-        return (TrainingSet("pooled", tuple(_of_samples(runs, n, *s) for n, s in spans.items())),)
-    rng = random_stream(settings.study.seed, "training")
-    needed, remedy = training_samples(needs), "shorten the training length"
+    needed = training_samples(needs)
+    for name in [longest] if training.scheme == "halves" else names:
+        samples, dt = spans[name][1] - spans[name][0] + 1, float(runs[name].attrs["dt"])
+        if samples < needed:
+            raise RequestError(
+                f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
+                f"({samples * dt:g} s), and the largest draw of all models needs {needed} "
+                f"({needs.snapshots} snapshots and {needs.history} of delay history, "
+                f"{needed * dt:g} s). Shorten window or the delays, or give longer runs."
+            )
+    if groups:
+        return tuple(
+            TrainingSet(
+                f"without {group[0]}" + (f" (+{len(group) - 1})" if len(group) > 1 else ""),
+                tuple((name, *times[name]) for name in names if name not in group),
+                tuple(group),
+            )
+            for group in groups.values()
+        )
+
+    def part(name: str, first: int, last: int) -> tuple[str, float, float]:
+        time = runs[name]["time"].values
+        return name, float(time[first]), float(time[last])
+
+    if training.scheme == "pooled":
+        return (TrainingSet("pooled", tuple(part(name, *span) for name, span in spans.items())),)
+    rng, remedy = random_stream(settings.study.seed, "training"), "shorten the training length"
     places = _places("training", training, spans, needed, needs.snapshots, rng, remedy)
     return tuple(
-        TrainingSet(f"t{number:02d}", (_of_samples(runs, name, spans[name][0], stop),))
+        TrainingSet(f"t{number:02d}", (part(name, spans[name][0], stop),))
         for number, (name, stop) in enumerate(places)
     )
-
-
-def _of_samples(runs: Runs, name: str, first: int, last: int) -> tuple[str, float, float]:
-    time = runs[name]["time"].values
-    return name, float(time[first]), float(time[last])
 
 
 def _places(
@@ -159,15 +184,11 @@ def _places(
 ) -> list[tuple[str, int]]:
     """Feasible last samples in random order; with 'apart' no two within `width` samples."""
     drawn = asked.placement == "random"
-    every = [
-        (name, stop)
-        for name, (first, last) in spans.items()
-        for stop in (
-            range(first + needed - 1, last + 1)
-            if drawn
-            else range(last, first + needed - 2, -max(width, 1))
-        )
-    ]
+    step = 1 if drawn else max(width, 1)
+    every: list[tuple[str, int]] = []
+    for name, (first, last) in spans.items():
+        stops = range(last, first + needed - 2, -step)
+        every += [(name, stop) for stop in (reversed(stops) if drawn else stops)]
     count = len(every) if asked.windows is None else asked.windows
     if drawn and count > len(every):
         raise RequestError(
@@ -175,48 +196,6 @@ def _places(
             f"for fewer, or {remedy}."
         )
     return [every[i] for i in rng.permutation(len(every))[:count]]
-
-
-def _check_span(name: str, span: tuple[int, int], needs: Needs, run: xr.Dataset) -> None:
-    samples, needed = span[1] - span[0] + 1, training_samples(needs)
-    if samples < needed:
-        dt = float(run.attrs["dt"])
-        raise RequestError(
-            f"training: no window is feasible in '{name}'. Its span holds {samples} samples "
-            f"({samples * dt:g} s), and the largest draw of all models needs {needed} "
-            f"({needs.snapshots} snapshots and {needs.history} of delay history, "
-            f"{needed * dt:g} s). Shorten window or the delays, or give longer runs."
-        )
-
-
-def _folds(
-    settings: StudySettings,
-    runs: Runs,
-    names: Sequence[str],
-    needs: Needs,
-    inputs: Sequence[str],
-) -> tuple[TrainingSet, ...]:
-    groups: dict[str, list[str]] = {}
-    left_out = settings.training.leave_out
-    for name, group in groups_of({n: runs[n] for n in names}, left_out, inputs).items():
-        groups.setdefault(group, []).append(name)
-    if len(groups) < 2:
-        what = "run with its repetitions" if left_out == "auto" else left_out.replace("_", " ")
-        raise RequestError(
-            f"training: leaving out a {what} of {', '.join(names)} leaves no run to learn "
-            "from. Give more runs, or use scheme = 'halves'."
-        )
-    spans = {name: whole_span(runs[name]) for name in names}
-    for name in names:
-        _check_span(name, _samples(runs[name], spans[name]), needs, runs[name])
-    return tuple(
-        TrainingSet(
-            f"without {group[0]}" + (f" (+{len(group) - 1})" if len(group) > 1 else ""),
-            tuple((name, *spans[name]) for name in names if name not in group),
-            tuple(group),
-        )
-        for group in groups.values()
-    )
 
 
 def choose_tests(
@@ -277,13 +256,10 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
     """
     shares = []
     for i, (run, begin, end) in enumerate(spans):
-        edges: npt.NDArray[np.float64] = np.linspace(begin, end, 201)
-        middle = 0.5 * (edges[1:] + edges[:-1])
-        covered = np.zeros(middle.size, dtype=bool)
-        for k, (other, first, last) in enumerate(spans):
-            if k != i and other == run:
-                covered |= (middle >= first) & (middle <= last)
-        shares.append(covered.mean())
+        middle = begin + (end - begin) * (np.arange(200) + 0.5) / 200
+        others = [span[1:] for k, span in enumerate(spans) if k != i and span[0] == run]
+        covered = [(first <= middle) & (middle <= last) for first, last in others]
+        shares.append(np.any([np.zeros(200, bool), *covered], axis=0).mean())
     return float(np.mean(shares)) if shares else 0.0
 
 
@@ -309,49 +285,34 @@ class Plan:
 
     Parameters
     ----------
-    digest : str
-        Of the study.
+    settings : StudySettings
+        What was asked for.
     states, inputs : tuple of str
         Channels.
     dt, encounter_period : float
         s.
-    level : float
-        Probability of the bands.
     models : dict of str to ResolvedModel
         Specs, and where their settings come from.
+    needs : Needs
+        Samples of the largest draw of all models.
     training : tuple of TrainingSet
         Training data of the members.
     tests : dict of str to tuple of TestWindow
         What they are judged on.
-    shown : int
-        Windows of the first test set whose members are kept; one of each further set.
-    needs : Needs
-        Samples of the largest draw of all models.
     calibrated_on : tuple of str
         Runs that train, if bands are to be calibrated on them.
-    scale : {"spread", "constant", "learnt"}
-        What the half-width of calibrated bands follows.
-    eigenvalues : bool
-        Whether those of every model are kept.
-    nowcast : bool
-        Whether models are judged in service too.
     """
 
-    digest: str
+    settings: StudySettings
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     dt: float
     encounter_period: float
-    level: float
     models: dict[str, ResolvedModel]
+    needs: Needs
     training: tuple[TrainingSet, ...]
     tests: dict[str, tuple[TestWindow, ...]]
-    shown: int
-    needs: Needs
     calibrated_on: tuple[str, ...] = ()
-    scale: BandScale = "spread"
-    eigenvalues: bool = True
-    nowcast: bool = False
 
     @property
     def specs(self) -> dict[str, Spec]:
@@ -363,18 +324,25 @@ class Plan:
         """Names of the models that have members."""
         return [name for name, each in self.models.items() if each.is_ensemble]
 
-    def is_shown(self, training: int, test: str, window: int) -> bool:
-        """Whether the members of a cell are kept for figures."""
-        wanted = self.shown if test == next(iter(self.tests)) else min(self.shown, 1)
-        run, total = self.tests[test][window].run, len(self.tests[test])
-        valid = (k for k, each in enumerate(self.training) if each.may_test(run))
-        spread_over_runs = np.linspace(0, total - 1, min(wanted, total)).round()
-        return window in spread_over_runs and next(valid, None) == training
+    def shown(self, test: str) -> dict[int, int]:
+        """Windows of a test set whose members are kept for figures, and the training set of each.
+
+        Of the first test set as many as the settings ask for, of each further set one.
+        """
+        wanted = self.settings.output.shown_windows
+        wanted = wanted if test == next(iter(self.tests)) else min(wanted, 1)
+        windows = self.tests[test]
+        out = {}
+        for k in np.linspace(0, len(windows) - 1, min(wanted, len(windows))).round().astype(int):
+            first = (t for t, each in enumerate(self.training) if each.may_test(windows[k].run))
+            out[int(k)] = next(first)
+        return out
 
 
 def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dict[str, xr.Dataset]]:
     """Prepare the runs of a study and choose its windows."""
     settings, campaign = study.settings, study.campaign
+    general = settings.study
     training_names = list(settings.training.runs) or campaign.training_runs
     testing = {name: _test_runs(study, name) for name in settings.tests}
     wanted = dict.fromkeys([*training_names, *(n for names in testing.values() for n in names)])
@@ -384,10 +352,8 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
     shared = next(iter(runs.values())).attrs
     dt = float(shared["dt"])
     # Prepared runs hold the period where their preparation counts in it.
-    period = settings.study.encounter_period or shared.get("encounter_period")
+    period = general.encounter_period or shared.get("encounter_period")
     period = period or campaign.encounter_period()
-    general = settings.study
-    aligned = can_align(campaign.settings, study.inputs)
     left_out = settings.training.scheme == "leave_out"
     models = {
         name: resolve_model(
@@ -396,15 +362,13 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
             dt,
             preset=general.preset,
             seed=general.seed,
-            aligned=aligned,
+            aligned=can_align(campaign.settings, study.inputs),
             folds=settings.training.leave_out if left_out else "auto",
         )
         for name, each in settings.models.items()
     }
-    specs = [each.spec for each in models.values()]
-    needs = needs_of(specs, dt)
+    needs = needs_of([each.spec for each in models.values()], dt)
     training = choose_training(settings, runs, training_names, needs, study.inputs)
-    default = "whole" if left_out else "test"
     tests = {
         name: choose_tests(
             name,
@@ -413,29 +377,30 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
             testing[name],
             steps=periods_to_samples(test.length, period, dt),
             needs=needs,
-            whole=(test.part or default) == "whole",
-            seed=settings.study.seed,
+            whole=(test.part or ("whole" if left_out else "test")) == "whole",
+            seed=general.seed,
         )
         for name, test in settings.tests.items()
     }
+    for name, windows in tests.items():
+        for window in windows:
+            if not any(each.may_test(window.run) for each in training):
+                raise RequestError(
+                    f"tests.{name}: no model may be tested on the run '{window.run}', because all "
+                    "learn from it. Leave it out of training.runs, or name other runs."
+                )
     plan = Plan(
-        digest=study.digest,
-        states=study.states,
-        inputs=study.inputs,
-        dt=dt,
-        encounter_period=period,
-        level=settings.statistics.level,
-        models=models,
-        training=training,
-        tests=tests,
-        shown=settings.output.shown_windows,
-        needs=needs,
-        calibrated_on=tuple(training_names) if settings.calibrates else (),
-        scale=settings.statistics.scale,
-        eigenvalues=settings.output.eigenvalues,
-        nowcast=settings.output.nowcast,
+        settings,
+        study.states,
+        study.inputs,
+        dt,
+        period,
+        models,
+        needs,
+        training,
+        tests,
+        tuple(training_names) if settings.calibrates else (),
     )
-    _check_pairs(plan)
     return plan, runs
 
 
@@ -482,16 +447,6 @@ def _check_channels(name: str, run: xr.Dataset, channels: list[str]) -> None:
             )
 
 
-def _check_pairs(plan: Plan) -> None:
-    for name, windows in plan.tests.items():
-        for window in windows:
-            if not any(each.may_test(window.run) for each in plan.training):
-                raise RequestError(
-                    f"tests.{name}: no model may be tested on the run '{window.run}', because all "
-                    "learn from it. Leave it out of training.runs, or name other runs."
-                )
-
-
 def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:
     """Warn once for a study, of the model and training set that hold the fewest slow periods."""
     least = None
@@ -504,12 +459,5 @@ def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:
                 least = trained, f"the training windows of '{model}' in '{training.name}'"
     if least is None:
         return
-    begins: dict[str, list[float]] = {}
-    for training in plan.training:
-        for name, begin, stop in training.spans:
-            begins.setdefault(name, []).extend((begin, stop))
-    parts = {
-        name: runs[name].sel(time=slice(min(ends) - 1e-6, max(ends) + 1e-6))
-        for name, ends in begins.items()
-    }
+    parts = trained_parts(plan.training, runs)
     warn_of_slow_motions(parts, list(plan.states), least[0], plan.encounter_period, least[1])

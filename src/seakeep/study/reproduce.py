@@ -318,70 +318,90 @@ def detrended_text(campaign: str) -> str:
     return "\n".join([head + text, *made])
 
 
+STUDY = """\
+# The paper's study on the virtual tank, {title}; written by `seakeep reproduce`.
+# {mark}: {kind}
+[study]
+name = "Virtual CK-14e, {title}"
+description = "HDMDc and BHDMDc of a moored vessel with a moon pool in head seas; data of the \
+virtual towing tank"
+campaign = "../campaign/{campaign}"{truth}
+preset = "{preset}"
+seed = {seed}
+
+[training]
+{training}
+
+[models.deterministic]
+kind = "hankel_dmdc"{alignment}
+
+[models.bayesian]
+kind = "bayesian_hankel_dmdc"
+n_members = {members}{alignment}
+
+[models.mean]
+kind = "mean"
+
+[models.hold_last]
+kind = "hold_last"
+
+[models.fir]
+kind = "fir"
+preset = "recommended"
+lead = "2 T"  # the same windows in all acts
+input_delays = "5 T"  # of them 3 T before the instant{alignment}
+
+[tests.irregular]
+waves = "irregular"
+label = "irregular"
+length = 15
+windows = {tests}
+part = "test"
+{regular}
+[statistics]
+n_series = {series}
+
+[output]
+paper = true
+"""
+REGULAR_TEST = """
+[tests.{name}]
+runs = ["{name}"]
+label = "regular, λ/L {ratio}"
+length = 5
+windows = {tests}
+startup = {startup}  # s: all acts have room for their delays, and the same windows
+"""
+
+
 def study_text(act: Act, size: Size, seed: int) -> str:
     """Study file of an act."""
-    paper = act.preset == "paper"
-    surge = "surge_with_drift" if act.without_drift else "surge"
-    aligned = f'alignment = {{ mode = "effective", surge = "measured", surge_channel = "{surge}" }}'
-    alignment = [aligned] if paper else []
-    halves = ['scheme = "halves"', f"windows = {size.training}", 'placement = "random"']
-    lines = [
-        f"# The paper's study on the virtual tank, {act.title}; written by `seakeep reproduce`.",
-        f"# {MARK}: {STUDY_FILE}",
-        "[study]",
-        f'name = "Virtual CK-14e, {act.title}"',
-        'description = "HDMDc and BHDMDc of a moored vessel with a moon pool in head seas; data '
-        'of the virtual towing tank"',
-        f'campaign = "../campaign/{"detrended/" if act.without_drift else ""}campaign.toml"',
-        *([] if act.without_drift else ['truth = "../campaign/truth"']),
-        f'preset = "{act.preset}"',
-        f"seed = {seed}",
-        "",
-        "[training]",
-        *(halves if paper else ['scheme = "leave_out"', 'leave_out = "run"']),
-        "",
-        "[models.deterministic]",
-        'kind = "hankel_dmdc"',
-        *alignment,
-        "",
-        "[models.bayesian]",
-        'kind = "bayesian_hankel_dmdc"',
-        f"n_members = {size.members if paper else min(size.members, CALIBRATED)}",
-        *alignment,
-        "",
-        "[models.mean]",
-        'kind = "mean"',
-        "",
-        "[models.hold_last]",
-        'kind = "hold_last"',
-        "",
-        "[models.fir]",
-        'kind = "fir"',
-        'preset = "recommended"',
-        'lead = "2 T"  # the same windows in all acts',
-        'input_delays = "5 T"  # of them 3 T before the instant',
-        *alignment,
-        "",
-        "[tests.irregular]",
-        'waves = "irregular"',
-        'label = "irregular"',
-        "length = 15",
-        f"windows = {size.tests}",
-        'part = "test"',
-        "",
+    training = 'scheme = "leave_out"\nleave_out = "run"'
+    alignment, members = "", min(size.members, CALIBRATED)
+    if act.preset == "paper":
+        training = f'scheme = "halves"\nwindows = {size.training}\nplacement = "random"'
+        surge, members = "surge_with_drift" if act.without_drift else "surge", size.members
+        how = f'mode = "effective", surge = "measured", surge_channel = "{surge}"'
+        alignment = f"\nalignment = {{ {how} }}"
+    regular = [
+        REGULAR_TEST.format(name=name, ratio=ratio, tests=size.tests, startup=STARTUP)
+        for name, ratio in REGULAR.items()
     ]
-    for name, ratio in REGULAR.items():
-        lines += [
-            f"[tests.{name}]",
-            f'runs = ["{name}"]',
-            f'label = "regular, λ/L {ratio}"',
-            "length = 5",
-            f"windows = {size.tests}",
-            f"startup = {STARTUP}  # s: all acts have room for their delays, and the same windows",
-            "",
-        ]
-    lines += ["[statistics]", f"n_series = {size.series}", "", "[output]", "paper = true", ""]
-    return "\n".join(lines)
+    return STUDY.format(
+        title=act.title,
+        mark=MARK,
+        kind=STUDY_FILE,
+        campaign="detrended/campaign.toml" if act.without_drift else "campaign.toml",
+        truth="" if act.without_drift else '\ntruth = "../campaign/truth"',
+        preset=act.preset,
+        seed=seed,
+        training=training,
+        alignment=alignment,
+        members=members,
+        tests=size.tests,
+        regular="".join(regular),
+        series=size.series,
+    )
 
 
 REGULAR = {"regular_1_5": "1.5", "regular_2": "2", "regular_3": "3"}

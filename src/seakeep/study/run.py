@@ -20,15 +20,17 @@ from seakeep.study.plan import Plan, make_plan, named, training_samples, warn_of
 from seakeep.study.settings import Study
 from seakeep.study.store import (
     RESULT,
-    Arrays,
+    Groups,
     StudyResult,
     UnitFolder,
     read_result,
-    relabel,
     versions,
     write_result,
 )
-from seakeep.study.units import Unit, choice_of, choose, collect, compute, units_of
+from seakeep.study.units import Unit, collect, compute_task, facts_of, tasks_of, units_of
+
+Data = tuple[Plan, dict[str, xr.Dataset], Groups]
+"""What workers read: the plan, the runs, and facts of the windows."""
 
 
 def run_study(
@@ -90,56 +92,58 @@ def run_study(
     hand_on = finished or (lambda result: None)
     folder = UnitFolder(out, study.digest)
     folder.check()
-    if (found := _finished(study, out, report)) is not None:
-        found = relabel(found, _labels(study))
-        hand_on(found)
-        return found
+    if (result := _finished(study, out, report)) is not None:
+        labels = _labels(study)
+        if any(result.attrs[key] != value for key, value in labels.items()):
+            return write_result(out, {**result.attrs, **labels}, result.groups, hand_on)
+        hand_on(result)
+        return result
     plan, runs = make_plan(study, named(report, "preparing "))
     warn_of_slow_study(plan, runs)
     taken = _taken(plan)
     folder.open(study.name)
     with folder.alone():
-        found = _finished(study, out, report)  # by another process, meanwhile
-        if found is None:
+        result = _finished(study, out, report)  # by another process, meanwhile
+        if result is None:
             units = units_of(plan)
-            _compute_all(plan, runs, folder, units, executor, report, taken)
+            facts = facts_of(study, plan, runs)
+            _compute_all((plan, runs, facts), folder, units, executor, report, taken)
             report(len(units), len(units), "statistics and densities")
             groups = describe_study(study, plan, runs)
             if "repeats" in groups:
                 warn(words_of_repeats(groups["repeats"]))
-            groups |= collect(study, plan, runs, lambda unit: _arrays(folder, unit))
+            groups |= collect(plan, facts, lambda unit: _groups(folder, unit))
             groups |= judge(groups, study.settings, list(plan.states), executor)
             if "statistics/lost" in groups:
-                words = words_of_lost(groups["statistics/lost"])
-                warn(words)
+                warn(words_of_lost(groups["statistics/lost"]))
             groups |= extra or {}
-            attributes = {**_attributes(study, plan, groups), **(notes or {})}
-            found = write_result(out, attributes, groups, hand_on)
+            attributes = {**_labels(study), **_attributes(study, plan), **(notes or {})}
+            result = write_result(out, attributes, groups, hand_on)
         else:
-            hand_on(found)
+            hand_on(result)
         folder.clear()
-    return found
+    return result
 
 
-def _arrays(folder: UnitFolder, unit: Unit) -> Arrays:
-    found = folder.read(unit.name)
-    if found is None:
+def _groups(folder: UnitFolder, unit: Unit) -> Groups:
+    groups = folder.read(unit.name)
+    if groups is None:
         raise SeakeepError(
-            f"the file {unit.name}.npz in {folder.folder} is missing or damaged. Run the study "
+            f"the file {unit.name}.nc in {folder.folder} is missing or damaged. Run the study "
             "again."
         )
-    return found
+    return groups
 
 
 def _finished(study: Study, out: Path, report: Progress) -> StudyResult | None:
     """The result of an earlier run, if there is one of the same study."""
     if not (out / RESULT).exists():
         return None
-    found = read_result(out)
-    if found.attrs.get("digest") != study.digest:
+    result = read_result(out)
+    if result.attrs.get("digest") != study.digest:
         return None
     report(1, 1, "finished before")
-    return found
+    return result
 
 
 def _labels(study: Study) -> dict[str, str]:
@@ -152,12 +156,12 @@ def _labels(study: Study) -> dict[str, str]:
     }
 
 
-def _attributes(
-    study: Study, plan: Plan, groups: Mapping[str, xr.Dataset]
-) -> dict[str, str | float | int]:
+def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
     general = study.settings.study
+    alignments = [getattr(spec, "alignment", None) for spec in plan.specs.values()]
+    # Measured output that a forecast reads after its start.
+    read = [each.surge_channel for each in alignments if each and each.surge == "measured"]
     return {
-        **_labels(study),
         "campaign": study.campaign.name,
         "preset": general.preset,
         "seed": general.seed,
@@ -168,16 +172,9 @@ def _attributes(
         "longest_training": training_samples(plan.needs) * plan.dt,
         "preparation": study.campaign.settings.preparation.model_dump_json(),
         "models": json.dumps({name: each.to_json() for name, each in plan.models.items()}),
-        "conditional_on": _conditional(plan),
+        "conditional_on": ", ".join(dict.fromkeys(read)),
         "versions": json.dumps(versions()),
     }
-
-
-def _conditional(plan: Plan) -> str:
-    """Measured output that a forecast reads after its start, through the alignment."""
-    alignments = [getattr(spec, "alignment", None) for spec in plan.specs.values()]
-    read = [each.surge_channel for each in alignments if each and each.surge == "measured"]
-    return ", ".join(dict.fromkeys(read))
 
 
 def _taken(plan: Plan) -> str:
@@ -196,39 +193,30 @@ def _taken(plan: Plan) -> str:
 
 
 def _compute_all(
-    plan: Plan,
-    runs: Mapping[str, xr.Dataset],
+    data: Data,
     folder: UnitFolder,
     units: list[Unit],
     executor: Executor | None,
     report: Progress,
     taken: str,
 ) -> None:
-    left = [unit for unit in units if not folder.has(unit.name)]
-    choices = {unit: choice_of(plan, unit) for unit in left}
-    todo = [each for each in dict.fromkeys(choices.values()) if each is not None]
-    todo = [each for each in todo if not folder.has(each.name)]
-    done, total = len(units) - len(left), len(units) + len(todo)
-    report(done, total, f"fitting and forecasting, {taken}")
-    # What is chosen serves several models: they wait for it.
-    ready = [unit for unit in left if (choice := choices[unit]) is None or choice not in todo]
-    known = {unit: choice for unit in ready if (choice := choices[unit]) is not None}
-    items: deque[tuple[Unit, Arrays | None]] = deque((unit, None) for unit in todo)
-    items.extend((u, _arrays(folder, known[u]) if u in known else None) for u in ready)
+    plan, *_ = data
+    left = [unit for unit in units if folder.read(unit.name) is None]
+    done, items = len(units) - len(left), deque(tasks_of(plan, left))
+    report(done, len(units), f"fitting and forecasting, {taken}")
     try:
-        for (unit, _), arrays in as_finished(_work, (plan, dict(runs)), items, executor):
-            folder.write(unit.name, arrays)
-            items.extend((each, arrays) for each in left if choices[each] == unit)
-            done += 1
-            what = "settings chosen" if unit.chooses else unit.model
-            report(done, total, f"{what}, training set {plan.training[unit.training].name}")
+        for task, computed in as_finished(_work, data, items, executor):
+            for unit, groups in zip(task, computed, strict=True):
+                folder.write(unit.name, groups)
+                done += 1
+                name = plan.training[unit.training].name
+                report(done, len(units), f"{unit.model}, training set {name}")
     except WorkerLostError as error:
         raise WorkerLostError(
             f"{error} What was finished is kept: the same command continues where it stopped."
         ) from None
 
 
-def _work(data: tuple[Plan, dict[str, xr.Dataset]], item: tuple[Unit, Arrays | None]) -> Arrays:
-    """Arrays of a unit, which come back to be written: a worker may have another disk."""
-    unit, choice = item
-    return choose(*data, unit) if unit.chooses else compute(*data, unit, choice)
+def _work(data: Data, task: tuple[Unit, ...]) -> list[Groups]:
+    """Groups of some units, which come back to be written: a worker may have another disk."""
+    return compute_task(*data, task)

@@ -24,7 +24,7 @@ from seakeep.sizes import MOST_SERIES
 from seakeep.study.resolve import mistakes_of
 from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 
-FORMAT = 7
+FORMAT = 8
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 Preset = Literal["paper", "recommended"]
@@ -272,8 +272,6 @@ class Study:
         for each in content["tests"].values():
             del each["label"]
         del content["output"]["paper"]
-        if not content["output"]["nowcast"]:  # results from before there was the key still hold
-            del content["output"]["nowcast"]
         content["channels"] = [list(self.states), list(self.inputs)]
         content["campaign"] = self.campaign.digest
         content["files"] = {n: self.campaign.checksum_of(n) for n in self.campaign.runs}
@@ -285,9 +283,6 @@ class Study:
                 if each.is_file()
             }
         content["format"] = FORMAT
-        kinds = {run.waves for run in self.campaign.settings.runs.values()}
-        if None in kinds and any(t.waves == "irregular" for t in self.settings.tests.values()):
-            content["waves_not_stated"] = "irregular"
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

@@ -1,4 +1,4 @@
-"""Results on disk: one file per finished unit, then one NetCDF file for the study."""
+"""Results on disk: sealed NetCDF files of groups, one per finished unit, then one for the study."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ import hashlib
 import io
 import json
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 from filelock import FileLock, Timeout
 
@@ -34,8 +33,10 @@ UNITS = "units"
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 FORBIDDEN = (errno.EACCES, errno.EPERM, errno.EROFS)
 NO_FOLDER = (errno.ENOENT, errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG)
+OF_HDF5 = frozenset({"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"})
+"""Attributes that tie variables to their dimensions."""
 
-Arrays = dict[str, npt.NDArray[Any]]
+Groups = dict[str, xr.Dataset]
 
 
 class StorageError(SeakeepError):
@@ -73,6 +74,101 @@ def storing(folder: Path) -> Iterator[None]:
         ) from error
 
 
+def write_groups(path: Path, attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -> None:
+    """Write groups into one sealed NetCDF-4 file, renamed into place.
+
+    h5netcdf would take a hundred times as long for the groups of a study.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    attrs : mapping
+        Attributes of the file.
+    groups : mapping of str to Dataset
+        What goes into it.
+
+    Raises
+    ------
+    RequestError, StorageError
+        As :func:`storing`.
+    """
+    # Here, so that commands that write no result start without HDF5.
+    import h5py
+
+    layout = {
+        name: [{str(k): each.dims for k, each in part.items()} for part in (group, group.coords)]
+        for name, group in groups.items()
+    }
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w", libver="latest", track_order=True) as file:
+        file.attrs.update({**attrs, "layout": json.dumps(layout)})
+        for name, group in groups.items():
+            place = file.create_group(name, track_order=True)
+            place.attrs.update(group.attrs)
+            for dim in group.sizes:
+                if dim not in group.variables:
+                    place.create_dataset(dim, (group.sizes[dim],), ">f4").make_scale(NO_VARIABLE)
+            for key, each in group.variables.items():
+                x, text = each.values, each.dtype.kind in "OU"
+                packing: dict[str, Any] = {"dtype": h5py.string_dtype()} if text else {}
+                if each.size > 4096 and each.dtype.kind == "f":
+                    packing = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+                as_type = {"b": "i1", "U": "O"}.get(each.dtype.kind, each.dtype)
+                variable = place.create_dataset(key, data=x.astype(as_type), **packing)
+                variable.attrs.update(
+                    each.attrs | ({"dtype": "bool"} if x.dtype.kind == "b" else {})
+                )
+                if each.dims == (key,):
+                    variable.make_scale(key)
+            for key, each in group.variables.items():
+                for number, dim in enumerate(each.dims if each.dims != (key,) else ()):
+                    place[key].dims[number].attach_scale(place[dim])
+    content = buffer.getvalue()
+    with storing(path.parent), replacing(path) as temporary:
+        temporary.write_bytes(content + SEAL + hashlib.sha256(content).hexdigest().encode())
+
+
+def read_groups(path: Path) -> tuple[dict[str, Any], Groups]:
+    """Attributes and groups of a file of :func:`write_groups`, in memory.
+
+    Raises
+    ------
+    RequestError
+        If there is no such file, or one of another format.
+    DataError
+        If it is damaged, or was altered since it was written.
+    """
+    # Here, so that commands that read no result start without HDF5.
+    import h5py
+
+    with h5py.File(read_sealed(path), "r") as file:
+        attrs = {key: _plain(value) for key, value in file.attrs.items()}
+        if attrs.get("format") != FORMAT:
+            raise RequestError(
+                f"{path} was written in format {attrs.get('format')!s:.{SHOWN}}, and this version "
+                f"of seakeep reads format {FORMAT}. Run the study again in another folder."
+            )
+        groups = {}
+        for name, parts in json.loads(attrs.pop("layout")).items():
+            variables, coords = (
+                {k: _variable(file[name][k], d) for k, d in p.items()} for p in parts
+            )
+            facts = {key: _plain(value) for key, value in file[name].attrs.items()}
+            groups[name] = xr.Dataset(variables, coords, facts)
+    return attrs, groups
+
+
+def _variable(stored: Any, dims: list[str]) -> xr.Variable:
+    attrs = {key: _plain(value) for key, value in stored.attrs.items() if key not in OF_HDF5}
+    values = (stored.asstr() if stored.dtype.kind == "O" else stored)[()]
+    return xr.Variable(dims, np.asarray(values, attrs.pop("dtype", None)), attrs)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+
+
 @dataclass(frozen=True)
 class UnitFolder:
     """Finished units of a study, one file each.
@@ -101,28 +197,44 @@ class UnitFolder:
         StorageError
             If the disk fails.
         """
+        units, header = self.folder / UNITS, self.folder / HEADER
         with storing(self.folder):
-            (self.folder / UNITS).mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=self.folder / UNITS).close()
-        header = self.folder / HEADER
-        found = _read_header(header) if header.exists() else None
+            units.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=units).close()
+        started = _read_header(header) if header.exists() else None
         is_finished = (self.folder / RESULT).exists()
-        if found is not None and (is_finished or any((self.folder / UNITS).glob("*.npz"))):
-            _check_header(self.folder, found, self._header())
+        if started is not None and (is_finished or any(units.glob("*.nc"))):
+            self._check_header(started)
         elif not is_finished:
             check_report(self.folder)
-            if found is None and any((self.folder / UNITS).iterdir()):
+            if started is None and any(units.iterdir()):
                 raise RequestError(
-                    f"{self.folder / UNITS} holds files, and {header} does not say of which study. "
+                    f"{units} holds files, and {header} does not say of which study. "
                     "Choose another folder (-o), or remove this one."
                 )
 
+    def _check_header(self, started: Mapping[str, Any]) -> None:
+        if started["digest"] != self.digest:
+            raise RequestError(
+                f"{self.folder} holds the results of another study: its digest starts with "
+                f"{str(started['digest'])[:12]} and this study's with {self.digest[:12]}. "
+                "Settings, campaign or raw files have changed since. Give another folder with -o, "
+                "or remove this one."
+            )
+        before, now = started.get("versions", {}), versions()
+        changed = [f"{k} {before.get(k)} (now {v})" for k, v in now.items() if before.get(k) != v]
+        if changed:
+            raise RequestError(
+                f"{self.folder} was started with {', '.join(changed)}; arrays of both would be "
+                "mixed. Give another folder with -o, or remove this one."
+            )
+
     def open(self, name: str) -> None:
-        """Make the folder this study's, or find that it belongs to it; errors as :meth:`check`."""
+        """Make the folder this study's, or see that it belongs to it; errors as :meth:`check`."""
         self.check()
-        text = json.dumps({"study": name, **self._header()}, indent=1)
+        header = {"study": name, "digest": self.digest, "versions": versions()}
         with storing(self.folder), replacing(self.folder / HEADER) as temporary:
-            temporary.write_text(text + "\n", encoding="utf-8")
+            temporary.write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -145,7 +257,12 @@ class UnitFolder:
         except (OSError, NotImplementedError):  # without locks in the file system all may work
             yield
             return
-        self._clear_litter()
+        # What a killed process had begun: nobody else works in the folder.
+        litter = [each for each in self.folder.rglob(".*.tmp") if each.is_file()]
+        for each in litter:
+            each.unlink(missing_ok=True)
+        if litter:
+            warn(f"{self.folder}: removed {len(litter)} unfinished file(s) of a killed run.")
         try:
             yield
         finally:
@@ -153,89 +270,40 @@ class UnitFolder:
                 path.unlink()
             lock.release()
 
-    def _clear_litter(self) -> None:
-        """Remove files that a killed process had begun; nobody else works in the folder."""
-        litter = [each for each in self.folder.rglob(".*.tmp") if each.is_file()]
-        for each in litter:
-            each.unlink(missing_ok=True)
-        if litter:
-            warn(f"{self.folder}: removed {len(litter)} unfinished file(s) of a killed run.")
-
-    def _header(self) -> dict[str, Any]:
-        return {"digest": self.digest, "versions": versions()}
-
     def _path(self, name: str) -> Path:
-        return self.folder / UNITS / f"{name}.npz"
+        return self.folder / UNITS / f"{name}.nc"
 
-    def write(self, name: str, arrays: Mapping[str, npt.ArrayLike]) -> None:
-        """Keep the arrays of a finished unit; the file is there whole or not at all.
+    def write(self, name: str, groups: Groups) -> None:
+        """Keep the groups of a finished unit; errors as :func:`write_groups`."""
+        write_groups(self._path(name), {"format": FORMAT, "digest": self.digest}, groups)
 
-        Raises
-        ------
-        StorageError
-            If the disk is full or cannot be written.
-        """
-        content = io.BytesIO()
-        np.savez(content, digest=np.array(self.digest), **cast("dict[str, Any]", arrays))
-        _write_sealed(self._path(name), content.getvalue())
-
-    def read(self, name: str) -> Arrays | None:
-        """Arrays of a finished unit; None where it is not finished, or damaged."""
+    def read(self, name: str) -> Groups | None:
+        """Groups of a finished unit; None where it is not finished, or damaged."""
         try:
-            content, _, seal = self._path(name).read_bytes().rpartition(SEAL)
-        except OSError:
+            attrs, groups = read_groups(self._path(name))
+        except SeakeepError:
             return None
-        if hashlib.sha256(content).hexdigest().encode() != seal:
-            return None
-        with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            arrays = {key: file[key] for key in file.files}
-        return arrays if str(arrays.pop("digest")) == self.digest else None
-
-    def has(self, name: str) -> bool:
-        """Whether a unit is finished."""
-        return self.read(name) is not None
+        return groups if attrs["digest"] == self.digest else None
 
     def clear(self) -> None:
         """Remove the units; for when all of them are in the result."""
-        for path in (self.folder / UNITS).glob("*.npz*"):
+        for path in (self.folder / UNITS).glob("*.nc"):
             path.unlink(missing_ok=True)
         with suppress(OSError):  # files of others stay
             (self.folder / UNITS).rmdir()
 
 
-def _write_sealed(path: Path, content: bytes) -> None:
-    with storing(path.parent), replacing(path) as temporary:
-        temporary.write_bytes(content + SEAL + hashlib.sha256(content).hexdigest().encode())
-
-
 def _read_header(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(read_bytes(path))
+        content = json.loads(read_bytes(path))
     except (RequestError, ValueError, RecursionError):
-        found = None
-    if not isinstance(found, dict) or "digest" not in found:
+        content = None
+    if not isinstance(content, dict) or "digest" not in content:
         raise RequestError(
             f"{path} is damaged or belongs to no study. Give another folder with -o, or remove "
             "this one."
         )
-    return found
-
-
-def _check_header(folder: Path, found: Mapping[str, Any], expected: Mapping[str, Any]) -> None:
-    if found["digest"] != expected["digest"]:
-        raise RequestError(
-            f"{folder} holds the results of another study: its digest starts with "
-            f"{str(found['digest'])[:12]} and this study's with {expected['digest'][:12]}. "
-            "Settings, campaign or raw files have changed since. Give another folder with -o, or "
-            "remove this one."
-        )
-    before, now = found.get("versions", {}), expected["versions"]
-    changed = [f"{k} {before.get(k)} (now {v})" for k, v in now.items() if before.get(k) != v]
-    if changed:
-        raise RequestError(
-            f"{folder} was started with {', '.join(changed)}; arrays of both would be mixed. Give "
-            "another folder with -o, or remove this one."
-        )
+    return content
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,7 +323,7 @@ class StudyResult:
 
     folder: Path
     attrs: dict[str, Any]
-    groups: dict[str, xr.Dataset]
+    groups: Groups
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -270,8 +338,8 @@ class StudyResult:
         ``settings`` gives for each key its ``value`` (a JSON value) and its ``source``: "stated",
         "preset", "study" (the study's seed) or "default".
         """
-        found: dict[str, Any] = json.loads(self.attrs["models"])
-        return found
+        out: dict[str, Any] = json.loads(self.attrs["models"])
+        return out
 
     @property
     def models(self) -> list[str]:
@@ -284,16 +352,16 @@ class StudyResult:
         return [str(name) for name in self.groups["channels"]["channel"].values]
 
     @property
-    def tests(self) -> dict[str, xr.Dataset]:
+    def tests(self) -> Groups:
         """Test sets by name."""
-        names = self.settings["tests"]
-        return {name: self.groups[f"tests/{name}"] for name in names}
+        return {name: self.groups[f"tests/{name}"] for name in self.settings["tests"]}
 
     @property
-    def prepared(self) -> dict[str, xr.Dataset]:
+    def prepared(self) -> Groups:
         """Prepared runs with all of their channels, flags and findings, by name."""
-        names = [str(name) for name in self.groups["runs"]["run"].values]
-        return {name: self.groups[f"prepared/{name}"] for name in names}
+        return {
+            str(name): self.groups[f"prepared/{name}"] for name in self.groups["runs"]["run"].values
+        }
 
     @property
     def shows_paper(self) -> bool:
@@ -328,54 +396,13 @@ def write_result(
     groups: Mapping[str, xr.Dataset],
     finished: Callable[[StudyResult], None] | None = None,
 ) -> StudyResult:
-    """Write everything into one sealed NetCDF file, renamed into place."""
+    """Write a result into its folder, once it was handed to `finished`; errors as there."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    found = StudyResult(folder, {"format": FORMAT, "created": created, **attrs}, dict(groups))
+    result = StudyResult(folder, {"format": FORMAT, "created": created, **attrs}, dict(groups))
     if finished is not None:
-        finished(found)
-    _write_sealed(folder / RESULT, _content(found))
-    return found
-
-
-def _content(result: StudyResult) -> bytes:
-    """NetCDF-4 file of a result; h5netcdf would take a hundred times as long for it."""
-    # Here, so that commands that write no result start without HDF5.
-    import h5py
-
-    layout = {
-        name: [{str(k): each.dims for k, each in part.items()} for part in (group, group.coords)]
-        for name, group in result.groups.items()
-    }
-    made = io.BytesIO()
-    with h5py.File(made, "w", libver="latest", track_order=True) as file:
-        file.attrs.update(result.attrs | {"layout": json.dumps(layout)})
-        for name, group in result.groups.items():
-            place = file.create_group(name, track_order=True)
-            place.attrs.update(group.attrs)
-            for dim in group.sizes:
-                if dim not in group.variables:
-                    place.create_dataset(dim, (group.sizes[dim],), ">f4").make_scale(NO_VARIABLE)
-            for key, each in group.variables.items():
-                x, text = each.values, each.dtype.kind in "OU"
-                packing: dict[str, Any] = {"dtype": h5py.string_dtype()} if text else {}
-                if each.size > 4096 and each.dtype.kind == "f":
-                    packing = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-                made_of = {"b": "i1", "U": "O"}.get(each.dtype.kind, each.dtype)
-                kept = place.create_dataset(key, data=x.astype(made_of), **packing)
-                kept.attrs.update(each.attrs | ({"dtype": "bool"} if x.dtype.kind == "b" else {}))
-                if each.dims == (key,):
-                    kept.make_scale(key)
-            for key, each in group.variables.items():
-                for number, dim in enumerate(each.dims if each.dims != (key,) else ()):
-                    place[key].dims[number].attach_scale(place[dim])
-    return made.getvalue()
-
-
-def relabel(result: StudyResult, words: Mapping[str, str]) -> StudyResult:
-    """Write other names and labels into a finished result: attributes on which no array depends."""
-    if all(result.attrs[key] == value for key, value in words.items()):
-        return result
-    return write_result(result.folder, {**result.attrs, **words}, result.groups)
+        finished(result)
+    write_groups(folder / RESULT, result.attrs, result.groups)
+    return result
 
 
 def read_result(folder: Path | str) -> StudyResult:
@@ -399,8 +426,7 @@ def read_result(folder: Path | str) -> StudyResult:
         If its file is damaged, or was altered since it was written.
     """
     folder = Path(folder)
-    path = folder / RESULT
-    if not is_there(path):
+    if not is_there(folder / RESULT):
         started = (folder / HEADER).exists()
         raise RequestError(
             f"{folder} holds no finished study ({RESULT} is missing). "
@@ -410,35 +436,4 @@ def read_result(folder: Path | str) -> StudyResult:
                 else "Give the folder that 'seakeep study' or 'seakeep reproduce' wrote."
             )
         )
-    # Here, so that commands that read no result start without HDF5.
-    import h5py
-
-    with h5py.File(read_sealed(path), "r") as file:
-        attrs = {key: _plain(value) for key, value in file.attrs.items()}
-        if attrs.get("format") != FORMAT:
-            raise RequestError(
-                f"{path} was written in format {attrs.get('format')!s:.{SHOWN}}, and this version "
-                f"of seakeep reads format {FORMAT}. Run the study again in another folder."
-            )
-        layout = json.loads(attrs.pop("layout"))
-        groups = {name: _read_group(file[name], *parts) for name, parts in layout.items()}
-    return StudyResult(folder, attrs, groups)
-
-
-OF_HDF5 = frozenset({"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"})
-"""Attributes that tie variables to their dimensions."""
-
-
-def _read_group(place: Any, *parts: Mapping[str, Sequence[str]]) -> xr.Dataset:
-    read: list[dict[str, xr.Variable]] = [{}, {}]
-    for into, part in zip(read, parts, strict=True):
-        for key, dims in part.items():
-            attrs = {k: _plain(v) for k, v in place[key].attrs.items() if k not in OF_HDF5}
-            values = (place[key].asstr() if place[key].dtype.kind == "O" else place[key])[()]
-            into[key] = xr.Variable(dims, np.asarray(values, attrs.pop("dtype", None)), attrs)
-    variables, coords = read
-    return xr.Dataset(variables, coords, {k: _plain(v) for k, v in place.attrs.items()})
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+    return StudyResult(folder, *read_groups(folder / RESULT))

@@ -1,0 +1,129 @@
+"""From the table of a model to its settings: as stated, else the preset's, else the default."""
+
+import json
+
+import pytest
+
+from seakeep.campaign import ModelSettings
+from seakeep.errors import RequestError
+from seakeep.study.resolve import resolve_model
+
+ENSEMBLE = "bayesian_hankel_dmdc"
+NORMAL = {"distribution": "norm", "parameters": {"loc": 15, "scale": 1}, "unit": "T"}
+READ = {"channel": "heave", "of": ["pitch"], "kind": "stacked"}
+
+
+def resolved(stated, period=2.0, **how):
+    """With an encounter period of 2 s and steps of 0.1 s."""
+    table = {"states": ("heave", "pitch"), "inputs": ("eta_fwd",), **stated}
+    return resolve_model(ModelSettings.model_validate(table), period, 0.1, **how)
+
+
+@pytest.mark.parametrize(
+    ("stated", "how", "expected"),
+    [
+        (
+            {"preset": "paper", "ridge": 7.0},
+            {},
+            {
+                "state_delays": (20, "preset"),
+                "input_delays": (100, "preset"),
+                "window": (400, "preset"),
+                "ridge": (7.0, "stated"),
+                "delay_rows": ("ridge", "default"),
+                "alignment": (None, "default"),
+            },
+        ),
+        ({"window": "inf T"}, {"preset": "paper"}, {"window": (None, "stated")}),
+        (
+            {"state_delays": 4, "input_delays": "1 T", "ridge": 1, "alignment": {"surge": "none"}},
+            {"preset": "recommended"},
+            {
+                "state_delays": (4, "stated"),
+                "input_delays": (20, "stated"),
+                "ridge_scale": ("per_snapshot", "preset"),
+                "alignment.surge": ("none", "stated"),
+                "alignment.mode": ("dispersion", "preset"),
+                "select.horizon": ([15.0, 45.0], "preset"),
+                "rank": (None, "default"),
+            },
+        ),
+        (
+            {"select": {"horizon": ["5 T", 10]}},
+            {"preset": "recommended", "folds": "sea_state"},
+            {"select.horizon": ([5.0, 10.0], "stated"), "select.folds": ("sea_state", "study")},
+        ),
+        (
+            {"select": {"folds": "run", "horizon": "15 T"}},
+            {"preset": "recommended", "folds": "sea_state"},
+            {"select.horizon": ([15.0], "stated"), "select.folds": ("run", "stated")},
+        ),
+        (
+            {"preset": "paper"},
+            {"aligned": True},
+            {"alignment.mode": ("effective", "preset"), "alignment.surge": ("measured", "preset")},
+        ),
+        (
+            {"preset": "paper", "alignment": {"surge": "none"}},
+            {"aligned": True},
+            {"alignment.surge": ("none", "stated")},
+        ),
+        (
+            {"kind": "fir"},
+            {"preset": "paper", "aligned": True},
+            {"input_delays": (60, "preset"), "alignment.surge": ("measured", "preset")},
+        ),
+        (
+            {"kind": "mean"},
+            {"preset": "paper", "aligned": True, "folds": "run"},
+            {"window": (None, "default")},
+        ),
+        (
+            {"kind": ENSEMBLE, "n_members": 5, "ridge": {"log_uniform": [0.1, 10]},
+             "state_delays": "0.5 T", "window": NORMAL},
+            {"preset": "paper", "seed": 7},
+            {
+                "n_members": (5, "stated"),
+                "ridge": ({"log_uniform": [0.1, 10.0]}, "stated"),
+                "state_delays": (10, "stated"),
+                "input_delays": ({"uniform": ["2.5 T", "7.5 T"]}, "preset"),
+                "window": (NORMAL, "stated"),
+                "seed": (7, "study"),
+                "train_on": ("all", "default"),
+            },
+        ),
+        (
+            {"kind": ENSEMBLE, "readouts": {"heave": {"of": ["pitch"], "kind": "stacked"}}},
+            {"preset": "recommended"},
+            {"readouts": ([READ], "stated")},
+        ),
+    ],
+)  # fmt: skip
+def test_each_key_has_its_value_and_its_source(stated, how, expected):
+    told = json.loads(json.dumps(resolved(stated, **how).to_json()))
+    settings = told["settings"]
+    assert {key: (settings[key]["value"], settings[key]["source"]) for key in expected} == expected
+    assert told["n_members"] == stated.get("n_members", 100 if told["ensemble"] else 1)
+
+
+@pytest.mark.parametrize(
+    ("stated", "how", "words"),
+    [
+        ({"preset": "recommended"}, {"period": None}, r"State encounter_period \(s\) in \[campaig"),
+        ({"kind": ENSEMBLE, "state_delays": 1, "input_delays": 1, "ridge": 1}, {"period": None},
+         r"an ensemble counts in .* State encounter_period"),
+        ({"state_delays": 3}, {}, r"no input_delays\. Add input_delays, ridge, or a preset"),
+        ({"kind": ENSEMBLE, "state_delays": 1}, {},
+         r"no input_delays\. Add input_delays, ridge as priors, such as { uniform"),
+        ({"kind": "hankel"}, {}, r"no kind of model 'hankel'.*Kinds: hankel_dmdc"),
+        ({"preset": "paper", "riddge": 1.0}, {}, r"has no key 'riddge'.*mean 'ridge'"),
+        ({"preset": "paper", "train_on": "runs"}, {}, "'hankel_dmdc' has no key 'train_on'"),
+        ({"kind": "fir", "readouts": "auto"}, {}, "kind = 'fir' has no key 'readouts'"),
+        ({"readouts": {"heave": {"of": ["pitch"], "kind": "stacked"}}}, {"preset": "paper"},
+         "received delay_rows = 'ridge', rank = None"),
+        ({"kind": "mean", "preset": "paper"}, {}, "kind = 'mean' has no preset"),
+    ],
+)  # fmt: skip
+def test_a_table_that_is_no_model_is_refused(stated, how, words):
+    with pytest.raises(RequestError, match=words):
+        resolved(stated, **how)
