@@ -21,7 +21,7 @@ from seakeep import (
     metrics,
 )
 from seakeep.models.labelled import mean_period
-from seakeep.models.selection import RIDGES, WORST, default_observables, select
+from seakeep.models.selection import RIDGES, WORST, default_observables, groups_of, select
 
 DT, PERIOD = 0.1, 10  # s, samples
 STATES, INPUTS = ["heave", "drift"], ["eta"]
@@ -132,6 +132,21 @@ def test_periods_are_counted_in_the_first_elevation():
     assert mean_period({"still": still, "b": stated}, list(waves)) == pytest.approx(15)
     with pytest.raises(DataError, match=r"no input \(wind\) is a wave elevation, eta_…\. Set run"):
         mean_period({"a": run}, ["wind"])
+
+
+def test_runs_that_repeat_the_wave_are_one_group_whatever_stands_first():
+    first, other = (run.assign(drift=run["drift"] + 1.0) for run in runs(2).values())
+    again = first.assign(drift=other["drift"], wind=other["heave"].assign_attrs(units="m/s"))
+    given = {
+        "first": first.assign(wind=first["heave"]),
+        "again": again,
+        "other": other.assign(wind=first["heave"]),
+    }
+    groups = groups_of(given, "auto", ["wind", "drift", "eta"])
+    assert groups["first"] == groups["again"] != groups["other"]
+    assert len(set(groups_of(given, "run", ["eta"]).values())) == 3
+    # Nothing tells of waves, so that nothing is held out together.
+    assert len(set(groups_of({"again": again, "b": again}, "auto", ["wind"]).values())) == 2
 
 
 def test_a_model_chooses_its_ridge_and_says_how(tmp_path):
