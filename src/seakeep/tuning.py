@@ -18,8 +18,7 @@ from seakeep.errors import RequestError
 from seakeep.files import read_bytes, replacing
 from seakeep.models import HankelDMDc
 from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
-from seakeep.models.readouts import FittedReadOut
-from seakeep.models.selection import select
+from seakeep.models.selection import Selected, select
 from seakeep.models.settings import FOLDS, Folds
 from seakeep.models.training import check_names, until
 from seakeep.toml import Length
@@ -31,32 +30,58 @@ __all__ = ["TuneResult", "tune", "tuned_campaign"]
 
 LENGTHS = ("state_delays", "input_delays", "lead")
 FIRST = "# seakeep_file: tuned campaign\n"
+COLUMNS = {
+    "state_delays": "state delays",
+    "input_delays": "input delays",
+    "lead": "lead",
+    "observables": "observables",
+    "alignment": "alignment",
+    "ridge": "λ per snapshot pair",
+    "rank": "number of singular values kept; 0 for all",
+    "score": "mean NRMSE of free runs",
+    "lower": "lower bound of the 95 % interval of the score",
+    "upper": "upper bound of the 95 % interval of the score",
+    "chosen": "chosen",
+}
+"""Columns of the table of what was tried, in words."""
 
 
 @dataclass(frozen=True, eq=False)
-class TuneResult:
+class TuneResult(Selected[HankelDMDc]):
     """Result of :func:`tune`.
 
     Parameters
     ----------
-    spec : HankelDMDc
-        The settings that were chosen; ``spec.fit(runs, states, inputs)`` fits the model.
-    table : Dataset
-        Over ``trial``: ``state_delays``, ``input_delays``, ``lead`` (samples), ``observables``
-        (their kinds), ``alignment``, ``ridge`` (per snapshot pair) or ``rank`` (0 for none),
-        ``score`` (mean NRMSE of free runs), the bounds ``lower`` and ``upper`` of its 95 %
-        interval, and ``chosen``.
+    settings : HankelDMDc
+        The settings that were chosen.
+    rows : tuple of dict
+        What was tried, as in :attr:`table`.
     note : str
-        How the choice was made, and the best λ of each candidate.
+        How the choice was made.
     readouts : tuple of FittedReadOut
         Read-outs of the settings that were chosen, as all training runs teach them; those that
         were chosen among have their scores.
     """
 
-    spec: HankelDMDc
-    table: xr.Dataset
-    note: str
-    readouts: tuple[FittedReadOut, ...] = ()
+    @property
+    def spec(self) -> HankelDMDc:
+        """The settings; ``spec.fit(runs, states, inputs)`` fits the model."""
+        return self.settings
+
+    @property
+    def table(self) -> xr.Dataset:
+        """What was tried, a Dataset over ``trial``.
+
+        ``state_delays``, ``input_delays``, ``lead`` (samples), ``observables`` (their kinds),
+        ``alignment``, ``ridge`` (per snapshot pair) or ``rank`` (0 for none), ``score`` (mean
+        NRMSE of free runs), the bounds ``lower`` and ``upper`` of its 95 % interval, ``chosen``.
+        """
+        return xr.Dataset(
+            {
+                key: ("trial", np.array([row[key] for row in self.rows]), {"long_name": words})
+                for key, words in COLUMNS.items()
+            }
+        )
 
     def describe(self) -> str:
         """Text: how the choice was made, the best λ of each candidate, and the read-outs.
@@ -65,7 +90,7 @@ class TuneResult:
         -------
         str
         """
-        return "\n".join([self.note, *(each.describe() for each in self.readouts)])
+        return "\n".join([super().describe(), *(each.describe() for each in self.readouts)])
 
     def figure(self) -> Figure:
         """Draw the error against λ, a line per candidate; needs the extra ``figures``.
@@ -152,12 +177,7 @@ def tune(
     named = until(as_runs(runs), stop)
     known: MutableMapping[str, Any] = {}
     if resume is not None:
-        asked = {
-            "spec": spec.to_json(),
-            "vary": sorted(vary),
-            "horizon": list(horizon),
-            "folds": folds,
-        }
+        asked = [spec.to_json(), sorted(vary), list(horizon), folds]
         known = _Kept(Path(resume), _digest(asked, named, [*states, *inputs]))
     found = select(
         spec,
@@ -173,44 +193,15 @@ def tune(
         known=known,
         seed=seed,
     )
-    chosen = replace(found.settings, select=None)
-    return TuneResult(chosen, _table(found.rows), found.describe(), found.readouts)
-
-
-def _table(rows: Sequence[dict[str, Any]]) -> xr.Dataset:
-    """Rows as a Dataset over ``trial``."""
-    words = {
-        "ridge": "λ per snapshot pair",
-        "rank": "number of singular values kept; 0 for all",
-        "score": "mean NRMSE of free runs",
-        "lower": "lower bound of the 95 % interval of the score",
-        "upper": "upper bound of the 95 % interval of the score",
-    }
-    keys = (
-        *("state_delays", "input_delays", "lead", "observables", "alignment", "ridge", "rank"),
-        "score",
-    )
-    return xr.Dataset(
-        {
-            key: (
-                "trial",
-                np.array([row[key] for row in rows]),
-                {"long_name": words.get(key, key.replace("_", " "))},
-            )
-            for key in (*keys, "lower", "upper", "chosen")
-        }
-    )
+    return TuneResult(replace(found.settings, select=None), found.rows, found.note, found.readouts)
 
 
 def _digest(asked: object, runs: dict[str, xr.Dataset], channels: Sequence[str]) -> str:
     """Checksum of what a search depends on."""
     found = hashlib.sha256(json.dumps(asked, sort_keys=True).encode())
     for name, run in runs.items():
-        found.update(name.encode())
-        facts = {key: run[key].attrs for key in channels} | {"run": run.attrs}
-        found.update(repr(facts).encode())
-        for values in (run["time"].values, channel_matrix(run, channels, name)):
-            found.update(np.ascontiguousarray(values).tobytes())
+        found.update(repr([name, run.attrs, *(run[key].attrs for key in channels)]).encode())
+        found.update(channel_matrix(run, channels, name).tobytes() + run["time"].values.tobytes())
     return found.hexdigest()
 
 
