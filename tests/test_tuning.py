@@ -1,6 +1,5 @@
 """``seakeep.tune`` and ``seakeep tune``: the table, the figure, the file, and going on."""
 
-import json
 import shutil
 import sys
 import tomllib
@@ -88,38 +87,6 @@ def test_the_result_is_the_same_for_any_number_of_workers():
     assert alone.table.identical(other.table)
 
 
-def test_a_search_that_was_interrupted_goes_on(tmp_path):
-    kept = tmp_path / "kept.json"
-    done = []
-
-    def stop(number, total, what):
-        done.append(number)
-        if number == 2:
-            raise KeyboardInterrupt
-
-    more = {"vary": ["ridge"], "horizon": (15,), "resume": kept}
-    with pytest.raises(KeyboardInterrupt):
-        seakeep.tune(SPEC, runs(), STATES, INPUTS, progress=stop, **more)
-    assert len(json.loads(kept.read_text())["scores"]) == 1  # the second was not handed on
-    counted = []
-    again = seakeep.tune(
-        SPEC, runs(), STATES, INPUTS, progress=lambda *each: counted.append(each), **more
-    )
-    assert len(counted) == 2  # of three folds
-    whole = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,))
-    assert again.table.identical(whole.table)
-    with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
-        seakeep.tune(SPEC, runs(2), STATES, INPUTS, **more)
-    shifted = {name: run.assign_coords(time=run["time"] + 1.0) for name, run in runs().items()}
-    longer = {name: run.assign_attrs(encounter_period=2.0) for name, run in runs().items()}
-    for others in (shifted, longer):  # the same values
-        with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
-            seakeep.tune(SPEC, others, STATES, INPUTS, **more)
-    kept.write_text("[]")
-    with pytest.raises(RequestError, match="keeps no scores of a search"):
-        seakeep.tune(SPEC, runs(), STATES, INPUTS, **more)
-
-
 @pytest.mark.parametrize(
     ("sea", "words"), [("calm", "all runs have the same"), (None, "no two runs share a")]
 )
@@ -169,7 +136,6 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, mon
     assert isinstance(tuned.ridge, float)
     assert tuned.ridge_scale == "per_snapshot"
     assert tuned.readouts == {}  # the tutorial's line is linear
-    assert not (tmp_path / "campaign_tuned.scores.json").exists()
     tried = pd.read_csv(tmp_path / "campaign_tuned.csv")
     assert tried["chosen"].sum() == 1
     assert np.all((tried["lower"] <= tried["score"]) & (tried["score"] <= tried["upper"]))

@@ -250,23 +250,6 @@ def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all():
     assert "no window of 150 samples can be held out of runs of at most 200" in fallen.note
 
 
-def test_what_is_known_is_not_found_again():
-    given, known = runs(), {}
-    first = select(SPEC, given, STATES, INPUTS, horizon=(15.0,), known=known)
-    told = []
-    again = select(
-        SPEC,
-        given,
-        STATES,
-        INPUTS,
-        horizon=(15.0,),
-        known=known,
-        progress=lambda *each: told.append(each),
-    )
-    assert told == []
-    assert again.rows == first.rows
-
-
 def test_progress_counts_all_that_is_tried_once():
     told = []
     vary = ("ridge", "observables", "lead")

@@ -9,8 +9,7 @@ of a candidate and a fold gives the whole path of λ (:mod:`seakeep.core.path`).
 from __future__ import annotations
 
 import itertools
-import json
-from collections.abc import Iterable, Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from typing import Any, Generic, TypeVar
@@ -62,10 +61,8 @@ Changes = dict[str, Any]
 """Settings of a candidate that differ from those of the best so far."""
 Columns = tuple[ProbeAlignment | None, int | None]
 """An alignment, and the look-ahead in samples where it is part of it: columns of their own."""
-Scores = tuple[list[list[float]], list[float]]
-"""Scores by level and window, and weights of the windows, as JSON values."""
-Known = MutableMapping[str, Scores]
-"""Scores by candidate and fold."""
+Scores = tuple[FloatArray, FloatArray]
+"""Scores, shape (level, window), and weights of the windows, which sum to one in a fold."""
 ALIKE = 0.03
 """Part of the lowest error by which the chosen λ may be worse.
 
@@ -271,9 +268,10 @@ class Problem:
         return dynamics, found
 
     def judge(self, candidate: HankelSettings, fold: int) -> Scores:
-        """Scores on a run that is held out, (level, window), and weights, over its horizons."""
-        dynamics, found = self.free_runs(candidate, self.levels(candidate), fold, self.horizons)
-        spread, scores = dynamics.state_scale.std, []
+        """Judge free runs on a run that is held out, over all horizons that fit."""
+        levels = self.levels(candidate)
+        dynamics, found = self.free_runs(candidate, levels, fold, self.horizons)
+        spread, scores = dynamics.state_scale.std, [np.empty((len(levels), 0))]
         for predicted, measured in found:
             with np.errstate(over="ignore", invalid="ignore"):
                 errors = metrics.nrmse(predicted=predicted, measured=measured, training_std=spread)
@@ -281,10 +279,9 @@ class Problem:
             errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
             if (moved := judged.any(axis=-1)).any():
                 scores.append(np.mean(errors[:, moved], axis=-1, where=judged[moved]))
-        weights = [np.full(each.shape[1], 1.0 / len(scores) / each.shape[1]) for each in scores]
-        nothing = np.empty((len(self.levels(candidate)), 0))
-        joined = np.concatenate([nothing, *scores], axis=1)
-        return joined.tolist(), np.concatenate([np.empty(0), *weights]).tolist()
+        counts = [each.shape[1] for each in scores]
+        weights = np.repeat(1.0 / np.maximum(counts, 1) / max(len(scores) - 1, 1), counts)
+        return np.concatenate(scores, axis=1), weights
 
     def held(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
         """Free runs, end to end, on each run by the model of the others, standardised."""
@@ -348,42 +345,29 @@ def _columns_of(candidate: HankelSettings) -> Columns:
 
 def _judge(
     problems: Mapping[Columns, Problem],
+    trials: dict[Settings, Trial],
     candidates: Iterable[Settings],
-    known: Known,
     executor: Executor | None,
     progress: Progress | None,
-    before: int = 0,
-    after: int = 0,
-) -> dict[Settings, Trial]:
-    """Judge candidates whose scores are not `known`, and add them there.
-
-    Progress counts a number of candidates that were judged `before`, and come `after` these.
-    """
-    folds, each_once = next(iter(problems.values())).folds(), dict.fromkeys(candidates)
-    todo = [(c, fold) for c in each_once for fold in folds if _key(c, fold) not in known]
+    later: int = 0,
+) -> None:
+    """Add trials of candidates that are not among them; `later` more are to come at most."""
+    folds = next(iter(problems.values())).folds()
+    new = [each for each in dict.fromkeys(candidates) if each not in trials]
+    before, after = len(trials) * len(folds), later * len(folds)
 
     def tell(done: int, total: int, what: str) -> None:
         if progress is not None:
-            earlier, later = before * len(folds), after * len(folds)
-            progress(earlier + done, earlier + total + later, what)
+            progress(before + done, before + total + after, what)
 
-    made = in_order(_unit, problems, todo, executor, tell, "candidate and fold")
-    for unit, scores in zip(todo, made, strict=True):
-        known[_key(*unit)] = scores
-    trials = {}
-    for candidate in each_once:
-        parts = [known[_key(candidate, fold)] for fold in folds]
-        weights = np.concatenate([part[1] for part in parts])
-        trials[candidate] = Trial(
-            problems[_columns_of(candidate)].levels(candidate),
-            np.concatenate([part[0] for part in parts], axis=1),
-            weights / weights.sum(),  # a fold sums to one, unless nothing moves in it
-        )
-    return trials
-
-
-def _key(candidate: HankelSettings, fold: int) -> str:
-    return json.dumps([candidate.to_json(), fold], sort_keys=True)
+    units = list(itertools.product(new, folds))
+    found = in_order(_unit, problems, units, executor, tell, "candidate and fold")
+    for candidate in new:
+        scores, weights = zip(*itertools.islice(found, len(folds)), strict=True)
+        joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
+        levels = problems[_columns_of(candidate)].levels(candidate)
+        every = np.concatenate(scores, axis=1)
+        trials[candidate] = Trial(levels, every, joined / joined.sum())
 
 
 def _unit(problems: Mapping[Columns, Problem], item: tuple[HankelSettings, int]) -> Scores:
@@ -506,7 +490,6 @@ def select(
     period: float | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    known: Known | None = None,
     seed: int = 0,
 ) -> Selected[Settings]:
     """Choose settings by free runs on training runs that are held out in turn.
@@ -539,8 +522,6 @@ def select(
         Judges candidates and folds side by side; the result is the same.
     progress : callable, optional
         Called with what is done.
-    known : mapping, optional
-        Scores by candidate and fold that need not be found again; new ones are added.
     seed : int
         Of the bootstrap of the intervals.
 
@@ -589,20 +570,19 @@ def select(
         fitted = _learnt(readouts, None, settings, 0.0, 0, *data)
         complete = replace(settings, readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
-    work = ({} if known is None else known), executor, progress
     trials: dict[Settings, Trial] = {}
     best, later = base, sum(len(changes) - 1 for changes in steps)  # the best is among them
     for changes in ([{}], *steps):
         later -= len(changes) - 1
         tried = [replace(best, **change) for change in changes]
-        trials |= _judge(problems, tried, *work, len(trials), later)
+        _judge(problems, trials, tried, executor, progress, later)
         best = min(trials, key=lambda each: float(trials[each].means.min()))
     taken, level = _best(problems, trials, best, 0.0 if folds == "sea_state" else ALIKE)
     without = {
         left: replace(taken, observables=tuple(o for o in taken.observables if o != left))
         for left in taken.observables
     }
-    trials |= _judge(problems, without.values(), *work, len(trials))
+    _judge(problems, trials, without.values(), executor, progress)
     worth = "".join(
         f"; without {named(left)} {trials[less].means.min():.3f}" for left, less in without.items()
     )
