@@ -264,7 +264,7 @@ class Problem:
                 table=None if windows.table is None else windows.table[..., delayed],
             )
             measured = np.stack([states[at + 1 : at + 1 + steps] for at in each])
-            found.append((model_runs(dynamics, coefficients, windows), measured))
+            found.append((model_runs(dynamics, coefficients, [windows])[0], measured))
         return dynamics, found
 
     def judge(self, candidate: HankelSettings, fold: int) -> Scores:
