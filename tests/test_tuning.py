@@ -1,6 +1,5 @@
 """``seakeep.tune`` and ``seakeep tune``: the table, the figure, the file, and going on."""
 
-import json
 import shutil
 import sys
 import tomllib
@@ -13,6 +12,7 @@ import pytest
 
 import seakeep
 from seakeep import HankelDMDc, RequestError, metrics
+from seakeep.cli import main
 from seakeep.models import processes
 from seakeep.models.selection import WORST
 from seakeep.tuning import tuned_campaign
@@ -22,17 +22,6 @@ sys.path.insert(0, str(Path(__file__).parent / "models"))
 from test_selection import DT, INPUTS, PERIOD, SPEC, STATES, runs
 
 TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial"
-
-
-def test_the_choice_is_in_the_spec_the_table_and_the_text():
-    result = seakeep.tune(SPEC, runs(), STATES, INPUTS, horizon=(15,))
-    chosen = result.table.isel(trial=np.flatnonzero(result.table["chosen"].values))
-    assert chosen.sizes["trial"] == 1
-    assert result.spec.ridge == float(chosen["ridge"][0])
-    assert {each.kind for each in result.spec.observables} <= {"slow_squares", "powers"}
-    assert "(chosen)" in result.describe()
-    model = result.spec.fit(runs(), STATES, INPUTS)
-    assert model.settings.ridge == result.spec.ridge
 
 
 @pytest.mark.parametrize(
@@ -88,38 +77,6 @@ def test_the_result_is_the_same_for_any_number_of_workers():
     assert alone.table.identical(other.table)
 
 
-def test_a_search_that_was_interrupted_goes_on(tmp_path):
-    kept = tmp_path / "kept.json"
-    done = []
-
-    def stop(number, total, what):
-        done.append(number)
-        if number == 2:
-            raise KeyboardInterrupt
-
-    more = {"vary": ["ridge"], "horizon": (15,), "resume": kept}
-    with pytest.raises(KeyboardInterrupt):
-        seakeep.tune(SPEC, runs(), STATES, INPUTS, progress=stop, **more)
-    assert len(json.loads(kept.read_text())["scores"]) == 1  # the second was not handed on
-    counted = []
-    again = seakeep.tune(
-        SPEC, runs(), STATES, INPUTS, progress=lambda *each: counted.append(each), **more
-    )
-    assert len(counted) == 2  # of three folds
-    whole = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,))
-    assert again.table.identical(whole.table)
-    with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
-        seakeep.tune(SPEC, runs(2), STATES, INPUTS, **more)
-    shifted = {name: run.assign_coords(time=run["time"] + 1.0) for name, run in runs().items()}
-    longer = {name: run.assign_attrs(encounter_period=2.0) for name, run in runs().items()}
-    for others in (shifted, longer):  # the same values
-        with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
-            seakeep.tune(SPEC, others, STATES, INPUTS, **more)
-    kept.write_text("[]")
-    with pytest.raises(RequestError, match="keeps no scores of a search"):
-        seakeep.tune(SPEC, runs(), STATES, INPUTS, **more)
-
-
 @pytest.mark.parametrize(
     ("sea", "words"), [("calm", "all runs have the same"), (None, "no two runs share a")]
 )
@@ -138,44 +95,55 @@ def test_folds_that_are_no_number_of_parts_are_refused():
         seakeep.tune(SPEC, runs(), STATES, INPUTS, folds=1)
 
 
-def test_the_figure_has_a_line_per_candidate_and_units():
+@pytest.mark.parametrize("vary", ["lead", "rank"])
+def test_the_figure_has_a_line_per_candidate_and_units(vary):
     pyplot = pytest.importorskip("matplotlib.pyplot")
-    result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["lead"], horizon=(15,))
+    result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=[vary], horizon=(15,))
+    table = result.table.isel(trial=np.flatnonzero(result.table["chosen"].values))
+    assert (table["ridge"].item(), table["rank"].item()) == (result.spec.ridge, 0)
+    assert "(chosen)" in result.describe()
     before = pyplot.get_fignums()
-    figure = result.figure()
+    axes, *others = result.figure().axes
     assert pyplot.get_fignums() == before  # pyplot keeps what it makes until it is closed
-    (axes,) = figure.axes
+    assert axes.get_xlabel() == "ridge per snapshot pair (1)"
     words = [text.get_text() for text in axes.get_legend().get_texts()]
-    leads = np.unique(result.table["lead"].values)
-    assert words == [*(f"lead {lead}" for lead in leads), "chosen"]
-    assert axes.get_xlabel().endswith("(1)")
+    if vary == "lead":
+        leads = np.unique(result.table["lead"].values)
+        assert (words, others) == ([*(f"lead {lead}" for lead in leads), "chosen"], [])
+        return
+    (rank,) = others
+    assert rank.get_xlabel() == "singular values kept (1)"
+    np.testing.assert_array_equal(rank.lines[0].get_xdata(), [23, 16])
+    assert "rank 23" in result.describe() or "rank 16" in result.describe()
 
 
-def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, monkeypatch, capsys):
+@pytest.fixture
+def tutorial(tmp_path, monkeypatch):
     for path in TUTORIAL.iterdir():
         if path.suffix in (".csv", ".toml"):
             shutil.copy(path, tmp_path)
     monkeypatch.chdir(tmp_path)
-    from seakeep.cli import main
+    return tmp_path
 
-    before = (tmp_path / "campaign.toml").read_text()
+
+def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tutorial, capsys):
+    before = (tutorial / "campaign.toml").read_text()
     words = ["tune", "campaign.toml", "--vary", "lead", "--vary", "readouts"]
     assert main(words) == 0, capsys.readouterr().err
     told = capsys.readouterr().out
     assert "held out in turn" in told
     assert "read-out      mooring_bow: none, floor -0.0" in told
-    assert (tmp_path / "campaign.toml").read_text() == before
-    tuned = seakeep.read_campaign(tmp_path / "campaign_tuned.toml").model()
+    assert (tutorial / "campaign.toml").read_text() == before
+    tuned = seakeep.read_campaign(tutorial / "campaign_tuned.toml").model()
     assert isinstance(tuned.ridge, float)
     assert tuned.ridge_scale == "per_snapshot"
     assert tuned.readouts == {}  # the tutorial's line is linear
-    assert not (tmp_path / "campaign_tuned.scores.json").exists()
-    tried = pd.read_csv(tmp_path / "campaign_tuned.csv")
+    tried = pd.read_csv(tutorial / "campaign_tuned.csv")
     assert tried["chosen"].sum() == 1
     assert np.all((tried["lower"] <= tried["score"]) & (tried["score"] <= tried["upper"]))
     assert len(tried) > 9  # each λ of each lead
     assert tuned.lead.value in (0, 0.5, 0.75, 1)  # of the campaign's period
-    text = (tmp_path / "campaign_tuned.toml").read_text()
+    text = (tutorial / "campaign_tuned.toml").read_text()
     changed = ("state_delays", "input_delays", "ridge", "lead")
     kept = [line for line in before.splitlines() if line.strip() and not line.startswith(changed)]
     assert all(line in text for line in kept)
@@ -185,26 +153,20 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tmp_path, mon
     assert "Name it tuned.toml" in capsys.readouterr().err
 
 
-def test_the_command_takes_windows_and_folds_from_the_file(tmp_path, monkeypatch, capsys):
-    for path in TUTORIAL.iterdir():
-        if path.suffix in (".csv", ".toml"):
-            shutil.copy(path, tmp_path)
-    monkeypatch.chdir(tmp_path)
-    from seakeep.cli import main
-
-    path = tmp_path / "campaign.toml"
-    head, rest = path.read_text().split("[model]\n", 1)
-    path.write_text(f'{head}[model]\nselect = {{ horizon = ["5 T", 10] }}\n{rest}')
-    given = {}
-
-    def spy(*_, **more):
-        given.update(more)
-        raise RequestError("seen")
-
-    monkeypatch.setattr("seakeep.tuning.tune", spy)
-    assert main(["tune", "campaign.toml"]) == 2
-    assert "seen" in capsys.readouterr().err
-    assert (given["horizon"], given["folds"]) == ((5.0, 10.0), "auto")
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ('horizon = ["900 T", 1000]', "no window of {} samples can be held out"),
+        ('horizon = "5 T", folds = "sea_state"', "sea state, so each was held out alone"),
+    ],
+)
+def test_the_command_takes_windows_and_folds_from_the_file(tutorial, capsys, settings, words):
+    path = tutorial / "campaign.toml"
+    text = path.read_text().replace("[model]\n", f"[model]\nselect = {{ {settings} }}\n", 1)
+    path.write_text(text)
+    assert main(["tune", "campaign.toml", "--vary", "ridge"]) == 0
+    samples = round(seakeep.read_campaign(path).seconds("900 T") / 0.08)
+    assert words.format(samples) in capsys.readouterr().out
 
 
 def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():
@@ -279,16 +241,6 @@ celerity = 2.0
     text = tuned_campaign(before, None, spec, ["ridge"], "recommended", 20.0)
     kept = tomllib.loads(text)["model"]
     assert kept["alignment"] == {"mode": "effective", "celerity": 2.0}
-
-
-def test_the_figure_shows_ranks_beside_ridges():
-    pytest.importorskip("matplotlib")
-    result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["rank"], horizon=(15,))
-    ridge, rank = result.figure().axes
-    assert ridge.get_xlabel() == "ridge per snapshot pair (1)"
-    assert rank.get_xlabel() == "singular values kept (1)"
-    np.testing.assert_array_equal(rank.lines[0].get_xdata(), [23, 16])
-    assert "rank 23" in result.describe() or "rank 16" in result.describe()
 
 
 def test_a_campaign_file_states_observables_read_outs_and_a_ridge_by_roll_out(tmp_path):

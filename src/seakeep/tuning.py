@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Collection, Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,11 +12,9 @@ import xarray as xr
 
 from seakeep.arrays import Progress
 from seakeep.errors import RequestError
-from seakeep.files import read_bytes, replacing
 from seakeep.models import HankelDMDc
-from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
-from seakeep.models.readouts import FittedReadOut
-from seakeep.models.selection import select
+from seakeep.models.labelled import Runs, Stop, as_runs
+from seakeep.models.selection import Selected, select
 from seakeep.models.settings import FOLDS, Folds
 from seakeep.models.training import check_names, until
 from seakeep.toml import Length
@@ -31,32 +26,58 @@ __all__ = ["TuneResult", "tune", "tuned_campaign"]
 
 LENGTHS = ("state_delays", "input_delays", "lead")
 FIRST = "# seakeep_file: tuned campaign\n"
+COLUMNS = {
+    "state_delays": "state delays",
+    "input_delays": "input delays",
+    "lead": "lead",
+    "observables": "observables",
+    "alignment": "alignment",
+    "ridge": "λ per snapshot pair",
+    "rank": "number of singular values kept; 0 for all",
+    "score": "mean NRMSE of free runs",
+    "lower": "lower bound of the 95 % interval of the score",
+    "upper": "upper bound of the 95 % interval of the score",
+    "chosen": "chosen",
+}
+"""Columns of the table of what was tried, in words."""
 
 
 @dataclass(frozen=True, eq=False)
-class TuneResult:
+class TuneResult(Selected[HankelDMDc]):
     """Result of :func:`tune`.
 
     Parameters
     ----------
-    spec : HankelDMDc
-        The settings that were chosen; ``spec.fit(runs, states, inputs)`` fits the model.
-    table : Dataset
-        Over ``trial``: ``state_delays``, ``input_delays``, ``lead`` (samples), ``observables``
-        (their kinds), ``alignment``, ``ridge`` (per snapshot pair) or ``rank`` (0 for none),
-        ``score`` (mean NRMSE of free runs), the bounds ``lower`` and ``upper`` of its 95 %
-        interval, and ``chosen``.
+    settings : HankelDMDc
+        The settings that were chosen.
+    rows : tuple of dict
+        What was tried, as in :attr:`table`.
     note : str
-        How the choice was made, and the best λ of each candidate.
+        How the choice was made.
     readouts : tuple of FittedReadOut
         Read-outs of the settings that were chosen, as all training runs teach them; those that
         were chosen among have their scores.
     """
 
-    spec: HankelDMDc
-    table: xr.Dataset
-    note: str
-    readouts: tuple[FittedReadOut, ...] = ()
+    @property
+    def spec(self) -> HankelDMDc:
+        """The settings; ``spec.fit(runs, states, inputs)`` fits the model."""
+        return self.settings
+
+    @property
+    def table(self) -> xr.Dataset:
+        """What was tried, a Dataset over ``trial``.
+
+        ``state_delays``, ``input_delays``, ``lead`` (samples), ``observables`` (their kinds),
+        ``alignment``, ``ridge`` (per snapshot pair) or ``rank`` (0 for none), ``score`` (mean
+        NRMSE of free runs), the bounds ``lower`` and ``upper`` of its 95 % interval, ``chosen``.
+        """
+        return xr.Dataset(
+            {
+                key: ("trial", np.array([row[key] for row in self.rows]), {"long_name": words})
+                for key, words in COLUMNS.items()
+            }
+        )
 
     def describe(self) -> str:
         """Text: how the choice was made, the best λ of each candidate, and the read-outs.
@@ -65,7 +86,7 @@ class TuneResult:
         -------
         str
         """
-        return "\n".join([self.note, *(each.describe() for each in self.readouts)])
+        return "\n".join([super().describe(), *(each.describe() for each in self.readouts)])
 
     def figure(self) -> Figure:
         """Draw the error against λ, a line per candidate; needs the extra ``figures``.
@@ -92,7 +113,6 @@ def tune(
     executor: Executor | None = None,
     seed: int = 0,
     progress: Progress | None = None,
-    resume: str | Path | None = None,
 ) -> TuneResult:
     """Choose settings by the error of free runs on training runs that are held out in turn.
 
@@ -124,8 +144,6 @@ def tune(
         Of the bootstrap of the intervals.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
-    resume : str or Path, optional
-        File that keeps what was found, so that an interrupted search continues.
 
     Returns
     -------
@@ -135,8 +153,7 @@ def tune(
     Raises
     ------
     RequestError
-        If `vary` names something else, the delay rows are not exact, or a file to resume is of
-        other runs or settings.
+        If `vary` names something else, or the delay rows are not exact.
     DataError
         As :meth:`HankelDMDc.fit`.
     """
@@ -149,19 +166,9 @@ def tune(
     check_names(states, inputs)
     if spec.select is not None and spec.select.observables:
         vary = list(dict.fromkeys([*vary, "observables"]))
-    named = until(as_runs(runs), stop)
-    known: MutableMapping[str, Any] = {}
-    if resume is not None:
-        asked = {
-            "spec": spec.to_json(),
-            "vary": sorted(vary),
-            "horizon": list(horizon),
-            "folds": folds,
-        }
-        known = _Kept(Path(resume), _digest(asked, named, [*states, *inputs]))
     found = select(
         spec,
-        named,
+        until(as_runs(runs), stop),
         list(states),
         list(inputs),
         vary=vary,
@@ -170,75 +177,9 @@ def tune(
         period=None if spec.select is None else spec.select.period,
         executor=executor,
         progress=progress,
-        known=known,
         seed=seed,
     )
-    chosen = replace(found.settings, select=None)
-    return TuneResult(chosen, _table(found.rows), found.describe(), found.readouts)
-
-
-def _table(rows: Sequence[dict[str, Any]]) -> xr.Dataset:
-    """Rows as a Dataset over ``trial``."""
-    words = {
-        "ridge": "λ per snapshot pair",
-        "rank": "number of singular values kept; 0 for all",
-        "score": "mean NRMSE of free runs",
-        "lower": "lower bound of the 95 % interval of the score",
-        "upper": "upper bound of the 95 % interval of the score",
-    }
-    keys = (
-        *("state_delays", "input_delays", "lead", "observables", "alignment", "ridge", "rank"),
-        "score",
-    )
-    return xr.Dataset(
-        {
-            key: (
-                "trial",
-                np.array([row[key] for row in rows]),
-                {"long_name": words.get(key, key.replace("_", " "))},
-            )
-            for key in (*keys, "lower", "upper", "chosen")
-        }
-    )
-
-
-def _digest(asked: object, runs: dict[str, xr.Dataset], channels: Sequence[str]) -> str:
-    """Checksum of what a search depends on."""
-    found = hashlib.sha256(json.dumps(asked, sort_keys=True).encode())
-    for name, run in runs.items():
-        found.update(name.encode())
-        facts = {key: run[key].attrs for key in channels} | {"run": run.attrs}
-        found.update(repr(facts).encode())
-        for values in (run["time"].values, channel_matrix(run, channels, name)):
-            found.update(np.ascontiguousarray(values).tobytes())
-    return found.hexdigest()
-
-
-class _Kept(dict[str, Any]):
-    """Scores in a file: each one that is added is written."""
-
-    def __init__(self, path: Path, digest: str) -> None:
-        self.path, self.digest = path, digest
-        if path.exists():
-            try:
-                content = json.loads(read_bytes(path))
-                known, scores = content["digest"], dict(content["scores"])
-            except (ValueError, LookupError, TypeError) as error:
-                raise RequestError(
-                    f"{path} keeps no scores of a search ({error}). Name another file, or remove "
-                    "it."
-                ) from None
-            if known != digest:
-                raise RequestError(
-                    f"{path} keeps scores of other runs or settings. Name another file, or remove "
-                    "it to start anew."
-                )
-            self.update(scores)
-
-    def __setitem__(self, key: str, value: Any) -> None:
-        super().__setitem__(key, value)
-        with replacing(self.path) as place:
-            place.write_text(json.dumps({"digest": self.digest, "scores": self}), encoding="utf-8")
+    return TuneResult(replace(found.settings, select=None), found.rows, found.note, found.readouts)
 
 
 def tuned_campaign(

@@ -41,56 +41,43 @@ def test_the_state_at_the_next_instant_comes_from_states_and_inputs_up_to_this_o
     np.testing.assert_allclose(forecast.time, test_run.time[k + 1 : k + 41], rtol=0, atol=0)
 
 
-def test_no_state_after_the_start_is_read(model, test_run):
-    expected = model.forecast(test_run, start=5.0, steps=100)
-    scrambled = test_run.copy(deep=True)
-    for name in model.states:
-        scrambled[name][101:] = np.nan
-    xr.testing.assert_identical(model.forecast(scrambled, start=5.0, steps=100), expected)
-    scrambled.heave[100] += 1.0
-    assert not model.forecast(scrambled, start=5.0, steps=100).equals(expected)
+def scrambled(run, names, samples):
+    run = run.copy(deep=True)
+    for name in names:
+        run[name][samples] = np.nan
+    return run
 
 
-def test_no_input_after_the_last_but_one_instant_is_read(model, test_run):
+def test_states_are_read_up_to_the_start_and_inputs_up_to_the_last_instant_but_one(model, test_run):
     expected = model.forecast(test_run, start=5.0, steps=100)
-    scrambled = test_run.copy(deep=True)
-    for name in model.inputs:
-        scrambled[name][200:] = np.nan  # the last instant forecast is sample 200
-    xr.testing.assert_identical(model.forecast(scrambled, start=5.0, steps=100), expected)
-    scrambled.eta_cog[199] += 1.0
-    other = model.forecast(scrambled, start=5.0, steps=100)
+    read = scrambled(test_run, model.states, slice(101, None))
+    read = scrambled(read, model.inputs, slice(200, None))  # sample 200 is the last one forecast
+    xr.testing.assert_identical(model.forecast(read, start=5.0, steps=100), expected)
+    read.eta_cog[199] += 1.0
+    other = model.forecast(read, start=5.0, steps=100)
     assert not other.isel(time=-1).equals(expected.isel(time=-1))
     xr.testing.assert_equal(other.isel(time=slice(0, -1)), expected.isel(time=slice(0, -1)))
+    read.heave[100] += 1.0
+    assert not model.forecast(read, start=5.0, steps=99).isel(time=0).equals(expected.isel(time=0))
 
 
 @pytest.mark.parametrize(("s", "z"), [(3, 8), (8, 3)])
 def test_nothing_before_the_delays_of_each_group_is_read(make_run, channels, test_run, s, z):
     model = HankelDMDc(s, z, 1.0).fit(make_run(), **channels)
     expected = model.forecast(test_run, start=5.0, steps=50)
-    scrambled = test_run.copy(deep=True)
-    scrambled.heave[: 100 - s] = np.nan
-    scrambled.eta_fwd[: 100 - z] = np.nan
-    xr.testing.assert_identical(model.forecast(scrambled, start=5.0, steps=50), expected)
+    read = scrambled(test_run, ["heave"], slice(100 - s))
+    read = scrambled(read, ["eta_fwd"], slice(100 - z))
+    xr.testing.assert_identical(model.forecast(read, start=5.0, steps=50), expected)
+    # The longer delay and the start fill the history.
+    assert model.history_samples == max(s, z) + 1
+    first = test_run.time.values[model.history_samples - 1]
+    assert model.forecast(test_run, start=first, steps=5).attrs["start"] == first
 
 
-def test_the_start_may_be_given_as_an_instant_of_the_run(model, test_run):
-    expected = model.forecast(test_run, start=5.0, steps=10)
-    xr.testing.assert_identical(
-        model.forecast(test_run, start=test_run.time[100], steps=10), expected
-    )
-
-
-def test_one_step_needs_no_input_after_the_start(model, test_run):
-    x, u = values(test_run, model.states), values(test_run, model.inputs)
-    out = model.forecast_arrays(x[:101], u[:101], np.zeros((0, 0)), steps=1)
-    expected = model.forecast(test_run, start=5.0, steps=1)
-    np.testing.assert_array_equal(out, values(expected, model.states))
-
-
-@pytest.mark.parametrize("offset", [-0.4, 0.4])
+@pytest.mark.parametrize("offset", [-0.4, 0.0, 0.4])
 def test_the_start_is_the_nearest_sample_and_the_result_says_which(model, test_run, offset):
     expected = model.forecast(test_run, start=5.0, steps=10)
-    snapped = model.forecast(test_run, start=5.0 + offset * DT, steps=10)
+    snapped = model.forecast(test_run, start=test_run.time[100] + offset * DT, steps=10)
     xr.testing.assert_identical(snapped, expected)
     assert snapped.attrs["start"] == float(test_run.time[100])
     assert float(snapped.time[0]) == float(test_run.time[101])
@@ -106,15 +93,10 @@ def test_channels_time_and_units_are_kept(model, test_run):
     assert (forecast.attrs["run"], forecast.attrs["status"]) == ("3041_2", "ok")
 
 
-def test_without_steps_the_forecast_goes_to_the_end_of_the_run(model, test_run):
-    forecast = model.forecast(test_run, start=5.0)
-    assert forecast.sizes["time"] == 199
-    assert float(forecast.time[-1]) == float(test_run.time[-1])
-
-
-def test_one_step_past_the_end_of_the_run_is_within_reach_of_its_inputs(model, test_run):
-    within = model.forecast(test_run, start=5.0, steps=199)
-    past = model.forecast(test_run, start=5.0, steps=200)
+def test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it(model, test_run):
+    within = model.forecast(test_run, start=5.0)
+    np.testing.assert_array_equal(within.time, test_run.time[101:])
+    past = model.forecast(test_run, start=5.0, steps=200)  # its inputs are there
     xr.testing.assert_equal(past.isel(time=slice(0, 199)), within)
     assert float(past.time[-1]) == pytest.approx(300 * DT)
     assert np.isfinite(past.heave[-1])
@@ -122,40 +104,21 @@ def test_one_step_past_the_end_of_the_run_is_within_reach_of_its_inputs(model, t
     assert float(last.time[0]) == pytest.approx(300 * DT)
 
 
-def test_the_first_possible_start_is_the_sample_that_fills_the_history(model, test_run):
-    assert model.history_samples == max(S, Z) + 1
-    first = test_run.time.values[model.history_samples - 1]
-    assert model.forecast(test_run, start=first, steps=5).attrs["start"] == first
-
-
-@pytest.mark.parametrize(("s", "z", "needed"), [(3, 8, 9), (8, 3, 9), (0, 0, 1)])
-def test_history_samples_are_the_longer_delay_and_the_start(s, z, needed):
-    assert HankelDMDc(s, z, 1.0).needs(dt=0.1).history + 1 == needed
-
-
-def test_arrays_give_the_same_bits_as_a_run(model, test_run):
+def test_arrays_give_the_same_bits_as_a_run_from_the_rows_that_are_needed(model, test_run):
     x, u = values(test_run, model.states), values(test_run, model.inputs)
-    forecast = model.forecast(test_run, start=5.0, steps=60)
-    arrays = model.forecast_arrays(x[:101], u[:101], u[101:160], steps=60)
-    np.testing.assert_array_equal(arrays, values(forecast, model.states))
-    shortest = model.forecast_arrays(x[100 - S : 101], u[100 - Z : 101], u[101:160], steps=60)
-    np.testing.assert_array_equal(shortest, arrays)
-
-
-def test_rows_of_arrays_that_are_not_needed_are_not_looked_at(model, test_run):
-    x, u = values(test_run, model.states), values(test_run, model.inputs)
-    expected = model.forecast_arrays(x[:101], u[:101], u[101:160], steps=60)
+    expected = values(model.forecast(test_run, start=5.0, steps=60), model.states)
     x[: 100 - S], u[: 100 - Z], u[160:] = np.nan, np.nan, np.nan
-    again = model.forecast_arrays(x[:101], u[:101], u[101:], steps=60)
-    np.testing.assert_array_equal(again, expected)
-
-
-def test_forecasting_leaves_the_arrays_it_gets_alone(model, test_run):
-    x, u = values(test_run, model.states), values(test_run, model.inputs)
     before = x.copy(), u.copy()
-    model.forecast_arrays(x[:101], u[:101], u[101:160], steps=60)
+    arrays = model.forecast_arrays(x[:101], u[:101], u[101:], steps=60)
+    np.testing.assert_array_equal(arrays, expected)
     np.testing.assert_array_equal(x, before[0])
     np.testing.assert_array_equal(u, before[1])
+    shortest = model.forecast_arrays(x[100 - S : 101], u[100 - Z : 101], u[101:160], steps=60)
+    np.testing.assert_array_equal(shortest, arrays)
+    # One step needs no input after the start.
+    one = model.forecast_arrays(x[:101], u[:101], np.zeros((0, 0)), steps=1)
+    alone = model.forecast(test_run, start=5.0, steps=1)
+    np.testing.assert_array_equal(one, values(alone, model.states))
 
 
 def test_windows_side_by_side_are_single_forecasts(model, test_run):

@@ -15,7 +15,6 @@ from seakeep import (
     Uniform,
     load_model,
 )
-from seakeep.models.forecasts import status_at_clock
 from seakeep.models.linear import modes
 
 
@@ -121,10 +120,10 @@ def test_a_forecast_that_diverges_ends_in_nan_with_its_status(make_dataset, fact
     assert forecast.attrs["status"] == f"diverged at t = {float(forecast.time[at]):g} s"
     # Seconds since 1970: the status still tells the sample.
     late = long.assign_coords(time=1.7e9 + 0.1 * np.arange(1060))
-    told = model.forecast(late, start=1.7e9 + 1.0).attrs["status"]
-    for clock, status in ((1.0, told), (3.0, status_at_clock(told, 3.0))):
-        instant = float(status.removeprefix("diverged at t = ").removesuffix(" s"))
-        assert instant == pytest.approx(clock * float(late.time[at + 11]), abs=1e-3, rel=0)
+    told, expected = model.forecast(late, start=1.7e9 + 1.0).attrs, float(late.time[at + 11])
+    assert told["diverged_at"] == expected
+    instant = float(told["status"].removeprefix("diverged at t = ").removesuffix(" s"))
+    assert instant == pytest.approx(expected, abs=1e-3, rel=0)
 
 
 @pytest.mark.parametrize("standardize", [False, True])

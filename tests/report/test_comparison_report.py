@@ -558,18 +558,21 @@ def test_envelopes_keep_off_the_frame():
 
 def test_statuses_follow_the_clock_of_full_scale():
     single = comparison(status="diverged at t = 3.5 s")
-    assert at_full_scale(single, 4.0).status == "diverged at t = 7 s"
+    single.forecast.attrs |= {"diverged_at": 3.5, "input_predicted_from": 2.0}
+    words = "diverged at t = 7 s, input predicted from t = 4 s"
+    assert at_full_scale(single, 4.0).status == words
     assert at_full_scale(comparison(), 4.0).status == "ok"
     members = xr.Dataset(
         {
             "heave": (("member", "time"), np.ones((2, 3)), {"units": "m"}),
             "status": ("member", np.array(["ok", "diverged at t = 2 s"])),
         },
-        coords={"time": [1.0, 2.0, 3.0]},
-        attrs={"status": "1 of 2 members diverged", "start": 0.5},
+        coords={"time": [1.0, 2.0, 3.0], "diverged_at": ("member", [np.nan, 2.0])},
+        attrs={"status": "1 of 2 members diverged", "start": 0.5, "diverged": 1, "members": 2},
     )
     full = forecast_at_full_scale(members, 4.0)
     assert list(full["status"].values) == ["ok", "diverged at t = 4 s"]
+    np.testing.assert_array_equal(full["diverged_at"], [np.nan, 4.0])
     assert full.attrs["status"] == "1 of 2 members diverged"
     assert full.attrs["start"] == 1.0
 

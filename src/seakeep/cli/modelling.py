@@ -135,7 +135,6 @@ def forecast(
     check_place(out)
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.models import is_ensemble, load_model
-    from seakeep.models.forecasts import is_usable
     from seakeep.quality import warn_of_runs
     from seakeep.report.comparison import (
         forecast_header,
@@ -197,7 +196,7 @@ def forecast(
         f"t = {begin} s, status {status}{reads and f'; {reads}'}.{scaled}"
     )
     members_left = result.sizes.get("member", 0) - int(result.attrs.get("diverged", 0))
-    usable = members_left > 0 if "member" in result.dims else is_usable(str(status))
+    usable = members_left > 0 if "member" in result.dims else "diverged_at" not in result.attrs
     if not usable:
         raise typer.Exit(1)
 

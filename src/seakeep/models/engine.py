@@ -7,6 +7,7 @@ members to an executor, and :func:`group_series` collects them, in a file where 
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import tempfile
@@ -20,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray, whole_number
+from seakeep.arrays import BoolArray, FloatArray, IntArray, whole_number
 from seakeep.core.recursion import Recursion, read_table, recursion
 from seakeep.core.rollout import rollouts
 from seakeep.errors import RequestError
@@ -39,7 +40,6 @@ __all__ = [
     "Windows",
     "array_windows",
     "cut_lost",
-    "driven",
     "first_lost",
     "group_series",
     "linear_runs",
@@ -61,8 +61,6 @@ members that go on from there would make up the mean of an ensemble."""
 MEMORY, LEAST = 20, 64
 """Longest delays over which the limit falls back after a high wave, or a spike of a probe, and the
 samples that a delay counts at least: slow drift rings for some hundred wave periods."""
-PIECE = 2**18
-"""Numbers that are looked at together, so that a long run takes little beside its result."""
 HELD = 32 * 2**20
 """Bytes of member series that are held in memory; more is put into a temporary file."""
 
@@ -185,6 +183,7 @@ def read_groups(
     check_choice("ahead", ahead, ("refuse", "predict"))
     predicts = ahead == "predict" and bool(signature.inputs)
     opened: dict[str, _Opened] = {}
+    wanted: dict[str, list[Span]] = {}
     spans: list[list[Span]] = []
     for places, steps in groups:
         if not places:
@@ -194,90 +193,77 @@ def read_groups(
                 f"steps is None, which is the end of the run, at another distance from each of the "
                 f"{len(places)} starts. Give the number of instants to forecast from all of them."
             )
-        mine = []
+        spans.append([])
         for name, start in places:
             if name not in opened:
-                opened[name] = _Opened.of(signature, runs[name], name)
-            mine.append(opened[name].span(signature, start, steps, predicts))
-        spans.append(mine)
-    wanted: dict[str, list[Span]] = {name: [] for name in opened}
-    for (places, _), each in zip(groups, spans, strict=True):
-        for (name, _), span in zip(places, each, strict=True):
+                opened[name], wanted[name] = _Opened.of(signature, runs[name], name), []
+            span = opened[name].span(signature, start, steps, predicts)
+            spans[-1].append(span)
             wanted[name].append(span)
     if predicts:
         opened = {name: each.continued(signature, wanted[name]) for name, each in opened.items()}
     drives = {name: each.drive(signature, wanted[name]) for name, each in opened.items()}
     return [
-        _windows(signature, [(opened[name], drives[name]) for name, _ in places], each)
-        for (places, _), each in zip(groups, spans, strict=True)
+        _driven(
+            signature,
+            [drives[name] for name, _ in places],
+            mine,
+            [opened[name] for name, _ in places],
+        )
+        for (places, _), mine in zip(groups, spans, strict=True)
     ]
 
 
-def _windows(
-    signature: Signature, sources: Sequence[tuple[_Opened, Drive]], spans: Sequence[Span]
+def _driven(
+    signature: Signature, drives: Sequence[Drive], spans: Sequence[Span], runs: Sequence[_Opened]
 ) -> Windows:
-    """Windows of one length from their runs."""
-    input_map = signature.input_map
-    runs = [run for run, _ in sources]
-    windows = Windows(
-        places=tuple(
-            (run.name, float(run.time[span.known])) for run, span in zip(runs, spans, strict=True)
-        ),
+    """Windows of one length, each with its run's drive."""
+    pairs = list(zip(runs, spans, strict=True))
+    maps, dt = signature.input_map, signature.dt
+    delayed, direct, table, starts = _regressors(signature, drives, spans)
+    return Windows(
+        places=tuple((run.name, float(run.time[span.known])) for run, span in pairs),
         steps=spans[0].stop - spans[0].known,
-        time=tuple(run.instants(signature.dt, span) for run, span in zip(runs, spans, strict=True)),
-        histories=np.stack(
-            [run.history(signature, span) for run, span in zip(runs, spans, strict=True)]
-        ),
-        delayed=np.empty(0),
-        direct=np.empty(0),
-        look_ahead=tuple(input_map.look_ahead(run.run, signature.dt) for run in runs),
-        notes=input_map.notes(runs[0].run),
-        predicted=tuple(
-            run.first_predicted(signature, span) for run, span in zip(runs, spans, strict=True)
-        ),
+        time=tuple(run.instants(dt, span) for run, span in pairs),
+        histories=np.stack([run.history(signature, span) for run, span in pairs]),
+        look_ahead=tuple(maps.look_ahead(run.run, dt) for run in runs),
+        notes=maps.notes(runs[0].run),
+        predicted=tuple(run.first_predicted(signature, span) for run, span in pairs),
+        delayed=delayed,
+        direct=direct,
+        table=table,
+        starts=starts,
     )
-    return driven(windows, signature, [drive for _, drive in sources], spans)
 
 
-def driven(
-    windows: Windows, signature: Signature, drives: Sequence[Drive], spans: Sequence[Span]
-) -> Windows:
-    """Windows with the regressors that drive them, each from its run's drive."""
-    z = signature.input_delays
+def _regressors(
+    signature: Signature, drives: Sequence[Drive], spans: Sequence[Span]
+) -> tuple[FloatArray, FloatArray, FloatArray | None, IntArray | None]:
+    """Regressors, table and starts of windows of one length, each from its run's drive."""
+    z, pairs = signature.input_delays, list(zip(drives, spans, strict=True))
     if signature.input_map.follows is None:
-        stops = [span.stop if signature.inputs else span.known + 1 for span in spans]
         rows = [
-            drive.rows(span.first, stop)
-            for drive, span, stop in zip(drives, spans, stops, strict=True)
+            drive.rows(span.first, span.stop if signature.inputs else span.known + 1)
+            for drive, span in pairs
         ]
-        return replace(
-            windows,
-            delayed=np.stack([each.delayed for each in rows]),
-            direct=np.stack([each.direct[z:] for each in rows]),
-        )
-    found = [drive for drive in drives if isinstance(drive, Followed)]
-    pairs = list(zip(found, spans, strict=True))
+        delayed = np.stack([each.delayed for each in rows])
+        return delayed, np.stack([each.direct[z:] for each in rows]), None, None
     place = signature.input_map.follows.place
+    followed = [(drive, span) for drive, span in pairs if isinstance(drive, Followed)]
     tables, starts, first = [], {}, 0
-    for drive in dict.fromkeys(found):
-        mine = [span for each, span in pairs if each is drive]
+    for drive in dict.fromkeys(drive for drive, _ in followed):
+        mine = [span for each, span in followed if each is drive]
         begin, end = min(span.known for span in mine), max(span.stop for span in mine)
         starts[drive] = first - begin
         tables.append(drive.table(begin, end))
         first += end - begin
-    table = np.concatenate(tables)
-    at = np.array([starts[drive] + span.known for drive, span in pairs])
-    here = np.array([drive.places(span.known, span.known + 1) for drive, span in pairs])
-    steps = np.arange(windows.steps)
-    held = read_table(place, table, at[:, None] + steps, here.repeat(windows.steps, axis=1))
-    before = np.stack([drive.rows(span.first, span.known).delayed for drive, span in pairs])
-    return replace(
-        windows,
-        delayed=np.concatenate([before, held], axis=1),
-        direct=np.stack([drive.direct(span.known, span.stop) for drive, span in pairs]),
-        table=table,
-        starts=at,
-    )
+    table, steps = np.concatenate(tables), spans[0].stop - spans[0].known
+    at = np.array([starts[drive] + span.known for drive, span in followed])
+    here = np.array([drive.places(span.known, span.known + 1) for drive, span in followed])
+    held = read_table(place, table, at[:, None] + np.arange(steps), here.repeat(steps, axis=1))
+    before = np.stack([drive.rows(span.first, span.known).delayed for drive, span in followed])
+    direct = np.stack([drive.direct(span.known, span.stop) for drive, span in followed])
+    return np.concatenate([before, held], axis=1), direct, table, at
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,12 +323,13 @@ class _Opened:
         """The run up to the last sample that is wanted, with inputs predicted that are missing."""
         stop = max(signature.input_map.reads(span).stop for span in spans)
         start = max(span.known for span in spans)
-        names = signature.inputs
-        values = labelled.channel_matrix(self.run, names, self.name, slice(0, stop))
-        ends = [min(_end(column), stop) for column in values.T]
+        values = self.read(signature.inputs, 0, stop)
         # Only the future is predicted: missing samples before a start are refused.
-        missing = [end if start < end < stop else None for end in ends]
-        if all(end is None for end in missing):
+        sound = {}
+        for name, column in zip(signature.inputs, values.T, strict=True):
+            if start < (found := _last_stretch(column)).stop < stop:
+                sound[name] = column[found], found.stop
+        if not sound:
             return self
         if signature.input_map.reads_surge:
             raise RequestError(
@@ -350,17 +337,15 @@ class _Opened:
                 "measured surge, which nothing continues. Forecast fewer steps, or fit a model "
                 "with surge = 'predicted' or 'none'."
             )
-        read = {name: self.run[name] for name in {*names, *signature.states} if name in self.run}
-        run = xr.Dataset(read, attrs=self.run.attrs).isel(time=slice(0, stop))
+        names = [each for each in (*signature.inputs, *signature.states) if each in self.run]
+        run = self.run[names].isel(time=slice(0, stop))
         more = stop - run.sizes["time"]
         beyond = self.time[-1] + signature.dt * np.arange(1, more + 1)
         run = run.pad(time=(0, more), keep_attrs=True)
         run = run.assign_coords(time=np.concatenate([self.time[:stop], beyond]))
-        for name, column, end in zip(names, values.T, missing, strict=True):
-            if end is not None:
-                whole = [column[:end], predict_waves(_sound_tail(column[:end]), stop - end)]
-                run[name] = ("time", np.concatenate(whole), run[name].attrs)
-        return replace(self, run=run, known=min(end for end in missing if end is not None) - 1)
+        for name, (known, end) in sound.items():
+            run[name].values[end:] = predict_waves(known, stop - end)
+        return replace(self, run=run, known=min(end for _, end in sound.values()) - 1)
 
     def first_predicted(self, signature: Signature, span: Span) -> int:
         """First step that reads predicted input, or −1."""
@@ -375,27 +360,26 @@ class _Opened:
         read = [signature.input_map.reads(span) for span in spans]
         first = min(each.first for each in read)
         stop = max(each.stop for each in read) if signature.inputs else first
-        names = signature.inputs
-        values = labelled.channel_matrix(self.run, names, self.name, slice(first, stop))
+        values = self.read(signature.inputs, first, stop)
         for each in read:
             wanted = values[each.first - first : max(each.stop - first, 0)]
-            labelled.check_finite(wanted, names, self.name, each.first, self.time)
+            labelled.check_finite(wanted, signature.inputs, self.name, each.first, self.time)
         surge = None
         if (follows := signature.input_map.follows) is not None:
             last = max(span.known for span in spans) + 1  # no later state is read
-            channel = signature.states[follows.column]
-            surge = labelled.channel_matrix(self.run, [channel], self.name, slice(first, last))[
-                :, 0
-            ]
+            surge = self.read([signature.states[follows.column]], first, last)[:, 0]
         return signature.input_map.wrap(Measured(values, first, surge), self.run, spans)
 
     def history(self, signature: Signature, span: Span) -> FloatArray:
         """States up to the start."""
         first = span.known + 1 - signature.state_samples
-        samples = slice(first, span.known + 1)
-        states = labelled.channel_matrix(self.run, signature.states, self.name, samples)
+        states = self.read(signature.states, first, span.known + 1)
         labelled.check_finite(states, signature.states, self.name, first, self.time)
         return states
+
+    def read(self, names: Sequence[str], first: int, stop: int) -> FloatArray:
+        """Channels at some samples."""
+        return labelled.channel_matrix(self.run, names, self.name, slice(first, stop))
 
     def instants(self, dt: float, span: Span) -> xr.Variable:
         """Instants that are forecast; the last ones may lie beyond the record."""
@@ -405,16 +389,12 @@ class _Opened:
         return xr.Variable(("time",), np.concatenate([inside, beyond]), attrs)
 
 
-def _end(values: FloatArray) -> int:
-    """Number of samples up to the last finite one."""
-    sound = np.flatnonzero(np.isfinite(values))
-    return int(sound[-1]) + 1 if sound.size else 0
-
-
-def _sound_tail(values: FloatArray) -> FloatArray:
-    """Samples after the last gap."""
-    gaps = np.flatnonzero(~np.isfinite(values))
-    return values[int(gaps[-1]) + 1 :] if gaps.size else values
+def _last_stretch(values: FloatArray) -> slice:
+    """The last samples in a row that are finite."""
+    sound = np.isfinite(values)
+    end = int(np.flatnonzero(sound)[-1]) + 1 if sound.any() else 0
+    gaps = np.flatnonzero(~sound[:end])
+    return slice(int(gaps[-1]) + 1 if gaps.size else 0, end)
 
 
 def array_windows(
@@ -457,15 +437,17 @@ def array_windows(
         measured = Measured(values, 0, surge)
         drives.append(signature.input_map.wrap(measured, rig, [span]))
     time = xr.Variable(("time",), signature.dt * np.arange(1, steps + 1))
-    windows = Windows(
+    delayed, direct, table, starts = _regressors(signature, drives, [span] * len(drives))
+    return Windows(
         places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
         time=(time,) * len(histories),
         histories=histories,
-        delayed=np.empty(0),
-        direct=np.empty(0),
+        delayed=delayed,
+        direct=direct,
+        table=table,
+        starts=starts,
     )
-    return driven(windows, signature, drives, [span] * len(drives))
 
 
 def linear_runs(
@@ -477,20 +459,18 @@ def linear_runs(
 
     Read-outs see each member's series when its run is done.
     """
-    found = [[read_out(readouts, values) for values in _runs(member, groups)] for member in members]
+    found = [model_runs(each, each.coefficients[None], groups) for each in members]
+    for values in itertools.chain.from_iterable(found):
+        read_out(readouts, values)
     # One member needs no copy.
     return [
-        each[0][None] if len(each) == 1 else np.stack(each) for each in zip(*found, strict=True)
+        each[0] if len(each) == 1 else np.concatenate(each) for each in zip(*found, strict=True)
     ]
 
 
-def _runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
-    if all(windows.table is None for windows in groups):
-        return _open_runs(member, groups)
-    return [model_runs(member, member.coefficients[None], windows)[0] for windows in groups]
-
-
-def model_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows) -> FloatArray:
+def model_runs(
+    scales: Dynamics, coefficients: FloatArray, groups: Sequence[Windows]
+) -> list[FloatArray]:
     """Free runs of models of the same delays and moments, side by side.
 
     Parameters
@@ -499,18 +479,24 @@ def model_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows) -> 
         Delays and moments of all models.
     coefficients : ndarray, shape (model, N, N(s+1) + n(z+1) + m)
         [Â B̂] of each.
-    windows : Windows
+    groups : sequence of Windows
         What they read.
 
     Returns
     -------
-    ndarray, shape (model, window, steps, N)
+    list of ndarray, each of shape (model, window, steps, N)
         Physical units; NaN from where a run is lost.
     """
-    if windows.table is None:
-        members = (replace(scales, coefficients=each) for each in coefficients)
-        return np.stack([_open_runs(member, [windows])[0] for member in members])
+    if any(windows.table is not None for windows in groups):
+        return [_followed_runs(scales, coefficients, windows) for windows in groups]
+    found = [_open_runs(replace(scales, coefficients=each), groups) for each in coefficients]
+    return [np.stack(each) if len(each) > 1 else each[0][None] for each in zip(*found, strict=True)]
+
+
+def _followed_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows) -> FloatArray:
+    """Free runs step by step, where the model follows its own surge."""
     assert windows.starts is not None
+    assert windows.table is not None
     follows, z, s = scales.follows, scales.input_delays, scales.state_delays
     assert follows is not None
     x, u, w = scales.state_scale, scales.input_scale, scales.direct_scale
@@ -567,20 +553,20 @@ def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
 
     What lies before a step counts less, by ``fading`` of each step in between.
     """
-    first = windows.delayed.shape[1] - scales.input_delays - windows.steps
+    z = scales.input_delays
+    first = windows.delayed.shape[1] - z - windows.steps
     if first < 0:  # without inputs
         return np.ones((len(windows), windows.steps))
-    parts = []
-    for scale, values in (
-        (scales.input_scale, windows.delayed[:, first:]),
-        (scales.direct_scale, windows.direct),
-    ):
-        count = values.shape[2]  # the slow surge squared is no input
-        relative = np.abs(values - scale.centre[:count]) / scale.bound[:count]
-        parts.append(relative.max(axis=2, initial=1.0))
-    delayed, direct = parts
-    found: FloatArray = np.maximum(delayed[:, scales.input_delays :], direct)
-    last, fade = delayed[:, : scales.input_delays].max(axis=1, initial=1.0), fading(scales)
+    delayed, direct = (
+        # The slow surge squared is no input.
+        (np.abs(x - scale.centre[: x.shape[2]]) / scale.bound[: x.shape[2]]).max(axis=2, initial=1)
+        for scale, x in (
+            (scales.input_scale, windows.delayed[:, first:]),
+            (scales.direct_scale, windows.direct),
+        )
+    )
+    found: FloatArray = np.maximum(delayed[:, z:], direct)
+    last, fade = delayed[:, :z].max(axis=1, initial=1.0), fading(scales)
     for now in found.T:
         last = now[:] = np.maximum(now, 1.0 + fade * (last - 1.0))
     return found
@@ -596,22 +582,18 @@ def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows)
     """NaN from where free runs (window, steps, N) are lost, in physical units; they are changed."""
     scale = scales.state_scale
     start = np.abs(windows.histories - scale.centre).max(axis=1, initial=0.0)
-    reach = np.maximum(scale.bound, start)[:, None]
-    limit = None
-    length = max(1, PIECE // max(1, values[:, 0].size))
-    before = np.zeros((len(values), 1), dtype=bool)
-    for first in range(0, values.shape[1], length):
-        piece = values[:, first : first + length]
-        with np.errstate(invalid="ignore", over="ignore"):
-            distance = np.abs(piece - scale.centre)
-        if np.all(distance <= GROWTH * reach) and not before.any():
-            continue  # for any input
-        if limit is None:
-            limit = GROWTH * reach * _excess(scales, windows)[..., None]
-        lost = ~np.all(distance <= limit[:, first : first + length], axis=-1)
-        lost[:, :1] |= before
-        piece[np.logical_or.accumulate(lost, axis=-1)] = np.nan
-        before = np.any(lost, axis=-1, keepdims=True)
+    reach = GROWTH * np.maximum(scale.bound, start)
+
+    def beyond(excess: FloatArray | float) -> BoolArray:
+        lost = np.zeros(values.shape[:2], dtype=bool)
+        for column, centre in enumerate(scale.centre):  # one after the other takes little room
+            lost |= ~(np.abs(values[..., column] - centre) <= reach[:, [column]] * excess)
+        return lost
+
+    with np.errstate(invalid="ignore", over="ignore"):
+        if beyond(1.0).any():
+            lost = beyond(_excess(scales, windows))
+            values[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return values
 
 
@@ -715,8 +697,5 @@ def _room(shape: tuple[int, ...]) -> Iterator[FloatArray]:
 
 def first_lost(values: FloatArray) -> npt.NDArray[np.int64]:
     """First instant at which a channel is NaN, or −1, of values (…, steps, N)."""
-    if not np.isnan(values.sum()):
-        return np.full(values.shape[:-2], -1)
-    gone: npt.NDArray[np.bool_] = np.isnan(values.sum(axis=-1))
-    first = np.argmax(gone, axis=-1)
-    return np.where(np.take_along_axis(gone, first[..., None], axis=-1)[..., 0], first, -1)
+    gone: BoolArray = np.isnan(values.sum(axis=-1))
+    return np.where(gone.any(axis=-1), gone.argmax(axis=-1), -1)

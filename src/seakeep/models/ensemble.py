@@ -34,6 +34,7 @@ from seakeep.models.forecasts import (
     counted,
     forecast_notes,
     label_channels,
+    lost_instants,
     one_run,
     statuses,
     verdict,
@@ -148,7 +149,11 @@ class _Forecasts(Forecaster):
         variables["status"] = self._status(lost[:, 0], windows)
         return xr.Dataset(
             variables,
-            coords={"member": np.arange(self.n_members), "time": windows.time[0]},
+            coords={
+                "member": np.arange(self.n_members),
+                "diverged_at": lost_instants(lost[:, 0], windows),
+                "time": windows.time[0],
+            },
             attrs=self._notes(windows)
             | verdict(lost, windows, self.dt)
             | {"start": windows.places[0][1]},
@@ -201,6 +206,7 @@ class _Forecasts(Forecaster):
             coords={
                 "statistic": statistic_coordinate(level, self._bounds(band)),
                 "member": np.arange(self.n_members),
+                "diverged_at": lost_instants(lost[:, 0], windows),
                 "time": windows.time[0],
             },
             attrs=self._notes(windows) | counts,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any, ClassVar
@@ -11,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, as_real, whole_number
+from seakeep.arrays import FloatArray, IntArray, as_real, whole_number
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine
 from seakeep.models.checks import check_choice
@@ -22,18 +21,18 @@ from seakeep.models.interface import Signature
 from seakeep.models.labelled import ChannelLabel, run_name
 from seakeep.models.training import Training
 from seakeep.signals.prediction import predict_waves
-from seakeep.signals.time_axis import fixed, instant_text, span_text
+from seakeep.signals.time_axis import instant_text, span_text
 
 __all__ = [
     "Forecaster",
     "SingleModel",
     "check_arrays",
     "counted",
-    "is_usable",
     "label_channels",
+    "lost_instants",
     "one_run",
     "rows_by_name",
-    "status_at_clock",
+    "status_text",
     "statuses",
     "verdict",
     "window_coords",
@@ -191,10 +190,10 @@ class SingleModel(Forecaster):
         Dataset
             States at the `steps` instants after `start`, with units; ``attrs["start"]`` is the
             instant taken, ``attrs["status"]`` "ok" or from when on the forecast diverged (NaN
-            from there), ``attrs["reads_input_until"]`` how long after the last instant the last
-            input that was read lies, s: negative where it lies before. Where input was predicted,
-            the status ends in ", input predicted from t = … s", the first instant that depends on
-            it, which ``attrs["input_predicted_from"]`` holds too.
+            from there; also ``attrs["diverged_at"]``, s), ``attrs["reads_input_until"]`` how long
+            after the last instant the last input that was read lies, s: negative where it lies
+            before. Where input was predicted, the status ends in ", input predicted from t = … s",
+            the first instant that depends on it, which ``attrs["input_predicted_from"]`` holds too.
 
         Raises
         ------
@@ -208,11 +207,11 @@ class SingleModel(Forecaster):
         signature = self.signature
         _warn_of_reach(signature, windows, values[0])
         variables = label_channels(signature, values[0], ("time",))
-        lost = first_lost(values)
-        status = window_status(int(lost[0]), windows, 0, signature.dt)
-        attrs = {**forecast_notes(signature, windows), "start": windows.places[0][1]}
+        facts = outcome(windows, 0, int(first_lost(values)[0]))
+        attrs = {**forecast_notes(signature, windows), "start": windows.places[0][1], **facts}
+        attrs["status"] = status_text(facts, signature.dt)
         # The instants stand among the variables: given as coords, xarray would merge twice.
-        return xr.Dataset({"time": windows.time[0], **variables}, attrs=attrs | {"status": status})
+        return xr.Dataset({"time": windows.time[0], **variables}, attrs=attrs)
 
     def forecast_windows(
         self,
@@ -252,7 +251,7 @@ class SingleModel(Forecaster):
         signature = self.signature
         variables = label_channels(signature, values, ("window", "lead"))
         status = [
-            window_status(int(at), windows, window, signature.dt)
+            status_text(outcome(windows, window, int(at)), signature.dt)
             for window, at in enumerate(first_lost(values))
         ]
         variables["status"] = xr.Variable(("window",), status)
@@ -298,15 +297,9 @@ def forecast_notes(signature: Signature, windows: Windows) -> dict[str, Any]:
     notes: dict[str, Any] = {}
     if signature.inputs:
         notes["reads_input_until"] = max(windows.look_ahead) - signature.dt
-    if len(windows) == 1 and (from_instant := predicted_from(windows, 0)) is not None:
-        notes["input_predicted_from"] = from_instant
+    if len(windows) == 1:
+        notes |= outcome(windows, 0)
     return {"run": windows.places[0][0], **windows.notes, **notes}
-
-
-def predicted_from(windows: Windows, window: int) -> float | None:
-    """First instant of a window that depends on predicted input, s."""
-    at = windows.predicted[window]
-    return None if at < 0 else float(windows.time[window].values[at])
 
 
 def label_channels(
@@ -337,60 +330,57 @@ def window_coords(windows: Windows, dt: float) -> dict[str, xr.Variable]:
         "lead": xr.Variable(("lead",), lead, {"units": "s", "long_name": "time after start"}),
     }
     if any(at >= 0 for at in windows.predicted):
-        found = [predicted_from(windows, window) for window in range(len(windows))]
+        found = [outcome(windows, each).get("input_predicted_from") for each in range(len(windows))]
         words = {"units": "s", "long_name": "first instant that depends on predicted input"}
         values = np.array(found, dtype=float)  # None becomes NaN
         coords["input_predicted_from"] = xr.Variable(("window",), values, words)
     return coords
 
 
-def status_text(lost: int, time: FloatArray, dt: float, predicted: int = -1) -> str:
-    """Text of ``status`` for a free run.
-
-    `lost` is its first lost instant and `predicted` the first that depends on predicted input, −1
-    for none.
-    """
-    said = "ok" if lost < 0 else f"diverged at t = {instant_text(time[lost], dt)} s"
-    if predicted < 0:
-        return said
-    return f"{said}, input predicted from t = {instant_text(time[predicted], dt)} s"
-
-
-def status_at_clock(status: str, clock: float) -> str:
-    """The same status where time runs by a factor `clock`, as at full scale."""
-
-    def scaled(found: re.Match[str]) -> str:
-        decimals = max(3, len(found[1].partition(".")[2]))
-        return f"t = {fixed(clock * float(found[1]), decimals)} s"
-
-    return re.sub(r"t = (\S+) s", scaled, status)
-
-
-def is_usable(status: str) -> bool:
-    """Whether a status says that there is a forecast at all instants."""
-    return status.startswith("ok")
-
-
-def window_status(lost: int, windows: Windows, window: int, dt: float) -> str:
-    """Status of one of several windows."""
+def outcome(windows: Windows, window: int, lost: int = -1) -> dict[str, float]:
+    """Instants that the status of a free run names, s; `lost` is its first lost one, or −1."""
+    places = {"diverged_at": lost, "input_predicted_from": windows.predicted[window]}
     time = windows.time[window].values
-    return status_text(lost, time, dt, windows.predicted[window])
+    return {name: float(time[at]) for name, at in places.items() if at >= 0}
 
 
-def statuses(
-    lost: npt.NDArray[np.int64], windows: Windows, window: int, dt: float
-) -> npt.NDArray[np.str_]:
+def status_text(facts: Mapping[str, Any], dt: float) -> str:
+    """Text of ``status``.
+
+    Parameters
+    ----------
+    facts : mapping
+        What :func:`outcome` found, and of an ensemble how many of its ``members`` ``diverged``.
+    dt : float
+        Time step, s.
+    """
+    said = "ok"
+    if "diverged_at" in facts:
+        said = f"diverged at t = {instant_text(facts['diverged_at'], dt)} s"
+    elif facts.get("diverged"):
+        said = f"{facts['diverged']} of {facts['members']} members diverged"
+    if "input_predicted_from" not in facts:
+        return said
+    return f"{said}, input predicted from t = {instant_text(facts['input_predicted_from'], dt)} s"
+
+
+def statuses(lost: IntArray, windows: Windows, window: int, dt: float) -> npt.NDArray[np.str_]:
     """Status of each member in a window from its first lost instant, or −1."""
-    return np.array([window_status(int(at), windows, window, dt) for at in lost], dtype=str)
+    found = [status_text(outcome(windows, window, int(at)), dt) for at in lost]
+    return np.array(found, dtype=str)
 
 
-def verdict(lost: npt.NDArray[np.int64], windows: Windows, dt: float) -> dict[str, Any]:
+def lost_instants(lost: IntArray, windows: Windows) -> xr.Variable:
+    """Coordinate over ``member``: from when on each is lost in a single window, NaN for never."""
+    instants = np.where(lost >= 0, windows.time[0].values[lost], np.nan)
+    words = {"units": "s", "long_name": "first instant at which the member is lost"}
+    return xr.Variable(("member",), instants, words)
+
+
+def verdict(lost: IntArray, windows: Windows, dt: float) -> dict[str, Any]:
     """Attributes that count the members that were lost, of a single window."""
-    diverged = int(np.count_nonzero(lost >= 0))
-    status = window_status(-1, windows, 0, dt)
-    if diverged:
-        status = status.replace("ok", f"{diverged} of {len(lost)} members diverged", 1)
-    return {"status": status, "diverged": diverged}
+    counts = {"diverged": int(np.count_nonzero(lost >= 0)), "members": len(lost)}
+    return {"status": status_text(counts | outcome(windows, 0), dt), **counts}
 
 
 def counted(number: int, thing: str) -> str:
@@ -459,9 +449,9 @@ def rows_by_name(
 def _by_name(name: str, value: npt.ArrayLike, names: Sequence[str]) -> Any:
     """Columns in the order of the model, where they have names."""
     table: Any = value
+    if isinstance(table, xr.DataArray) and table.ndim == 2:
+        table = table.to_pandas()
     columns = getattr(table, "columns", None)
-    if isinstance(table, xr.DataArray) and table.ndim == 2 and table.dims[1] in table.coords:
-        columns = table.indexes[table.dims[1]]
     if columns is None or not all(isinstance(each, str) for each in columns):
         return value
     missing = [each for each in names if each not in list(columns)]
@@ -469,8 +459,6 @@ def _by_name(name: str, value: npt.ArrayLike, names: Sequence[str]) -> Any:
         raise RequestError(
             f"{name} has no column '{missing[0]}'; its columns: {', '.join(columns)}."
         )
-    if isinstance(table, xr.DataArray):
-        return table.sel({table.dims[1]: list(names)}).values
     return table[list(names)].to_numpy()
 
 

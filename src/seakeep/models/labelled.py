@@ -340,11 +340,22 @@ def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "sta
     return min(max(round((instant - float(time[0])) / step), 0), time.size - 1)
 
 
+def wave_channel(run: xr.Dataset, inputs: Sequence[str], name: str) -> str | None:
+    """The input that tells of the waves of a run, which messages call `name`.
+
+    The first that is named as a wave elevation, else the first that has no unit or metres; None
+    where there is neither.
+    """
+    variables = check_channels(run, inputs, name)
+    units = [variable.attrs.get("units", "") for variable in variables]
+    lengths = [each for each, unit in zip(inputs, units, strict=True) if unit in ("", "m")]
+    return next(iter([*filter(is_elevation, inputs), *lengths]), None)
+
+
 def mean_period(runs: Mapping[str, xr.Dataset], inputs: Sequence[str]) -> float:
     """Mean encounter period of some runs, samples: as they state it, or counted.
 
-    It is counted in the first input that is a wave elevation, or, where none is named as one, in
-    the first that has no unit or metres; runs without waves do not count.
+    It is counted in the :func:`wave_channel` of each run; runs without waves do not count.
 
     Raises
     ------
@@ -358,14 +369,13 @@ def mean_period(runs: Mapping[str, xr.Dataset], inputs: Sequence[str]) -> float:
         return float(np.mean(found))
     reason = f"no input ({', '.join(inputs) or 'none'}) is a wave elevation, eta_…."
     for name, run in runs.items():
-        lengths = [each for each in inputs if run[each].attrs.get("units", "") in ("", "m")]
-        for wave in [*filter(is_elevation, inputs), *lengths][:1]:
-            series = channel_matrix(run, [wave], name)[:, 0]
-            try:
-                counted = encounter_period(series[np.isfinite(series)], steps[name])
-                found.append(counted / steps[name])
-            except (DataError, RequestError) as error:
-                reason = f"{name}, channel '{wave}': {error}"
+        if (wave := wave_channel(run, inputs, name)) is None:
+            continue
+        series = channel_matrix(run, [wave], name)[:, 0]
+        try:
+            found.append(encounter_period(series[np.isfinite(series)], steps[name]) / steps[name])
+        except (DataError, RequestError) as error:
+            reason = f"{name}, channel '{wave}': {error}"
     if not found:
         raise DataError(
             f"the encounter period is not known: no run states it, and {reason} Set "

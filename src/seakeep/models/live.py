@@ -8,12 +8,15 @@ was not measured (:mod:`seakeep.core.kalman`); a forecast starts from its estima
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import math
+from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -34,13 +37,13 @@ from seakeep.core.recursion import read_table
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import load_sealed, write_sealed_array
 from seakeep.models import engine, store
-from seakeep.models.engine import Dynamics, Windows
+from seakeep.models.engine import Dynamics, Runs, Windows
 from seakeep.models.executor import one_blas_thread
 from seakeep.models.following import Followed, Following
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors
 from seakeep.models.inputs import Chain, FittedAlignment, Measured
-from seakeep.models.interface import Regressors, Signature, Span
+from seakeep.models.interface import Signature, Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
@@ -63,22 +66,54 @@ RIG = ("water_depth", "celerity", "probe_offset")
 """Attributes of a run that an alignment reads."""
 
 
-class Servable(Protocol):
+class Servable(Runs, Protocol):
     """A model that can go into service."""
-
-    @property
-    def signature(self) -> Signature: ...
-    @property
-    def n_members(self) -> int: ...
-    def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
-        """Free runs of members over groups of windows."""
-        ...
 
     def live(
         self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
     ) -> Live:
         """Put the model into service."""
         ...
+
+
+class _Update(NamedTuple):
+    """What the filter makes of one sample.
+
+    Gain, shape (N(s+1), N); whitening of its innovation, shape (N, N); and standard deviations of
+    that, shape (N,).
+    """
+
+    gain: FloatArray
+    whitening: FloatArray
+    deviations: FloatArray
+
+
+@dataclass
+class _Counts:
+    """Counts of samples, by which a service goes on.
+
+    Parameters
+    ----------
+    taken : int
+        All.
+    final : int
+        Number of the last one whose estimate no later wave moves; the first sample is 0.
+    since : int
+        Those since the whole history was measured.
+    partly : bool
+        Whether anything was seen since then.
+    complete : int
+        Complete ones in a row.
+    lead : int
+        Those since the start of a free run.
+    """
+
+    taken: int = 0
+    final: int = -1
+    since: int = 0
+    partly: bool = True
+    complete: int = 0
+    lead: int = 0
 
 
 class Live:
@@ -131,46 +166,45 @@ class Live:
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
         chain = Chain.of(signature.input_map)
-        self._follows = signature.input_map.follows
-        rig = _dataset(signature, self._rig)
-        aligned = chain.alignment
-        if aligned is not None and self._follows is None and aligned.carries_in(rig):
+        self._follows, aligned = chain.follows, chain.alignment
+        if aligned is not None and self._follows is None and aligned.carries_in(self._rig):
             raise RequestError(
                 "the model is driven by waves that are carried over whole records, which are not "
                 "there in service. Fit it with alignment mode = 'dispersion', surge = 'predicted', "
                 "which carries them in each step, or without alignment."
             )
-        self._places, self._depth = _places(signature, chain.alignment, self._rig)
+        self._places, self._depth = _places(signature, aligned, self._rig)
         self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
         count, s = len(signature.states), signature.state_delays
         size, variances = count * (s + 1), self._noise**2
         process = process_noise(errors.residual, self._a, variances)
         self._filter = DelayFilter(self._a, process, variances, np.zeros((size, size)))
-        self._whitening_known = np.linalg.inv(np.linalg.cholesky(process))
-        self._deviation_known = np.sqrt(np.diagonal(process) + variances)
-        # Samples after an instant whose input is needed before its estimate is final.
+        self._as_it_is = _Update(  # of a complete sample after complete ones
+            np.eye(size, count, count - size),
+            np.linalg.inv(np.linalg.cholesky(process)),
+            np.sqrt(np.diagonal(process) + variances),
+        )
         self._time = math.nan
+        # Samples after an instant whose input is needed before its estimate is final.
         self._ahead = signature.lead_samples
         # Of a model that follows its own surge: the map with its carriers in this rig, and filters
         # that predict the probes from one another; rows at all places of the samples to come.
         self._following = next((each for each in chain.maps if isinstance(each, Following)), None)
         self._table = (0, np.empty(0))
         if self._following is not None:
-            self._banks = self._following.banks(rig)
-            self._foresight = self._following.foresight(rig, max(self._ahead, 1))
+            self._banks = self._following.banks(self._rig)
+            self._foresight = self._following.foresight(self._rig, max(self._ahead, 1))
+        # Rows of samples, `_first` the number of the first; half of the room is always there.
         longest = max(s, signature.input_delays) + 1
         needed = 2 * (signature.history_samples + self._ahead + 1)
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
         delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
         widths = {"u": len(signature.inputs), "x": count, "y": count}
         widths |= {"delayed": delayed, "direct": direct}
-        room = 2 * self._record
+        self._first, room = 0, 2 * self._record
         self._kept = {name: np.full((room, width), np.nan) for name, width in widths.items()}
-        slots = self._ahead + 2
-        self._gains = np.zeros((slots, size, count))
-        self._whitenings = np.zeros((slots, count, count))
-        self._deviations = np.zeros((slots, count))
-        self._plain = np.zeros(slots, dtype=bool)
+        self._count = _Counts()
+        self._updates: deque[_Update] = deque(maxlen=self._ahead + 2)
         self._history = np.tile(signature.state_scale.centre, (s + 1, 1))
         self._innovation = np.full(count, np.nan)
         # Of squares that fade: sums, and weights; of all states, of each, and of each in free runs.
@@ -178,21 +212,6 @@ class Live:
         self._fade = np.full(2 * count + 1, 1.0 - 1.0 / CONSISTENCY)
         self._fade[count + 1 :] = 1.0 - 1.0 / max(CONSISTENCY, 2 * len(errors.rms))
         self._free = self._history.copy()
-        # Places in the record (how much of it is filled, the last final estimate, the first row of
-        # regressors that is not, the first sample that is predicted), then counts of samples: all,
-        # those since the whole history was measured and whether anything was seen since then,
-        # complete ones in a row, and those since the start of a free run.
-        self._at = {
-            "filled": 0,
-            "final": -1,
-            "rows": signature.history_samples - 1 - signature.input_delays,
-            "begins": signature.history_samples,
-            "taken": 0,
-            "since": 0,
-            "partly": 1,
-            "complete": 0,
-            "lead": 0,
-        }
 
     def __repr__(self) -> str:
         return (
@@ -208,12 +227,12 @@ class Live:
     @property
     def ready(self) -> bool:
         """Whether there is enough history to forecast: ``history_samples`` of the model."""
-        return self._at["filled"] >= self.signature.history_samples
+        return self._count.taken >= self.signature.history_samples
 
     @property
     def state(self) -> FloatArray:
         """Estimate of the states at :attr:`time`, shape (N,), physical units."""
-        state: FloatArray = self._x[self._last].copy()
+        state: FloatArray = self._rows("x", self._count.taken - 1, self._count.taken)[0].copy()
         return state
 
     @property
@@ -269,13 +288,9 @@ class Live:
         moments = {"centre": scale.centre, "spread": scale.spread, "record": self._record}
         return {"a": self._a, "b": self._b, "offset": self._offset} | noises | moments
 
-    @property
-    def _last(self) -> int:
-        return self._at["filled"] - 1
-
-    @property
-    def _x(self) -> FloatArray:
-        return self._kept["x"]
+    def _rows(self, name: str, first: int, stop: int) -> FloatArray:
+        """A view of some samples, by their numbers."""
+        return self._kept[name][first - self._first : stop - self._first]
 
     @one_blas_thread()
     def step(
@@ -309,18 +324,22 @@ class Live:
             If a length, a name or the time does not fit, or a value is infinite. Nothing has
             changed then, and the same sample can be given again.
         """
-        signature = self.signature
+        signature, at = self.signature, self._count.taken
         instant = self._instant(time)
         states, inputs = _sample("y", y, signature.states), self._inputs(u)
-        self._make_room()
-        at = self._at["filled"]
-        self._kept["u"][at], self._kept["y"][at] = inputs, states
+        if at - self._first == 2 * self._record:  # all room is used up
+            for values in self._kept.values():
+                values[: self._record] = values[self._record :]
+            self._first += self._record
+        self._rows("u", at, at + 1)[:] = inputs
+        self._rows("y", at, at + 1)[:] = states
         # Held until it is estimated: an alignment reads where the vessel is.
-        self._x[at] = np.where(np.isfinite(states), states, self._x[at - 1])
-        self._at["filled"] += 1
-        self._at["taken"] += 1
+        last = self._kept["x"][at - 1 - self._first]
+        self._rows("x", at, at + 1)[:] = np.where(np.isfinite(states), states, last)
+        self._count.taken += 1
         self._time = instant
         self._filtered(at, np.isfinite(states))
+        self._settle(at)
         return self.state
 
     def _instant(self, time: float | None) -> float:
@@ -345,31 +364,21 @@ class Live:
         )
 
     def _inputs(self, u: npt.ArrayLike | Mapping[str, float] | None) -> FloatArray:
-        inputs = _sample("u", u, self.signature.inputs)
+        """Inputs of a sample; what was lost comes from each record, and from the probe up-wave."""
+        inputs, taken = _sample("u", u, self.signature.inputs), self._count.taken
         lost = np.isnan(inputs)
-        if lost.any():
-            if (filled := self._at["filled"]) < 4:
-                raise RequestError(
-                    f"inputs that are missing are predicted from the samples before, and there are "
-                    f"{filled}. Start with at least 4 samples of all of u."
-                )
-            inputs[lost] = self._foreseen()[lost]
-        return inputs
-
-    def _foreseen(self) -> FloatArray:
-        """Inputs of a sample that was lost: from each record, and from the probe up-wave."""
-        known, placed = self._known_inputs(), np.count_nonzero(np.isfinite(self._places))
-        if self._following is not None and self.ready:
-            first: FloatArray = self._expected(known, 1)[0]
-            return first
-        expected: FloatArray
-        if placed < 2 or not self.ready:
-            expected = predict_waves(known, 1)[0]
-            return expected
-        rng, dt = np.random.default_rng(0), self.signature.dt
-        pair = draw_sea(known, 1, 1, rng, dt=dt, positions=self._places, depth=self._depth)
-        expected = pair.mean(axis=0)[0]  # the draws lie about it
-        return expected
+        if not lost.any():
+            return inputs
+        if taken < 4:
+            raise RequestError(
+                f"inputs that are missing are predicted from the samples before, and there are "
+                f"{taken}. Start with at least 4 samples of all of u."
+            )
+        known = self._known_inputs()
+        if self._following is None and self.ready and np.isfinite(self._places).sum() >= 2:
+            drawn = self._drawn(known, 1, 1, 0)
+            return np.where(lost, drawn.mean(axis=0)[0], inputs)  # the draws lie about it
+        return np.where(lost, self._expected(known, 1)[0], inputs)
 
     def _expected(self, known: FloatArray, count: int) -> FloatArray:
         """Inputs of the next samples: in waves as those of training, or from each record."""
@@ -385,165 +394,154 @@ class Live:
             out[:, others] = predict_waves(known[:, others], count)
         return out
 
+    def _drawn(self, known: FloatArray, count: int, pairs: int, seed: int) -> FloatArray:
+        """Futures of the waves, shape (2 pairs, count, Q)."""
+        rng, dt = np.random.default_rng(seed), self.signature.dt
+        return draw_sea(known, count, pairs, rng, dt=dt, positions=self._places, depth=self._depth)
+
     def _known_inputs(self) -> FloatArray:
         """Inputs that waves are predicted from: the last ones, always as many once there are."""
-        filled = self._at["filled"]
-        return self._kept["u"][max(filled - self._record, 0) : filled]
-
-    def _make_room(self) -> None:
-        """Move what is kept to the front where the room is used up."""
-        if self._at["filled"] < 2 * self._record:
-            return
-        for values in self._kept.values():
-            values[: self._record] = values[self._record :]
-        for place in ("filled", "final", "rows", "begins"):
-            self._at[place] -= self._record
+        return self._rows("u", max(self._count.taken - self._record, 0), self._count.taken)
 
     def _filtered(self, at: int, seen: BoolArray) -> None:
-        """Covariance and gain of the sample, then the means that its input completes."""
-        place = self._at
-        slot = place["taken"] % len(self._gains)
+        """Covariance and gain of a sample."""
+        count, begins = self._count, self.signature.history_samples
         is_exact = bool(seen.all()) and not self._noise.any()
-        plain = is_exact and place["since"] == 0 and at >= place["begins"]
-        self._plain[slot] = plain
-        if not plain:
-            self._update(at, seen, slot)
-        place["complete"] = place["complete"] + 1 if is_exact else 0
-        if place["complete"] > self.signature.state_delays:
-            place["since"] = place["partly"] = 0
-            self._filter.covariance.fill(0.0)
-        elif not plain:
-            place["since"] += 1
-            place["partly"] |= int(seen.any())
-        self._settle(at)
-
-    def _update(self, at: int, seen: BoolArray, slot: int) -> None:
-        if at < self._at["begins"]:
-            self._filter.shift(np.diag(self.signature.state_scale.spread**2))
+        if is_exact and count.since == 0 and at >= begins:
+            update = self._as_it_is
         else:
-            self._filter.shift()
-            limit = self.errors.at(self._at["since"] + 1) ** 2
-            blind = not (self._at["partly"] or seen.any())
-            self._filter.limit(limit, exactly=blind)
-        self._deviations[slot] = np.sqrt(np.diagonal(self.covariance) + self._noise**2)
-        self._gains[slot], self._whitenings[slot] = self._filter.measure(seen)
+            if at < begins:
+                self._filter.shift(np.diag(self.signature.state_scale.spread**2))
+            else:
+                self._filter.shift()
+                limit = self.errors.at(count.since + 1) ** 2
+                self._filter.limit(limit, exactly=not (count.partly or seen.any()))
+            deviations = np.sqrt(np.diagonal(self.covariance) + self._noise**2)
+            update = _Update(*self._filter.measure(seen), deviations)
+        self._updates.append(update)
+        count.complete = count.complete + 1 if is_exact else 0
+        if count.complete > self.signature.state_delays:
+            count.since, count.partly = 0, False
+            self._filter.covariance.fill(0.0)
+        elif update is not self._as_it_is:
+            count.since += 1
+            count.partly = count.partly or bool(seen.any())
 
     def _settle(self, at: int) -> None:
         """Bring estimates up to the sample `at`: final ones, then those that waves to come move."""
-        place = self._at
-        if at < place["begins"]:
+        count = self._count
+        if at < self.signature.history_samples:
             self._advance(self._history, at, at)
-            place["final"] = at
+            count.final = at
             return
         final = at - max(self._ahead - 1, 0)
-        if final > place["final"]:
+        if final > count.final:
             self._find_rows(final, self._known_inputs())
-            place["rows"] = final
-            self._advance(self._history, place["final"] + 1, final, is_final=True)
-            place["final"] = final
-        if place["final"] == at:
-            return
-        slots = (place["taken"] - np.arange(at - place["final"])) % len(self._plain)
-        if self._plain[slots].all():
-            self._x[at] = self._kept["y"][at]
+            self._advance(self._history, count.final + 1, final, is_final=True)
+            count.final = final
+        if all(each is self._as_it_is for each in self._pending()):
+            if count.final < at:
+                self._rows("x", at, at + 1)[:] = self._rows("y", at, at + 1)
             return
         known = self._known_inputs()
         if self._ahead and self.signature.inputs:
             known = np.concatenate([known, self._expected(known, self._ahead)])
         self._find_rows(at, known)
-        self._advance(self._history.copy(), place["final"] + 1, at)
+        self._advance(self._history.copy(), count.final + 1, at)
+
+    def _update_of(self, at: int) -> _Update:
+        return self._updates[at - self._count.taken]
 
     def _advance(
         self, history: FloatArray, first: int, last: int, *, is_final: bool = False
     ) -> None:
         """Run the mean through samples, with the gains that were found for them."""
-        place, s = self._at, self.signature.state_delays
+        s = self.signature.state_delays
         for at in range(first, last + 1):
-            slot = (place["taken"] - (self._last - at)) % len(self._gains)
-            measured = self._kept["y"][at]
+            update, measured = self._update_of(at), self._rows("y", at, at + 1)[0]
             predicted = self.signature.state_scale.centre
-            if at >= place["begins"]:
+            if at >= self.signature.history_samples:
                 predicted = self._predicted(history, at - 1)
             innovation = measured - predicted
             history[:-1] = history[1:]
-            if self._plain[slot]:
+            if update is self._as_it_is:
                 history[-1] = measured
             else:
                 history[-1] = predicted
-                told = np.where(np.isfinite(innovation), innovation, 0.0)
-                history += (self._gains[slot] @ told).reshape(history.shape)
+                seen = np.isfinite(innovation)
+                history += (update.gain @ np.where(seen, innovation, 0.0)).reshape(history.shape)
                 exact = np.isfinite(measured) & (self._noise == 0)
                 history[-1][exact] = measured[exact]
-            first_kept = max(at - s, 0)
-            self._x[first_kept : at + 1] = history[first_kept - at - 1 :]
+            rows = self._rows("x", max(at - s, 0), at + 1)
+            rows[:] = history[len(history) - len(rows) :]
             if is_final:
-                self._judge(at, slot, innovation)
+                self._judge(at, update, innovation)
 
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""
-        z, kept = self.signature.input_delays, self._kept
+        delayed = self._rows("delayed", at - self.signature.input_delays, at + 1)
+        direct = self._rows("direct", at, at + 1)[0]
         if self._follows is not None:
             place, column, _ = self._follows
             first, table = self._table
-            here = place.of(self._x[at + 1 - place.taps.size : at + 1, column])
-            kept["delayed"][at] = read_table(place, table, np.array([at - first]), here)[0]
-            kept["direct"][at, -1] = place.squared(here)[0]
+            here = place.of(self._rows("x", at + 1 - place.taps.size, at + 1)[:, column])
+            delayed[-1] = read_table(place, table, np.array([at - first]), here)[0]
+            direct[-1] = place.squared(here)[0]
         out = self._a @ history.ravel()
         out += self._offset
-        out += self._b @ kept["delayed"][at - z : at + 1].ravel()
+        out += self._b @ delayed.ravel()
         if self._d.size:
-            out += self._d @ kept["direct"][at]
+            out += self._d @ direct
         return out
 
-    def _judge(self, at: int, slot: int, innovation: FloatArray) -> None:
+    def _judge(self, at: int, update: _Update, innovation: FloatArray) -> None:
         """Take a sample into the running squares, NaN for what was not measured."""
-        self._innovation, plain, lead = innovation, self._plain[slot], self._at["lead"]
-        measured, seen = self._kept["y"][at], np.isfinite(innovation)
-        one, free = np.full(seen.size + 1, np.nan), np.full(seen.size, np.nan)
+        self._innovation, lead = innovation, self._count.lead
+        measured, seen = self._rows("y", at, at + 1)[0], np.isfinite(innovation)
+        squares = np.full(2 * seen.size + 1, np.nan)
         with np.errstate(over="ignore", invalid="ignore"):
             if seen.any():
                 # A sum of squares: it may overflow, and is never negative.
-                whitening = self._whitening_known if plain else self._whitenings[slot]
-                white = whitening @ np.where(seen, innovation, 0.0)
-                one[0] = np.fmin(np.sum(white**2) / np.count_nonzero(seen), SPIKE)
-                deviations = self._deviation_known if plain else self._deviations[slot]
-                one[1:] = (innovation / deviations) ** 2
+                white = update.whitening @ np.where(seen, innovation, 0.0)
+                squares[0] = np.fmin(np.sum(white**2) / np.count_nonzero(seen), SPIKE)
+                squares[1 : seen.size + 1] = (innovation / update.deviations) ** 2
             if lead:
                 predicted = self._predicted(self._free, at - 1)
                 self._free[:-1], self._free[-1] = self._free[1:], predicted
-                free = ((measured - predicted) / self.errors.at(lead)) ** 2
-        squares = np.concatenate([one, free])
+                free = (measured - predicted) / self.errors.at(lead)
+                squares[seen.size + 1 :] = free**2
         taken = ~np.isnan(squares)
         self._squares[:, taken] *= self._fade[taken]
         self._squares[0, taken] += np.minimum(squares[taken], SPIKE)
         self._squares[1, taken] += 1.0
         lead = (lead + 1) % (len(self.errors.rms) + 1) if lead else 0
-        if not lead and (plain or self._noise.any()):
+        if not lead and (update is self._as_it_is or self._noise.any()):
             self._free[:], lead = self._history, 1
-        self._at["lead"] = lead
+        self._count.lead = lead
 
     def _find_rows(self, stop: int, known: FloatArray) -> None:
         """Regressors of the samples up to before `stop`; `known` ends with inputs to come."""
-        first, signature = self._at["rows"], self.signature
+        signature, begins = self.signature, self.signature.history_samples
+        first = self._count.final
+        if first < begins:  # no row was wanted yet
+            first = begins - 1 - signature.input_delays
         if stop <= first:
             return
-        begin = self._at["filled"] - min(self._at["filled"], self._record)
+        taken = self._count.taken
+        begin = max(taken - self._record, 0)
+        delayed, direct = self._rows("delayed", first, stop), self._rows("direct", first, stop)
         if self._following is not None and self._follows is not None:
-            surge = self._x[begin : self._at["filled"], self._follows.column]
+            surge = self._rows("x", begin, taken)[:, self._follows.column]
             drive = Followed(self._following, Measured(known, begin, surge), self._banks)
-            places = drive.places(first, stop)
-            self._table = (first, drive.table(first, stop))
-            self._kept["delayed"][first:stop] = read_table(
-                self._follows.place, self._table[1], np.arange(stop - first), places
-            )
-            self._kept["direct"][first:stop, :-1] = drive.direct(first, stop)
+            table, places = drive.table(first, stop), drive.places(first, stop)
+            self._table = (first, table)
+            delayed[:] = read_table(self._follows.place, table, np.arange(stop - first), places)
+            direct[:, :-1] = drive.direct(first, stop)
             return
         # Direct regressors are wanted from the first prediction on.
-        span = Span(first, max(first, self._at["begins"] - 1), stop)
+        span = Span(first, max(first, begins - 1), stop)
         wrapped = signature.input_map.wrap(Measured(known, begin), None, [span])
-        found: Regressors = wrapped.rows(first, stop)
-        self._kept["delayed"][first:stop] = found.delayed
-        self._kept["direct"][first:stop] = found.direct
+        delayed[:], direct[:] = wrapped.rows(first, stop)
 
     @one_blas_thread()
     def forecast(
@@ -591,9 +589,10 @@ class Live:
         signature, count = self.signature, whole_number(steps, "steps")
         level, share = fraction(level, "level"), positive(share, "share", "training SD")
         if not self.ready:
+            needed = signature.history_samples
             raise RequestError(
-                f"there are {self._at['filled']} samples of history and the model needs "
-                f"{signature.history_samples}. Call step {self._missing()} more times first."
+                f"there are {self._count.taken} samples of history and the model needs {needed}. "
+                f"Call step {needed - self._count.taken} more times first."
             )
         futures, known = self._futures(count, future)
         windows = self._windows(count, futures)
@@ -632,9 +631,6 @@ class Live:
         apart = float(np.ptp(self._places[order]))
         return predictable_time(record, self.signature.dt, apart, self._depth)
 
-    def _missing(self) -> int:
-        return self.signature.history_samples - self._at["filled"]
-
     def _futures(self, steps: int, future: npt.ArrayLike | None) -> tuple[list[FloatArray], int]:
         """Inputs of the record and after it, of each future, and how many rows were given."""
         names, record = self.signature.inputs, self._known_inputs()
@@ -652,29 +648,19 @@ class Live:
         known = np.concatenate([record, given])
         if len(given) == wanted:
             return [known], len(given)
-        rng = np.random.default_rng(self._at["taken"])
-        drawn = draw_sea(
-            known,
-            wanted - len(given),
-            PAIRS,
-            rng,
-            dt=self.signature.dt,
-            positions=self._places,
-            depth=self._depth,
-        )
+        drawn = self._drawn(known, wanted - len(given), PAIRS, self._count.taken)
         return [np.concatenate([known, each]) for each in drawn], len(given)
 
     def _windows(self, steps: int, futures: Sequence[FloatArray]) -> Windows:
         """What a forecast reads, for each future."""
-        signature, filled = self.signature, self._at["filled"]
-        history = self._x[filled - signature.state_samples : filled]
+        signature, taken = self.signature, self._count.taken
+        history = self._rows("x", taken - signature.state_samples, taken)
         back = signature.input_map.history(signature.input_delays) + 1
-        size = min(filled, self._record)
-        inputs = np.stack([each[size - back :] for each in futures])
+        inputs = np.stack([each[min(taken, self._record) - back :] for each in futures])
         if not signature.inputs:
             inputs = np.zeros((1, signature.input_delays + steps, 0))
         histories = np.broadcast_to(history, (len(inputs), *history.shape))
-        rig = None if self._follows is None else _dataset(signature, self._rig)
+        rig = None if self._follows is None else self._rig
         return engine.array_windows(signature, histories, inputs, steps, rig)
 
     def _error_variances(self, steps: int) -> FloatArray:
@@ -682,8 +668,8 @@ class Live:
         own = self.errors.of_forecast(steps)
         if not self._filter.covariance.any():
             return own
-        bound = self.errors.of_forecast(steps, self._at["since"])
-        if not self._at["partly"]:
+        bound = self.errors.of_forecast(steps, self._count.since)
+        if not self._count.partly:
             return bound
         result: FloatArray = np.minimum(own + self._filter.ahead(steps), bound)
         return result
@@ -706,28 +692,28 @@ class Live:
         RequestError
             If the file cannot be written, or another one is there.
         """
-        parts = np.concatenate([each.ravel() for each in self._parts()])
-        covariance = self._filter.covariance
-        rows = np.flatnonzero(covariance.any(axis=1))
-        block = covariance[np.ix_(rows, rows)][np.tril_indices(rows.size)]
-        words = {"places": self._at, "plain": self._plain.tolist(), "time": self._time}
-        words |= {"rig": self._rig, "noise": self._noise.tolist(), "rows": rows.tolist()}
+        words = {
+            "counts": asdict(self._count),
+            "as_it_is": [each is self._as_it_is for each in self._pending()],
+            "time": self._time,
+            "rig": [self._rig.attrs, {name: each.attrs for name, each in self._rig.items()}],
+            "noise": self._noise.tolist(),
+        }
         attrs = {"settings": json.dumps(words), "model": self._identity}
-        return write_sealed_array(np.concatenate([parts, block]), attrs, path, STATE)
+        values = np.concatenate([each.ravel() for each in self._parts()])
+        return write_sealed_array(values, attrs, path, STATE)
+
+    def _pending(self) -> list[_Update]:
+        """Updates of the samples whose estimates are not final."""
+        return [self._update_of(at) for at in range(self._count.final + 1, self._count.taken)]
 
     def _parts(self) -> list[FloatArray]:
-        """Views of what samples and forecasts to come read, but for the covariance."""
-        place, signature = self._at, self.signature
-        filled, slots = place["filled"], len(self._plain)
-        taps = 0 if self._follows is None else self._follows[0].taps.size
-        longest = max(signature.state_delays, signature.input_delays, taps)
-        record, tail = (max(filled - each, 0) for each in (self._record, slots + longest + 2))
-        kept = [each[record if name == "u" else tail : filled] for name, each in self._kept.items()]
-        pending = (place["taken"] - np.arange(filled - 1 - place["final"])) % slots
-        used = [slot for slot in pending if not self._plain[slot]]
-        of_slots = (self._gains, self._whitenings, self._deviations)
-        gains = [each[slot] for slot in used for each in of_slots]
-        return [*kept, *gains, self._history, self._free, self._innovation, self._squares]
+        """Views of all that samples and forecasts to come read."""
+        taken = self._count.taken
+        kept = [self._rows(each, max(taken - self._record, 0), taken) for each in self._kept]
+        updates = [each for each in self._pending() if each is not self._as_it_is]
+        state = (self._history, self._free, self._innovation, self._squares)
+        return [*kept, *itertools.chain(*updates), *state, self._filter.covariance]
 
     @cached_property
     def _identity(self) -> str:
@@ -737,17 +723,17 @@ class Live:
             found.update(np.ascontiguousarray(each).tobytes())
         return found.hexdigest()
 
-    def _restore(self, kept: dict[str, Any], values: FloatArray) -> None:
+    def _restore(self, kept: Mapping[str, Any], values: FloatArray) -> None:
         """Restore what :meth:`save` wrote."""
-        self._at, self._time, self._plain[:] = kept["places"], kept["time"], kept["plain"]
+        self._count, self._time = _Counts(**kept["counts"]), kept["time"]
+        self._first = max(self._count.taken - self._record, 0)
+        shapes = [each.shape for each in self._as_it_is]
+        for as_it_is in kept["as_it_is"]:
+            self._updates.append(self._as_it_is if as_it_is else _Update(*map(np.empty, shapes)))
         at = 0
         for part in self._parts():
             part[:] = values[at : at + part.size].reshape(part.shape)
             at += part.size
-        rows = np.array(kept["rows"], dtype=int)
-        block = np.zeros((rows.size, rows.size))
-        block[np.tril_indices(rows.size)] = values[at:]
-        self._filter.covariance[np.ix_(rows, rows)] = block + np.tril(block, -1).T
 
 
 def load_live(model: Servable, path: str | Path) -> Live:
@@ -774,11 +760,8 @@ def load_live(model: Servable, path: str | Path) -> Live:
     """
     dataset = load_sealed(path, STATE)
     kept = store.content(dataset, "settings")
-    rig, noise = kept["rig"], zip(model.signature.states, kept["noise"], strict=False)
-    like = xr.Dataset(
-        {name: ((), 0.0, {"x_position": each}) for name, each in rig["positions"].items()},
-        attrs=rig["run"],
-    )
+    (attrs, probes), noise = kept["rig"], zip(model.signature.states, kept["noise"], strict=False)
+    like = xr.Dataset({name: ((), 0.0, each) for name, each in probes.items()}, attrs=attrs)
     live = model.live(like=like, noise={name: each for name, each in noise if each})
     if dataset.attrs["model"] != live._identity:
         raise RequestError(
@@ -839,47 +822,34 @@ def _mean_predictor(
     return offset / number, *flat, d / number
 
 
-def _rig(signature: Signature, like: xr.Dataset | None) -> dict[str, dict[str, float]]:
-    """Attributes of a run that an alignment reads."""
+def _rig(signature: Signature, like: xr.Dataset | None) -> xr.Dataset:
+    """Attributes of a run that an alignment reads, as those of a run without samples."""
+    rig = xr.Dataset({each: ("time", np.zeros(0)) for each in signature.inputs})
     if like is None:
-        return {"run": {}, "positions": {}}
+        return rig
     given: object = like
     if not isinstance(given, xr.Dataset):
         raise RequestError(
             f"like must be a Dataset, a run of the rig in service; received {type(given).__name__}."
         )
-    positions = {
-        name: float(like[name].attrs["x_position"])
-        for name in signature.inputs
-        if name in like and "x_position" in like[name].attrs
-    }
-    found = {key: float(like.attrs[key]) for key in RIG if key in like.attrs}
-    return {"run": found, "positions": positions}
-
-
-def _dataset(signature: Signature, rig: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
-    """Attributes of a rig as those of a run without samples."""
-    run = xr.Dataset({each: ("time", np.zeros(0)) for each in signature.inputs}, attrs=rig["run"])
-    for name, position in rig["positions"].items():
-        run[name].attrs["x_position"] = position
-    return run
+    rig.attrs = {key: float(like.attrs[key]) for key in RIG if key in like.attrs}
+    for name in signature.inputs:
+        if name in like and "x_position" in like[name].attrs:
+            rig[name].attrs["x_position"] = float(like[name].attrs["x_position"])
+    return rig
 
 
 def _places(
-    signature: Signature,
-    alignment: FittedAlignment | None,
-    rig: Mapping[str, Mapping[str, float]],
+    signature: Signature, alignment: FittedAlignment | None, rig: xr.Dataset
 ) -> tuple[FloatArray, float]:
     """Positions of the inputs that are elevations, NaN where none is known, and the depth."""
-    stated: dict[str, float | None] = {}
-    depth = rig["run"].get("water_depth")
+    depth = rig.attrs.get("water_depth", None if alignment is None else alignment.water_depth)
+    if depth is None:
+        return np.full(len(signature.inputs), math.nan), math.nan
     if alignment is not None:
-        stated |= zip(alignment.inputs, alignment.positions, strict=True)
-        depth = alignment.water_depth if depth is None else depth
-    stated |= rig["positions"]
-    found = [None if depth is None else stated.get(name) for name in signature.inputs]
-    places = np.array([math.nan if each is None else each for each in found])
-    return places, math.nan if depth is None else depth
+        return np.array(alignment.positions_in(rig), dtype=float), depth
+    found = [rig[name].attrs.get("x_position") for name in signature.inputs]
+    return np.array(found, dtype=float), depth  # None becomes NaN
 
 
 def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArray:

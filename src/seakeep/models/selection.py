@@ -1,19 +1,18 @@
 r"""Settings chosen by free runs on training runs that are held out.
 
-Each candidate is fitted to all training runs but one and judged by its free runs on that one, in
-windows of one or two lengths; the mean over folds, windows and channels of the NRMSE decides. The
-columns of all candidates are built once: a fold, a choice of delays and of observables is a part of
-one Gram matrix, and one eigendecomposition gives every λ (:mod:`seakeep.core.path`).
+A candidate is a complete set of settings but for λ. It is fitted to all training runs but one and
+judged by its free runs on that one, in windows of one or two lengths; the mean over folds, windows
+and channels of the NRMSE decides. The regressors of all candidates are made once; one Gram matrix
+of a candidate and a fold gives the whole path of λ (:mod:`seakeep.core.path`).
 """
 
 from __future__ import annotations
 
 import itertools
-import json
-from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import astuple, dataclass, field, replace
-from typing import Any, Generic, TypeVar, cast
+from dataclasses import dataclass, fields, replace
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -21,36 +20,34 @@ import xarray as xr
 from seakeep.arrays import BoolArray, FloatArray, IntArray
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
-from seakeep.core.path import Moments, lagged, ridge_path, truncated_path
+from seakeep.core.gram import Piece, primal_system
+from seakeep.core.path import ridge_path, truncated_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.engine import Dynamics, Windows, model_runs
+from seakeep.models.engine import Dynamics, model_runs, read_groups
 from seakeep.models.executor import Progress, in_order
-from seakeep.models.following import LEAD, Followed
-from seakeep.models.inputs import FittedAlignment, Measured, Mode, ProbeAlignment, Surge
+from seakeep.models.following import LEAD
+from seakeep.models.inputs import FittedAlignment, ProbeAlignment
 from seakeep.models.interface import Scale
-from seakeep.models.labelled import mean_period
+from seakeep.models.members import spectral_radius
 from seakeep.models.observables import Observable, Powers, SlowSquares, named
-from seakeep.models.readouts import FittedReadOut, ReadOut, readouts_asked
+from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
 from seakeep.models.stacking import PERIODS, Held, fit_readouts
-from seakeep.models.training import TrainingData, gather
+from seakeep.models.training import TrainingData, gather, scales_of
 from seakeep.signals import repeated_waves
 
 __all__ = [
     "RIDGES",
     "VARIED",
-    "Candidate",
-    "Choice",
     "Problem",
     "Selected",
     "Trial",
     "default_observables",
+    "groups_of",
     "readouts_for",
-    "search",
     "select",
     "settle",
-    "split",
 ]
 
 RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-10, -1))
@@ -58,14 +55,14 @@ RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-10, -
 
 On the virtual tank and on both measured sets the best lies between 3e-5 and 3e-2; the error is flat
 within half a decade of it."""
-Scales = tuple[
-    tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]
-]
-"""Mean and standard deviation of the states, of the delayed and of the direct regressors."""
-Variant = tuple[ProbeAlignment | None, int | None]
-"""An alignment, and the look-ahead in samples where it is part of it: columns of their own."""
 Settings = TypeVar("Settings", bound=HankelSettings)
 Chosen = TypeVar("Chosen")
+Changes = dict[str, Any]
+"""Settings of a candidate that differ from those of the best so far."""
+Columns = tuple[ProbeAlignment | None, int | None]
+"""An alignment, and the look-ahead in samples where it is part of it: columns of their own."""
+Scores = tuple[FloatArray, FloatArray]
+"""Scores, shape (level, window), and weights of the windows, which sum to one in a fold."""
 ALIKE = 0.03
 """Part of the lowest error by which the chosen λ may be worse.
 
@@ -76,6 +73,8 @@ FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
 RANKS = tuple(round(2 ** (exponent / 2)) for exponent in range(18, 7, -1))
 """Numbers of singular values that are tried, half an octave apart: 512 to 16."""
+DELAYS = {"input_delays": (2.0, 3.0, 5.0), "state_delays": (0.5, 1.0, 1.5)}
+"""Delays that are tried, encounter periods."""
 LEADS = (0.0, 0.5, 0.75, 1.0)
 """Look-aheads that are tried, encounter periods."""
 VARIED = (
@@ -87,32 +86,8 @@ WORST = 1.0
 """NRMSE at which a channel counts no worse: a forecast that is no better than the mean is none.
 
 Runs that no setting can forecast, or windows of calm water, must not decide for all others."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A choice of columns.
-
-    Parameters
-    ----------
-    state_delays, input_delays : int
-        s and z.
-    lead : int
-        Look-ahead of the delayed regressors, samples.
-    observables : tuple of int
-        Those that are taken, by their place among all.
-    alignment : int
-        That which is taken, by its place among all.
-    truncated : bool
-        Whether singular values are cut off instead of λ.
-    """
-
-    state_delays: int
-    input_delays: int
-    lead: int
-    observables: tuple[int, ...]
-    alignment: int = 0
-    truncated: bool = False
+DRAWS = 400
+"""Times that windows are drawn again for the interval of a score."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,397 +116,262 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class _Regression:
-    """Models that have not seen one run: its number, their scales, and coefficients by level."""
-
-    fold: int
-    scales: Scales
-    weights: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
 class Problem:
-    """Training runs with the columns of all candidates.
+    """Training runs with the regressors of all candidates of one alignment.
 
     Parameters
     ----------
-    data : TrainingData
-        Gathered with the longest delays, the longest lead and all observables.
-    drives : tuple of Drive
-        One per run, where the model follows its own surge.
-    offsets : tuple of int
-        Sample of each run at which its arrays in `data` start.
-    widest : Candidate
-        What `data` was gathered with.
-    owners : tuple of int
-        For each delayed column the observable that made it, −1 for an input itself.
-    direct_owners : tuple of int
-        For each direct column the observable that made it, −1 for the slow surge squared.
-    horizons : tuple of int
-        Lengths of the windows, samples.
-    is_per_snapshot : bool
-        Whether λ counts per snapshot pair.
+    runs : dict of Dataset
+        Training runs, or parts of them.
     groups : tuple of str
         One per run: runs of one group do not teach what is judged on another of it.
+    data : TrainingData
+        Gathered with the longest delays, the longest lead and all observables.
+    widest : HankelSettings
+        What `data` was gathered with.
+    ridges : tuple of float
+        λ that are tried, in ascending order.
+    horizons : tuple of int
+        Lengths of the windows that are judged, samples.
     """
 
-    data: TrainingData
-    drives: tuple[Followed, ...]
-    offsets: tuple[int, ...]
-    widest: Candidate
-    owners: tuple[int, ...]
-    direct_owners: tuple[int, ...]
-    horizons: tuple[int, ...]
-    is_per_snapshot: bool
+    runs: Mapping[str, xr.Dataset]
     groups: tuple[str, ...]
-    moments: tuple[Moments, ...] = field(init=False, repr=False)
+    data: TrainingData
+    widest: HankelSettings
+    ridges: tuple[float, ...]
+    horizons: tuple[int, ...]
 
-    def __post_init__(self) -> None:
-        made = tuple(self._moments(run) for run in range(len(self.data.names)))
-        object.__setattr__(self, "moments", made)
+    def ahead(self, candidate: HankelSettings) -> int:
+        """Samples that delayed regressors look ahead too far."""
+        return self.widest.lead - candidate.lead
 
-    def _moments(self, run: int) -> Moments:
-        data, window, widest = self.data, self.data.windows[run], self.widest
-        first, count = window.first_column, window.columns
-        parts = [
-            lagged(data.states[run], first, count, widest.state_delays),
-            lagged(data.delayed[run], first, count, widest.input_delays),
-            data.direct[run][first : first + count],
+    def parts(self, candidate: HankelSettings) -> tuple[BoolArray, BoolArray, BoolArray]:
+        """Which states (all), delayed and direct regressors a candidate has."""
+        chain, direct = self.data.input_map, list[bool]()
+        delayed = [True] * len(self.data.input_labels)
+        bound = () if chain.observed is None else chain.observed.bound
+        for observable, each in zip(self.widest.observables, bound, strict=True):
+            columns = [observable in candidate.observables] * len(each.labels)
+            (delayed if each.delayed else direct).extend(columns)
+        direct += [True] * (chain.follows is not None)  # the slow surge squared
+        states = np.ones(len(self.data.state_labels), dtype=bool)
+        return states, np.array(delayed), np.array(direct, dtype=bool)
+
+    def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
+        """What is tried of a candidate: the λ, or ranks below its number of columns."""
+        if candidate.rank is None:
+            return self.ridges
+        states, delayed, direct = (np.count_nonzero(part) for part in self.parts(candidate))
+        size = states * (candidate.state_delays + 1) + delayed * (candidate.input_delays + 1)
+        return tuple(rank for rank in RANKS if rank < size + direct)
+
+    def models(
+        self, candidate: HankelSettings, levels: Sequence[float], runs: Sequence[int]
+    ) -> tuple[Dynamics, FloatArray]:
+        """Models of some runs: the first of them, and coefficients, shape (level, N, p)."""
+        data, parts = self.data, self.parts(candidate)
+        delays = candidate.state_delays, candidate.input_delays, 0
+        windows = [data.windows[run] for run in runs]
+        labels = data.state_labels, *data.input_map.regressors(data.input_labels)
+        names = [[label.name for label in group] for group in labels]
+        series = [
+            [scale.physical(values[run]) for run in runs]
+            for scale, values in (
+                (data.state_scale, data.states),
+                (data.input_scale, data.delayed),
+                (data.direct_scale, data.direct),
+            )
         ]
-        targets = data.states[run][first + 1 : first + 1 + count]
-        return Moments.of(np.concatenate(parts, axis=1), targets)
-
-    def columns(self, candidate: Candidate) -> IntArray:
-        """Columns of a candidate among those of the widest."""
-        N, Q = self.data.states[0].shape[1], self.data.delayed[0].shape[1]
-        states = np.arange(N * (candidate.state_delays + 1))
-        kept = np.flatnonzero(self._delayed(candidate))
-        ahead = self._ahead(candidate)
-        lags = np.arange(ahead, ahead + candidate.input_delays + 1)
-        first = N * (self.widest.state_delays + 1)
-        delayed = (first + Q * lags[:, None] + kept).ravel()
-        first += Q * (self.widest.input_delays + 1)
-        direct = first + np.flatnonzero(self._direct(candidate))
-        return np.concatenate([states, delayed, direct])
-
-    def _ahead(self, candidate: Candidate) -> int:
-        """Samples that delayed columns look ahead too far; none where the model follows."""
-        return 0 if self.data.input_map.follows else self.widest.lead - candidate.lead
-
-    def _delayed(self, candidate: Candidate) -> BoolArray:
-        return np.isin(self.owners, (-1, *candidate.observables))
-
-    def _direct(self, candidate: Candidate) -> BoolArray:
-        return np.isin(self.direct_owners, (-1, *candidate.observables))
-
-    def levels(self, candidate: Candidate, ridges: Sequence[float]) -> tuple[float, ...]:
-        """What is tried of a candidate: these λ, or ranks below its number of columns."""
-        if not candidate.truncated:
-            return tuple(ridges)
-        return tuple(rank for rank in RANKS if rank < len(self.columns(candidate)))
-
-    def _path(
-        self,
-        candidate: Candidate,
-        levels: Sequence[float],
-        gram: FloatArray,
-        right: FloatArray,
-        count: int,
-    ) -> FloatArray:
-        """Coefficients at each level, shape (level, N, p)."""
-        if candidate.truncated:
-            return truncated_path(gram, right, [int(level) for level in levels])
-        factor = count if self.is_per_snapshot else 1
-        return ridge_path(gram, right, [factor * level for level in levels])
-
-    def radius(self, candidate: Candidate, level: float) -> float:
-        """Spectral radius of the model that a candidate gives of all runs."""
-        scales, gram, right, count = self._system(candidate, range(len(self.data.names)))
-        size = len(scales[0][0]) * (candidate.state_delays + 1)
-        top = self._path(candidate, [level], gram, right, count)[0, :, :size]
-        square = np.concatenate([top, np.eye(size - len(top), size)])
-        return float(np.abs(np.linalg.eigvals(square)).max())
-
-    def others(self, run: int) -> list[int]:
-        """Runs that teach what is judged on a run: those of other groups, if there are any."""
-        rest = [other for other in range(len(self.groups)) if other != run]
-        return [other for other in rest if self.groups[other] != self.groups[run]] or rest
-
-    def folds(self) -> list[int]:
-        """Runs in which a window of some horizon fits: each is held out once."""
-        return [
-            run
-            for run in range(len(self.data.names))
-            if any(self._starts(run, steps).size for steps in self.horizons)
+        scales = [
+            Scale(*(getattr(scale, each.name)[part] for each in fields(scale)))
+            for scale, part in zip(
+                scales_of(series, windows, names, True, data.input_map.stretch), parts, strict=True
+            )
         ]
+        # Later by the samples that a row looks ahead too far.
+        series[1] = [np.roll(each, self.ahead(candidate), axis=0) for each in series[1]]
+        groups = [
+            [scale.deviations(each[:, part]) for each in group]
+            for group, scale, part in zip(series, scales, parts, strict=True)
+        ]
+        there = [number for number, part in enumerate(parts) if part.any()]
+        system = primal_system(
+            [
+                Piece(
+                    groups[0][run],
+                    tuple(groups[number][run] for number in there),
+                    window.first_column,
+                    window.columns,
+                )
+                for run, window in enumerate(windows)
+            ],
+            [delays[number] for number in there],
+        )
+        if candidate.rank is not None:
+            ranks = [int(level) for level in levels]
+            found = truncated_path(system.gram, system.right, ranks)
+        else:
+            pairs = sum(window.columns for window in windows)
+            factor = pairs if candidate.ridge_scale == "per_snapshot" else 1
+            found = ridge_path(system.gram, system.right, [factor * level for level in levels])
+        x, u, w = scales
+        return Dynamics(found[0], *delays[:2], x, u, w, data.input_map.follows), found
 
-    def held(self, candidate: Candidate, level: float, steps: int) -> Iterator[Held]:
-        """Free runs, end to end, on each run by the model of the others."""
-        for run in range(len(self.data.names)):
-            if len(self.data.names) > 1 and (starts := self._starts(run, steps)).size:
-                predicted = self._forecast(candidate, self._without(candidate, [level], run), steps)
-                yield Held(run, predicted[0], self._measured(run, starts, steps))
+    def grows(self, candidate: HankelSettings, level: float) -> bool:
+        """Whether the model that a candidate gives of all runs grows."""
+        return spectral_radius(self.models(candidate, [level], range(len(self.groups)))[0]) >= 1.0
 
-    def _starts(self, run: int, steps: int) -> IntArray:
+    def starts(self, run: int, steps: int) -> IntArray:
         """Samples from which windows end to end are forecast in a run that is held out."""
         window = self.data.windows[run]
         return np.arange(window.first_column, window.last - steps + 1, steps)
 
-    def judge(
-        self, candidate: Candidate, levels: Sequence[float], fold: int
-    ) -> Iterator[FloatArray]:
-        """Scores, shape (level, window), for each horizon that fits into the held-out run."""
-        held = self._without(candidate, levels, fold)
-        spread = held.scales[0][1]
-        for steps in self.horizons:
-            starts = self._starts(fold, steps)
-            if starts.size:
-                predicted = self._forecast(candidate, held, steps)
-                measured = self._measured(fold, starts, steps)
-                with np.errstate(over="ignore", invalid="ignore"):
-                    errors = metrics.nrmse(
-                        predicted=predicted, measured=measured, training_std=spread
-                    )
-                judged = ~metrics.is_slack(
-                    predicted=measured, measured=measured, training_std=spread
-                )
-                errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
-                moved = judged.any(axis=-1)
-                yield np.mean(errors[:, moved], axis=-1, where=judged[moved])
+    def folds(self) -> list[int]:
+        """Runs in which a window of some length fits: each is held out once."""
+        runs = range(len(self.groups))
+        return [run for run in runs if any(self.starts(run, k).size for k in self.horizons)]
 
-    def _measured(self, run: int, starts: IntArray, steps: int) -> FloatArray:
-        states = self.data.states[run]
-        return np.stack([states[at + 1 : at + 1 + steps] for at in starts])
+    def free_runs(
+        self,
+        candidate: HankelSettings,
+        levels: Sequence[float],
+        run: int,
+        horizons: Sequence[int],
+    ) -> tuple[Dynamics, list[tuple[FloatArray, FloatArray]]]:
+        """Free runs on a run by models of others, and what was measured there.
 
-    def _without(self, candidate: Candidate, levels: Sequence[float], fold: int) -> _Regression:
-        """Models of the other runs, at each level."""
-        others = self.others(fold)
-        scales, gram, right, count = self._system(candidate, others)
-        return _Regression(fold, scales, self._path(candidate, levels, gram, right, count))
-
-    def _forecast(self, candidate: Candidate, held: _Regression, steps: int) -> FloatArray:
-        """Free runs on the run that is held out, shape (level, window, steps, N).
-
-        They are in the standardised deviations of `data`.
+        Runs of other groups teach, if there are any. For each horizon that fits the arrays have
+        the shapes (level, window, steps, N) and (window, steps, N).
         """
-        data, fold, follows = self.data, held.fold, self.data.input_map.follows
-        s, z, ahead = candidate.state_delays, candidate.input_delays, self._ahead(candidate)
-        kept, direct = self._delayed(candidate), self._direct(candidate)
-        own = (data.state_scale, data.input_scale, data.direct_scale)
-        parts = (slice(None), kept, direct)
-        x, u, w = (_scale(*each) for each in zip(own, held.scales, parts, strict=True))
-        starts, rows = self._starts(fold, steps), s + 1
-        if follows is not None:
-            rows = max(rows, follows.place.taps.size)
-        states = data.state_scale.physical(data.states[fold])
-        delayed = data.input_scale.physical(data.delayed[fold])[:, kept]
-        straight = data.direct_scale.physical(data.direct[fold])[:, direct]
-        windows = Windows(
-            places=(("a run held out", 0.0),) * len(starts),
-            steps=steps,
-            time=(),
-            histories=np.stack([states[at + 1 - rows : at + 1] for at in starts]),
-            delayed=np.stack([delayed[at - ahead - z : at - ahead + steps] for at in starts]),
-            direct=np.stack([straight[at : at + steps] for at in starts]),
-        )
-        if follows is not None:
-            first, last = starts[[0, -1]] + self.offsets[fold]
-            table = self.drives[fold].table(int(first), int(last) + steps)[:, :, kept]
-            squares = windows.direct[..., :-1]
-            windows = replace(windows, direct=squares, table=table, starts=starts - starts[0])
-        scales = Dynamics(held.weights[0], s, z, x, u, w, follows)
-        found = model_runs(scales, held.weights, windows)
-        return data.state_scale.deviations(np.nan_to_num(found, nan=np.inf))
-
-    def _system(
-        self, candidate: Candidate, runs: Sequence[int]
-    ) -> tuple[Scales, FloatArray, FloatArray, int]:
-        """Moments of states and both kinds of regressors, Gram matrix, right-hand side, pairs."""
-        data, s, z = self.data, candidate.state_delays, candidate.input_delays
-        x, u = (_pooled(series, data, runs, False) for series in (data.states, data.delayed))
-        w = _pooled(data.direct, data, runs, True)
-        if (stretch := data.input_map.stretch) is not None:
-            u, w = ((each[0], each[1] * by) for each, by in zip((u, w), stretch, strict=True))
-        kept, direct = self._delayed(candidate), self._direct(candidate)
-        mean, scale = (
-            np.concatenate(
-                [np.tile(x[part], s + 1), np.tile(u[part][kept], z + 1), w[part][direct]]
+        data, (_, delayed, direct) = self.data, self.parts(candidate)
+        rest = [other for other in range(len(self.groups)) if other != run]
+        others = [other for other in rest if self.groups[other] != self.groups[run]]
+        dynamics, coefficients = self.models(candidate, levels, others or rest)
+        name, window = data.names[run], data.windows[run]
+        begin = data.first_instants[run] - window.first * data.dt
+        starts = [(each, k) for k in horizons if (each := self.starts(run, k)).size]
+        places = [([(name, begin + at * data.dt) for at in each], k) for each, k in starts]
+        states = data.state_scale.physical(data.states[run])
+        found = []
+        read = read_groups(data.signature(self.widest), self.runs, places)
+        for windows, (each, steps) in zip(read, starts, strict=True):
+            last = windows.delayed.shape[1] - self.ahead(candidate)
+            windows = replace(
+                windows,
+                delayed=windows.delayed[:, :last, delayed],
+                direct=windows.direct[..., direct[: windows.direct.shape[2]]],
+                table=None if windows.table is None else windows.table[..., delayed],
             )
-            for part in (0, 1)
-        )
-        total = sum((self.moments[run] for run in runs[1:]), self.moments[runs[0]])
-        system = total.chosen(self.columns(candidate)).standardised(mean, scale, *x)
-        return (x, u, w), *system, total.count
+            measured = np.stack([states[at + 1 : at + 1 + steps] for at in each])
+            found.append((model_runs(dynamics, coefficients, [windows])[0], measured))
+        return dynamics, found
+
+    def judge(self, candidate: HankelSettings, fold: int) -> Scores:
+        """Judge free runs on a run that is held out, over all horizons that fit."""
+        levels = self.levels(candidate)
+        dynamics, found = self.free_runs(candidate, levels, fold, self.horizons)
+        spread, scores = dynamics.state_scale.std, [np.empty((len(levels), 0))]
+        for predicted, measured in found:
+            with np.errstate(over="ignore", invalid="ignore"):
+                errors = metrics.nrmse(predicted=predicted, measured=measured, training_std=spread)
+            judged = ~metrics.is_slack(predicted=measured, measured=measured, training_std=spread)
+            errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
+            if (moved := judged.any(axis=-1)).any():
+                scores.append(np.mean(errors[:, moved], axis=-1, where=judged[moved]))
+        counts = [each.shape[1] for each in scores]
+        weights = np.repeat(1.0 / np.maximum(counts, 1) / max(len(scores) - 1, 1), counts)
+        return np.concatenate(scores, axis=1), weights
+
+    def held(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
+        """Free runs, end to end, on each run by the model of the others, standardised."""
+        deviations = self.data.state_scale.deviations
+        for run in range(len(self.groups)) if len(self.groups) > 1 else ():
+            for predicted, measured in self.free_runs(candidate, [level], run, [steps])[1]:
+                yield Held(run, deviations(predicted[0]), deviations(measured))
 
 
-def _scale(own: Scale, moments: tuple[FloatArray, FloatArray], part: Any) -> Scale:
-    """Moments of some columns in physical units, of moments of standardised deviations."""
-    mean, std = own.mean + own.std * moments[0], own.std * moments[1]
-    return Scale(*(each[part] for each in (mean, std, own.spread, own.centre, own.reach)))
+def _problem(
+    settings: HankelSettings,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    folds: Mapping[str, str] | int,
+    ridges: Iterable[float],
+    horizons: tuple[int, ...],
+    tried: Mapping[str, Sequence[int]],
+) -> Problem | None:
+    """The columns of settings with all that is tried; None where the runs are too short for them.
 
-
-def _pooled(
-    series: Sequence[FloatArray], data: TrainingData, runs: Sequence[int], is_direct: bool
-) -> tuple[FloatArray, FloatArray]:
-    """Mean and standard deviation (ddof = 1) over the windows of some runs, as a fit takes them."""
-    parts = []
-    for run in runs:
-        window = data.windows[run]
-        first = max(window.first, window.first_column) if is_direct else window.first
-        parts.append(series[run][first : window.last + 1])
-    values = np.concatenate(parts)
-    return values.mean(axis=0), values.std(axis=0, ddof=1)
-
-
-def split(
-    runs: Mapping[str, xr.Dataset], parts: int, before: int = 0, after: int = 0
-) -> dict[str, xr.Dataset]:
-    """Parts of runs, end to end: what is held out in turn where there is one run alone.
-
-    Each part comes with as many samples `before` and `after` it as a snapshot pair reads, so that
-    every pair of the run is in one of the parts.
+    `folds` holds the group of each run, or the number of parts that runs are split into, and
+    `tried` delays and look-aheads.
     """
-    out = {}
-    for name, run in runs.items():
-        edges = np.linspace(before, run.sizes["time"] - after, parts + 1).astype(int)
-        for number, (first, stop) in enumerate(itertools.pairwise(edges), start=1):
-            samples = slice(max(first - before, 0), stop + after)
-            out[f"{name}, part {number}"] = run.isel(time=samples)
-    return out
-
-
-@dataclass(frozen=True, eq=False)
-class Choice:
-    """Result of a search.
-
-    Parameters
-    ----------
-    candidate : Candidate
-        Columns.
-    level : float
-        λ, or the number of singular values of a truncated candidate.
-    trials : tuple of (Candidate, Trial)
-        All that was tried, in order.
-    """
-
-    candidate: Candidate
-    level: float
-    trials: tuple[tuple[Candidate, Trial], ...]
-
-
-def search(
-    problems: Sequence[Problem],
-    base: Candidate,
-    options: Mapping[str, Sequence[Any]],
-    ridges: Sequence[float],
-    *,
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-    known: MutableMapping[str, list[list[list[float]]]] | None = None,
-    alike: float = ALIKE,
-) -> Choice:
-    """Choose columns and λ: one setting after the other, each with the whole path of λ.
-
-    Parameters
-    ----------
-    problems : sequence of Problem
-        Training runs, one per alignment.
-    base : Candidate
-        Where the search starts.
-    options : mapping of str to sequence
-        Values to try of fields of :class:`Candidate`.
-    ridges : sequence of float
-        λ to try, in ascending order.
-    executor : Executor, optional
-        Judges candidates and folds side by side; the result is the same.
-    progress : callable, optional
-        Called with what is done.
-    known : mapping, optional
-        Scores by candidate and fold that need not be found again; new ones are added.
-    alike : float
-        Part of the lowest error by which the chosen λ may be worse.
-
-    Returns
-    -------
-    Choice
-        The best columns, and the largest λ (or the smallest rank) that is as good as the best.
-        Where that model grows, the best of all that were tried and do not.
-    """
-    known = {} if known is None else known
-    trials: dict[Candidate, Trial] = {}
-    best, folds = base, len(problems[0].folds())
-    later = folds * sum(len(values) - 1 for values in options.values())  # the best is tried again
-    for key, values in (("", [None]), *options.items()):
-        tried = [replace(best, **{key: value}) if key else best for value in values]
-        later -= folds * (len(values) - 1)
-        tell = _counted(progress, folds * len(trials), later)
-        for candidate, trial in _judged(problems, tried, ridges, executor, tell, known):
-            trials.setdefault(candidate, trial)
-        best = min(trials, key=lambda each: float(trials[each].means.min()))
-    means = trials[best].means
-    largest = int(np.flatnonzero(means <= (1.0 + alike) * means.min())[-1])
-    every = [
-        (float(score), candidate, level)
-        for candidate, trial in trials.items()
-        for score, level in zip(trial.means, trial.levels, strict=True)
-    ]
-    wanted = [(best, trials[best].levels[largest])]
-    wanted += [each[1:] for each in sorted(every, key=lambda each: each[0])]
-    still = (each for each in wanted if problems[each[0].alignment].radius(*each) < 1.0)
-    return Choice(*next(still, wanted[0]), tuple(trials.items()))
-
-
-def _counted(progress: Progress | None, before: int, after: int) -> Progress | None:
-    """Progress of a part, counted among what was done before it and what comes after."""
-    if progress is None:
+    state_delays, input_delays, leads = (
+        [getattr(settings, name), *tried.get(name, ())]
+        for name in ("state_delays", "input_delays", "lead")
+    )
+    widest = replace(
+        settings,
+        state_delays=max(state_delays),
+        input_delays=max(input_delays) + max(leads) - min(leads),
+        lead=max(leads),
+        ridge=1.0,
+        standardize=True,
+    )
+    chain = widest.input_map(dict(runs), states, inputs, settings.window)
+    before = max(widest.state_delays, chain.history(widest.input_delays))
+    after = max(chain.lead_samples - 1, 0)
+    pieces = dict(runs)
+    if isinstance(folds, int):  # with what their pairs read, so that each pair is in one part
+        pieces = {}
+        for name, run in runs.items():
+            edges = np.linspace(before, run.sizes["time"] - after, folds + 1).astype(int)
+            for number, (first, stop) in enumerate(itertools.pairwise(edges), start=1):
+                samples = slice(max(first - before, 0), stop + after)
+                pieces[f"{name}, part {number}"] = run.isel(time=samples)
+    if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
         return None
-    return lambda done, total, what: progress(before + done, before + total + after, what)
+    data = gather(pieces, states, inputs, None, widest)
+    groups = tuple(pieces if isinstance(folds, int) else folds.values())
+    return Problem(pieces, groups, data, widest, tuple(ridges), horizons)
 
 
-def _judged(
-    problems: Sequence[Problem],
-    candidates: Sequence[Candidate],
-    ridges: Sequence[float],
+def _columns_of(candidate: HankelSettings) -> Columns:
+    """What makes columns of their own: the alignment, and the look-ahead if it is part of that."""
+    aligned = candidate.alignment
+    follows = aligned is not None and aligned.surge == "predicted"
+    return aligned, candidate.lead if follows else None
+
+
+def _judge(
+    problems: Mapping[Columns, Problem],
+    trials: dict[Settings, Trial],
+    candidates: Iterable[Settings],
     executor: Executor | None,
     progress: Progress | None,
-    known: MutableMapping[str, list[list[list[float]]]],
-) -> Iterator[tuple[Candidate, Trial]]:
-    folds = problems[0].folds()
+    later: int = 0,
+) -> None:
+    """Add trials of candidates that are not among them; `later` more are to come at most."""
+    folds = next(iter(problems.values())).folds()
+    new = [each for each in dict.fromkeys(candidates) if each not in trials]
+    before, after = len(trials) * len(folds), later * len(folds)
 
-    def levels(candidate: Candidate) -> tuple[float, ...]:
-        return problems[candidate.alignment].levels(candidate, ridges)
+    def tell(done: int, total: int, what: str) -> None:
+        if progress is not None:
+            progress(before + done, before + total + after, what)
 
-    todo = [
-        (candidate, levels(candidate), fold)
-        for candidate in dict.fromkeys(candidates)
-        for fold in folds
-        if _key(candidate, fold) not in known
-    ]
-    made = in_order(_unit, tuple(problems), todo, executor, progress, "candidate and fold")
-    for (candidate, _, fold), scores in zip(todo, made, strict=True):
-        known[_key(candidate, fold)] = [each.tolist() for each in scores]
-    for candidate in dict.fromkeys(candidates):
-        scores, weights = [], []
-        for fold in folds:
-            found = [np.array(each) for each in known[_key(candidate, fold)]]
-            horizons = [each for each in found if each.shape[1]]  # in others nothing moves
-            scores += horizons
-            weights += [
-                np.full(each.shape[1], 1.0 / (len(horizons) * each.shape[1])) for each in horizons
-            ]
+    units = list(itertools.product(new, folds))
+    found = in_order(_unit, problems, units, executor, tell, "candidate and fold")
+    for candidate in new:
+        scores, weights = zip(*itertools.islice(found, len(folds)), strict=True)
         joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
-        kept = np.concatenate(scores, axis=1), joined / joined.sum()
-        yield candidate, Trial(levels(candidate), *kept)
+        levels = problems[_columns_of(candidate)].levels(candidate)
+        every = np.concatenate(scores, axis=1)
+        trials[candidate] = Trial(levels, every, joined / joined.sum())
 
 
-def _key(candidate: Candidate, fold: int) -> str:
-    return json.dumps([*astuple(candidate), fold])
-
-
-def _unit(
-    problems: Sequence[Problem], item: tuple[Candidate, Sequence[float], int]
-) -> list[FloatArray]:
-    return list(problems[item[0].alignment].judge(*item))
+def _unit(problems: Mapping[Columns, Problem], item: tuple[HankelSettings, int]) -> Scores:
+    return problems[_columns_of(item[0])].judge(*item)
 
 
 @dataclass(frozen=True, eq=False)
@@ -595,10 +435,8 @@ def settle(
         What was asked for.
     chosen : Select, optional
         What is chosen beside λ, and how.
-    runs, states, inputs
+    runs, states, inputs, executor, progress
         As in :func:`select`.
-    executor, progress
-        As in :func:`search`.
 
     Returns
     -------
@@ -622,8 +460,7 @@ def settle(
             "remove select."
         )
     asked = chosen or Select()
-    vary = ["ridge"] + ["observables"] * asked.observables
-    vary += ["readouts"] * (settings.readouts == "auto")
+    vary = ["observables"] * asked.observables + ["readouts"] * (settings.readouts == "auto")
     found = select(
         settings,
         runs,
@@ -646,17 +483,20 @@ def select(
     states: Sequence[str],
     inputs: Sequence[str],
     *,
-    vary: Sequence[str] = ("ridge",),
+    vary: Sequence[str] = (),
     ridges: Sequence[float] | None = None,
     horizon: Sequence[float] = (15.0, 45.0),
     folds: Folds | int = "auto",
     period: float | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    known: MutableMapping[str, Any] | None = None,
     seed: int = 0,
 ) -> Selected[Settings]:
     """Choose settings by free runs on training runs that are held out in turn.
+
+    One setting after the other is chosen, each candidate with the whole path of λ. Of the best
+    columns the largest λ (or the smallest rank) is taken that is as good as the best. Where that
+    model grows, it is the best of all that were tried and do not.
 
     Parameters
     ----------
@@ -669,7 +509,8 @@ def select(
     vary : sequence of str
         Names out of ``VARIED``; λ is always chosen.
     ridges : sequence of float, optional
-        λ to try, as the settings count it; by default ``RIDGES`` per snapshot pair.
+        λ to try in ascending order, as the settings count it; by default ``RIDGES`` per snapshot
+        pair.
     horizon : sequence of float
         Lengths of the windows that are judged, encounter periods.
     folds : {"auto", "run", "sea_state"} or int, optional
@@ -677,8 +518,10 @@ def select(
         their number. A single run is held out in three parts.
     period : float, optional
         Encounter period, s; by default that of the runs.
-    executor, progress, known
-        As in :func:`search`.
+    executor : Executor, optional
+        Judges candidates and folds side by side; the result is the same.
+    progress : callable, optional
+        Called with what is done.
     seed : int
         Of the bootstrap of the intervals.
 
@@ -692,123 +535,146 @@ def select(
     RequestError
         If `vary` names something else, or the delay rows are not exact.
     """
+    data = runs, states, inputs
     labels = labelled.common_labels(runs, states)
     readouts = readouts_asked(settings.readouts, labels)
     _check_asked(settings, vary, readouts)
-    if isinstance(folds, str) and len(runs) == 1:
-        folds = 3
-    apart = folds if isinstance(folds, int) else groups_of(runs, folds, inputs)
-    step = labelled.common_step(runs)
-    samples = mean_period(runs, list(inputs)) if period is None else period / step
     if "readouts" in vary:
         asked = readouts or readouts_asked("auto", labels)
         readouts = tuple(replace(each, kind="auto") for each in asked)
-    variants = list(_variants(settings, runs, states, inputs, vary, samples))
-    wanted = [settings.observables]
-    if "observables" in vary and not settings.observables:
-        wanted = _defaults(settings, runs, states, inputs, samples * step, folds == "sea_state")
-    base = Candidate(
-        settings.state_delays,
-        settings.input_delays,
-        int(settings.lead),
-        tuple(range(len(settings.observables))),
-    )
+    if isinstance(folds, str):
+        folds = 3 if len(runs) == 1 else folds
+    step = labelled.common_step(runs)
+    samples = labelled.mean_period(runs, inputs) if period is None else period / step
     if ridges is None:
         settings = replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot")
-        ridges = RIDGES
-    for chosen in wanted:  # runs may be too short for the longest
-        options = _options(vary, samples, len(chosen), variants)
-        made = [
-            _problem(
-                replace(
-                    settings,
-                    observables=chosen,
-                    alignment=alignment,
-                    lead=base.lead if lead is None else lead,
-                ),
-                runs,
-                states,
-                inputs,
-                base if lead is None else replace(base, lead=lead),
-                options if lead is None else {**options, "lead": []},
-                tuple(max(round(each * samples), 1) for each in horizon),
-                apart,
-            )
-            for alignment, lead in variants
-        ]
-        problems = [problem for problem in made if problem is not None and problem.folds()]
+    offered = [settings.observables]
+    if "observables" in vary and not settings.observables:
+        offered = _defaults(settings, *data, samples * step, folds == "sea_state")
+    variants = list(_variants(settings, *data, vary, samples))
+    apart = folds if isinstance(folds, int) else groups_of(runs, folds, inputs)
+    horizons = tuple(max(round(each * samples), 1) for each in horizon)
+    base = replace(settings, readouts=(), **variants[0])
+    for observables in offered:  # runs may be too short for the longest
+        steps = [*_steps(observables, vary, samples, variants)]
+        every = replace(base, observables=observables)
+        problems = _problems(every, steps, *data, apart, ridges or RIDGES, horizons)
         if len(problems) == len(variants):
             break
     else:
         longest = max(run.sizes["time"] for run in runs.values())
-        return _with_readouts(
-            settings,
-            (),
+        note = (
             f"ridge {settings.ridge:g} per snapshot pair: no window of "
-            f"{round(min(horizon) * samples)} samples can be held out of runs of at most {longest}",
-            fit_readouts(readouts, _measured(settings, runs, states, inputs), ())
-            if readouts
-            else (),
-            "readouts" in vary,
+            f"{round(min(horizon) * samples)} samples can be held out of runs of at most {longest}"
         )
-    known = {} if known is None else known
-    found = search(
-        problems,
-        base,
-        options,
-        ridges,
-        executor=executor,
-        progress=progress,
-        known=known,
-        alike=0.0 if folds == "sea_state" else ALIKE,
+        fitted = _learnt(readouts, None, settings, 0.0, 0, *data)
+        complete = replace(settings, readouts=_asked(settings, fitted, vary))
+        return Selected(complete, (), note, fitted)
+    trials: dict[Settings, Trial] = {}
+    best, later = base, sum(len(changes) - 1 for changes in steps)  # the best is among them
+    for changes in ([{}], *steps):
+        later -= len(changes) - 1
+        tried = [replace(best, **change) for change in changes]
+        _judge(problems, trials, tried, executor, progress, later)
+        best = min(trials, key=lambda each: float(trials[each].means.min()))
+    taken, level = _best(problems, trials, best, 0.0 if folds == "sea_state" else ALIKE)
+    without = {
+        left: replace(taken, observables=tuple(o for o in taken.observables if o != left))
+        for left in taken.observables
+    }
+    _judge(problems, trials, without.values(), executor, progress)
+    worth = "".join(
+        f"; without {named(left)} {trials[less].means.min():.3f}" for left, less in without.items()
     )
-    taken = found.candidate
-    without = [
-        replace(taken, observables=tuple(each for each in taken.observables if each != number))
-        for number in taken.observables
+    problem = problems[_columns_of(taken)]
+    fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), *data)
+    if taken.rank is None:
+        complete = replace(taken, ridge=level, readouts=_asked(settings, fitted, vary))
+    else:
+        complete = replace(taken, rank=int(level))
+    return Selected(
+        complete,
+        tuple(_rows_of(trials, taken, level, seed)),
+        _note(problem, trials, taken, level, worth, vary, folds == "sea_state"),
+        fitted,
+    )
+
+
+def _problems(
+    base: HankelSettings,
+    steps: Sequence[Sequence[Changes]],
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    folds: Mapping[str, str] | int,
+    ridges: Sequence[float],
+    horizons: tuple[int, ...],
+) -> dict[Columns, Problem]:
+    """A problem per variant, of which the last step is made, if something can be held out."""
+    tried = {
+        name: [change[name] for changes in steps[:-1] for change in changes if name in change]
+        for name in ("state_delays", "input_delays", "lead")
+    }
+    found = {}
+    for variant in steps[-1]:
+        start = replace(base, **variant)
+        lengths = tried | ({"lead": []} if "lead" in variant else {})
+        problem = _problem(start, runs, states, inputs, folds, ridges, horizons, lengths)
+        if problem is not None and problem.folds():
+            found[_columns_of(start)] = problem
+    return found
+
+
+def _best(
+    problems: Mapping[Columns, Problem],
+    trials: Mapping[Settings, Trial],
+    best: Settings,
+    alike: float,
+) -> tuple[Settings, float]:
+    """The best columns and the largest λ that is as good; if that grows, the best that does not."""
+    means = trials[best].means
+    largest = int(np.flatnonzero(means <= (1.0 + alike) * means.min())[-1])
+    every = [
+        (float(score), candidate, level)
+        for candidate, trial in trials.items()
+        for score, level in zip(trial.means, trial.levels, strict=True)
     ]
-    trials = dict(found.trials)
-    untried = [each for each in without if each not in trials]
-    tell = _counted(progress, len(trials) * len(problems[0].folds()), 0)
-    trials |= dict(_judged(problems, untried, ridges, executor, tell, known))
-    found = replace(found, trials=tuple(trials.items()))
-    best = trials[taken]
-    score = float(best.means[best.levels.index(found.level)])
-    alignment, lead = variants[taken.alignment]
-    complete = replace(
-        settings,
-        state_delays=found.candidate.state_delays,
-        input_delays=found.candidate.input_delays,
-        lead=found.candidate.lead if lead is None else lead,
-        observables=tuple(chosen[number] for number in found.candidate.observables),
-        alignment=alignment,
-        rank=int(found.level) if taken.truncated else None,
-        ridge=0.0 if taken.truncated else found.level,
-    )
-    level = (
-        f"rank {found.level:g}" if taken.truncated else f"ridge {found.level:g} per snapshot pair"
-    )
-    count = sum(len(trial.means) for _, trial in found.trials)
+    wanted = [(best, trials[best].levels[largest])]
+    wanted += [each[1:] for each in sorted(every, key=lambda each: each[0])]
+    sound = (each for each in wanted if not problems[_columns_of(each[0])].grows(*each))
+    return next(sound, wanted[0])
+
+
+def _note(
+    problem: Problem,
+    trials: Mapping[Settings, Trial],
+    taken: Settings,
+    level: float,
+    worth: str,
+    vary: Sequence[str],
+    by_sea: bool,
+) -> str:
+    """How the choice was made, in words."""
+    count = sum(len(trial.levels) for trial in trials.values())
+    score = trials[taken].means[trials[taken].levels.index(level)]
+    chosen = f"ridge {level:g} per snapshot pair" if taken.rank is None else f"rank {level:g}"
     note = (
-        f"{level}: out of {count} settings (below, the best λ of each kind) in free runs on "
-        f"{len(problems[0].folds())} parts held out in turn, mean NRMSE {score:.3f}"
+        f"{chosen}: out of {count} settings (below, the best λ of each kind) in free runs on "
+        f"{len(problem.folds())} parts held out in turn, mean NRMSE {score:.3f}{worth}"
     )
-    note += "".join(
-        f"; without {named(chosen[number])} {trials[less].means.min():.3f}"
-        for number, less in zip(taken.observables, without, strict=True)
-    )
-    lengths = {"lead", "input_delays", "state_delays", "alignment"} & {*vary}
-    note += "; over instants that all of these can forecast" * bool(lengths)
-    groups = problems[0].groups
-    if folds == "sea_state" or len(set(groups)) < len(groups):
-        note += f"; {_words_of_groups(groups, folds == 'sea_state')}"
-    rows = tuple(_rows_of(found, chosen, variants, seed))
-    fitted: tuple[FittedReadOut, ...] = ()
-    if readouts:
-        problem = problems[taken.alignment]
-        held = list(problem.held(taken, found.level, round(PERIODS * samples)))
-        fitted = fit_readouts(readouts, problem.data, held)
-    return _with_readouts(complete, rows, note, fitted, "readouts" in vary)
+    if {"lead", "input_delays", "state_delays", "alignment"} & {*vary}:
+        note += "; over instants that all of these can forecast"
+    seas = len(set(problem.groups))
+    if 1 < seas < len(problem.groups):
+        if by_sea:
+            alike = f"the runs of its sea state, of which there are {seas}"
+        else:
+            alike = f"the runs that repeat its waves; {seas} waves differ"
+        note += f"; held out with each: {alike}"
+    elif by_sea or seas == 1:
+        shared = "no two runs share a sea state" if seas > 1 else "all runs have the same sea state"
+        note += f"; {shared}, so each was held out alone"
+    return note
 
 
 def _check_asked(
@@ -834,20 +700,32 @@ def _check_asked(
         )
 
 
-def _with_readouts(
-    settings: Settings,
-    rows: tuple[dict[str, Any], ...],
-    note: str,
-    readouts: tuple[FittedReadOut, ...],
-    chosen: bool,
-) -> Selected[Settings]:
-    """What was selected, with the kinds of read-outs in the settings where they were chosen."""
-    if chosen:
-        kinds = tuple(
-            ReadOut(each.channel, each.of, each.kind) for each in readouts if each.kind != "none"
-        )
-        settings = replace(settings, readouts=kinds)
-    return Selected(settings, rows, note, readouts)
+def _asked(
+    settings: HankelSettings, fitted: Sequence[FittedReadOut], vary: Sequence[str]
+) -> ReadOuts:
+    """Read-outs of complete settings: as stated, or of the kinds that were chosen."""
+    if "readouts" not in vary:
+        return settings.readouts
+    return tuple(ReadOut(o.channel, o.of, o.kind) for o in fitted if o.kind != "none")
+
+
+def _learnt(
+    readouts: Sequence[ReadOut],
+    problem: Problem | None,
+    candidate: HankelSettings,
+    level: float,
+    steps: int,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+) -> tuple[FittedReadOut, ...]:
+    """Fit read-outs to runs, and to forecasts of what is held out, if anything can be."""
+    if not readouts:
+        return ()
+    if problem is not None:
+        return fit_readouts(readouts, problem.data, list(problem.held(candidate, level, steps)))
+    settings = replace(candidate, ridge=1.0, standardize=True)
+    return fit_readouts(readouts, gather(runs, states, inputs, None, settings), ())
 
 
 def readouts_for(
@@ -879,38 +757,22 @@ def readouts_for(
         If a stacked read-out has no forecast to learn from.
     """
     readouts = readouts_asked(settings.readouts, labelled.common_labels(runs, states))
-    if not readouts:
-        return ()
     stacked = [each for each in readouts if each.kind != "hinge"]
     if not stacked:
-        return fit_readouts(readouts, _measured(settings, runs, states, inputs), ())
+        return _learnt(readouts, None, settings, 0.0, 0, runs, states, inputs)
     ridge = float(settings.ridge)
     if ridge == 0.0:
         raise RequestError(
             f"readouts: {stacked[0].channel}: kind = '{stacked[0].kind}' learns from free runs of "
             "ridge regressions, which take ridge above zero. Raise ridge, or take kind = 'hinge'."
         )
-    steps = round(PERIODS * mean_period(runs, list(inputs)))
-    base = Candidate(settings.state_delays, settings.input_delays, int(settings.lead), ())
-    base = replace(base, observables=tuple(range(len(settings.observables))))
+    steps = round(PERIODS * labelled.mean_period(runs, inputs))
     if len(runs) == 1 and settings.window is not None:  # whose parts are shorter
         runs = {name: run.isel(time=slice(-settings.window, None)) for name, run in runs.items()}
         settings = replace(settings, window=None)
     apart = 3 if len(runs) == 1 else groups_of(runs, "auto", inputs)
-    problem = _problem(settings, runs, states, inputs, base, {}, (steps,), apart)
-    if problem is None:
-        return fit_readouts(readouts, _measured(settings, runs, states, inputs), ())
-    return fit_readouts(readouts, problem.data, list(problem.held(base, ridge, steps)))
-
-
-def _measured(
-    settings: HankelSettings,
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
-) -> TrainingData:
-    """States of the training windows, standardised."""
-    return gather(runs, states, inputs, None, replace(settings, ridge=1.0, standardize=True))
+    problem = _problem(settings, runs, states, inputs, apart, (ridge,), (steps,), {})
+    return _learnt(readouts, problem, settings, ridge, steps, runs, states, inputs)
 
 
 def default_observables(
@@ -941,27 +803,62 @@ def default_observables(
     return slow, Powers(elevations)
 
 
-def _options(
-    vary: Sequence[str], period: float, observables: int, variants: Sequence[Variant]
-) -> dict[str, list[Any]]:
-    """Values to try of the fields of a candidate."""
-    found: dict[str, list[Any]] = {}
+def _defaults(
+    settings: HankelSettings,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    period: float,
+    unseen: bool,
+) -> list[tuple[Observable, ...]]:
+    """Observables to choose among, and fewer of them for runs that are too short."""
+    aligned, lead = settings.alignment, None
+    if aligned is not None and aligned.surge == "predicted":
+        is_left_out = aligned.optional and aligned.missing(runs, states, inputs)
+        lead = None if is_left_out else int(settings.lead)
+    defaults = default_observables(inputs, period, unseen, lead)
+    return list(dict.fromkeys([defaults, defaults[1:], ()]))
+
+
+def _steps(
+    every: tuple[Observable, ...],
+    vary: Sequence[str],
+    period: float,
+    variants: Sequence[Changes],
+) -> Iterator[Sequence[Changes]]:
+    """Changes to try of one setting after the other."""
     if "observables" in vary:
-        every = tuple(range(observables))
-        found["observables"] = list(dict.fromkeys([(), *((number,) for number in every), every]))
-    for name, periods in (
-        ("lead", LEADS),
-        ("input_delays", (2.0, 3.0, 5.0)),
-        ("state_delays", (0.5, 1.0, 1.5)),
-    ):
+        subsets = dict.fromkeys([(), *((each,) for each in every), every])
+        yield [{"observables": each} for each in subsets]
+    if "lead" in vary and "lead" not in variants[0]:
+        yield [{"lead": round(each * period)} for each in LEADS]
+    for name, periods in DELAYS.items():
         if name in vary:
-            found[name] = [round(each * period) for each in periods]
+            yield [{name: round(each * period)} for each in periods]
     if "rank" in vary:
-        found["truncated"] = [False, True]
-    if all(lead is not None for _, lead in variants):
-        found.pop("lead", None)
-    found["alignment"] = list(range(len(variants)))
-    return found
+        yield [{}, {"rank": RANKS[0], "ridge": 0.0}]
+    yield variants
+
+
+def _variants(
+    settings: HankelSettings,
+    runs: Mapping[str, xr.Dataset],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    vary: Sequence[str],
+    period: float,
+) -> Iterator[Changes]:
+    """Alignments, with each look-ahead that is tried where the model follows its own surge."""
+    leads = [settings.lead]
+    leads += [round(part * period) for part in LEADS if part > LEAD and "lead" in vary]
+    alignments = [settings.alignment]
+    if "alignment" in vary:
+        alignments = _alignments(settings.alignment, runs, states, inputs)
+    for each in alignments:
+        if each is None or each.surge != "predicted":
+            yield {"alignment": each}
+        else:
+            yield from ({"alignment": each, "lead": lead} for lead in dict.fromkeys(leads))
 
 
 def _alignments(
@@ -975,130 +872,23 @@ def _alignments(
     None reads the measured surge: what is read after a start is no choice of a setting.
     """
     base = replace(stated or ProbeAlignment(), optional=False)
+    carried = replace(base, mode="dispersion", celerity=None)
     found: list[ProbeAlignment | None] = []
-    modes: tuple[Mode, ...] = ("dispersion", "effective")
-    surges: tuple[Surge, ...] = ("predicted", "none")
-    for mode, surge in itertools.product(modes, surges):
-        if surge == "predicted" and mode == "effective":
-            continue
-        made = replace(
-            base,
-            mode=mode,
-            surge=surge,
-            celerity=base.celerity if mode == "effective" else None,
-            highest_frequency=base.highest_frequency if mode == "dispersion" else None,
-        )
+    for made in (
+        replace(carried, surge="predicted"),
+        replace(carried, surge="none"),
+        replace(base, mode="effective", surge="none", highest_frequency=None),
+    ):
         try:
             fitted = made.fit(runs, states, inputs, None)
         except (RequestError, DataError):
             continue  # no depth, no positions, or no surge among the states
         assert isinstance(fitted, FittedAlignment)
-        if surge == "predicted" or any(np.any(fitted.offsets(run)) for run in runs.values()):
+        if made.surge == "predicted" or any(np.any(fitted.offsets(run)) for run in runs.values()):
             found.append(made)
     found.append(None)
-    first = None if stated is None else replace(stated, optional=False)
+    first = None if stated is None else base
     return sorted(found, key=lambda each: each != first)
-
-
-def _defaults(
-    settings: HankelSettings,
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
-    period: float,
-    unseen: bool,
-) -> list[tuple[Observable, ...]]:
-    """Observables to choose among, and fewer of them for runs that are too short."""
-    elevations = [
-        label.name for label in labelled.common_labels(runs, inputs) if is_elevation(label.name)
-    ]
-    aligned, lead = settings.alignment, None
-    if aligned is not None and aligned.surge == "predicted":
-        is_left_out = aligned.optional and aligned.missing(runs, states, inputs)
-        lead = None if is_left_out else int(settings.lead)
-    defaults = default_observables(elevations, period, unseen, lead)
-    return list(dict.fromkeys([defaults, defaults[1:], ()]))
-
-
-def _variants(
-    settings: HankelSettings,
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
-    vary: Sequence[str],
-    period: float,
-) -> Iterator[Variant]:
-    """Alignments, with each look-ahead that is tried where the model follows its own surge."""
-    stated = int(settings.lead)
-    tried = [round(part * period) for part in LEADS if part > LEAD and "lead" in vary]
-    alignments = [settings.alignment]
-    if "alignment" in vary:
-        alignments = _alignments(settings.alignment, runs, states, inputs)
-    for each in alignments:
-        if each is None or each.surge != "predicted":
-            yield each, None
-        else:
-            yield from ((each, ahead) for ahead in dict.fromkeys([stated, *tried]))
-
-
-def _problem(
-    settings: HankelSettings,
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
-    base: Candidate,
-    options: Mapping[str, Sequence[Any]],
-    horizons: tuple[int, ...],
-    folds: Mapping[str, str] | int,
-) -> Problem | None:
-    """The columns of all candidates; None where the runs are too short for them."""
-    leads = [base.lead, *options.get("lead", ())]
-    lead = max(leads)
-    delays = max([base.input_delays, *options.get("input_delays", ())]) + lead - min(leads)
-    widest = Candidate(
-        max([base.state_delays, *options.get("state_delays", ())]),
-        delays,
-        lead,
-        tuple(range(len(settings.observables))),
-    )
-    wide = replace(
-        settings,
-        state_delays=widest.state_delays,
-        input_delays=widest.input_delays,
-        lead=lead,
-        ridge=1.0,
-        standardize=True,
-    )
-    chain = wide.input_map(dict(runs), states, inputs, settings.window)
-    before = max(widest.state_delays, chain.history(delays))
-    after = max(chain.lead_samples - 1, 0)
-    pieces = split(runs, folds, before, after) if isinstance(folds, int) else dict(runs)
-    if any(run.sizes["time"] < before + 2 + after for run in pieces.values()):
-        return None
-    data = gather(pieces, states, inputs, None, wide)
-    chain, drives, offsets = data.input_map, [], []
-    for (name, run), x in zip(pieces.items(), data.states, strict=True):
-        size = run.sizes["time"]
-        offsets.append(size - max(chain.lead_samples - 1, 0) - len(x))
-        if chain.follows is not None:
-            values = labelled.channel_matrix(run, list(inputs), name)
-            drives.append(cast("Followed", chain.wrap(Measured(values), run, [])))
-    owners: list[int] = [-1] * len(inputs)
-    direct: list[int] = []
-    for number, bound in enumerate(() if chain.observed is None else chain.observed.bound):
-        (owners if bound.delayed else direct).extend([number] * len(bound.labels))
-    direct += [-1] * (chain.follows is not None)  # the slow surge squared
-    return Problem(
-        data=data,
-        drives=tuple(drives),
-        offsets=tuple(offsets),
-        widest=widest,
-        owners=tuple(owners),
-        direct_owners=tuple(direct),
-        horizons=horizons,
-        is_per_snapshot=settings.ridge_scale == "per_snapshot",
-        groups=tuple(pieces if isinstance(folds, int) else folds.values()),
-    )
 
 
 def groups_of(
@@ -1107,56 +897,40 @@ def groups_of(
     """Name, by run, of the group of runs that are held out together.
 
     With "sea_state", runs that state the same; with "auto", runs whose waves are the same, as the
-    first of `inputs` that is a length recorded them; with "run", each is alone.
+    channel that periods are counted in recorded them; with "run", each is alone.
     """
     if folds == "sea_state":
         return {name: str(run.attrs.get("sea_state") or name) for name, run in runs.items()}
-    if folds == "run" or not inputs or len(runs) < 2:
+    waves = {name: labelled.wave_channel(run, inputs, name) for name, run in runs.items()}
+    if folds == "run" or None in waves.values():
         return {name: name for name in runs}
-    lengths = (label.name for label in labelled.common_labels(runs, inputs) if label.units == "m")
-    wave = next(lengths, inputs[0])
-    records = {name: run[wave].to_numpy() for name, run in runs.items()}
+    records = {name: runs[name][wave].to_numpy() for name, wave in waves.items()}
     return repeated_waves(records, labelled.common_step(runs))
 
 
-def _words_of_groups(groups: Sequence[str], by_sea: bool) -> str:
-    """What was held out beside each run."""
-    seas = len(set(groups))
-    if 1 < seas < len(groups):
-        if by_sea:
-            return f"held out with each: the runs of its sea state, of which there are {seas}"
-        return f"held out with each: the runs that repeat its waves; {seas} waves differ"
-    shared = "no two runs share a sea state" if seas > 1 else "all runs have the same sea state"
-    return f"{shared}, so each was held out alone"
-
-
 def _rows_of(
-    found: Choice,
-    observables: Sequence[Observable],
-    variants: Sequence[Variant],
-    seed: int,
+    trials: Mapping[Settings, Trial], taken: Settings, level: float, seed: int
 ) -> Iterator[dict[str, Any]]:
-    """Rows of the table: windows are drawn again 400 times for the interval of each score."""
+    """Rows of the table: windows are drawn again for the interval of each score."""
     rng = np.random.default_rng(seed)
-    for candidate, trial in found.trials:
+    for candidate, trial in trials.items():
         count = len(trial.weights)
-        drawn = rng.integers(count, size=(400, count))
+        drawn = rng.integers(count, size=(DRAWS, count))
         weights = trial.weights[drawn]
         totals = (trial.scores[:, drawn] * weights).sum(axis=2) / weights.sum(axis=1)
         lower, upper = np.quantile(totals, [0.025, 0.975], axis=1)
-        aligned, lead = variants[candidate.alignment]
-        for number, (level, score) in enumerate(zip(trial.levels, trial.means, strict=True)):
+        aligned, is_rank = candidate.alignment, candidate.rank is not None
+        for number, (own, score) in enumerate(zip(trial.levels, trial.means, strict=True)):
             yield {
                 "state_delays": candidate.state_delays,
                 "input_delays": candidate.input_delays,
-                "lead": candidate.lead if lead is None else lead,
-                "observables": ", ".join(observables[k].kind for k in candidate.observables)
-                or "none",
+                "lead": candidate.lead,
+                "observables": ", ".join(each.kind for each in candidate.observables) or "none",
                 "alignment": "none" if aligned is None else f"{aligned.mode}, {aligned.surge}",
-                "ridge": 0.0 if candidate.truncated else level,
-                "rank": int(level) if candidate.truncated else 0,
+                "ridge": 0.0 if is_rank else own,
+                "rank": int(own) if is_rank else 0,
                 "score": float(score),
                 "lower": float(lower[number]),
                 "upper": float(upper[number]),
-                "chosen": candidate == found.candidate and level == found.level,
+                "chosen": candidate == taken and own == level,
             }

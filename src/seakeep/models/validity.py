@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,6 @@ __all__ = ["Coverage", "Waves", "compare_waves", "outside_training"]
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
-"""Bands of a training record: a hundred octaves are more than any holds."""
 CYCLES = 5.0
 """Periods from which on a spectrum shows which waves it holds."""
 
@@ -91,8 +90,8 @@ class Waves:
         """
         margin = 1.1 + 1.7 * np.sqrt(self.period / duration)
         height = steepness = ""
-        unit = f" {self.units}" if self.units else ""
         if self.height > margin * self.highest:
+            unit = f" {self.units}" if self.units else ""
             height = (
                 f"{self.channel}: a height of {self.height:.3g}{unit}, trained "
                 f"up to {self.highest:.3g}{unit}"
@@ -132,11 +131,8 @@ class Coverage:
         """Coverage of the windows of several runs, each (time, channel)."""
         longest = max(len(each) for each in series)
         first = int(np.floor(PER_OCTAVE * np.log2(1.0 / (longest * dt))))
-        count = _last_band(dt) + 1 - first
-        energy = sum(
-            (band_energy(each, dt, first, count) for each in series),
-            np.zeros((len(channels), count)),
-        )
+        count = int(np.floor(PER_OCTAVE * np.log2(0.5 / dt))) + 1 - first
+        energy = np.sum([band_energy(each, dt, first, count) for each in series], axis=0)
         most = np.max([_heights(each, dt) for each in series], axis=0)
         return cls(tuple(channels), first, _shares(energy), *most)
 
@@ -154,33 +150,34 @@ class Coverage:
         result: BoolArray = inside & known[:, np.clip(band, 0, self.shares.shape[1] - 1)]
         return result
 
-    def compare(self, inputs: FloatArray, dt: float) -> list[Waves]:
+    def compare(self, inputs: FloatArray, dt: float, units: Sequence[str]) -> list[Waves]:
         """Compare the inputs (time, channel) of a forecast with those of training."""
         found = _shares(band_energy(inputs, dt, self.first, self.shares.shape[1]))
-        heights, steep = _heights(inputs, dt)
         edges = band_edges(self.first, self.shares.shape[1])
         periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])
+        heights, steep = _heights(inputs, dt)
         out = []
         for column, channel in enumerate(self.channels):
-            is_trained = self.shares[column] >= TRAINED
-            if not is_trained.any() or not found[column].any():
+            trained = np.flatnonzero(self.shares[column] >= TRAINED)
+            if not trained.size or not found[column].any():
                 continue  # a constant has no period
-            known = _with_neighbours(is_trained)
+            known = _with_neighbours(self.shares[column] >= TRAINED)
             peak = int(np.argmax(found[column]))
-            inside = np.flatnonzero(is_trained)
-            is_gap = bool(inside[0] < peak < inside[-1] and not known[peak])
-            edge = [inside[inside < peak][-1], inside[inside > peak][0]] if is_gap else inside
+            low, high = trained[0], trained[-1]
+            if is_gap := bool(low < peak < high and not known[peak]):
+                low, high = trained[trained < peak][-1], trained[trained > peak][0]
             out.append(
                 Waves(
                     channel=channel,
                     period=float(periods[peak]),
-                    trained=(float(periods[edge[-1]]), float(periods[edge[0]])),
+                    trained=(float(periods[high]), float(periods[low])),
                     outside=float(found[column][~known].sum()),
                     is_gap=is_gap,
                     height=float(heights[column]),
                     highest=float(self.heights[column]),
                     steepness=float(steep[column]) if is_elevation(channel) else np.nan,
                     steepest=float(self.steepnesses[column]),
+                    units=units[column],
                 )
             )
         return out
@@ -202,11 +199,6 @@ class Coverage:
         keys = ("wave_shares", "wave_heights", "wave_steepnesses")
         first = int(dataset["wave_shares"].attrs["first"])
         return cls(tuple(signature.inputs), first, *(store.numbers(dataset, key) for key in keys))
-
-
-def _last_band(dt: float) -> int:
-    """Number of the band that holds the highest frequency of a record."""
-    return int(np.floor(PER_OCTAVE * np.log2(0.5 / dt)))
 
 
 def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> list[Waves]:
@@ -238,9 +230,8 @@ def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> li
     values = labelled.channel_matrix(run, model.inputs, name, slice(first, at + steps))
     if len(values) < 2 or not np.all(np.isfinite(values)):
         return []
-    units = {label.name: label.units for label in model.signature.input_labels}
-    found = coverage.compare(values, model.dt)
-    return [replace(each, units=units[each.channel]) for each in found]
+    units = [label.units for label in model.signature.input_labels]
+    return coverage.compare(values, model.dt, units)
 
 
 def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) -> list[str]:

@@ -20,7 +20,7 @@ from seakeep.conventions import displayed, is_elevation
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
-from seakeep.models.forecasts import status_at_clock
+from seakeep.models.forecasts import status_text
 from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period, froude_factor
 from seakeep.signals.time_axis import span_text
@@ -159,13 +159,20 @@ def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
             "forecast must be what model.forecast or summarize returns, whose attributes hold a "
             f"status; received a Dataset of {', '.join(map(str, forecast.data_vars)) or 'nothing'}."
         )
-    clock = froude_factor("s", scale)
-    out = to_full_scale(forecast.drop_vars("status", errors="ignore"), scale)
-    out.attrs["status"] = status_at_clock(str(forecast.attrs["status"]), clock)
+    clock, own = froude_factor("s", scale), ["status", "diverged_at"]
+    out = to_full_scale(forecast.drop_vars(own, errors="ignore"), scale)
+    dt = float(np.diff(out["time"].values[:2]).sum())
+    out.attrs["status"] = status_text(out.attrs, dt)
     if "status" in forecast:
-        status = forecast["status"]
-        words = [status_at_clock(str(each), clock) for each in status.values]
-        out["status"] = (status.dims, words, status.attrs)
+        lost = clock * forecast["diverged_at"].variable
+        facts = {key: out.attrs[key] for key in out.attrs.keys() & {"input_predicted_from"}}
+        words = [
+            status_text(facts if np.isnan(at) else facts | {"diverged_at": at}, dt)
+            for at in lost.values
+        ]
+        out = out.assign_coords(diverged_at=lost.copy())
+        out["status"] = (lost.dims, words, forecast["status"].attrs)
+        out["diverged_at"].attrs = dict(forecast["diverged_at"].attrs)
     return out
 
 

@@ -9,7 +9,7 @@ from seakeep.signals.froude import froude_factor
 
 ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s",
                "test_span": "s", "water_depth": "m",
-               "reads_input_until": "s", "input_predicted_from": "s",
+               "reads_input_until": "s", "input_predicted_from": "s", "diverged_at": "s",
                "probe_offset": "m", "probe_offset_spread": "m"}  # fmt: skip
 """Times and lengths among the attributes of a run, with their units."""
 
