@@ -18,8 +18,8 @@ from seakeep.report.comparison import (
     write_comparison,
     write_differences,
     write_forecast,
+    write_nowcasts,
 )
-from seakeep.report.nowcast import write_nowcasts
 from seakeep.report.style import LINES
 from seakeep.study import (
     Comparison,
@@ -148,7 +148,7 @@ def test_a_band_that_is_lost_altogether_is_said_to_be():
 
 def test_the_figure_of_an_ensemble_shows_mean_and_band():
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     judged = in_degrees(ensemble())
     figure = overlay_figure(judged)
@@ -193,7 +193,7 @@ def test_a_forecast_says_per_instant_until_when_it_reads_the_waves(tmp_path):
 
 def test_labels_of_many_channels_are_whole_and_apart():
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     plain = comparison()
     motions = ("surge", "heave", "pitch", "yaw", "roll")
@@ -331,7 +331,8 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
 
 def test_figures_of_several_models_name_each_of_them():
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import error_figure, overlay_figure
+    from seakeep.report.figures.errors import error_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     found = {"ours": [waves_of(1.0, 0.9, "r")], "theirs": [waves_of(1.0, 0.5, "r")]}
     figure = overlay_figure({name: each[0] for name, each in found.items()})
@@ -341,12 +342,12 @@ def test_figures_of_several_models_name_each_of_them():
     assert "ANRMSE" not in figure.get_suptitle()
     axes = error_figure(difference_table(found)).axes[0]
     assert axes.get_xticklabels()[0].get_text() == "r\n1 s"
-    assert [line.get_label() for line in axes.get_lines()] == list(found)
+    assert axes.get_legend_handles_labels()[1] == list(found)
 
 
 def test_the_figure_judges_as_the_table_does_where_loads_are_shown_in_kilonewtons():
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     plain = comparison()
     large = {name: data.copy() for name, data in (("m", plain.measured), ("f", plain.forecast))}
@@ -366,7 +367,7 @@ def test_the_figure_judges_as_the_table_does_where_loads_are_shown_in_kilonewton
 
 def test_figure_has_a_row_a_channel_with_units_and_no_overlap():
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     figure = overlay_figure(in_degrees(comparison()))
     assert [axes.get_ylabel() for axes in figure.axes] == [
@@ -385,7 +386,7 @@ def test_figure_has_a_row_a_channel_with_units_and_no_overlap():
 
 def test_inputs_share_a_panel_with_those_of_their_unit_only():
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     judged = comparison()
     elevation = judged.inputs["eta_fwd"]
@@ -419,7 +420,7 @@ def lengthened(short):
 @pytest.mark.parametrize("make", [comparison, ensemble])
 def test_long_records_get_envelopes_and_an_enlarged_part(make):
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     long = lengthened(make())
     figure = overlay_figure(long)
@@ -437,7 +438,7 @@ def test_long_records_get_envelopes_and_an_enlarged_part(make):
 
 def test_an_envelope_ends_where_a_forecast_is_lost():
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     long = lengthened(comparison(status="diverged at t = 300 s"))
     lost = long.forecast.where(long.forecast["time"] < 300.0)
@@ -461,7 +462,7 @@ def named(judged, **long_names):
 
 def test_labels_are_what_the_campaign_calls_a_channel():
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     words = "Bow line LC-1 (FWD), 2 $ shackles, 1 $ pin"
     judged = named(comparison(), pitch="Trim angle (MRU-5)", mooring_stern=words)
@@ -482,7 +483,7 @@ def test_labels_are_what_the_campaign_calls_a_channel():
 
 def test_a_figure_at_full_scale_says_so_and_shows_loads_with_a_prefix(tmp_path):
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     small = comparison()
     large = at_full_scale(small, 120.0)
@@ -507,34 +508,25 @@ def test_a_figure_at_full_scale_says_so_and_shows_loads_with_a_prefix(tmp_path):
     assert "scale" not in path.read_text().splitlines()[0]
 
 
-@pytest.mark.parametrize(("count", "rows"), [(5, [3, 2]), (8, [4, 4]), (10, [4, 4, 2])])
-def test_many_inputs_are_told_apart_in_colour_and_in_grey(count, rows):
+@pytest.mark.parametrize("count", [5, 10])
+def test_many_inputs_are_told_apart(count):
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import input_styles, overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     judged = comparison()
     elevation = judged.inputs["eta_fwd"]
     names = [f"eta_{number + 1}" for number in range(count)]
     many = xr.Dataset(dict.fromkeys(names, elevation))
     figure = overlay_figure(replace(judged, inputs=many))
-    styles = [(style["color"], style["linestyle"]) for style in input_styles(count)]
-    assert [line.get_color() for line in figure.axes[-1].lines[:count]] == [c for c, _ in styles]
-    assert len(set(styles)) == count
-    assert len({dash for _, dash in styles[:8]}) == min(count, 8)  # grey print: by dash alone
-    figure.draw_without_rendering()
-    texts = figure.axes[-1].get_legend().get_texts()
-    places = {}
-    for text in texts:
-        box = text.get_window_extent()
-        places.setdefault(round(box.y0), []).append((box.x0, text.get_text()))
-    order = [sorted(places[y]) for y in sorted(places, reverse=True)]
-    assert [len(row) for row in order] == rows
-    assert [word for row in order for _, word in row] == names  # read along the rows
+    lines = figure.axes[-1].lines[:count]
+    assert len({line.get_color() for line in lines}) == min(count, 9)
+    words = [text.get_text() for text in figure.axes[-1].get_legend().get_texts()]
+    assert words == names
 
 
 def test_a_mean_lies_over_a_thin_measurement_over_the_band():
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     axes = overlay_figure(ensemble()).axes[0]
     measured, mean = axes.lines[:2]
@@ -547,7 +539,7 @@ def test_a_mean_lies_over_a_thin_measurement_over_the_band():
 
 def test_envelopes_keep_off_the_frame():
     pytest.importorskip("matplotlib")
-    from seakeep.report.overlay import overlay_figure
+    from seakeep.report.figures.histories import overlay_figure
 
     long = lengthened(comparison())
     axes = overlay_figure(long).axes[0]

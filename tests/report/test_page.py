@@ -27,18 +27,17 @@ from seakeep.report.sections.summary import (
     plain_symbol,
     summary,
 )
-from seakeep.report.style import LINES
+from seakeep.report.style import LINES, line_of, panels
 from seakeep.report.tables import Table, latex_text, number, probability, small_number
 from seakeep.study import StudyResult, read_result, read_study, run_study
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
-from seakeep.report.figures.boxes import FEWEST, draw_box_violin
-from seakeep.report.figures.common import grid_of_axes, model_colour
-from seakeep.report.figures.errors import eigenvalue_figure
+
+from seakeep.report.figures.errors import FEWEST, draw_box_violin, eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
-from seakeep.report.page import write_page, write_report
-from seakeep.report.section import Drawing, Section
+from seakeep.report.page import Drawing, Section, write_page
+from seakeep.report.sections import write_report
 
 ROOT = Path(__file__).parents[2]
 
@@ -362,7 +361,7 @@ def test_numbers_have_a_minus_and_zero_has_none():
 
 def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(result):
     for table in (divergence_table(result, "bayesian", "recommended"), *age(result).tables):
-        cells = [cell for row in table.rows for k, cell in enumerate(row) if k in table.numeric]
+        cells = [cell for row in table.rows for k, cell in enumerate(row) if k in table.numbers]
         assert not [cell for cell in cells if re.search(r"\b0\.0000\b", cell)]
     assert (probability(0.0004), probability(0.0386)) == ("< 0.001", "0.039")
     assert small_number(0.0) == "0"
@@ -398,9 +397,8 @@ def test_the_date_stands_in_one_piece_and_titles_have_the_width_of_the_page(page
     ("channels", "rows"), [(3, [3]), (5, [3, 2]), (6, [3, 3]), (11, [4, 4, 3])]
 )
 def test_panels_fill_their_rows(channels, rows):
-    from matplotlib.figure import Figure
 
-    axes = grid_of_axes(Figure(), channels, 4)
+    _, axes = panels(None, channels, 4, (2.0, 1.0))
     places = [each.get_subplotspec().rowspan.start for each in axes]
     assert [places.count(row) for row in range(len(rows))] == rows
     assert axes[0].get_subplotspec().get_gridspec().ncols == rows[0]
@@ -613,7 +611,7 @@ def test_each_of_many_models_has_a_colour_of_its_own():
     names = ["single", "bayesian", "mean", "hold_last", "fir", "arx", "subspace"]
     told = {name: {"ensemble": name == "bayesian"} for name in names}
     result = StudyResult(None, {"models": json.dumps(told)}, {})
-    assert len({model_colour(result, name) for name in names}) == len(names)
+    assert len({line_of(result, name)["color"] for name in names}) == len(names)
 
 
 @pytest.fixture(scope="module")
@@ -624,8 +622,8 @@ def wide_page(tmp_path_factory):
     runs = tuple(f"3102_{number}" for number in range(16))
     errors = ("mooring_starboard", *["0.284"] * 16)
     tables = (
-        Table("runs", "Errors of runs", of_runs, (row,), "A note.", tuple(range(1, 8)), heat=(1,)),
-        Table("states", "Errors", ("state", *runs), (errors,), "", tuple(range(1, 17)), heat=(6,)),
+        Table("runs", "Errors of runs", of_runs, (row,), "A note.", tuple(range(1, 8)), heat=1),
+        Table("states", "Errors", ("state", *runs), (errors,), "", tuple(range(1, 17)), heat=1),
     )
     stamp = {"description": "", "finished": ""}
     section = Section("worth", "Worth", tables=tables)

@@ -52,7 +52,7 @@ def test_a_study_judges_its_models_in_service(study, result):
 
 def test_the_report_shows_it_and_the_key_leaves_other_studies_as_they_were(study, result):
     pytest.importorskip("matplotlib")
-    from seakeep.report.nowcast import nowcast_blocks
+    from seakeep.report.comparison import nowcast_blocks
     from seakeep.report.sections.judgements import service
 
     section = service(result)
