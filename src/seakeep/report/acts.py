@@ -11,13 +11,13 @@ import numpy as np
 from seakeep.arrays import Progress
 from seakeep.report.claims import claims_table
 from seakeep.report.figures.histories import acts_figure
-from seakeep.report.page import Drawing, Section, write_page
+from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import wave_tables
 from seakeep.report.sections.judgements import divergence_table
 from seakeep.report.sections.settings import finished
 from seakeep.report.sections.summary import heat_table
 from seakeep.report.style import judged_models, model_words
-from seakeep.report.tables import Table, numbers
+from seakeep.report.tables import Table, numbers, table
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import average_of
@@ -60,20 +60,18 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
             for act in _played(results)
             for model in judged_models(results[act.name])
         }
-        title = f"Median NRMSE, {first.label_of(test)}"
-        heat.append(heat_table(first, f"channels_{test}", title, places))
+        key = {"name": f"channels_{test}", "test": first.label_of(test)}
+        heat.append(heat_table(first, "channels", places, **key))
     sections = [_summary(results)]
     if {"paper", "raw"} <= set(results):
-        words = "What the paper says, and what this tank says"
-        sections.append(Section("claims", words, tables=(claims_table(results),)))
+        sections.append(section("claims", tables=(claims_table(results),)))
     divergence, beside = divergence_table(first, "bayesian", "paper"), ", beside the paper's"
     links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
-    told = "Errors, histories, bands, data and settings of each act have a page of their own:"
     sections += [
-        Section("channels", "Channel by channel", tables=heat),
+        section("channels", tables=heat),
         Section("densities", f"Divergence of the densities{beside}", tables=(divergence,)),
-        Section("waves", "Waves and probes", tables=wave_tables(first)),
-        Section("studies", "The studies", words=(told,), links=links),
+        section("waves", tables=wave_tables(first)),
+        section("studies", links=links),
     ]
     return write_page(folder, "The paper's study on the virtual tank", stamp, sections, progress)
 
@@ -83,17 +81,12 @@ def _played(results: Results) -> list[Act]:
 
 
 def _summary(results: Results) -> Section:
-    caption = (
-        "Heave and surge in one window of irregular waves, measured and forecast in each "
-        "act, with the ensemble's 95 % band."
-    )
     repeats = [result.groups.get("repeats") for result in results.values()]
-    return Section(
+    return section(
         "summary",
-        "Results",
-        words=(NOTE,),
+        more=(NOTE,),
         points=[f"{act.title}. {act.sentence}" for act in _played(results)],
-        figures=(Drawing("acts", caption, partial(acts_figure, results)),),
+        figures=(drawing("acts", partial(acts_figure, results)),),
         tables=(acts_table(results),),
         # Once what several studies warn of.
         notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each is not None)),
@@ -116,17 +109,10 @@ def acts_table(results: Results) -> Table:
             rows.append(tuple(row))
     seas = [first.label_of(test).removeprefix("regular, ") for test in first.tests]
     reading = [a.letter for a in _played(results) if results[a.name].attrs["conditional_on"]]
-    note = (
-        "Average over channels, median over training sets and windows, in measured SDs: 1 is no "
-        "better than the mean of the window. Slow: surge and both mooring loads; waves: the eight "
-        "others. Mean, hold last: the training mean, and the last measured state; FIR: "
-        "a linear filter of the waves without states, which reads them 2 T̂ ahead, "
-        "further than the recommended model (0.75 T̂) and the paper's (none). "
-    )
+    conditions = ""
     if reading:
-        note += (
+        conditions = (
             f"{' and '.join(reading)}: conditional on measured surge, which the alignment reads."
         )
     columns = ("act", "model", *(f"{sea}: {part}" for sea in seas for part in ("waves", "slow")))
-    title = "Median NRMSE of three acts and their baselines"
-    return Table("acts", title, columns, rows, note, heat=2)
+    return table("acts", rows, columns=columns, conditions=conditions)

@@ -13,7 +13,7 @@ import xarray as xr
 from seakeep.check import Checked
 from seakeep.conventions import displayed
 from seakeep.report.figures import checks
-from seakeep.report.page import Drawing, Section, write_page
+from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.style import shown_unit
 from seakeep.report.tables import (
     MISSING,
@@ -26,8 +26,10 @@ from seakeep.report.tables import (
     percent,
     probability,
     short,
+    table,
     to,
     uncertain,
+    words,
 )
 
 OVERSHOOT = 1.1
@@ -63,15 +65,8 @@ def worth_section(found: xr.Dataset, checked: Checked) -> Section:
             f"{run}: outside what trained the model ({why})." for run, why in _outside(validity)
         ]
     one = str(found.attrs["of"]).removesuffix("s")
-    words = [
-        f"Free runs from one measured start to the end of each {one} "
-        f"({found.sizes['run']}); errors in measured SDs of the run. A verdict "
-        "reads the upper bound of the 95 % interval of the error: below 0.1 (99 % of the variance "
-        "is forecast), 0.3 (91 %), 0.7 (51 %). Better than a baseline: the paired 95 % interval of "
-        "the change of the error lies below zero. Intervals hold for these runs."
-    ]
     tables = [_by_run(found, one), _by_state(found), _of_runs(found)]
-    return Section("worth", "What the model is worth", words, points, tables=tables)
+    return section("worth", {"one": one, "runs": found.sizes["run"]}, points=points, tables=tables)
 
 
 def _verdicts(found: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
@@ -134,8 +129,8 @@ def _by_run(found: xr.Dataset, one: str) -> Table:
         "Baselines are fitted to the training runs with their recommended settings, and read no "
         "wave after the instant that they forecast and no measured state after the start."
     ) * (len(models) > 1)
-    title, heads = "ANRMSE of the model and of baselines", (one, "model", "95 %", *models[1:])
-    return Table("worth", title, heads, rows, note, averages=averages, heat=1)
+    heads = (one, "model", "95 %", *models[1:])
+    return table("worth", rows, columns=heads, more=note, averages=averages)
 
 
 def _cells(at: xr.Dataset, key: str) -> list[Number]:
@@ -155,10 +150,7 @@ def _by_state(found: xr.Dataset) -> Table:
                 beside = (best, number(one["nrmse"].sel(model=best)), _change(one, best))
             use = USES.get(float(one["limit"]), "not judged").partition(" (")[0]
             rows.append((str(state), str(kind), *_cells(one, "nrmse")[:2], *beside, use))
-    columns = ("state", "waves", "NRMSE", "95 %", "best baseline", "its NRMSE", "change", "verdict")
-    note = "Change: from the best baseline to the model, paired 95 % interval."
-    title = "NRMSE of each state, mean over runs, and the verdict"
-    return Table("verdicts", title, columns, rows, note, folded=True)
+    return table("verdicts", rows)
 
 
 def _of_runs(found: xr.Dataset) -> Table:
@@ -166,8 +158,7 @@ def _of_runs(found: xr.Dataset) -> Table:
     errors = found["run_nrmse"]
     heads = ("state", *map(str, errors["run"].values))
     rows = [(str(row["channel"].values), *numbers(row)) for row in errors]
-    title = "NRMSE of each state in each run"
-    return Table("worth_of_runs", title, heads, rows, heat=1, folded=True)
+    return table("worth_of_runs", rows, columns=heads)
 
 
 def _outside(validity: xr.Dataset) -> list[tuple[str, str]]:
@@ -181,13 +172,10 @@ def response_section(found: xr.Dataset, checked: Checked) -> Section:
     measured, reference = checked.found.get("measured_response"), found.attrs["reference"]
     if "validation" in checked.refused:  # points beside the answer to something else
         measured = None
-    wave = f"a wave that passes all probes, counted from {reference}"
-    words = [
-        "The response amplitude operator (RAO): the response per amplitude of "
-        f"{wave if 'wave' in found['input'] else reference}, from the "
-        "matrices of the model: its answer to small "
-        "waves. Bars are expanded uncertainties at 95 %.",
-    ]
+    per = reference
+    if "wave" in found["input"]:
+        per = f"a wave that passes all probes, counted from {reference}"
+    words = []
     unknown = found["amplitude"].isnull().all([d for d in found["amplitude"].dims if d != "state"])
     if read := ", ".join(map(str, found["state"].values[unknown])):
         words.append(f"{read}: read off other states, so that no linear response stands for it.")
@@ -197,17 +185,13 @@ def response_section(found: xr.Dataset, checked: Checked) -> Section:
             "Points of irregular waves are of all runs, training included. Their bars hold chance, "
             "and the change from segments half as long, by which leakage is judged."
         )
-    caption = (
-        "Amplitude (RAO) and phase of the response (phase positive where the vessel is early). "
-        "Grey: the training input holds no energy there."
-    )
-    drawing = Drawing("response", caption, partial(checks.response, found, measured))
+    figure = drawing("response", partial(checks.response, found, measured))
     tables = []
     if measured is not None and "regular" in kinds:
         tables.append(_points_table(measured, found))
     if "validation" in checked.found:
         tables.append(_validation_table(checked.found["validation"]))
-    return Section("response", "Response (RAO)", words, figures=[drawing], tables=tables)
+    return section("response", {"per": per}, words, figures=[figure], tables=tables)
 
 
 def _points_table(measured: xr.Dataset, found: xr.Dataset) -> Table:
@@ -226,15 +210,7 @@ def _points_table(measured: xr.Dataset, found: xr.Dataset) -> Table:
         for point in range(at.sizes["point"])
         for own, factor, state in _states(at.isel(point=point))
     ]
-    return Table(
-        "measured_response",
-        "Measured response in regular waves",
-        ("run", "frequency [Hz]", "wave amplitude [m]", "state", "amplitude", "phase [°]"),
-        rows,
-        "± expanded uncertainty at 95 % by ITTC 7.5-02-07-02.1: scatter over windows of whole "
-        "periods, and the accuracy of the instruments. Without a stated accuracy: scatter only.",
-        folded=True,
-    )
+    return table("measured_response", rows)
 
 
 def _states(found: xr.Dataset) -> Iterator[tuple[xr.Dataset, float, str]]:
@@ -266,14 +242,7 @@ def _validation_table(found: xr.Dataset) -> Table:
                     uncertain(error[worst], allowed[worst]),
                 )
             )
-    return Table(
-        "validation",
-        "Judgement by ASME V&V 20: comparison error E = S − D of the amplitude",
-        ("state", "waves", "points", "|E| < U_val", "RMS of E", "worst at [Hz]", "E ± U_val there"),
-        rows,
-        "Where |E| < U_val the error cannot be told from the uncertainty of the measurement and "
-        "of an ensemble's members; elsewhere the model errs by about E.",
-    )
+    return table("validation", rows)
 
 
 def possible_section(found: xr.Dataset, checked: Checked) -> Section:
@@ -307,27 +276,13 @@ def possible_section(found: xr.Dataset, checked: Checked) -> Section:
             f"The inputs are carried by measured {state} and so hold part of it: with waves alone "
             f"the bounds of {state}, and of what follows it, are higher."
         )
-    words = (
-        "The linear bound is the least error of a linear map of the inputs, by coherence in "
-        f"{found.attrs['of']} in irregular waves ({found.attrs['averages']:.0f} segments of "
-        f"{segment:.3g} s). It is estimated from what linear models "
-        "leave, which hardly leaks between frequencies, and lies above the error of none of "
-        "them: the baselines, and this model if it is linear. With observables the model "
-        "itself counts. Its error is that of free runs over the same instants."
+    return section(
+        "coherence",
+        found.attrs,
+        points=points,
+        figures=[drawing("coherence", partial(checks.coherence, found))],
+        tables=[table("possible", rows)],
     )
-    table = Table(
-        "possible",
-        "NRMSE of the model's free runs, and what the inputs allow",
-        ("state", "of", "model", "linear bound", "95 %", "with observables", "95 % of it"),
-        rows,
-        "Bounds are corrected for what as many inputs explain of noise by chance; "
-        "intervals are those of the part that is left. Training is shown as context.",
-        heat=2,
-    )
-    caption = "Coherence of each state with the inputs, over the spectrum of the state."
-    drawing = Drawing("coherence", caption, partial(checks.coherence, found))
-    title = "What is possible"
-    return Section("possible", title, (words,), points, figures=[drawing], tables=[table])
 
 
 def _bounds(own: xr.Dataset) -> tuple[str, ...]:
@@ -358,13 +313,12 @@ def _advice(model: float, linear: float, more: float, ahead: bool) -> str:
     return "As good as inputs and observables allow."
 
 
-def decay_section(table: xr.Dataset, checked: Checked) -> Section:
+def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
     """Return free decay, beside measured ones, and the modes."""
     figures, tables, words, points = [], [], [], []
     if (found := checked.found.get("decay")) is not None:
         tables.append(_decay_table(found, checked.found.get("measured_decay")))
-        caption = "What is left of an offset of one training SD after its release in still water."
-        figures.append(Drawing("decay", caption, partial(checks.decay, found)))
+        figures.append(drawing("decay", partial(checks.decay, found)))
         most = np.abs(found["displacement"].values).max(axis=1)
         # None swings farther than it was moved in still water.
         points = [
@@ -380,11 +334,10 @@ def decay_section(table: xr.Dataset, checked: Checked) -> Section:
             "with fewer than three extremes has neither period nor damping: it creeps back, or its "
             "forecast leans on the waves and forgets the state."
         )
-    if table.sizes["state"] > 1:
-        caption = "Modes that decay slowest: states that take part in each (parts of one)."
-        figures.append(Drawing("modes", caption, partial(checks.modes, table)))
-    tables.append(_modes_table(table))
-    return Section("decay", "Free decay and modes", words, points, figures=figures, tables=tables)
+    if modes.sizes["state"] > 1:
+        figures.append(drawing("modes", partial(checks.modes, modes)))
+    tables.append(_modes_table(modes))
+    return section("modes", more=words, points=points, figures=figures, tables=tables)
 
 
 def _decay_table(found: xr.Dataset, measured: xr.Dataset | None) -> Table:
@@ -398,12 +351,7 @@ def _decay_table(found: xr.Dataset, measured: xr.Dataset | None) -> Table:
         (str(own["motion"].values), *(number(own[key]) for key in keys), q, of)
         for own, q, of in cases
     ]
-    columns = ("motion", "period [s]", "damping ratio", "p", "q [1/m or 1/rad]", "of")
-    note = (
-        "Decrement of a cycle p + q a. A linear model's does not depend on the amplitude a. A "
-        "dash: fewer than three extremes, as where a motion creeps back."
-    )
-    return Table("decay", "Free decay", columns, rows, note)
+    return table("decay", rows)
 
 
 def _modes_table(found: xr.Dataset) -> Table:
@@ -413,8 +361,7 @@ def _modes_table(found: xr.Dataset) -> Table:
         parts = own["participation"].to_series().sort_values(ascending=False, kind="stable")[:2]
         taking = ", ".join(f"{state} {part:.2f}" for state, part in parts.items())
         rows.append((*(number(own[key], 4) for key in keys), taking))
-    columns = ("period [s]", "damping ratio", "decay time [s]", "modulus", "states that take part")
-    return Table("modes", f"All {found.sizes['mode']} modes", columns, rows, folded=True)
+    return table("modes", rows, modes=found.sizes["mode"])
 
 
 def residuals_section(found: xr.Dataset, checked: Checked) -> Section:
@@ -425,36 +372,17 @@ def residuals_section(found: xr.Dataset, checked: Checked) -> Section:
     rows = [
         _residuals_row(each.sel(state=state)) for state in found["state"].values for each in shown
     ]
-    columns = (
-        *("state", "of", "one step [SD]", "Ljung–Box Q", "p", "past inputs beyond limit"),
-        *("slow", "wave", "above", "after 1 T"),
-        f"after {found.sizes['age'] * (lag[1] - lag[0]) / period:.0f} T",
-    )
-    table = Table(
+    residuals = table(
         "residuals",
-        "Errors of one step, and of free runs by band and age (in measured SDs)",
-        columns,
         rows,
-        f"Ljung–Box up to a lag of {lag[-1]:.3g} s ({lag.size - 1} samples) over "
-        f"{found.attrs['instants']} instants; p is the probability of white noise. Of white "
-        "residuals 5 % of the lags lie beyond the limit. Bands: below 0.5, to 2, and above 2 "
-        f"cycles per encounter period ({period:.3g} s).",
-        heat=6,
+        oldest=found.sizes["age"] * (lag[1] - lag[0]) / period,
+        lag=lag[-1],
+        lags=lag.size - 1,
+        instants=found.attrs["instants"],
+        period=period,
     )
-    caption = (
-        "Per state: autocorrelation of one-step errors and their correlation with past inputs "
-        "(grey: 95 % limits), spectrum of the error of free runs over that of the measurement, and "
-        "error against the age of the forecast."
-    )
-    drawing = Drawing("residuals", caption, partial(checks.residuals, found))
-    words = (
-        "A model that has taken all from the data leaves one-step errors that are white and know "
-        "nothing of past inputs. With long records even small errors fail this test: read it with "
-        f"the size of the error. The figure is of the {found.attrs['of']}; the table also shows "
-        "training, as context. Errors by age start at other instants than the free runs of the "
-        "first section, and so differ from them."
-    )
-    return Section("residuals", "Residuals", (words,), figures=[drawing], tables=[table])
+    figure = drawing("residuals", partial(checks.residuals, found))
+    return section("residuals", found.attrs, figures=[figure], tables=[residuals])
 
 
 def _residuals_row(own: xr.Dataset) -> tuple[str, ...]:
@@ -496,29 +424,12 @@ def statistics_section(found: xr.Dataset, checked: Checked) -> Section:
                 )
             )
     hours = float(found.attrs["duration"]) / 3600
-    columns = (
-        *("state", "of", "significant double amplitude", "zero-crossing period [s]", "peaks"),
-        *("Weibull shape", "extreme", "95 % of it", "JSD"),
-    )
-    table = Table(
-        "statistics",
-        f"Statistics of responses over the {found.attrs['of']} in irregular waves",
-        columns,
-        rows,
-        f"Extreme: most probable largest deviation from the mean in {hours:.3g} h of "
-        "these records' time (3 h at full scale), by Weibull's law; its interval is what the fit "
-        "does not know. Rayleigh's law has the shape 2. JSD: Jensen–Shannon divergence of the "
-        "densities forecast and measured (0 to 0.69), of deviations from the mean: no offset is "
-        "seen. Peaks of slow channels mix slow and wave motion.",
-    )
-    caption = (
-        "How often a peak exceeds a level, measured and forecast, beside Rayleigh and Weibull."
-    )
-    drawings = [
-        Drawing("exceedance", caption, partial(checks.exceedance, found)),
-        Drawing("density", "Densities of the states.", partial(checks.density, found)),
+    figures = [
+        drawing("exceedance", partial(checks.exceedance, found)),
+        drawing("density", partial(checks.density, found)),
     ]
-    return Section("statistics", "Statistics of responses", figures=drawings, tables=[table])
+    tables = [table("statistics", rows, of=found.attrs["of"], hours=hours)]
+    return section("statistics", figures=figures, tables=tables)
 
 
 def validity_section(found: xr.Dataset, checked: Checked) -> Section:
@@ -532,11 +443,6 @@ def validity_section(found: xr.Dataset, checked: Checked) -> Section:
         for at in [found.sel(run=run, part=part)]
         if np.isfinite(at["height"])
     ]  # fmt: skip
-    columns = ("run", "part", "waves", "height [m]", "period [s]", "steepness", "mean surge [m]")
-    note = (
-        "Steepness here is height over wave length in the depth of the run. Reasons judge "
-        "steepness in deep water, by spectral mean period, so that their figures differ a little."
-    )
     points = [
         f"{run}: {why}. What the model says there is an extrapolation."
         for run, why in _outside(found)
@@ -545,15 +451,8 @@ def validity_section(found: xr.Dataset, checked: Checked) -> Section:
         f"{text[0].upper()}{text[1:]} This test shows memory, not skill."
         for text in checked.repeats.values()
     ]
-    caption = (
-        "Waves (and mean surge) that trained the model, and those of each test. A test is outside "
-        "where most of its energy lies at periods without energy in training, or where its height "
-        "or steepness is beyond the largest of training by a tenth and the scatter of so short a "
-        "record."
-    )
-    drawing = Drawing("validity", caption, partial(checks.validity, found))
-    table = Table("validity", "Waves", columns, rows, note)
-    return Section("validity", "Validity", points=points, figures=[drawing], tables=[table])
+    figure = drawing("validity", partial(checks.validity, found))
+    return section("validity", points=points, figures=[figure], tables=[table("validity", rows)])
 
 
 def drift_section(found: xr.Dataset, checked: Checked) -> Section:
@@ -568,48 +467,35 @@ def drift_section(found: xr.Dataset, checked: Checked) -> Section:
             offset = (factor * own[key][k] for key in ("offset", "offset_uncertainty"))
             run = str(own["run"].values[k])
             rows.append((state, run, number(f), number(value, 4), uncertain(*offset)))
-    columns = ("state", "run", "frequency [Hz]", "model", "measured")
-    note = (
-        "Offset from the rest in still water, as the model has it, over the wave amplitude "
-        "squared; ± expanded uncertainty at 95 % of the measured mean."
-    )
-    title = "Mean offset in regular waves, per amplitude squared"
-    tables = [Table("drift", title, columns, rows, note)] if rows else []
-    words = (
-        "What the observables make of one wave (the mean) and of two whose frequencies differ (a "
-        "slow response at the difference, half of it per amplitude squared, so that it tends to "
-        f"the mean), probed with an amplitude of {float(found.attrs['amplitude']):.3g} m."
-    )
-    caption = (
-        "Mean and slow response per wave amplitude squared, against the frequency of the wave."
-    )
-    drawing = Drawing("drift", caption, partial(checks.drift, found))
-    return Section("second-order", "Second order", (words,), figures=[drawing], tables=tables)
+    figure = drawing("drift", partial(checks.drift, found))
+    tables = [table("drift", rows)] if rows else []
+    return section("drift", found.attrs, figures=[figure], tables=tables)
 
 
-CHECK_SECTIONS: list[tuple[str, Sequence[str], Callable[[xr.Dataset, Checked], Section]]] = [
-    ("What the model is worth", ("worth",), worth_section),
-    ("Response (RAO)", ("response", "measured_response", "validation"), response_section),
-    ("What is possible", ("coherence",), possible_section),
-    ("Free decay and modes", ("modes", "decay", "measured_decay"), decay_section),
-    ("Residuals", ("residuals",), residuals_section),
-    ("Statistics of responses", ("statistics",), statistics_section),
-    ("Validity", ("validity",), validity_section),
-    ("Second order", ("drift",), drift_section),
-]
-"""Title, the checks that it shows, and what makes it of the result of the first."""
+CHECK_SECTIONS: dict[Callable[[xr.Dataset, Checked], Section], Sequence[str]] = {
+    worth_section: ("worth",),
+    response_section: ("response", "measured_response", "validation"),
+    possible_section: ("coherence",),
+    decay_section: ("modes", "decay", "measured_decay"),
+    residuals_section: ("residuals",),
+    statistics_section: ("statistics",),
+    validity_section: ("validity",),
+    drift_section: ("drift",),
+}
+"""Sections, with the checks that each shows; it is made of the result of the first."""
 
 
 def check_sections(checked: Checked) -> list[Section]:
     """Sections of the page; each says what could not be judged, and why."""
     out = []
-    for title, needed, make in CHECK_SECTIONS:
+    for make, needed in CHECK_SECTIONS.items():
         found = checked.found.get(needed[0])
+        title = words()["sections"][needed[0]]["title"]
         made = Section(needed[0], title) if found is None else make(found, checked)
         refused = [checked.refused[name] for name in needed if name in checked.refused]
         told = [f"Cannot be judged: {text}" for text in dict.fromkeys(refused)]
         told += dict.fromkeys(note for name in needed for note in checked.notes.get(name, ()))
-        out.append(replace(made, notices=(*made.notices, *told)))
+        out.append(replace(made, notices=tuple(told)))
     return out
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.core.bands import split_bands
-from seakeep.report.tables import Form, Table, number, probability, signed
+from seakeep.report.tables import Form, Table, number, probability, signed, table, words
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.judge import (
@@ -74,27 +74,13 @@ class Interval(NamedTuple):
 
 def claims_table(results: Results) -> Table:
     """Each claim, our figure, and whether it holds, in the first act."""
-    words = {True: "holds", False: "does not", None: "cannot tell"}
+    verdicts = {True: "holds", False: "does not", None: "cannot tell"}
     rows = []
-    for claim, judge, why in CLAIMS:
+    for key, judge in CLAIMS.items():
+        claim, how = words()["claims"][key]
         figure, holds = judge(results)
-        rows.append((claim, figure, words[holds], why))
-    heads = (
-        "the paper says",
-        "here: act (a) unless said",
-        "verdict",
-        "how judged, what is the tank's",
-    )
-    return Table(
-        "claims",
-        "Claims of the paper's results and conclusions",
-        heads,
-        rows,
-        "In brackets 95 % intervals by a two-way block bootstrap over training sets and windows; a "
-        "claim whose bound lies inside its interval is one that the study cannot tell. The "
-        "Bayesian model where no other is named. The paper's vessel and tank are others: what does "
-        "not hold here is not refuted there.",
-    )
+        rows.append((claim, figure, verdicts[holds], how.format(useful=USEFUL)))
+    return table("claims", rows)
 
 
 def all_of(verdicts: Iterable[bool | None]) -> bool | None:
@@ -379,90 +365,23 @@ def _stern(results: Results) -> Judged:
     return f"NRMSE {listed}; slack {parts} of the time", all_of(falls) if falls else None
 
 
-CLAIMS: tuple[tuple[str, Callable[[Results], Judged], str], ...] = (
-    (
-        "Reliable and robust prediction for unseen irregular waves",
-        _robust,
-        f"Median below {USEFUL:g}, no cell above 1. FIR is a linear filter of the waves.",
-    ),
-    (
-        "No trend in ε(t) over 15 T̂",
-        _trend,
-        "Mann–Kendall test of ε(t), both models; p below 0.05 is a trend, and above it proves "
-        "none.",
-    ),
-    (
-        "The same accuracy for arbitrarily long sequences",
-        _any_length,
-        "No longer windows are judged; this tank's drift (18 T̂) is slower than a window.",
-    ),
-    (
-        "The great majority of the errors arises from the mooring forces",
-        _who_errs,
-        "More than half, by 2 of 11 channels.",
-    ),
-    (
-        "JSD of the loads an order of magnitude above the others",
-        _load_divergence,
-        "Mean JSD of the loads and of the nine others; a factor above √10. The interval joins the "
-        "bounds of both, which is wide.",
-    ),
-    (
-        "Densities of the motions very close, intervals almost always overlapping",
-        _densities,
-        "JSD below the upper bound of the measurement's divergence from itself.",
-    ),
-    (
-        "The Bayesian model lowers both errors in irregular waves",
-        partial(_better, statistic=_median),
-        "Change of the median from the deterministic to the Bayesian model.",
-    ),
-    (
-        "… and their dispersion",
-        partial(_better, statistic=_spread),
-        "Change of the inter-quartile range.",
-    ),
-    ("… consistently, in all conditions", _always_better, "Four seas, two measures."),
-    (
-        "The uncertainty of the Bayesian model is very low",
-        _narrow,
-        f"Width below {USEFUL:g} SD. The spread of the hyperparameters is not the error.",
-    ),
-    (
-        "Its interval does not cover the mooring loads",
-        _load_band,
-        "Fewer than 90 %.",
-    ),
-    (
-        "The low-frequency content of the loads is captured",
-        _slow_loads,
-        "NRMSE of what is slower than the waves; below 1 it beats the mean. Act (a) has none left. "
-        "Drift goes with the square of the waves, which no linear map makes.",
-    ),
-    (
-        "Load peaks are fairly estimated",
-        _peaks,
-        "Less than one SD. Slap and slack lines of the tank make peaks that no linear model has.",
-    ),
-    (
-        "Remarkable accuracy for the motions in regular waves too; loads worst",
-        _regular,
-        f"Median NRMSE of the motions below {USEFUL:g}, of the loads larger, in all three.",
-    ),
-    (
-        "In regular waves ANRMSE slightly higher, NAMMAE lower than in irregular",
-        _against_irregular,
-        "Median over all regular windows against that in irregular waves.",
-    ),
-    (
-        "… with a more pronounced phase error of the loads",
-        _phase,
-        "At the wave's frequency, over the three regular runs.",
-    ),
-    (
-        "The stern load is better predicted in longer waves (less slack)",
-        _stern,
-        "λ/L 1.5, 2, 3. The tank's drift force and pretension decide how slack the line is.",
-    ),
-)
-"""Claims in the order of the paper, what judges each, and how it is judged."""
+CLAIMS: dict[str, Callable[[Results], Judged]] = {
+    "robust": _robust,
+    "trend": _trend,
+    "any_length": _any_length,
+    "who_errs": _who_errs,
+    "load_divergence": _load_divergence,
+    "densities": _densities,
+    "better": partial(_better, statistic=_median),
+    "dispersion": partial(_better, statistic=_spread),
+    "always_better": _always_better,
+    "narrow": _narrow,
+    "load_band": _load_band,
+    "slow_loads": _slow_loads,
+    "peaks": _peaks,
+    "regular": _regular,
+    "against_irregular": _against_irregular,
+    "phase": _phase,
+    "stern": _stern,
+}
+"""What judges each claim, in the order of the paper; ``words.toml`` has the words."""

@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 from seakeep.arrays import Progress
 from seakeep.files import MARK, check_output, replacing
 from seakeep.report.style import figure_style, save_figure
-from seakeep.report.tables import Table, shade, write_csv, write_latex
+from seakeep.report.tables import Table, shade, words, write_csv, write_latex
 from seakeep.study.store import storing
 
 if TYPE_CHECKING:
@@ -92,6 +92,25 @@ class Section:
     histories: dict[str, Any] | None = None
     figures: Sequence[Drawing] = ()
     tables: Sequence[Table] = ()
+
+
+def drawing(
+    key: str, draw: Callable[[], Figure], *, name: str = "", raster: bool = False, **values: Any
+) -> Drawing:
+    """Figure with the caption of ``words.toml``, and the values that it holds in braces."""
+    return Drawing(name or key, words()["figures"][key].format(**values), draw, raster)
+
+
+def section(
+    key: str, values: Mapping[str, Any] | None = None, more: Sequence[str] = (), **parts: Any
+) -> Section:
+    """Section with the title and paragraphs of ``words.toml``, and `more` paragraphs.
+
+    `values` are what the paragraphs hold in braces, `parts` the other parts of a :class:`Section`.
+    """
+    entry = words()["sections"][key]
+    paragraphs = [each.format(**values or {}) for each in entry.get("words", ())]
+    return Section(key, entry["title"], [*paragraphs, *filter(None, more)], **parts)
 
 
 def write_page(

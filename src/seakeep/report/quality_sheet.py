@@ -16,19 +16,13 @@ from seakeep.files import MARK, replacing
 from seakeep.quality import compared, findings_of
 from seakeep.quality.faults import FLAGS
 from seakeep.report.figures.runs import quality_figure
-from seakeep.report.page import Drawing, Section, inline_picture, rendered
+from seakeep.report.page import Section, drawing, inline_picture, rendered, section
 from seakeep.report.style import figure_style, shown_unit
-from seakeep.report.tables import Number, Table, number, short
+from seakeep.report.tables import MISSING, Number, number, short, table
 from seakeep.signals.synchronisation import ASSUMED, Clock
 
 SHEET = "data-quality sheet"
 """Kind of the files of a sheet, which sets them apart from the user's."""
-WORDS = (
-    "Checks flag and report; nothing is repaired unless the campaign asks for it, and what was "
-    "repaired is listed. A lag is positive where a sensor is late against the trusted one of its "
-    "group; inside the green band it does no harm. Findings count over the whole record that was "
-    "read; the shares flagged, the statistics and the pictures show the span used."
-)
 
 
 @dataclass(frozen=True)
@@ -111,16 +105,11 @@ def write_quality_sheet(
             with figure_style(), replacing(path) as temporary:  # all colours: marks are small
                 mark, small = {"Software": f"{MARK}: {SHEET}"}, {"optimize": True}
                 figure.savefig(temporary, format="png", dpi=100, metadata=mark, pil_kwargs=small)
-    rows = [(*run_row(name, run)[:3], run_row(name, run)[3] or "nothing found")
-            for name, run in runs.items()]  # fmt: skip
-    rows += [
-        (name, Number("not prepared"), number(np.nan), why) for name, why in (unread or {}).items()
-    ]
-    heads = ("run", "span used", "findings", "channels")
+    rows = [(*row, kinds or "nothing found") for *row, kinds in map(run_row, runs, runs.values())]
+    rows += [(n, Number("not prepared"), MISSING, why) for n, why in (unread or {}).items()]
     marked = [k for k, row in enumerate(rows) if row[2] != "0"]
-    every = Table("runs", "Runs", heads, rows, marked=marked)
-    sections = [Section("runs", "Runs", (WORDS,), tables=(every,))]
-    sections += [_section(name, run) for name, run in runs.items()]
+    every = section("runs", tables=(table("runs", rows, marked=marked),))
+    sections = [every, *map(_section, runs, runs.values())]
     drawn = {
         path.stem: inline_picture(path.read_bytes(), f"channels of {name}")
         for name, path in pictures.items()
@@ -159,14 +148,11 @@ def _section(name: str, run: xr.Dataset) -> Section:
         (each.channel, each.unit, *map(short, each.numbers), each.flagged, "; ".join(each.found))
         for each in channels
     ]
-    heads = ("channel", "unit", "min", "max", "mean", "SD", "flagged in the span",
-             "found in the record, and done about it")  # fmt: skip
     marked = [k for k, each in enumerate(channels) if each.found]
-    table = Table(f"channels_{name}", f"Channels of {name}", heads, rows, marked=marked)
-    caption = f"All channels of {name}, flagged samples marked."
-    drawing = Drawing(f"quality_{name}", caption, lambda: quality_figure(run, {}))
-    words, points = (steps_of(run),), [*clocks, *other_findings(run)]
-    return Section(name, name, words, points, figures=(drawing,), tables=(table,))
+    shown = table("channels_of_run", rows, name=f"channels_{name}", run=name, marked=marked)
+    figure = drawing("quality", lambda: quality_figure(run, {}), name=f"quality_{name}", run=name)
+    points = [*clocks, *other_findings(run)]
+    return Section(name, name, (steps_of(run),), points, figures=(figure,), tables=(shown,))
 
 
 def is_newer(path: Path, source: Path) -> bool:

@@ -127,7 +127,7 @@ def figure_style() -> Iterator[None]:
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure, in inches; draw on it inside :func:`figure_style`."""
-    from matplotlib.figure import Figure as Figure
+    from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 

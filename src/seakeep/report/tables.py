@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import re
+import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, SupportsFloat
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 import numpy as np
 import numpy.typing as npt
@@ -85,6 +87,64 @@ class Table:
             for k, cells in enumerate(columns)
             if cells and all(isinstance(each, Number) for each in cells)
         )
+
+
+@cache
+def words() -> dict[str, Any]:
+    """Words of the pages: sections, figures and tables by name."""
+    file = resources.files("seakeep.report").joinpath("templates/words.toml")
+    return tomllib.loads(file.read_text("utf-8"))
+
+
+def table(
+    key: str,
+    rows: Sequence[Sequence[str]],
+    *,
+    name: str = "",
+    columns: Sequence[str] = (),
+    more: str = "",
+    folded: bool = False,
+    averages: Sequence[int] = (),
+    marked: Sequence[int] = (),
+    elsewhere: Sequence[int] = (),
+    **values: Any,
+) -> Table:
+    """Return a table with the words of ``words.toml``.
+
+    Parameters
+    ----------
+    key : str
+        Its place there.
+    rows : sequence of sequence of str
+        Cells.
+    name : str, optional
+        Name of its files, if it is not the key.
+    columns : sequence of str, optional
+        Headings that are not stated there.
+    more : str, optional
+        What follows the note.
+    folded, averages, marked, elsewhere
+        As of :class:`Table`.
+    **values
+        What the words hold in braces.
+
+    Returns
+    -------
+    Table
+    """
+    entry = {"columns": (), "note": "", "heat": 0, "folded": folded, **words()["tables"][key]}
+    return Table(
+        name or key,
+        entry["title"].format(**values),
+        tuple(columns or (head.format(**values) for head in entry["columns"])),
+        rows,
+        entry["note"].format(**values) + more,
+        elsewhere=elsewhere,
+        averages=averages,
+        marked=marked,
+        folded=entry["folded"],
+        heat=entry["heat"],
+    )
 
 
 SHADES = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)

@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 
 from seakeep.report.figures.runs import quality_figure, spectrum_figure
-from seakeep.report.page import Drawing, Section
+from seakeep.report.page import Section, drawing, section
 from seakeep.report.quality_sheet import channel_rows, clock_rows, other_findings, run_row
 from seakeep.report.style import shown_unit
-from seakeep.report.tables import Number, Table, number, percent, short
+from seakeep.report.tables import Number, Table, number, percent, short, table
 from seakeep.study import StudyResult
 from seakeep.waves import phase_speed
 
@@ -20,13 +20,9 @@ def waves(result: StudyResult) -> Section | None:
     tables, figures = wave_tables(result), []
     if "spectra" in result.groups:
         regular = bool(np.isfinite(result.groups["runs"]["wave_frequency"].values).any())
-        caption = (
-            "Power spectral density of the wave elevation: nominal where it is known, and "
-            "measured (mean over the irregular runs, or over all where none is) with the "
-            "paper's Welch segments and with long ones."
-        ) + " Vertical lines: the regular waves." * regular
-        figures.append(Drawing("spectrum", caption, partial(spectrum_figure, result)))
-    return Section("waves", "Waves", figures=figures, tables=tables) if tables else None
+        words = " Vertical lines: the regular waves." * regular
+        figures.append(drawing("spectrum", partial(spectrum_figure, result), regular=words))
+    return section("waves", figures=figures, tables=tables) if tables else None
 
 
 def wave_tables(result: StudyResult) -> list[Table]:
@@ -47,8 +43,7 @@ def wave_tables(result: StudyResult) -> list[Table]:
     ]
     if rows:
         frame = str(result.groups["channels"].attrs.get("frame", ""))
-        heads = ("channel", "words", "x [m]", "used")
-        tables.append(Table("positions", "Positions of the wave probes", heads, rows, frame))
+        tables.append(table("positions", rows, frame=frame))
     return tables
 
 
@@ -77,45 +72,27 @@ def _wave_table(result: StudyResult) -> Table:
                 spans or "test",
             )
         )
-    return Table(
-        "waves",
-        "Waves tested, as measured",
-        ("run", "sea", "height [m]", "frequency [Hz]", "length [m]", "phase speed [m/s]", "used"),
-        rows,
-        f"From {spectra.attrs['channel']}. Height: of regular waves 2√2, of a sea "
-        "4 standard deviations of the elevation. Length and speed: linear theory at the depth of "
-        "the campaign.",
-    )
+    return table("waves", rows, channel=spectra.attrs["channel"])
 
 
 def data(result: StudyResult) -> Section:
     """Return channels, and what preparation found in each run."""
     figures = [
-        Drawing(
-            f"quality_{name}",
-            f"All channels of {name} after preparation, flagged samples marked; "
-            "tinted: a channel in which something was found.",
+        drawing(
+            "quality",
             partial(quality_figure, run, {}),
+            name=f"quality_{name}",
             raster=True,
+            run=name,
         )
         for name, run in result.prepared.items()
     ]
     tables = [_sign_table(result), _run_table(result)]
     clocks = [(n, *row) for n, run in result.prepared.items() for row in clock_rows(run)]
     if clocks:
-        tables.append(
-            Table(
-                "clocks",
-                "Clocks of the loggers against the reference",
-                ("run", "logger", "offset", "drift", "from"),
-                clocks,
-                "Offset: what the logger's clock reads when the reference reads zero. n: pulses, "
-                "windows or samples that it rests on. ±: one standard error.",
-                folded=True,
-            )
-        )
+        tables.append(table("clocks", clocks))
     tables += [_quality_table(result, name) for name in result.prepared]
-    return Section("data", "Data", figures=figures, tables=tables)
+    return section("data", figures=figures, tables=tables)
 
 
 def _sign_table(result: StudyResult) -> Table:
@@ -124,8 +101,8 @@ def _sign_table(result: StudyResult) -> Table:
         at = channels.sel(name=name)
         use, unit, *others = (str(at[k].values) for k in ("use", "units", "positive", "source"))
         rows.append((result.words_of(name), use, shown_unit(unit), *others))
-    frame, heads = channels.attrs.get("frame", ""), ("channel", "use", "unit", "positive", "source")
-    return Table("signs", "Channels and signs", heads, rows, f"Frame: {frame}." if frame else "")
+    frame = channels.attrs.get("frame", "")
+    return table("signs", rows, frame=frame and f"Frame: {frame}.")
 
 
 def _run_table(result: StudyResult) -> Table:
@@ -135,15 +112,7 @@ def _run_table(result: StudyResult) -> Table:
         sea = str(result.groups["runs"]["sea_state"].sel(run=name).values)
         others = "; ".join(other_findings(run))
         rows.append((name, sea, str(span), count, kinds.replace("_", " ") or "none", others))
-    return Table(
-        "runs",
-        "Data quality of the runs, as preparation found it",
-        ("run", "sea state", "part used", "findings", "channel (kind)", "findings of loggers"),
-        rows,
-        "Checks flag and report; nothing is repaired unless the campaign asks for it, and what was "
-        "repaired is in the tables below. A finding concerns the whole record, the part that is "
-        "cut off too.",
-    )
+    return table("quality_of_runs", rows, name="runs")
 
 
 def _quality_table(result: StudyResult, name: str) -> Table:
@@ -158,15 +127,5 @@ def _quality_table(result: StudyResult, name: str) -> Table:
         low, high, *others = map(short, each.numbers)
         row = (each.words, use, each.unit, *others, low, high, frozen, slack, each.flagged)
         rows.append((*row, "; ".join(each.found)))
-    return Table(
-        f"quality_{name}",
-        f"Data quality of {name}, channel by channel (SI units)",
-        ("channel", "used", "unit", "mean", "SD", "min", "max", "frozen %", "slack %", "flagged",
-         "found, and done about it"),
-        rows,
-        "After preparation; no value that the study uses is missing, or it would have refused the "
-        "run. Frozen: samples equal to both neighbours. Slack: a load within the SD of its noise. "
-        "Flagged: fraction of the samples.",
-        folded=True,
-        marked=[k for k, each in enumerate(channels) if each.found],
-    )  # fmt: skip
+    marked = [k for k, each in enumerate(channels) if each.found]
+    return table("quality", rows, name=f"quality_{name}", run=name, marked=marked)

@@ -9,20 +9,15 @@ import numpy as np
 import xarray as xr
 
 from seakeep.report.figures.errors import FEWEST, average_boxes, channel_boxes
-from seakeep.report.page import Drawing, Section
+from seakeep.report.page import Section, drawing, section
 from seakeep.report.sections.summary import by_channel, conditional, overview_table
 from seakeep.report.style import HEADING, judged_models, model_words
-from seakeep.report.tables import Number, Table, beside, number, percent, short, signed
+from seakeep.report.tables import Number, Table, beside, number, percent, short, signed, table
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of, verdict
 
 SELDOM = 0.01
 """Part of a run's samples below which a slack line is not worth a word."""
-
-BOX = (
-    "Boxes: quartiles; whiskers: furthest values within 1.5 inter-quartile ranges; violins: "
-    f"density, from {FEWEST} cells on; dots: single cells, outliers included."
-)
 
 
 def errors(result: StudyResult) -> Section:
@@ -30,24 +25,28 @@ def errors(result: StudyResult) -> Section:
     tests = list(result.tests)
     groups = [tests[:1], tests[1:]] if len(tests) <= 9 else [tests]
     figures = [
-        Drawing(
-            f"errors_{group[0] if len(group) == 1 else 'others'}",
-            f"ANRMSE and NAMMAE of all cells ({', '.join(map(result.label_of, group))}). {BOX}",
+        drawing(
+            "errors",
             partial(average_boxes, result, group),
+            name=f"errors_{group[0] if len(group) == 1 else 'others'}",
+            tests=", ".join(map(result.label_of, group)),
+            fewest=FEWEST,
         )
         for group in filter(None, groups)
     ]
     figures += [
-        Drawing(
-            f"errors_{test}_by_channel",
-            f"NRMSE and NAMMAE channel by channel, {result.label_of(test)}. {BOX}",
+        drawing(
+            "errors_by_channel",
             partial(channel_boxes, result, test),
+            name=f"errors_{test}_by_channel",
+            tests=result.label_of(test),
+            fewest=FEWEST,
         )
         for test in tests
     ]
     skill = [_skill_table(result)] if "statistics/skill" in result.groups else []
     tables = [overview_table(result), *skill, *(error_table(result, test) for test in tests)]
-    return Section("errors", "Errors", figures=figures, tables=tables)
+    return section("errors", figures=figures, tables=tables)
 
 
 def _skill_table(result: StudyResult) -> Table:
@@ -62,16 +61,7 @@ def _skill_table(result: StudyResult) -> Table:
             for model in (each for each in result.models if each != name):
                 cells = (_change(at.sel(model=model, measure=key)) for key in HEADING)
                 rows.append((result.label_of(test), against, model_words(model), *cells))
-    return Table(
-        "skill",
-        "Models against the baselines",
-        ("test set", "baseline", "model", *(f"{each} [%], 95 %" for each in HEADING.values())),
-        rows,
-        "Change of the median error against the baseline's: −20 % is an error smaller by a fifth; "
-        "intervals by a two-way block bootstrap over training sets and windows. "
-        "Best linear: the linear baseline of least median ANRMSE in the test set.",
-        folded=True,
-    )
+    return table("skill", rows)
 
 
 def _change(at: xr.Dataset) -> Number:
@@ -92,32 +82,30 @@ def error_table(result: StudyResult, test: str) -> Table:
             at = {"channel": name, "measure": measure, "model": model}
             yield beside(boxes["median"].sel(at), spread.sel(at))
 
-    note = (
-        f"Over {int(result.tests[test]['judged'].sum())} cells (training set × test window). "
-        "Errors in measured standard deviations of the window, k = 1. The average row is the "
-        "paper's ANRMSE and NAMMAE: the average of each cell over its channels, then the median "
-        "over the cells."
-    )
+    more = ""
     if left_out := int(boxes["left_out"].sel(model=models, measure="nrmse").sum()):
-        note += (
+        more = (
             f" {left_out} values were left out: a channel whose measured SD is below 1 % of its "
             "training SD (a slack line), or more than half of whose variance is noise, is not "
             "judged, nor is a forecast that diverged."
         )
     heads = [f"{key.upper()} {model_words(model)}: median [IQR]" for key, model in places]
-    title, folded = f"ANRMSE and NAMMAE, {result.label_of(test)}", test != next(iter(result.tests))
-    return by_channel(result, f"errors_{test}", title, heads, cells, note, folded=folded)
+    return by_channel(
+        result,
+        "errors",
+        cells,
+        heads,
+        name=f"errors_{test}",
+        test=result.label_of(test),
+        count=int(result.tests[test]["judged"].sum()),
+        more=more + conditional(result),
+        folded=test != next(iter(result.tests)),
+    )
 
 
 def scales(result: StudyResult) -> Section:
     """Return errors counted in both standard deviations."""
-    words = (
-        "A window may hold little of a channel's motion: in regular waves drift stands still, at a "
-        "mean far from that of the training, and an error that is small beside the motions of the "
-        "training is many SD of the window."
-    )
-    tables = [_scales_table(result, test) for test in result.tests]
-    return Section("scales", "Errors in SD of the training", (words,), tables=tables)
+    return section("scales", tables=[_scales_table(result, test) for test in result.tests])
 
 
 def _scales_table(result: StudyResult, test: str) -> Table:
@@ -133,15 +121,15 @@ def _scales_table(result: StudyResult, test: str) -> Table:
             both = (number(at.sel(measure=key)) for key in ("nrmse", "training_nrmse"))
             yield "{} ({})".format(*both)
 
+    heads = ("SD of the window [training SD]", *map(model_words, result.models))
     return by_channel(
         result,
-        f"scales_{test}",
-        f"Errors in SD of the window, and in SD of the training, {result.label_of(test)}",
-        ("SD of the window [training SD]", *map(model_words, result.models)),
+        "scales",
         cells,
-        "Medians over the cells of the root mean square error, in SD of the window, and in "
-        "parentheses in SD of the training set. A channel that barely moves in the window is not "
-        "judged in the first, and counts in the second.",
+        heads,
+        name=f"scales_{test}",
+        test=result.label_of(test),
+        more=conditional(result),
         folded=test != next(iter(result.tests)),
     )
 
@@ -151,9 +139,8 @@ def regular(result: StudyResult) -> Section | None:
     if "statistics/response" not in result.groups:
         return None
     tests = [str(test) for test in result.groups["statistics/response"]["test"].values]
-    words = [*filter(None, [_slack_words(result, tests)])]
-    title = "Regular waves: where the error comes from"
-    return Section("regular", title, words, tables=[_response_table(result, tests)])
+    words = [_slack_words(result, tests)]
+    return section("regular", more=words, tables=[_response_table(result, tests)])
 
 
 def _response_table(result: StudyResult, tests: list[str]) -> Table:
@@ -173,15 +160,7 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
                 row += [number(at["amplitude_ratio"], 2), signed(at["phase_lead"])]
                 row += [number(offset, 2), share]
             rows.append(tuple(row))
-    return Table(
-        "response",
-        "Forecast against measurement at the wave's frequency",
-        columns,
-        rows,
-        "Amplitude: ratio of forecast to measurement; phase: positive where the forecast is early; "
-        "offset: root mean square over the cells of the difference of means, in measured SDs; "
-        "share: the offset's part of the mean square error." + conditional(result),
-    )
+    return table("response", rows, columns=columns, more=conditional(result))
 
 
 def _slack_words(result: StudyResult, tests: list[str]) -> str:
@@ -224,16 +203,7 @@ def bands(result: StudyResult) -> Section | None:
                     _by_part(result, parts, name, title),
                     _of_all(result, parts, name, title),
                 ]
-    if not tables:
-        return None
-    words = (
-        "Thirds of the instants by the height of the waves around them, and by the age of the "
-        "forecast. The Winkler score is the width of the band and 2/(1 − level) times what "
-        "lies outside of it; the CRPS is that of the normal distribution that the band stands "
-        "for. Less is better in both: a band that is wide without need scores badly, and so does "
-        "a narrow one that misses."
-    )
-    return Section("bands", "Bands by waves, horizon and channel", (words,), tables=tables)
+    return section("bands", tables=tables) if tables else None
 
 
 def _by_part(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title: str) -> Table:
@@ -250,14 +220,7 @@ def _by_part(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title
             means = (average_of(each.sel(part=part).values) for each in scores)
             row = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
             rows.append((result.label_of(test), str(part), *row, *(number(m, 2) for m in means)))
-    return Table(
-        name,
-        f"{title}, in parts",
-        ("test set", "instants", "inside", "least covered", "width", "Winkler", "CRPS"),
-        rows,
-        "Averages over the channels; width and scores in measured SD of the test set."
-        + conditional(result),
-    )
+    return table("bands", rows, name=name, band=title, more=conditional(result))
 
 
 def _of_all(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title: str) -> Table:
@@ -274,11 +237,5 @@ def _of_all(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title:
         for channel in result.channels
         for one in [data.sel(part="all", channel=channel)]
     ]
-    return Table(
-        f"{name}_channels",
-        f"{title}, by channel",
-        ("test set", "channel", "inside", "width [SD]", "Winkler", "CRPS"),
-        rows,
-        "Scores in the unit of the channel (SI)." + conditional(result),
-        folded=True,
-    )
+    more = conditional(result)
+    return table("bands_by_channel", rows, name=f"{name}_channels", band=title, more=more)

@@ -14,7 +14,7 @@ import xarray as xr
 from seakeep.conventions import displayed, is_elevation
 from seakeep.files import replacing
 from seakeep.report.figures.histories import history_figure, shown_cells
-from seakeep.report.page import Drawing, Section
+from seakeep.report.page import Section, drawing, section
 from seakeep.report.style import judged_models, line_of, model_words, shown_unit
 from seakeep.study import StudyResult
 
@@ -26,7 +26,7 @@ MISSING = 65535
 def explorer(result: StudyResult) -> Section | None:
     """Return the interactive plot: all windows and training sets."""
     data = history_data(result)
-    return Section("explore", "Time histories, interactive", histories=data) if data else None
+    return section("explore", histories=data) if data else None
 
 
 def histories(result: StudyResult) -> Section | None:
@@ -34,16 +34,17 @@ def histories(result: StudyResult) -> Section | None:
     level = 100 * float(result.settings["statistics"]["level"])
     edges = ", and that band calibrated (dotted)" if result.is_calibrated else ""
     figures = [
-        Drawing(
-            f"history_{test}_{window:03d}",
-            f"Time histories, {result.label_of(test)}: deviations from the training mean in "
-            "training standard deviations; measured, deterministic forecast, and the ensemble's "
-            f"mean with its {level:g} % band{edges}.",
+        drawing(
+            "history",
             partial(history_figure, result, test, training, window),
+            name=f"history_{test}_{window:03d}",
+            test=result.label_of(test),
+            level=level,
+            edges=edges,
         )
         for test, training, window in shown_cells(result)
     ]
-    return Section("histories", "Time histories", figures=figures) if figures else None
+    return section("histories", figures=figures) if figures else None
 
 
 def pack(values: npt.ArrayLike) -> dict[str, Any]:

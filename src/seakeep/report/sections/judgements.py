@@ -15,7 +15,7 @@ from seakeep.report.figures.errors import (
     hyperparameter_figure,
     nowcast_figure,
 )
-from seakeep.report.page import Drawing, Section
+from seakeep.report.page import Section, drawing, section
 from seakeep.report.sections.summary import by_channel, conditional
 from seakeep.report.style import judged_models, model_words
 from seakeep.report.tables import (
@@ -26,6 +26,7 @@ from seakeep.report.tables import (
     probability,
     short,
     small_number,
+    table,
 )
 from seakeep.study import StudyResult
 from seakeep.study.judge import VARIANTS
@@ -55,15 +56,8 @@ them.
 def age(result: StudyResult) -> Section:
     """Return the error over the age of a forecast."""
     split = float(result.settings["statistics"]["split_period"])
-    figure = Drawing(
-        "error_over_time",
-        "ε(t): mean over all cells (lines) and quartiles (shaded), with the p-value of its trend "
-        f"test; the error as a whole, and parted at a period of {split:g} T̂ into slow drift and "
-        "waves. Each row has its own scale.",
-        partial(error_over_time_figure, result),
-    )
-    title = "Error over the age of a forecast"
-    return Section("time", title, figures=(figure,), tables=(_trend_table(result, split),))
+    figure = drawing("error_over_time", partial(error_over_time_figure, result), split=split)
+    return section("time", figures=(figure,), tables=(_trend_table(result, split),))
 
 
 def _trend_table(result: StudyResult, split: float) -> Table:
@@ -85,20 +79,7 @@ def _trend_table(result: StudyResult, split: float) -> Table:
                         probability(at["p_value"]),
                     )
                 )
-    return Table(
-        "trend",
-        "Trend of ε(t), whole and in bands",
-        (
-            "test set", "band", "model", "mean ε", "change over the window",
-            "slope [1/s] with 95 %", "Kendall's τ", "p",
-        ),
-        rows,
-        "Block-bootstrap Mann–Kendall test of ε(t) averaged over all cells. A p below 0.05 says "
-        "that the error changes with the age of the forecast; blocks break some of the "
-        "dependence, so slow series are called trends too often (10 to 15 %). The error is parted "
-        f"at a period of {split:g} T̂ ({seconds:.2f} s) into slow drift and waves; both are "
-        "counted in SDs of the whole measured channel." + conditional(result),
-    )  # fmt: skip
+    return table("trend", rows, split=split, seconds=seconds, more=conditional(result))
 
 
 def coverage(result: StudyResult) -> Section | None:
@@ -106,12 +87,12 @@ def coverage(result: StudyResult) -> Section | None:
     kinds = (False, True) if result.is_calibrated else (False,)
     ensembles = filter(result.is_ensemble, result.models)
     tables = [coverage_table(result, model, kind) for model in ensembles for kind in kinds]
-    return Section("coverage", "Coverage of the band", tables=tables) if tables else None
+    return section("coverage", tables=tables) if tables else None
 
 
 def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
     """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
-    prefix, words = ("calibrated_", "calibrated ") if calibrated else ("", "")
+    prefix = "calibrated_" * calibrated
     found = result.groups["statistics/coverage"].sel(model=model)
     true = "truth" in found["against"].values
     kinds, two = ("inside" + " [of the truth]" * true, "width [SD]"), partial(number, digits=2)
@@ -124,20 +105,25 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
             yield two(width.sel(against="measured"))
 
     level = float(result.settings["statistics"]["level"])
-    note = (
-        f"Fraction of the measured instants inside the band of nominally {level:g} (quantiles of "
-        "the members), and its mean width in measured SD; means over all cells."
-    )
-    if calibrated:
-        note += _calibrated_words(result, model, level)
+    more = _calibrated_words(result, model, level) if calibrated else ""
     if true:
-        note += (
+        more += (
             " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
             "slap; rates are not filtered."
         )
     heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
-    title = f"Coverage of the {words}{short(100 * level)} % band, {model_words(model)}"
-    return by_channel(result, f"coverage_{prefix}{model}", title, heads, cells, note)
+    return by_channel(
+        result,
+        "coverage",
+        cells,
+        heads,
+        name=f"coverage_{prefix}{model}",
+        kind=prefix.replace("_", " "),
+        level=short(100 * level),
+        part=level,
+        model=model_words(model),
+        more=more + conditional(result),
+    )
 
 
 def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
@@ -184,17 +170,17 @@ def densities(result: StudyResult) -> Section:
     """Return densities of measurement and forecasts, and their divergence."""
     ensembles = [model for model in result.models if result.is_ensemble(model)]
     figures = [
-        Drawing(
-            f"densities_{model}",
-            f"Densities of measurement and {model_words(model)} forecast with the 95 % bands of "
-            "their moving-block bootstrap (paper's settings); area 1 each, no common height.",
+        drawing(
+            "densities",
             partial(density_figure, result, model),
+            name=f"densities_{model}",
+            model=model_words(model),
         )
         for model in (ensembles or result.models[:1])
     ]
     order = sorted(judged_models(result), key=lambda model: model not in ensembles)
     tables = [divergence_table(result, m, variant) for m in order for variant in VARIANTS]
-    return Section("densities", "Densities and their divergence", figures=figures, tables=tables)
+    return section("densities", figures=figures, tables=tables)
 
 
 def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
@@ -215,19 +201,21 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     quantiles = ("EV", "q0.025", "q0.975", "U")
     heads = [*quantiles, "noise floor", "block (samples)"]
     published = [f"paper: {each}" for each in quantiles] if comparable else []
-    test = result.label_of(str(data.attrs["test"]))
     how = "blocks may cross joins, block length and bandwidth as printed in the paper"
     if variant == "recommended":
         how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
+    more = " The paper's columns are of another vessel in another tank." * comparable
     return by_channel(
         result,
-        f"jsd_{model}_{variant}",
-        f"Divergence of the densities, {model_words(model)}, {test}: {variant} variant",
-        [*heads, *published],
+        "jsd",
         cells,
-        f"Nats, 0 to ln 2; {how}. The noise floor is the divergence of the measurement from "
-        "itself under two independent bootstraps: what a record of this length cannot tell from "
-        "none." + " The paper's columns are of another vessel in another tank." * comparable,
+        [*heads, *published],
+        name=f"jsd_{model}_{variant}",
+        model=model_words(model),
+        test=result.label_of(str(data.attrs["test"])),
+        variant=variant,
+        how=how,
+        more=more + conditional(result),
         elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
         folded=not result.is_ensemble(model) and any(map(result.is_ensemble, result.models)),
     )
@@ -236,25 +224,17 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
 def members(result: StudyResult) -> Section | None:
     """Return errors of the members of ensembles over what was drawn, and eigenvalues."""
     figures = [
-        Drawing(
-            f"hyperparameters_{model}",
-            f"Median ANRMSE of each member of the {model_words(model)} ensemble over all cells, "
-            "against what was drawn for it, with Spearman's rank correlation.",
+        drawing(
+            "hyperparameters",
             partial(hyperparameter_figure, result, model),
+            name=f"hyperparameters_{model}",
+            model=model_words(model),
         )
         for model in filter(result.is_ensemble, result.models)
     ]
     if any(name.startswith("eigenvalues/") for name in result.groups):
-        figures.append(
-            Drawing(
-                "eigenvalues",
-                "Eigenvalues of the models of the first training set: upper half of the complex "
-                "plane, and modulus against frequency. A modulus of 1 neither grows nor decays; "
-                f"those below {LOWEST:g} are left out on the right.",
-                partial(eigenvalue_figure, result),
-            )
-        )
-    return Section("members", "Members of the ensemble", figures=figures) if figures else None
+        figures.append(drawing("eigenvalues", partial(eigenvalue_figure, result), lowest=LOWEST))
+    return section("members", figures=figures) if figures else None
 
 
 def service(result: StudyResult) -> Section | None:
@@ -265,17 +245,13 @@ def service(result: StudyResult) -> Section | None:
         return None
     first = next(iter(found.values()))
     figures = [
-        Drawing(
-            f"nowcast_{run}",
-            f"{run}: root mean square error in service against lead time, and what the model "
-            f"claims of it, over {int(first.attrs['starts'])} forecasts.",
+        drawing(
+            "nowcast",
             partial(nowcast_figure, found, str(run)),
+            name=f"nowcast_{run}",
+            run=run,
+            starts=int(first.attrs["starts"]),
         )
         for run in first["run"].values
     ]
-    words = (
-        "Models of the first training set, played sample by sample. Waves after a start are "
-        "predicted from what the probes have measured until then."
-    )
-    tables = [*nowcast_blocks(found)]
-    return Section("service", "In service", (words,), figures=figures, tables=tables)
+    return section("service", figures=figures, tables=[*nowcast_blocks(found)])

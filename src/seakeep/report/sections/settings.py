@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from seakeep.report.page import Section
+from seakeep.report.page import Section, section
 from seakeep.report.style import model_words
-from seakeep.report.tables import Table, number, percent
+from seakeep.report.tables import Table, number, percent, table
 from seakeep.study import StudyResult
 from seakeep.study.plan import windows_overlap
 
@@ -29,9 +29,9 @@ def settings(result: StudyResult) -> Section:
     """Return settings, training sets and test windows."""
     made = str(result.attrs.get("waves_note", ""))
     waves = f"Waves of the virtual tank: {made}." if made else ""
-    words = [*filter(None, (waves, training_overlap(result)[1], test_overlap(result)))]
+    words = (waves, training_overlap(result)[1], test_overlap(result))
     tables = (_model_table(result), _settings_table(result), _windows_table(result))
-    return Section("settings", "Settings and windows", words, tables=tables)
+    return section("settings", more=words, tables=tables)
 
 
 def _model_table(result: StudyResult) -> Table:
@@ -46,15 +46,7 @@ def _model_table(result: StudyResult) -> Table:
         for model, stated in result.model_settings.items()
         for key, each in stated["settings"].items()
     ]
-    return Table(
-        "models",
-        "Settings of the models, and where each comes from",
-        ("model", "setting", "value", "from"),
-        rows,
-        "Stated: in the study file. Preset: filled in by the model's preset, or the study's. "
-        "Study: the study's seed. Default: none of them says anything.",
-        folded=True,
-    )
+    return table("models", rows)
 
 
 def _settings_table(result: StudyResult) -> Table:
@@ -76,8 +68,7 @@ def _settings_table(result: StudyResult) -> Table:
         ("filter before resampling", " and ".join(filters) or "none"),
         *((key, setting_text(key, value)) for key, value in _leaves("", every)),
     ]
-    title = "Settings of the study, defaults included"
-    return Table("settings", title, ("setting", "value"), rows, folded=True)
+    return table("settings", rows)
 
 
 def _leaves(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -142,17 +133,7 @@ def _windows_table(result: StudyResult) -> Table:
         for test in result.tests
         for run, begin, end in _test_spans(result, test)
     ]
-    return Table(
-        "windows",
-        "Training sets and test windows, the same for all models",
-        ("use", "set", "instants", "left out"),
-        rows,
-        "Of a training set: from the start of its span to its stop. A draw reads the last part, "
-        f"{float(result.attrs['longest_training']):.2f} s at most, delay history included{whole}. "
-        "The delay history of a forecast is "
-        "measured data just before the start; it may reach into a training span.",
-        folded=True,
-    )
+    return table("windows", rows, reads=float(result.attrs["longest_training"]), whole=whole)
 
 
 Spans = list[tuple[str, float, float]]
@@ -267,8 +248,7 @@ def versions(result: StudyResult) -> Section:
     rows = [(key.replace("_", " "), str(result.attrs[key])) for key in keys]
     rows.append(("finished", finished(result)))
     rows += [(name, str(each)) for name, each in json.loads(result.attrs["versions"]).items()]
-    table = Table("versions", "Versions and digest", ("what", "value"), rows)
-    return Section("versions", "Versions and digest", tables=(table,))
+    return section("versions", tables=(table("versions", rows),))
 
 
 def chosen(result: StudyResult) -> Section | None:
@@ -281,14 +261,4 @@ def chosen(result: StudyResult) -> Section | None:
             if text or ahead > 0:
                 words = "; ".join(map(str.strip, str(text or "stated").splitlines()))
                 rows.append((model_words(model), str(name), number(ahead, 2), words))
-    if not rows:
-        return None
-    words = (
-        "Settings that are not stated are chosen by free runs on training runs that are held out "
-        "in turn; test windows are never looked at. Mean error with its 95 % interval and the best "
-        "λ of each choice: what an observable is worth is the error of the choice without it. The "
-        "look-ahead is how long after the instant that is forecast the last wave that is read lies."
-    )
-    heads = ("model", "training set", "look-ahead [s]", "chosen")
-    table = Table("chosen", "Choices and look-ahead", heads, rows)
-    return Section("chosen", "How settings were chosen", (words,), tables=(table,))
+    return section("chosen", tables=(table("chosen", rows),)) if rows else None

@@ -12,7 +12,7 @@ import numpy as np
 from seakeep.conventions import canonical_channel
 from seakeep.report.figures.errors import FEWEST
 from seakeep.report.figures.histories import history_figure, shown_cells
-from seakeep.report.page import Drawing, Section
+from seakeep.report.page import Section, drawing, section
 from seakeep.report.sections.settings import test_overlap, training_overlap, unequal_training
 from seakeep.report.style import HEADING, judged_models, model_words
 from seakeep.report.tables import (
@@ -24,6 +24,8 @@ from seakeep.report.tables import (
     percent,
     short,
     signed,
+    table,
+    words,
 )
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -44,18 +46,17 @@ def summary(result: StudyResult) -> Section:
     ]
     name = "heave" if "heave" in result.channels else result.channels[0]
     figures = [
-        Drawing(
+        drawing(
             "first_history",
-            f"{result.words_of(name).capitalize()} in {result.label_of(place[0])}, the first of "
-            "the windows shown below: measured and forecast.",
             partial(history_figure, result, *place, names=(name,)),
+            channel=result.words_of(name).capitalize(),
+            test=result.label_of(place[0]),
         )
         for place in shown_cells(result)[:1]
     ]
-    return Section(
+    return section(
         "summary",
-        "Results",
-        words=(_tested(result),),
+        more=(_tested(result),),
         points=findings(result),
         notices=tuple(filter(None, notices)),
         figures=figures,
@@ -88,24 +89,18 @@ def _tested(result: StudyResult) -> str:
 
 def by_channel(
     result: StudyResult,
-    name: str,
-    title: str,
-    heads: Sequence[str],
+    key: str,
     cells: Callable[[str], Iterable[str]],
-    note: str,
+    heads: Sequence[str],
     **options: Any,
 ) -> Table:
-    """Table of numbers with a row per channel, and one of averages; `cells` takes a channel.
-
-    A note, where there is one, also says what the forecasts of the study are conditional on.
-    """
+    """Table of numbers with a row per channel, and one of averages; `cells` takes a channel."""
     labels = [*map(result.words_of, result.channels), "average"]
     rows = [
         (label, *map(Number, cells(each)))
         for label, each in zip(labels, [*result.channels, "average"], strict=True)
     ]
-    note, last = note and note + conditional(result), [len(rows) - 1]
-    return Table(name, title, ("channel", *heads), rows, note, averages=last, **options)
+    return table(key, rows, columns=("channel", *heads), averages=[len(rows) - 1], **options)
 
 
 def _heat(result: StudyResult) -> Table:
@@ -115,17 +110,11 @@ def _heat(result: StudyResult) -> Table:
         for test in result.tests
         for model in judged_models(result)
     }
-    title = "Median NRMSE, channel by channel"
-    note = "The darker, the worse; average: the paper's ANRMSE."
-    return heat_table(result, "heat", title, places, note)
+    return heat_table(result, "heat", places, more=conditional(result))
 
 
 def heat_table(
-    result: StudyResult,
-    name: str,
-    title: str,
-    places: Mapping[str, tuple[StudyResult, str, str]],
-    note: str = "",
+    result: StudyResult, key: str, places: Mapping[str, tuple[StudyResult, str, str]], **words: str
 ) -> Table:
     """Median error of each channel, by heading in a test set of a study, of one model."""
 
@@ -134,7 +123,7 @@ def heat_table(
             at = {"test": test, "model": model, "measure": "nrmse", "channel": channel}
             yield number(study.groups["statistics/boxes"]["median"].sel(at), 2)
 
-    return by_channel(result, name, title, [*places], cells, note, heat=1)
+    return by_channel(result, key, cells, [*places], **words)
 
 
 def overview_table(result: StudyResult) -> Table:
@@ -150,16 +139,7 @@ def overview_table(result: StudyResult) -> Table:
             scaled = at["median"].sel(measure="training_nrmse")
             row += [number(scaled), number(at["count"].sel(measure="nrmse"), 0)]
             rows.append(tuple(row))
-    heads = [f"{words} {k}" for words in HEADING.values() for k in ("median", "IQR")]
-    return Table(
-        "overview",
-        "ANRMSE and NAMMAE",
-        ("test set", "model", *heads, "in training SD", "cells"),
-        rows,
-        "Medians and inter-quartile ranges over all cells (training set × test window) of the "
-        "average over the channels that are judged; in measured standard deviations, and ANRMSE "
-        "in those of the training set too." + conditional(result),
-    )
+    return table("overview", rows, more=conditional(result))
 
 
 def conditional(result: StudyResult) -> str:
@@ -283,7 +263,6 @@ def plain_symbol(channel: str) -> str:
 
 def glossary(result: StudyResult) -> Section:
     """Return terms and symbols with what they mean."""
-    period = float(result.attrs["encounter_period"])
     symbols = {name: (plain_symbol(name), result.words_of(name)) for name in result.channels}
     explained = "; ".join(" ".join(dict.fromkeys(each)) for each in symbols.values())
     loads = any(name.startswith("mooring_") for name in result.channels)
@@ -292,26 +271,16 @@ def glossary(result: StudyResult) -> Section:
         " It is that of the irregular sea and counts lengths in regular waves too: 5 T̂ may hold "
         "more or fewer than five regular waves."
     )
+    slap = any("truth" in data for data in result.tests.values())
+    left_out = {"λ/L": not regular, "slap": not slap}
+    values = {
+        "period": float(result.attrs["encounter_period"]),
+        "same": same * regular,
+        "symbols": explained + ". M is a mooring load, a force in N." * loads,
+    }
     terms = [
-        ("cell", "one training set × one test window: one forecast of each model"),
-        ("judged", "counted: not a cell whose run was trained on, nor a channel that hardly moves "
-         "in the window"),
-        ("T̂", f"mean encounter period, {period:.3f} s; lengths are counted in it."
-         + same * regular),
-        ("NRMSE, ANRMSE", "root mean square error over the measured SD of the window; ANRMSE: "
-         "averaged over the channels"),
-        ("NAMMAE", "mean absolute error of the smallest and the largest value in the window, over "
-         "k measured SDs, k = 1; averaged over the channels"),
-        ("SD, IQR", "standard deviation; inter-quartile range, upper quartile − lower quartile"),
-        ("HDMDc, BHDMDc", "Hankel dynamic mode decomposition with control: a linear model with "
-         "delays; its ensemble over hyperparameters, here 'Bayesian'"),
-        ("EV, U", "of a bootstrapped divergence: mean, and q0.975 − q0.025"),
-        ("ε(t)", "absolute error at an age of the forecast, averaged over the channels, in "
-         "measured SDs"),
-        ("in figures", explained + ". M is a mooring load, a force in N." * loads),
-    ]  # fmt: skip
-    if regular:
-        terms.append(("λ/L", "length of the regular waves over that of the vessel"))
-    if any("truth" in data for data in result.tests.values()):
-        terms.append(("slap", "decaying pulses in a load as its line dips into the water and out"))
-    return Section("words", "Words and symbols", terms=terms)
+        (term, meaning.format(**values))
+        for term, meaning in words()["terms"].items()
+        if not left_out.get(term)
+    ]
+    return section("words", terms=terms)
