@@ -60,8 +60,8 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
             for act in _played(results)
             for model in judged_models(results[act.name])
         }
-        key = {"name": f"channels_{test}", "test": first.label_of(test)}
-        heat.append(heat_table(first, "channels", places, **key))
+        words = {"test": first.label_of(test)}
+        heat.append(heat_table(first, "channels", places, words, name=f"channels_{test}"))
     sections = [_summary(results)]
     if {"paper", "raw"} <= set(results):
         sections.append(section("claims", tables=(claims_table(results),)))
@@ -115,4 +115,4 @@ def acts_table(results: Results) -> Table:
             f"{' and '.join(reading)}: conditional on measured surge, which the alignment reads."
         )
     columns = ("act", "model", *(f"{sea}: {part}" for sea in seas for part in ("waves", "slow")))
-    return table("acts", rows, columns=columns, conditions=conditions)
+    return table("acts", rows, more=conditions, columns=columns)

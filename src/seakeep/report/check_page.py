@@ -361,7 +361,7 @@ def _modes_table(found: xr.Dataset) -> Table:
         parts = own["participation"].to_series().sort_values(ascending=False, kind="stable")[:2]
         taking = ", ".join(f"{state} {part:.2f}" for state, part in parts.items())
         rows.append((*(number(own[key], 4) for key in keys), taking))
-    return table("modes", rows, modes=found.sizes["mode"])
+    return table("modes", rows, {"modes": found.sizes["mode"]})
 
 
 def residuals_section(found: xr.Dataset, checked: Checked) -> Section:
@@ -372,17 +372,17 @@ def residuals_section(found: xr.Dataset, checked: Checked) -> Section:
     rows = [
         _residuals_row(each.sel(state=state)) for state in found["state"].values for each in shown
     ]
-    residuals = table(
-        "residuals",
-        rows,
-        oldest=found.sizes["age"] * (lag[1] - lag[0]) / period,
-        lag=lag[-1],
-        lags=lag.size - 1,
-        instants=found.attrs["instants"],
-        period=period,
-    )
+    words = {
+        "oldest": found.sizes["age"] * (lag[1] - lag[0]) / period,
+        "lag": lag[-1],
+        "lags": lag.size - 1,
+        "instants": found.attrs["instants"],
+        "period": period,
+    }
     figure = drawing("residuals", partial(checks.residuals, found))
-    return section("residuals", found.attrs, figures=[figure], tables=[residuals])
+    return section(
+        "residuals", found.attrs, figures=[figure], tables=[table("residuals", rows, words)]
+    )
 
 
 def _residuals_row(own: xr.Dataset) -> tuple[str, ...]:
@@ -428,7 +428,7 @@ def statistics_section(found: xr.Dataset, checked: Checked) -> Section:
         drawing("exceedance", partial(checks.exceedance, found)),
         drawing("density", partial(checks.density, found)),
     ]
-    tables = [table("statistics", rows, of=found.attrs["of"], hours=hours)]
+    tables = [table("statistics", rows, {"of": found.attrs["of"], "hours": hours})]
     return section("statistics", figures=figures, tables=tables)
 
 

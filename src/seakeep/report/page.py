@@ -95,10 +95,10 @@ class Section:
 
 
 def drawing(
-    key: str, draw: Callable[[], Figure], *, name: str = "", raster: bool = False, **values: Any
+    key: str, draw: Callable[[], Figure], values: Mapping[str, Any] | None = None, name: str = ""
 ) -> Drawing:
     """Figure with the caption of ``words.toml``, and the values that it holds in braces."""
-    return Drawing(name or key, words()["figures"][key].format(**values), draw, raster)
+    return Drawing(name or key, words()["figures"][key].format(**values or {}), draw)
 
 
 def section(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -149,8 +150,8 @@ def _section(name: str, run: xr.Dataset) -> Section:
         for each in channels
     ]
     marked = [k for k, each in enumerate(channels) if each.found]
-    shown = table("channels_of_run", rows, name=f"channels_{name}", run=name, marked=marked)
-    figure = drawing("quality", lambda: quality_figure(run, {}), name=f"quality_{name}", run=name)
+    shown = table("channels_of_run", rows, {"run": name}, name=f"channels_{name}", marked=marked)
+    figure = drawing("quality", partial(quality_figure, run, {}), {"run": name}, f"quality_{name}")
     points = [*clocks, *other_findings(run)]
     return Section(name, name, (steps_of(run),), points, figures=(figure,), tables=(shown,))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import resources
@@ -99,15 +99,9 @@ def words() -> dict[str, Any]:
 def table(
     key: str,
     rows: Sequence[Sequence[str]],
-    *,
-    name: str = "",
-    columns: Sequence[str] = (),
+    values: Mapping[str, Any] | None = None,
     more: str = "",
-    folded: bool = False,
-    averages: Sequence[int] = (),
-    marked: Sequence[int] = (),
-    elsewhere: Sequence[int] = (),
-    **values: Any,
+    **options: Any,
 ) -> Table:
     """Return a table with the words of ``words.toml``.
 
@@ -117,34 +111,22 @@ def table(
         Its place there.
     rows : sequence of sequence of str
         Cells.
-    name : str, optional
-        Name of its files, if it is not the key.
-    columns : sequence of str, optional
-        Headings that are not stated there.
+    values : mapping, optional
+        What the words hold in braces.
     more : str, optional
         What follows the note.
-    folded, averages, marked, elsewhere
-        As of :class:`Table`.
-    **values
-        What the words hold in braces.
+    **options
+        Other parts of a :class:`Table`, such as ``name``, if it is not the key.
 
     Returns
     -------
     Table
     """
-    entry = {"columns": (), "note": "", "heat": 0, "folded": folded, **words()["tables"][key]}
-    return Table(
-        name or key,
-        entry["title"].format(**values),
-        tuple(columns or (head.format(**values) for head in entry["columns"])),
-        rows,
-        entry["note"].format(**values) + more,
-        elsewhere=elsewhere,
-        averages=averages,
-        marked=marked,
-        folded=entry["folded"],
-        heat=entry["heat"],
-    )
+    entry = {"name": key, "columns": (), "note": "", **words()["tables"][key], **options}
+    entry["columns"] = tuple(each.format(**values or {}) for each in entry["columns"])
+    entry["title"] = entry["title"].format(**values or {})
+    entry["note"] = entry["note"].format(**values or {}) + more
+    return Table(rows=rows, **entry)
 
 
 SHADES = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)

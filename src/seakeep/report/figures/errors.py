@@ -66,29 +66,25 @@ def draw_box_violin(
     width: float,
     colour: str,
     hatch: str = "",
+    label: str | None = None,
 ) -> float:
     """Draw one box-violin and return its upper whisker; the hatch sets models apart in grey print.
 
-    A logarithmic axis has no place for values that are not positive.
+    A logarithmic axis shows no violin, and no values that are not positive.
     """
     logarithmic = axes.get_yscale() == "log"
     x = np.asarray(values, dtype=float).ravel()
     x = x[np.isfinite(x) & (not logarithmic or x > 0)]
     if x.size == 0:
         return 0.0
-    # Before the violin, whose logarithms a logarithmic axis would be scaled to.
     sideways = place + 0.16 * width * np.resize(JITTER, x.size)
     axes.scatter(sideways, x, s=7, color=colour, alpha=0.5, linewidths=0, rasterized=True, zorder=2)
-    if x.size >= FEWEST and np.ptp(x) > 0:
-        spread = np.log10(x) if logarithmic else x
-        violin = axes.violinplot([spread], [place], widths=width, showextrema=False, points=120)
+    if x.size >= FEWEST and np.ptp(x) > 0 and not logarithmic:
+        violin = axes.violinplot([x], [place], widths=width, showextrema=False, points=120)
         for body in violin["bodies"]:
-            if logarithmic:
-                vertices = body.get_paths()[0].vertices
-                vertices[:, 1] = 10.0 ** vertices[:, 1]
             body.set(facecolor=colour, edgecolor=colour, alpha=0.18, linewidth=0.6)
     line = {"color": colour, "linewidth": 0.9}
-    box = {"facecolor": "white", "edgecolor": colour, "hatch": hatch, "alpha": 0.75}
+    box = {"facecolor": "white", "edgecolor": colour, "hatch": hatch, "alpha": 0.75, "label": label}
     drawn = axes.boxplot(
         [x], positions=[place], widths=0.26 * width, capwidths=0.16 * width, showfliers=False,
         patch_artist=True, manage_ticks=False, zorder=3, boxprops=box, whiskerprops=line,
@@ -116,7 +112,7 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
             for model in result.models
         }
         _draw_boxes(axes, result, columns, labels, heading)
-    _legend(figure, result, result.models)
+    legend_outside(figure, axes, side="upper right")
     return figure
 
 
@@ -133,7 +129,7 @@ def channel_boxes(result: StudyResult, test: str) -> Figure:
         axes.set_yscale(scale)
         columns = {model: [*each.T] for model, each in zip(models, cells, strict=True)}
         _draw_boxes(axes, result, columns, labels, measure.upper())
-    _legend(figure, result, models)
+    legend_outside(figure, axes, side="upper right")
     return figure
 
 
@@ -159,7 +155,8 @@ def _draw_boxes(
         first = width * (number - 0.5 * (len(columns) - 1))
         look = line_of(result, model)["color"], HATCHES[number % len(HATCHES)]
         for place, values in enumerate(of_model):
-            whisker = draw_box_violin(axes, values, first + place, 0.92 * width, *look)
+            label = None if place else model_words(model)
+            whisker = draw_box_violin(axes, values, first + place, 0.92 * width, *look, label)
             tallest = max(tallest, whisker)
     axes.set_xticks(range(len(labels)), labels)
     axes.set_xlim(-0.6, len(labels) - 0.4)
@@ -188,23 +185,9 @@ def _narrow(label: str) -> str:
     return "\n".join(textwrap.fill(part, NARROW) for part in label.replace(", ", ",\n").split("\n"))
 
 
-def _legend(figure: Figure, result: StudyResult, models: Sequence[str]) -> None:
-    """Legend of the boxes of models: colour and hatch."""
-    from matplotlib.patches import Patch
-
-    boxes = [
-        Patch(facecolor="white", edgecolor=line_of(result, model)["color"], hatch=hatch)
-        for model, hatch in zip(models, HATCHES * len(models), strict=False)
-    ]
-    labels = [model_words(model) for model in models]
-    figure.legend(boxes, labels, loc="outside upper right", ncols=min(len(models), 5))
-
-
 @figure_style()
 def error_over_time_figure(result: StudyResult) -> Figure:
     """ε(t) of each test set, whole and in bands: mean over all cells with its quartiles."""
-    from matplotlib.lines import Line2D
-
     tests, models = list(result.tests), judged_models(result)
     lines = {model: line_of(result, model) for model in models}
     figure = new_figure(8.5, 0.7 + 2.1 * len(tests))
@@ -219,7 +202,8 @@ def error_over_time_figure(result: StudyResult) -> Figure:
                 quartiles = (at[f"{side}_quartile"] for side in ("lower", "upper"))
                 axes.fill_between(time, *quartiles, color=line["color"], alpha=0.15, linewidth=0)
                 p = float(at["p_value"])
-                label = "trend p < 0.01" if p < 0.01 else f"trend p = {p:.2f}"
+                words_of_p = "p < 0.01" if p < 0.01 else f"p = {p:.2f}"
+                label = f"{model_words(model)}, trend {words_of_p}"
                 axes.plot(time, at["error_mean"], label=label, **line)
             axes.set_title(words, loc="left", fontsize=8)
             axes.legend(fontsize=6.5, loc="upper left")
@@ -227,9 +211,6 @@ def error_over_time_figure(result: StudyResult) -> Figure:
         row[0].set_ylabel(f"{result.label_of(test)}\nε [measured SD]")
     for axes in grid[-1]:
         axes.set_xlabel("time in encounter periods")
-    handles = [Line2D([], [], **line) for line in lines.values()]
-    labels = [model_words(model) for model in models]
-    figure.legend(handles, labels, loc="outside upper right", ncols=min(len(models), 5))
     return figure
 
 

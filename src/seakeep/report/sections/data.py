@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -21,7 +22,7 @@ def waves(result: StudyResult) -> Section | None:
     if "spectra" in result.groups:
         regular = bool(np.isfinite(result.groups["runs"]["wave_frequency"].values).any())
         words = " Vertical lines: the regular waves." * regular
-        figures.append(drawing("spectrum", partial(spectrum_figure, result), regular=words))
+        figures.append(drawing("spectrum", partial(spectrum_figure, result), {"regular": words}))
     return section("waves", figures=figures, tables=tables) if tables else None
 
 
@@ -43,7 +44,7 @@ def wave_tables(result: StudyResult) -> list[Table]:
     ]
     if rows:
         frame = str(result.groups["channels"].attrs.get("frame", ""))
-        tables.append(table("positions", rows, frame=frame))
+        tables.append(table("positions", rows, {"frame": frame}))
     return tables
 
 
@@ -72,18 +73,15 @@ def _wave_table(result: StudyResult) -> Table:
                 spans or "test",
             )
         )
-    return table("waves", rows, channel=spectra.attrs["channel"])
+    return table("waves", rows, spectra.attrs)
 
 
 def data(result: StudyResult) -> Section:
     """Return channels, and what preparation found in each run."""
     figures = [
-        drawing(
-            "quality",
-            partial(quality_figure, run, {}),
-            name=f"quality_{name}",
+        replace(
+            drawing("quality", partial(quality_figure, run, {}), {"run": name}, f"quality_{name}"),
             raster=True,
-            run=name,
         )
         for name, run in result.prepared.items()
     ]
@@ -102,7 +100,7 @@ def _sign_table(result: StudyResult) -> Table:
         use, unit, *others = (str(at[k].values) for k in ("use", "units", "positive", "source"))
         rows.append((result.words_of(name), use, shown_unit(unit), *others))
     frame = channels.attrs.get("frame", "")
-    return table("signs", rows, frame=frame and f"Frame: {frame}.")
+    return table("signs", rows, {"frame": frame and f"Frame: {frame}."})
 
 
 def _run_table(result: StudyResult) -> Table:
@@ -128,4 +126,4 @@ def _quality_table(result: StudyResult, name: str) -> Table:
         row = (each.words, use, each.unit, *others, low, high, frozen, slack, each.flagged)
         rows.append((*row, "; ".join(each.found)))
     marked = [k for k, each in enumerate(channels) if each.found]
-    return table("quality", rows, name=f"quality_{name}", run=name, marked=marked)
+    return table("quality", rows, {"run": name}, name=f"quality_{name}", marked=marked)

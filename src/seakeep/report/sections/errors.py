@@ -24,26 +24,18 @@ def errors(result: StudyResult) -> Section:
     """Return the errors of every model in every test set."""
     tests = list(result.tests)
     groups = [tests[:1], tests[1:]] if len(tests) <= 9 else [tests]
-    figures = [
-        drawing(
-            "errors",
-            partial(average_boxes, result, group),
-            name=f"errors_{group[0] if len(group) == 1 else 'others'}",
-            tests=", ".join(map(result.label_of, group)),
-            fewest=FEWEST,
+    figures = []
+    for group in filter(None, groups):
+        words = {"tests": ", ".join(map(result.label_of, group)), "fewest": FEWEST}
+        name = f"errors_{group[0] if len(group) == 1 else 'others'}"
+        figures.append(drawing("errors", partial(average_boxes, result, group), words, name))
+    for test in tests:
+        words, name = (
+            {"tests": result.label_of(test), "fewest": FEWEST},
+            f"errors_{test}_by_channel",
         )
-        for group in filter(None, groups)
-    ]
-    figures += [
-        drawing(
-            "errors_by_channel",
-            partial(channel_boxes, result, test),
-            name=f"errors_{test}_by_channel",
-            tests=result.label_of(test),
-            fewest=FEWEST,
-        )
-        for test in tests
-    ]
+        draw = partial(channel_boxes, result, test)
+        figures.append(drawing("errors_by_channel", draw, words, name))
     skill = [_skill_table(result)] if "statistics/skill" in result.groups else []
     tables = [overview_table(result), *skill, *(error_table(result, test) for test in tests)]
     return section("errors", figures=figures, tables=tables)
@@ -90,14 +82,14 @@ def error_table(result: StudyResult, test: str) -> Table:
             "judged, nor is a forecast that diverged."
         )
     heads = [f"{key.upper()} {model_words(model)}: median [IQR]" for key, model in places]
+    count = int(result.tests[test]["judged"].sum())
     return by_channel(
         result,
         "errors",
         cells,
-        heads,
+        {"test": result.label_of(test), "count": count},
+        columns=heads,
         name=f"errors_{test}",
-        test=result.label_of(test),
-        count=int(result.tests[test]["judged"].sum()),
         more=more + conditional(result),
         folded=test != next(iter(result.tests)),
     )
@@ -126,9 +118,9 @@ def _scales_table(result: StudyResult, test: str) -> Table:
         result,
         "scales",
         cells,
-        heads,
+        {"test": result.label_of(test)},
+        columns=heads,
         name=f"scales_{test}",
-        test=result.label_of(test),
         more=conditional(result),
         folded=test != next(iter(result.tests)),
     )
@@ -220,7 +212,7 @@ def _by_part(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title
             means = (average_of(each.sel(part=part).values) for each in scores)
             row = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
             rows.append((result.label_of(test), str(part), *row, *(number(m, 2) for m in means)))
-    return table("bands", rows, name=name, band=title, more=conditional(result))
+    return table("bands", rows, {"band": title}, conditional(result), name=name)
 
 
 def _of_all(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title: str) -> Table:
@@ -237,5 +229,5 @@ def _of_all(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title:
         for channel in result.channels
         for one in [data.sel(part="all", channel=channel)]
     ]
-    more = conditional(result)
-    return table("bands_by_channel", rows, name=f"{name}_channels", band=title, more=more)
+    words = {"band": title}
+    return table("bands_by_channel", rows, words, conditional(result), name=f"{name}_channels")

@@ -33,17 +33,11 @@ def histories(result: StudyResult) -> Section | None:
     """Return figures of the cells that are shown."""
     level = 100 * float(result.settings["statistics"]["level"])
     edges = ", and that band calibrated (dotted)" if result.is_calibrated else ""
-    figures = [
-        drawing(
-            "history",
-            partial(history_figure, result, test, training, window),
-            name=f"history_{test}_{window:03d}",
-            test=result.label_of(test),
-            level=level,
-            edges=edges,
-        )
-        for test, training, window in shown_cells(result)
-    ]
+    figures = []
+    for test, training, window in shown_cells(result):
+        draw = partial(history_figure, result, test, training, window)
+        words = {"test": result.label_of(test), "level": level, "edges": edges}
+        figures.append(drawing("history", draw, words, f"history_{test}_{window:03d}"))
     return section("histories", figures=figures) if figures else None
 
 

@@ -56,7 +56,7 @@ them.
 def age(result: StudyResult) -> Section:
     """Return the error over the age of a forecast."""
     split = float(result.settings["statistics"]["split_period"])
-    figure = drawing("error_over_time", partial(error_over_time_figure, result), split=split)
+    figure = drawing("error_over_time", partial(error_over_time_figure, result), {"split": split})
     return section("time", figures=(figure,), tables=(_trend_table(result, split),))
 
 
@@ -79,7 +79,7 @@ def _trend_table(result: StudyResult, split: float) -> Table:
                         probability(at["p_value"]),
                     )
                 )
-    return table("trend", rows, split=split, seconds=seconds, more=conditional(result))
+    return table("trend", rows, {"split": split, "seconds": seconds}, conditional(result))
 
 
 def coverage(result: StudyResult) -> Section | None:
@@ -112,16 +112,14 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
             "slap; rates are not filtered."
         )
     heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
+    words = {"kind": prefix.replace("_", " "), "level": short(100 * level), "part": level}
     return by_channel(
         result,
         "coverage",
         cells,
-        heads,
+        {**words, "model": model_words(model)},
+        columns=heads,
         name=f"coverage_{prefix}{model}",
-        kind=prefix.replace("_", " "),
-        level=short(100 * level),
-        part=level,
-        model=model_words(model),
         more=more + conditional(result),
     )
 
@@ -169,15 +167,10 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
 def densities(result: StudyResult) -> Section:
     """Return densities of measurement and forecasts, and their divergence."""
     ensembles = [model for model in result.models if result.is_ensemble(model)]
-    figures = [
-        drawing(
-            "densities",
-            partial(density_figure, result, model),
-            name=f"densities_{model}",
-            model=model_words(model),
-        )
-        for model in (ensembles or result.models[:1])
-    ]
+    figures = []
+    for model in ensembles or result.models[:1]:
+        draw, words = partial(density_figure, result, model), {"model": model_words(model)}
+        figures.append(drawing("densities", draw, words, f"densities_{model}"))
     order = sorted(judged_models(result), key=lambda model: model not in ensembles)
     tables = [divergence_table(result, m, variant) for m in order for variant in VARIANTS]
     return section("densities", figures=figures, tables=tables)
@@ -205,16 +198,14 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     if variant == "recommended":
         how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
     more = " The paper's columns are of another vessel in another tank." * comparable
+    test = result.label_of(str(data.attrs["test"]))
     return by_channel(
         result,
         "jsd",
         cells,
-        [*heads, *published],
+        {"model": model_words(model), "test": test, "variant": variant, "how": how},
+        columns=[*heads, *published],
         name=f"jsd_{model}_{variant}",
-        model=model_words(model),
-        test=result.label_of(str(data.attrs["test"])),
-        variant=variant,
-        how=how,
         more=more + conditional(result),
         elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
         folded=not result.is_ensemble(model) and any(map(result.is_ensemble, result.models)),
@@ -223,17 +214,14 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
 
 def members(result: StudyResult) -> Section | None:
     """Return errors of the members of ensembles over what was drawn, and eigenvalues."""
-    figures = [
-        drawing(
-            "hyperparameters",
-            partial(hyperparameter_figure, result, model),
-            name=f"hyperparameters_{model}",
-            model=model_words(model),
-        )
-        for model in filter(result.is_ensemble, result.models)
-    ]
+    figures = []
+    for model in filter(result.is_ensemble, result.models):
+        draw, words = partial(hyperparameter_figure, result, model), {"model": model_words(model)}
+        figures.append(drawing("hyperparameters", draw, words, f"hyperparameters_{model}"))
     if any(name.startswith("eigenvalues/") for name in result.groups):
-        figures.append(drawing("eigenvalues", partial(eigenvalue_figure, result), lowest=LOWEST))
+        figures.append(
+            drawing("eigenvalues", partial(eigenvalue_figure, result), {"lowest": LOWEST})
+        )
     return section("members", figures=figures) if figures else None
 
 
@@ -244,14 +232,9 @@ def service(result: StudyResult) -> Section | None:
     if not found:
         return None
     first = next(iter(found.values()))
-    figures = [
-        drawing(
-            "nowcast",
-            partial(nowcast_figure, found, str(run)),
-            name=f"nowcast_{run}",
-            run=run,
-            starts=int(first.attrs["starts"]),
-        )
-        for run in first["run"].values
-    ]
+    figures = []
+    for run in map(str, first["run"].values):
+        words = {"run": run, "starts": int(first.attrs["starts"])}
+        draw = partial(nowcast_figure, found, run)
+        figures.append(drawing("nowcast", draw, words, f"nowcast_{run}"))
     return section("service", figures=figures, tables=[*nowcast_blocks(found)])

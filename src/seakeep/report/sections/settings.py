@@ -133,7 +133,9 @@ def _windows_table(result: StudyResult) -> Table:
         for test in result.tests
         for run, begin, end in _test_spans(result, test)
     ]
-    return table("windows", rows, reads=float(result.attrs["longest_training"]), whole=whole)
+    return table(
+        "windows", rows, {"reads": float(result.attrs["longest_training"]), "whole": whole}
+    )
 
 
 Spans = list[tuple[str, float, float]]

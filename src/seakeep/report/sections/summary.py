@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -49,8 +49,7 @@ def summary(result: StudyResult) -> Section:
         drawing(
             "first_history",
             partial(history_figure, result, *place, names=(name,)),
-            channel=result.words_of(name).capitalize(),
-            test=result.label_of(place[0]),
+            {"channel": result.words_of(name).capitalize(), "test": result.label_of(place[0])},
         )
         for place in shown_cells(result)[:1]
     ]
@@ -91,16 +90,16 @@ def by_channel(
     result: StudyResult,
     key: str,
     cells: Callable[[str], Iterable[str]],
-    heads: Sequence[str],
+    values: Mapping[str, Any] | None = None,
+    *,
+    columns: Iterable[str],
     **options: Any,
 ) -> Table:
     """Table of numbers with a row per channel, and one of averages; `cells` takes a channel."""
-    labels = [*map(result.words_of, result.channels), "average"]
-    rows = [
-        (label, *map(Number, cells(each)))
-        for label, each in zip(labels, [*result.channels, "average"], strict=True)
-    ]
-    return table(key, rows, columns=("channel", *heads), averages=[len(rows) - 1], **options)
+    rows = [(result.words_of(name), *map(Number, cells(name))) for name in result.channels]
+    rows.append(("average", *map(Number, cells("average"))))
+    last = [len(rows) - 1]
+    return table(key, rows, values, columns=("channel", *columns), averages=last, **options)
 
 
 def _heat(result: StudyResult) -> Table:
@@ -114,7 +113,11 @@ def _heat(result: StudyResult) -> Table:
 
 
 def heat_table(
-    result: StudyResult, key: str, places: Mapping[str, tuple[StudyResult, str, str]], **words: str
+    result: StudyResult,
+    key: str,
+    places: Mapping[str, tuple[StudyResult, str, str]],
+    values: Mapping[str, Any] | None = None,
+    **options: Any,
 ) -> Table:
     """Median error of each channel, by heading in a test set of a study, of one model."""
 
@@ -123,7 +126,7 @@ def heat_table(
             at = {"test": test, "model": model, "measure": "nrmse", "channel": channel}
             yield number(study.groups["statistics/boxes"]["median"].sel(at), 2)
 
-    return by_channel(result, key, cells, [*places], **words)
+    return by_channel(result, key, cells, values, columns=places, **options)
 
 
 def overview_table(result: StudyResult) -> Table:
