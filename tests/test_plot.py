@@ -41,7 +41,7 @@ def test_overlay_draws_each_channel_with_units_on_its_axes(run, model):
     assert len(given.get_lines()) == 2
     with pytest.raises(RequestError, match=r"axes holds 1 Axes and the figure draws 3 panels"):
         seakeep.plot.overlay(forecast, run, axes=given)
-    with pytest.raises(RequestError, match=r"forecast has no channel 'heav'\. Channels: surge,"):
+    with pytest.raises(RequestError, match=r"forecast has no channel 'heav' .*Channels: surge,"):
         seakeep.plot.overlay(forecast, run, channels=["heav"])
 
 
@@ -56,9 +56,9 @@ def test_band_takes_members_or_their_statistics(run, model):
     for forecast in (members, ensemble.forecast_summary(run, start=10.0, steps=50)):
         figure = seakeep.plot.band(forecast, run)
         assert len(figure.axes[0].collections) == 1
-    with pytest.raises(RequestError, match=r"over \(member, time\), .*with seakeep\.plot\.band"):
+    with pytest.raises(RequestError, match=r"Channels: none\. .*with seakeep\.plot\.band"):
         seakeep.plot.overlay(members, run)
-    with pytest.raises(RequestError, match="measured has no instants in seconds in a coordinate"):
+    with pytest.raises(RequestError, match=r"measured has no channel .* in a coordinate 'time'"):
         seakeep.plot.band(members, run.drop_vars("time"))
     with pytest.raises(RequestError, match=r"it has no band\. Draw it with seakeep\.plot\.overlay"):
         seakeep.plot.band(model.forecast(run, start=10.0, steps=50), run)

@@ -29,8 +29,8 @@ from matplotlib.patches import Rectangle
 from PIL import Image
 
 import seakeep
-from seakeep.report.overlay import overlay_figure
-from seakeep.report.page import write_report
+from seakeep.report.figures.histories import overlay_figure
+from seakeep.report.sections import write_report
 from seakeep.report.style import figure_style, save_figure
 from seakeep.study import compare, fit_campaign, in_degrees, read_study, run_study
 
@@ -327,7 +327,11 @@ def sjtu():
 
 def tank():
     """Coefficients, spectrum, a run and a video frame of the virtual tank."""
-    from seakeep.report.tank_figures import hydrodynamics_figure, run_figure, spectrum_figure
+    from seakeep.report.figures.runs import (
+        hydrodynamics_figure,
+        run_figure,
+        tank_spectrum_figure,
+    )
     from seakeep.tank.play import check_settings, play_run, truth
     from seakeep.tank.realised import realise
     from seakeep.tank.settings import default_settings
@@ -338,7 +342,7 @@ def tank():
     played = {name: play_run(settings, name, rig) for name in settings.runs}
     measured = [realise(each, name) for name, each in played.items()]
     save(hydrodynamics_figure(rig, settings), HERE / "tank_hydrodynamics.png")
-    save(spectrum_figure(settings, measured), HERE / "tank_spectrum.png")
+    save(tank_spectrum_figure(settings, measured), HERE / "tank_spectrum.png")
     channels = ["eta_kn_fwd", "surge", "heave", "pitch", "piston", "mooring_bow", "mooring_stern"]
     run = truth(played["irregular_1"], "irregular_1", 0.05)
     save(run_figure(run, channels), HERE / "tank_run.png")
@@ -352,7 +356,7 @@ def chain():
     """A part of the data-quality sheet, by the example of the measurement chain's page."""
     from seakeep.campaign.pipeline import redundant_pairs
     from seakeep.quality import compared
-    from seakeep.report.quality_sheet import quality_figure
+    from seakeep.report.figures.runs import quality_figure
     from seakeep.tank.play import play
     from seakeep.tank.settings import default_settings
 

@@ -16,7 +16,8 @@ from seakeep.report.figures.checks import (
     response,
     validity,
 )
-from seakeep.report.figures.forecasts import band, errors, overlay
+from seakeep.report.figures.errors import errors
+from seakeep.report.figures.histories import band, overlay
 
 __all__ = [
     "band",

@@ -20,7 +20,7 @@ from seakeep.models.training import check_names, until
 from seakeep.toml import Length
 
 if TYPE_CHECKING:
-    from seakeep.report.figures.tuning import Figure
+    from seakeep.report.style import Figure
 
 __all__ = ["TuneResult", "tune", "tuned_campaign"]
 
@@ -95,7 +95,7 @@ class TuneResult(Selected[HankelDMDc]):
         -------
         Figure
         """
-        from seakeep.report.figures.tuning import tuning_figure
+        from seakeep.report.figures.errors import tuning_figure
 
         return tuning_figure(self.table)
 

@@ -81,9 +81,9 @@ def drawn():
 def _empty_figures(request, monkeypatch):
     if "drawn" in request.fixturenames or importlib.util.find_spec("matplotlib") is None:
         return
-    from seakeep.report import overlay
+    from seakeep.report.figures import histories
 
-    monkeypatch.setattr(overlay, "overlay_figure", lambda found: overlay.new_figure(1, 1))
+    monkeypatch.setattr(histories, "overlay_figure", lambda found: histories.new_figure(1, 1))
 
 
 def test_the_entry_point_and_the_module_are_one_program():

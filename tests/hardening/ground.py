@@ -240,7 +240,7 @@ def prepare(folder: Path) -> Path:
     """Write it into a folder with models and a study of it, and import what the commands import."""
     import seakeep.cli.console
     import seakeep.report.comparison
-    import seakeep.report.page
+    import seakeep.report.sections
     import seakeep.study
     import seakeep.tuning  # noqa: F401
     from seakeep.cli import main

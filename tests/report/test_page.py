@@ -24,21 +24,19 @@ from seakeep.report.sections.settings import training_overlap, unequal_training
 from seakeep.report.sections.summary import (
     findings,
     glossary,
-    plain_symbol,
     summary,
 )
-from seakeep.report.style import LINES
-from seakeep.report.tables import Table, latex_text, number, probability, small_number
+from seakeep.report.style import LINES, line_of, panels
+from seakeep.report.tables import Table, probability, small_number
 from seakeep.study import StudyResult, read_result, read_study, run_study
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
-from seakeep.report.figures.boxes import FEWEST, draw_box_violin
-from seakeep.report.figures.common import grid_of_axes, model_colour
-from seakeep.report.figures.errors import eigenvalue_figure
+
+from seakeep.report.figures.errors import FEWEST, draw_box_violin, eigenvalue_figure
 from seakeep.report.figures.histories import history_figure, shown_cells
-from seakeep.report.page import write_page, write_report
-from seakeep.report.section import Drawing, Section
+from seakeep.report.page import Drawing, Section, write_page
+from seakeep.report.sections import write_report
 
 ROOT = Path(__file__).parents[2]
 
@@ -82,7 +80,19 @@ def result(page):
     return read_result(page.parent)
 
 
-def test_the_page_names_nothing_outside_itself(page):
+def rows_of(page, name):
+    """Cells of a CSV file of the report, its head first."""
+    with (page.parent / "tables" / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))
+
+
+def changed(result, groups=(), **settings):
+    """The same study with other groups and settings."""
+    attrs = {**result.attrs, "settings": json.dumps({**result.settings, **settings})}
+    return replace(result, attrs=attrs, groups={**result.groups, **dict(groups)})
+
+
+def test_the_page_holds_its_parts_and_names_nothing_outside_itself(page, result):
     text = page.read_text("utf-8")
     addresses = re.findall(r"""(?:src|href)\s*=\s*["']([^"']*)["']""", text)
     assert addresses
@@ -95,59 +105,68 @@ def test_the_page_names_nothing_outside_itself(page):
         "http://www.w3.org/2000/svg",
         "http://www.w3.org/1999/xlink",
     }
-
-
-def test_no_id_stands_twice(page):
-    ids = re.findall(r'\bid="([^"]+)"', page.read_text("utf-8"))
+    ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(ids) == len(set(ids))
-
-
-def test_what_it_holds(page, result):
-    text = page.read_text("utf-8")
     wanted = ["summary", "errors", "explore", "densities", "settings", "versions", "words"]
     found = re.findall(r'<section id="(.*?)">', text)
     assert [each for each in found if each in wanted] == wanted
-    assert "a &amp; b &lt; c" in text
-    assert "noise floor" in text
-    assert "@media print" in text
-    assert result.attrs["digest"] in text
+    for part in ("a &amp; b &lt; c", "noise floor", "@media print", result.attrs["digest"]):
+        assert part in text
+    for term in ("cell", "T̂", "NAMMAE", "HDMDc, BHDMDc", "EV, U"):
+        assert f"<dt>{term}</dt>" in text
+    assert "θ pitch; z\u0307 heave rate" in text
+    (when,) = re.findall(r'finished\s<span class="whole">(.*?)</span>', text)
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", when)
+    assert "<caption>" not in text  # as narrow as its table
+    for name in re.findall(r'<div class="table" id="table-([^"]+)"', text):
+        assert f'aria-labelledby="caption-{name}"' in text
+    for name in result.prepared:
+        assert f'href="figures/quality_{name}.png"' in text
 
 
-def test_figures_and_tables_are_files_too(page):
-    figures = {path.suffix for path in (page.parent / "figures").iterdir()}
-    assert figures == {".png", ".svg"}
-    names = {path.stem for path in (page.parent / "figures").iterdir()}
-    assert {"errors_unseen", "densities_bayesian", "error_over_time", "eigenvalues"} <= names
-    tables = page.parent / "tables"
-    with (tables / "jsd_bayesian_paper.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
-    assert rows[0][-1] == "block (samples)"
-    assert all(len(row) == len(rows[0]) for row in rows)
-    with (tables / "trend.csv").open(encoding="utf-8", newline="") as file:
-        bands = [row[1] for row in csv.reader(file)][1:]
+def test_figures_and_tables_are_files_too(page, result):
+    figures = {path.stem for path in (page.parent / "figures").iterdir()}
+    assert {path.suffix for path in (page.parent / "figures").iterdir()} == {".png", ".svg"}
+    assert {"errors_unseen", "densities_bayesian", "error_over_time", "eigenvalues"} <= figures
+    assert {f"quality_{name}" for name in result.prepared} <= figures
+    head, *rows = rows_of(page, "jsd_bayesian_paper")
+    assert head[-1] == "block (samples)"
+    assert all(len(row) == len(head) for row in rows)
+    bands = [row[1] for row in rows_of(page, "trend")][1:]
     assert bands == [f"{k} frequencies" for k in ("all", "low", "wave") for _ in range(2)]
-    latex = (tables / "jsd_bayesian_paper.tex").read_text("utf-8")
-    assert r"\begin{tabular}" in latex
-    assert r"\toprule" in latex
-    for path in tables.glob("*.tex"):
+    assert [row[0] for row in rows_of(page, "runs")] == ["run", *result.prepared]
+    for name, run in result.prepared.items():
+        assert len(rows_of(page, f"quality_{name}")) == 1 + len(run.data_vars)
+    settings = {(model, key): told for model, key, *told in rows_of(page, "models")}
+    assert settings["Bayesian", "window"] == ["uniform, 10 to 20 T̂", "stated"]
+    assert settings["deterministic", "delay rows"] == ["exact", "preset"]
+    assert settings["deterministic", "window"] == ["all samples", "default"]
+    assert not any("(" in value or "None" in value for value, _ in settings.values())
+    for path in (page.parent / "tables").glob("*.tex"):
         text = path.read_text("utf-8")
+        assert r"\toprule" in text
         # What pdfLaTeX prints without further packages.
         strange = {each for each in text if ord(each) > 127} - set("äöüßÄÖÜéèêçÂÅåøØæ")
         assert not strange, path
 
 
 def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result):
-    path = page.parent / "tables" / "coverage_calibrated_bayesian.csv"
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
-    table = result.groups["statistics/coverage"].sel(
-        test="unseen", model="bayesian", against="measured"
+    average = result.groups["statistics/coverage"].sel(
+        test="unseen", model="bayesian", against="measured", channel="average"
     )
-    average = table.sel(channel="average")
     expected = [average["calibrated_inside"], average["calibrated_relative_width"]]
-    assert rows[-1] == ["average", *(f"{float(value):.2f}" for value in expected)]
+    row = rows_of(page, "coverage_calibrated_bayesian")[-1]
+    assert row == ["average", *(f"{float(value):.2f}" for value in expected)]
     windows = result.groups["calibration"]["windows"].sel(ensemble="bayesian").values
     assert f"A training set had {windows.min()}" in page.read_text("utf-8")
+    assert "not made for" not in coverage_table(result, "bayesian", calibrated=True).note
+    tests = result.settings["tests"]
+    tests["long"] = {**tests["unseen"], "length": 12.0, "label": ""}
+    table = result.groups["statistics/coverage"]
+    table = xr.concat([table, table.assign_coords(test=["long"])], "test")
+    groups = {"statistics/coverage": table, "tests/long": result.groups["tests/unseen"]}
+    note = coverage_table(changed(result, groups, tests=tests), "bayesian", calibrated=True).note
+    assert "Those are 6 T̂ long; the margin is not made for long (12 T̂)" in note
 
 
 def test_models_that_learn_from_unequal_lengths_are_told(result):
@@ -162,7 +181,7 @@ def test_models_that_learn_from_unequal_lengths_are_told(result):
     assert "Bayesian from a part (uniform, 10 to 20 T̂)" in said
     assert "(all of it: deterministic)" in settings_of(result).tables[-1].note
     # In one run both sets begin where its span begins, so that the shorter lies in the longer.
-    one = replace(result, groups={**result.groups, "training": in_one_run(training)})
+    one = changed(result, {"training": in_one_run(training)})
     shares, words = training_overlap(one)
     assert shares
     assert "as deterministic reads them, they share" in words
@@ -202,25 +221,12 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
         wider = one["mean"].values - half
         mean, spread = float(one["training_mean"]), float(one["training_std"])
         np.testing.assert_allclose(lower.get_ydata(), (wider - mean) / spread, rtol=1e-10)
+    assert figure.get_supylabel() == "deviation from the training mean, in training SD"
     (legend,) = figure.legends
     assert "calibrated" in [text.get_text() for text in legend.get_texts()]
     without = {n: g for n, g in result.groups.items() if n != "calibration"}
     plain = history_figure(replace(result, groups=without), test, training, window)
     assert "calibrated" not in [text.get_text() for text in plain.legends[0].get_texts()]
-
-
-def test_histories_state_their_unit_and_hide_no_line_behind_another(result):
-    figure = history_figure(result, *shown_cells(result)[0])
-    assert figure.get_supylabel() == "deviation from the training mean, in training SD"
-    axes = figure.axes[0]
-    lines = {line.get_label(): line for line in axes.lines}
-    measured, mean = lines["measured"], lines["Bayesian mean"]
-    (band,) = axes.collections
-    assert band.get_zorder() < measured.get_zorder() <= lines["deterministic"].get_zorder()
-    assert measured.get_linewidth() < mean.get_linewidth()
-    figure.draw_without_rendering()
-    (words,) = (text.get_window_extent() for text in figure.texts)
-    assert all(words.x1 <= each.get_tightbbox().x0 + 1 for each in figure.axes)
 
 
 def test_tables_say_what_the_campaign_calls_a_channel(result):
@@ -261,51 +267,16 @@ def test_the_legend_of_the_eigenvalues_stands_over_none_of_them(result):
     assert all(legend.get_window_extent().y0 >= axes.get_window_extent().y1 for axes in figure.axes)
 
 
-def test_the_data_quality_of_every_run_and_channel_is_a_link_away(page, result):
-    text = page.read_text("utf-8")
-    assert len(result.prepared) == 3
-    for name, run in result.prepared.items():
-        assert f'href="figures/quality_{name}.png"' in text
-        assert (page.parent / "figures" / f"quality_{name}.png").exists()
-        with (page.parent / "tables" / f"quality_{name}.csv").open(encoding="utf-8") as file:
-            rows = list(csv.reader(file))
-        assert len(rows) == 1 + len(run.data_vars)
-    with (page.parent / "tables" / "runs.csv").open(encoding="utf-8", newline="") as file:
-        assert [row[0] for row in csv.reader(file)] == ["run", *result.prepared]
-
-
-def test_each_setting_of_a_model_says_where_it_comes_from(page):
-    with (page.parent / "tables" / "models.csv").open(encoding="utf-8", newline="") as file:
-        rows = {(model, key): told for model, key, *told in csv.reader(file)}
-    assert rows["Bayesian", "window"] == ["uniform, 10 to 20 T̂", "stated"]
-    assert rows["Bayesian", "n members"] == ["4", "stated"]
-    assert rows["deterministic", "delay rows"] == ["exact", "preset"]
-    assert rows["deterministic", "window"] == ["all samples", "default"]
-    assert not any("(" in value or "None" in value for value, _ in rows.values())
-
-
 def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(result):
     columns = divergence_table(result, "bayesian", "paper").columns
     assert not any("paper" in each for each in columns)
-    settings = result.settings
-    settings["output"]["paper"] = True
-    asked = replace(result, attrs={**result.attrs, "settings": json.dumps(settings)})
+    asked = changed(result, output={**result.settings["output"], "paper": True})
     table = divergence_table(asked, "bayesian", "paper")
     assert table.columns[-4:] == ("paper: EV", "paper: q0.025", "paper: q0.975", "paper: U")
     assert [row[-4:] for row in table.rows if row[0] == "heave"] == [PUBLISHED["heave"]]
     # U is the distance of the quantiles, to the rounding of the last digit.
     for _, low, high, width in PUBLISHED.values():
         assert float(high) - float(low) == pytest.approx(float(width), abs=1.01e-4)
-
-
-def test_words_and_symbols_are_said_once(page):
-    text = page.read_text("utf-8")
-    assert text.count(">Words and symbols<") == 2  # the heading, and its place among the contents
-    for term in ("cell", "T̂", "NAMMAE", "HDMDc, BHDMDc", "EV, U"):
-        assert f"<dt>{term}</dt>" in text
-    assert "θ pitch; z\u0307 heave rate" in text
-    assert plain_symbol("pitch_acceleration") == "θ\u0308"
-    assert plain_symbol("eta_fwd") == "η_fwd"
 
 
 def test_few_cells_are_told_and_drawn_without_a_density(page, result):
@@ -322,55 +293,18 @@ def test_few_cells_are_told_and_drawn_without_a_density(page, result):
         assert len(bodies) == violins
 
 
-def test_test_windows_that_overlap_are_told(result):
-    length = float(result.tests["unseen"]["time"].values[-1])
-    start = result.tests["unseen"]["start"]
+def test_windows_that_overlap_or_do_not_fit_are_told(page, result):
+    test = result.tests["unseen"]
+    length, start = float(test["time"].values[-1]), test["start"]
     for apart, words in ((1.5 * length, ""), (0.5 * length, " 67 %")):
-        starts = start.copy(data=apart * np.arange(start.size))
-        moved = result.tests["unseen"].assign(start=starts)
-        other = replace(result, groups={**result.groups, "tests/unseen": moved})
+        moved = test.assign(start=start.copy(data=apart * np.arange(start.size)))
         # Three windows each half over the next: shares of 1/2, 1 and 1/2.
-        assert (words in overlap_of_tests(other)) if words else overlap_of_tests(other) == ""
-
-
-def test_windows_asked_for_that_do_not_fit_are_told(result):
+        told = overlap_of_tests(changed(result, {"tests/unseen": moved}))
+        assert (words in told) if words else told == ""
     assert not any("asked for" in text for text in findings(result))
-    settings = result.settings
-    settings["training"]["windows"] = 30
-    many = replace(result, attrs={**result.attrs, "settings": json.dumps(settings)})
+    many = changed(result, training={**result.settings["training"], "windows": 30})
     assert findings(many)[-1].startswith("2 training windows were used of the 30 asked for")
-
-
-def test_a_margin_for_windows_of_another_length_is_named(result):
-    assert "not made for" not in coverage_table(result, "bayesian", calibrated=True).note
-    settings = result.settings
-    settings["tests"]["long"] = {**settings["tests"]["unseen"], "length": 12.0, "label": ""}
-    table = result.groups["statistics/coverage"]
-    table = xr.concat([table, table.assign_coords(test=["long"])], "test")
-    groups = {**result.groups, "statistics/coverage": table}
-    groups["tests/long"] = groups["tests/unseen"]
-    both = replace(result, attrs={**result.attrs, "settings": json.dumps(settings)}, groups=groups)
-    note = coverage_table(both, "bayesian", calibrated=True).note
-    assert "Those are 6 T̂ long; the margin is not made for long (12 T̂)" in note
-
-
-def test_numbers_have_a_minus_and_zero_has_none():
-    assert number(-0.0004) == "0.000"
-    assert number(-0.4) == "-0.400"
-    assert latex_text("-0.12 [-0.3, 0.1] a-1") == r"$-$0.12 [$-$0.3, 0.1] a-1"
-
-
-def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(result):
-    for table in (divergence_table(result, "bayesian", "recommended"), *age(result).tables):
-        cells = [cell for row in table.rows for k, cell in enumerate(row) if k in table.numeric]
-        assert not [cell for cell in cells if re.search(r"\b0\.0000\b", cell)]
-    assert (probability(0.0004), probability(0.0386)) == ("< 0.001", "0.039")
-    assert small_number(0.0) == "0"
-
-
-def test_training_windows_that_do_not_overlap_are_no_warning(page, result):
-    text = page.read_text("utf-8")
-    notices = re.findall(r'<p class="notice">(.*?)</p>', text, flags=re.S)
+    notices = re.findall(r'<p class="notice">(.*?)</p>', page.read_text("utf-8"), flags=re.S)
     assert training_overlap(result)[0] == any("A training window" in n for n in notices)
     part = with_models(result, deterministic__window=300)  # without one it reads from the start
     length = float(result.attrs["longest_training"])
@@ -378,37 +312,28 @@ def test_training_windows_that_do_not_overlap_are_no_warning(page, result):
     for apart, overlaps in ((2.0, False), (0.5, True)):
         ends = length * (1 + apart * np.arange(one.sizes["training"]))
         moved = one.assign(end=one["end"].copy(data=ends[:, None]))
-        other = replace(part, groups={**result.groups, "training": moved})
-        shares, words = training_overlap(other)
+        shares, words = training_overlap(changed(part, {"training": moved}))
         assert shares == overlaps
         assert ("do not overlap" in words) != overlaps
 
 
-def test_the_date_stands_in_one_piece_and_titles_have_the_width_of_the_page(page):
-    text = page.read_text("utf-8")
-    (when,) = re.findall(r'finished\s<span class="whole">(.*?)</span>', text)
-    assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", when)
-    assert ".whole { white-space: nowrap; }" in text
-    assert "<caption>" not in text  # as narrow as its table
-    for name in re.findall(r'<div class="table" id="table-([^"]+)"', text):
-        assert f'aria-labelledby="caption-{name}"' in text
+def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(result):
+    for table in (divergence_table(result, "bayesian", "recommended"), *age(result).tables):
+        cells = [cell for row in table.rows for k, cell in enumerate(row) if k in table.numbers]
+        assert not [cell for cell in cells if re.search(r"\b0\.0000\b", cell)]
+    assert (probability(0.0004), probability(0.0386)) == ("< 0.001", "0.039")
+    assert small_number(0.0) == "0"
 
 
 @pytest.mark.parametrize(
     ("channels", "rows"), [(3, [3]), (5, [3, 2]), (6, [3, 3]), (11, [4, 4, 3])]
 )
 def test_panels_fill_their_rows(channels, rows):
-    from matplotlib.figure import Figure
 
-    axes = grid_of_axes(Figure(), channels, 4)
+    _, axes = panels(None, channels, 4, (2.0, 1.0))
     places = [each.get_subplotspec().rowspan.start for each in axes]
     assert [places.count(row) for row in range(len(rows))] == rows
     assert axes[0].get_subplotspec().get_gridspec().ncols == rows[0]
-
-
-def test_letters_that_latex_reads_otherwise():
-    assert latex_text("τ̂ and T̂, not τ") == r"$\hat\tau$ and $\hat T$, not $\tau$"
-    assert latex_text("50 % of a_b & λ") == r"50 \% of a\_b \& $\lambda$"
 
 
 def test_packing_loses_a_step_of_the_range_at_most():
@@ -613,7 +538,7 @@ def test_each_of_many_models_has_a_colour_of_its_own():
     names = ["single", "bayesian", "mean", "hold_last", "fir", "arx", "subspace"]
     told = {name: {"ensemble": name == "bayesian"} for name in names}
     result = StudyResult(None, {"models": json.dumps(told)}, {})
-    assert len({model_colour(result, name) for name in names}) == len(names)
+    assert len({line_of(result, name)["color"] for name in names}) == len(names)
 
 
 @pytest.fixture(scope="module")
@@ -624,8 +549,8 @@ def wide_page(tmp_path_factory):
     runs = tuple(f"3102_{number}" for number in range(16))
     errors = ("mooring_starboard", *["0.284"] * 16)
     tables = (
-        Table("runs", "Errors of runs", of_runs, (row,), "A note.", tuple(range(1, 8)), heat=(1,)),
-        Table("states", "Errors", ("state", *runs), (errors,), "", tuple(range(1, 17)), heat=(6,)),
+        Table("runs", "Errors of runs", of_runs, (row,), "A note.", tuple(range(1, 8)), heat=1),
+        Table("states", "Errors", ("state", *runs), (errors,), "", tuple(range(1, 17)), heat=1),
     )
     stamp = {"description": "", "finished": ""}
     section = Section("worth", "Worth", tables=tables)

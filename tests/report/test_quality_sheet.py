@@ -94,7 +94,8 @@ class TestShipSection:
 def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
     from seakeep.quality.agreement import LATE, Agreement
     from seakeep.quality.faults import FLAGS
-    from seakeep.report.quality_sheet import channel_rows, quality_figure
+    from seakeep.report.figures.runs import quality_figure
+    from seakeep.report.quality_sheet import channel_rows
 
     time = np.linspace(0.0, 10.0, 101)
     heave = 3.0 + np.sin(time)
@@ -130,7 +131,7 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
 
 
 def test_a_constant_channel_is_drawn_as_one():
-    from seakeep.report.quality_sheet import quality_figure
+    from seakeep.report.figures.runs import quality_figure
 
     # A constant that is not a binary fraction, after a filter: its spread is rounding.
     still = 0.1 + 1e-16 * np.arange(50)
@@ -144,7 +145,7 @@ def test_a_channel_with_findings_keeps_its_line_and_shows_its_marks():
     from matplotlib.colors import to_rgb
 
     from seakeep.quality.faults import FLAGS
-    from seakeep.report.quality_sheet import quality_figure
+    from seakeep.report.figures.runs import quality_figure
 
     time = np.linspace(0.0, 10.0, 101)
     flags = np.zeros(time.size, dtype=np.int16)

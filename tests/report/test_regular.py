@@ -44,9 +44,9 @@ def result(offset, wave=0.3, rest=0.1, slack=0.0):
 
 def test_one_table_holds_all_waves_side_by_side():
     (table,) = regular(result(0.4)).tables
-    assert table.columns[2:6] == [
+    assert table.columns[2:6] == (
         "λ/L 1.5: amplitude", "λ/L 1.5: phase [°]", "λ/L 1.5: offset [SD]", "λ/L 1.5: share"
-    ]  # fmt: skip
+    )  # fmt: skip
     # 0.16 of 0.16 + 0.09 + 0.01 of the mean square is the offset's.
     assert table.rows[0] == ("surge", "m", *("0.90", "-5", "0.40", "62 %") * 2)
 

@@ -52,7 +52,7 @@ def test_a_study_judges_its_models_in_service(study, result):
 
 def test_the_report_shows_it(result):
     pytest.importorskip("matplotlib")
-    from seakeep.report.nowcast import nowcast_blocks
+    from seakeep.report.comparison import nowcast_blocks
     from seakeep.report.sections.judgements import service
 
     section = service(result)

@@ -195,10 +195,11 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study, monk
     # The study ends in a report, whose figures are made here and not written.
     pytest.importorskip("matplotlib", reason="the report draws figures")
     from seakeep.report import page
+    from seakeep.report.sections import write_report
 
     made = []
     monkeypatch.setattr(page, "_drawn", lambda drawing, folder: made.append(drawing.draw()))
-    text = page.write_report(found).read_text("utf-8")
+    text = write_report(found).read_text("utf-8")
     assert "6 forecast(s) diverged and are left out: model " in text
     assert made
 

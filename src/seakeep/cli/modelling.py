@@ -337,7 +337,8 @@ def _nowcast(
     used: list[Path],
 ) -> None:
     """Judge models in service: tables on the terminal, a CSV file, a figure per run."""
-    from seakeep.report.nowcast import HEADER, nowcast_blocks, nowcast_figure, write_nowcasts
+    from seakeep.report.comparison import HEADER, nowcast_blocks, write_nowcasts
+    from seakeep.report.figures.errors import nowcast_figure
     from seakeep.report.style import save_figure
     from seakeep.study import nowcasts
 
@@ -405,7 +406,8 @@ def _draw(
 ) -> list[Path]:
     if not figures:
         return []
-    from seakeep.report.overlay import error_figure, overlay_figure
+    from seakeep.report.figures.errors import error_figure
+    from seakeep.report.figures.histories import overlay_figure
     from seakeep.report.style import save_figure
 
     written = []

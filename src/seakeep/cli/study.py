@@ -62,7 +62,7 @@ def study(
 
 
 def _write_study(found: StudyResult) -> Path:
-    from seakeep.report.page import write_report
+    from seakeep.report.sections import write_report
 
     with progress_bar("Report") as tell:
         return write_report(found, tell)
@@ -150,7 +150,7 @@ def _write_reproduction(
     """Write the page over all acts, and those of the acts where no worker has drawn them."""
     from seakeep.models.executor import on_this_machine
     from seakeep.report.acts import write_reproduction
-    from seakeep.report.page import write_report
+    from seakeep.report.sections import write_report
 
     for name, each in found.items() if on_this_machine(executor) is None else ():
         with progress_bar(f"Report of {each.attrs['study']}") as tell:
@@ -167,7 +167,7 @@ def _pictured(acts: Iterable[str]) -> str:
 
 
 def _write_act(_: None, item: tuple[StudyResult, bool]) -> None:
-    from seakeep.report.page import write_report
+    from seakeep.report.sections import write_report
 
     write_report(item[0], pictures=item[1])
 

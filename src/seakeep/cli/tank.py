@@ -137,14 +137,20 @@ def _print(settings: TankSettings, measured: list[Realised]) -> None:
 
 
 def _draw(settings: TankSettings, rig: Rig, measured: list[Realised], folder: Path) -> None:
+    from seakeep.report.figures.runs import (
+        hydrodynamics_figure,
+        run_figure,
+        tank_spectrum_figure,
+    )
     from seakeep.report.style import save_figure
-    from seakeep.report.tank_figures import hydrodynamics_figure, run_figure, spectrum_figure
     from seakeep.tank.play import play_run, truth
 
     make_folder(folder)
     written = [save_figure(hydrodynamics_figure(rig, settings), folder / "hydrodynamics.png")]
     if any(each.irregular for each in measured):
-        written.append(save_figure(spectrum_figure(settings, measured), folder / "spectrum.png"))
+        written.append(
+            save_figure(tank_spectrum_figure(settings, measured), folder / "spectrum.png")
+        )
     for each in measured:
         data = truth(play_run(settings, each.run, rig), each.run, 0.02)
         written.append(save_figure(run_figure(data), folder / f"run_{each.run}.png"))

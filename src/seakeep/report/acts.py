@@ -10,20 +10,18 @@ import numpy as np
 
 from seakeep.arrays import Progress
 from seakeep.report.claims import claims_table
-from seakeep.report.figures.common import judged_models, model_words
 from seakeep.report.figures.histories import acts_figure
-from seakeep.report.page import write_page
-from seakeep.report.section import Drawing, Section
-from seakeep.report.sections.data import position_table, wave_table
+from seakeep.report.page import Section, drawing, section, write_page
+from seakeep.report.sections.data import wave_tables
 from seakeep.report.sections.judgements import divergence_table
 from seakeep.report.sections.settings import finished
-from seakeep.report.tables import Table, number
+from seakeep.report.sections.summary import heat_table
+from seakeep.report.style import judged_models, model_words
+from seakeep.report.tables import Table, numbers, table
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import average_of
 from seakeep.study.reproduce import ACTS, NOTE, SLOW, Act
-
-__all__ = ["acts_table", "write_reproduction"]
 
 Results = Mapping[str, StudyResult]
 
@@ -45,8 +43,8 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
     Path
         The page.
     """
-    all_of_them = list(results.values())
-    first, last = all_of_them[0], all_of_them[-1]
+    every = list(results.values())
+    first, last = every[0], every[-1]
     stamp = {
         "description": "A study of linear models with delays that forecast a moored vessel in head "
         "seas, on data of a virtual towing tank: six runs, three procedures.",
@@ -55,25 +53,25 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
         "digest": "",
         "finished": finished(last),
     }
-    claims = []
+    heat = []
+    for test in first.tests:
+        places = {
+            f"{act.letter} {model_words(model)}": (results[act.name], test, model)
+            for act in _played(results)
+            for model in judged_models(results[act.name])
+        }
+        words = {"test": first.label_of(test)}
+        heat.append(heat_table(first, "channels", places, words, name=f"channels_{test}"))
+    sections = [_summary(results)]
     if {"paper", "raw"} <= set(results):
-        words = "What the paper says, and what this tank says"
-        claims = [Section("claims", words, tables=(claims_table(results),))]
-    heat = tuple(_heat_table(results, test) for test in first.tests)
-    waves = tuple(filter(None, (wave_table(first), position_table(first))))
-    links = tuple((f"{act.name}/report.html", act.title) for act in _played(results))
-    told = "Errors, histories, bands, data and settings of each act have a page of their own:"
-    sections = [
-        _summary(results),
-        *claims,
-        Section("channels", "Channel by channel", tables=heat),
-        Section(
-            "densities",
-            "Divergence of the densities, beside the paper's",
-            tables=(divergence_table(first, "bayesian", "paper"),),
-        ),
-        Section("waves", "Waves and probes", tables=waves),
-        Section("studies", "The studies", words=(told,), links=links),
+        sections.append(section("claims", tables=(claims_table(results),)))
+    divergence, beside = divergence_table(first, "bayesian", "paper"), ", beside the paper's"
+    links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
+    sections += [
+        section("channels", tables=heat),
+        Section("densities", f"Divergence of the densities{beside}", tables=(divergence,)),
+        section("waves", tables=wave_tables(first)),
+        section("studies", links=links),
     ]
     return write_page(folder, "The paper's study on the virtual tank", stamp, sections, progress)
 
@@ -83,103 +81,38 @@ def _played(results: Results) -> list[Act]:
 
 
 def _summary(results: Results) -> Section:
-    return Section(
-        "summary",
-        "Results",
-        words=(NOTE,),
-        points=tuple(f"{act.title}. {act.sentence}" for act in _played(results)),
-        figures=(
-            Drawing(
-                "acts",
-                "Heave and surge in one window of irregular waves, measured and forecast in each "
-                "act, with the ensemble's 95 % band.",
-                partial(acts_figure, results),
-            ),
-        ),
-        tables=(acts_table(results),),
-        notices=tuple(_warnings(results)),
-    )
-
-
-def _warnings(results: Results) -> list[str]:
-    """What a study of the acts warns of: once where several do."""
     repeats = [result.groups.get("repeats") for result in results.values()]
-    return list(dict.fromkeys(words_of_repeats(each) for each in repeats if each is not None))
+    return section(
+        "summary",
+        more=(NOTE,),
+        points=[f"{act.title}. {act.sentence}" for act in _played(results)],
+        figures=(drawing("acts", partial(acts_figure, results)),),
+        tables=(acts_table(results),),
+        # Once what several studies warn of.
+        notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each is not None)),
+    )
 
 
 def acts_table(results: Results) -> Table:
     """Median errors of every model of every act, per sea, of wave-frequency and slow channels."""
-    rows = []
-    tests = next(iter(results.values())).tests
+    rows, first = [], next(iter(results.values()))
     for act in _played(results):
         result = results[act.name]
         for model in result.models:
-            row = [act.letter, model_words(model)]
-            for test in tests:
-                row += [number(value, 2) for value in _split(result, test, model)]
+            row: list[str] = [act.letter, model_words(model)]
+            for data in result.tests.values():
+                cells = (
+                    data["error"].sel(model=model, measure="nrmse").values[data["judged"].values]
+                )
+                slow = np.isin(data["channel"].values.astype(str), SLOW)
+                row += numbers([np.nanmedian(average_of(cells[:, k])) for k in (~slow, slow)], 2)
             rows.append(tuple(row))
-    columns = ["act", "model"]
-    for test in tests:
-        label = next(iter(results.values())).label_of(test).removeprefix("regular, ")
-        columns += [f"{label}: waves", f"{label}: slow"]
-    numeric = range(2, len(columns))
-    return Table(
-        "acts",
-        "Median NRMSE of three acts and their baselines",
-        columns,
-        rows,
-        "Average over channels, median over training sets and windows, in measured SDs: 1 is no "
-        "better than the mean of the window. Slow: surge and both mooring loads; waves: the eight "
-        "others. Mean, hold last: the training mean, and the last measured state; FIR: "
-        "a linear filter of the waves without states, which reads them 2 T̂ ahead, "
-        "further than the recommended model (0.75 T̂) and the paper's (none). "
-        + _conditions(results),
-        numeric,
-        heat=numeric,
-    )
-
-
-def _conditions(results: Results) -> str:
-    """Which acts read a measured output after the start."""
-    reading = [act for act in _played(results) if results[act.name].attrs["conditional_on"]]
-    read = [act.letter for act in reading]
-    if not read:
-        return ""
-    return f"{' and '.join(read)}: conditional on measured surge, which the alignment reads."
-
-
-def _split(result: StudyResult, test: str, model: str) -> list[float]:
-    """Median error of the wave-frequency and of the slow channels."""
-    data = result.tests[test]
-    cells = data["error"].sel(model=model, measure="nrmse").values[data["judged"].values]
-    slow = np.isin(data["channel"].values.astype(str), SLOW)
-    return [float(np.nanmedian(average_of(cells[:, part]))) for part in (~slow, slow)]
-
-
-def _heat_table(results: Results, test: str) -> Table:
-    """Median error of each channel in a test set, act beside act."""
-    places = [
-        (act, results[act.name], model)
-        for act in _played(results)
-        for model in judged_models(results[act.name])
-    ]
-    rows = []
-    first = next(iter(results.values()))
-    for name in [*first.channels, "average"]:
-        cells = []
-        for _, result, model in places:
-            at = result.groups["statistics/boxes"]["median"].sel(test=test)
-            cells.append(number(at.sel(model=model, measure="nrmse", channel=name), 2))
-        rows.append((name.replace("_", " "), *cells))
-    heads = [f"{act.title.partition(' ')[0]} {model_words(model)}" for act, _, model in places]
-    numeric = range(1, len(heads) + 1)
-    return Table(
-        f"channels_{test}",
-        f"Median NRMSE, {first.label_of(test)}",
-        ("channel", *heads),
-        rows,
-        "",
-        numeric,
-        averages=[len(rows) - 1],
-        heat=numeric,
-    )
+    seas = [first.label_of(test).removeprefix("regular, ") for test in first.tests]
+    reading = [a.letter for a in _played(results) if results[a.name].attrs["conditional_on"]]
+    conditions = ""
+    if reading:
+        conditions = (
+            f"{' and '.join(reading)}: conditional on measured surge, which the alignment reads."
+        )
+    columns = ("act", "model", *(f"{sea}: {part}" for sea in seas for part in ("waves", "slow")))
+    return table("acts", rows, more=conditions, columns=columns)

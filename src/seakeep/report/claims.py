@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.core.bands import split_bands
-from seakeep.report.tables import Table, probability, signed
+from seakeep.report.tables import Form, Table, number, probability, signed, table, words
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.judge import (
@@ -24,13 +25,13 @@ from seakeep.study.judge import (
 from seakeep.study.plan import random_stream
 from seakeep.study.reproduce import SLOW
 
-__all__ = ["CLAIMS", "Verdict", "claims_table"]
-
 Results = Mapping[str, StudyResult]
 Statistic = Callable[..., FloatArray]
+Judged = tuple[str, bool | None]
+"""Our number, and whether the claim holds: None where the study cannot tell."""
 
 LOADS = ("mooring_bow", "mooring_stern")
-REGULAR = ("regular_1_5", "regular_2", "regular_3")
+SEA, REGULAR = ("irregular",), ("regular_1_5", "regular_2", "regular_3")
 USEFUL = 0.5
 """Median NRMSE below which a forecast counts as accurate: three quarters of the variance."""
 SINGLE, ENSEMBLE = "deterministic", "bayesian"
@@ -46,9 +47,7 @@ class Interval(NamedTuple):
 
     def below(self, bound: float) -> bool | None:
         """Whether it lies below a bound; None where the interval holds the bound."""
-        if self.upper < bound:
-            return True
-        return False if self.lower > bound else None
+        return self.below_other(Interval(bound, bound, bound))
 
     def below_other(self, other: Interval) -> bool | None:
         """Whether it lies below another number; None where the intervals meet."""
@@ -56,72 +55,35 @@ class Interval(NamedTuple):
             return True
         return False if self.lower > other.upper else None
 
-    def percent(self) -> str:
+    def text(self, digits: int = 2, unit: str = "", factor: float = 1.0) -> str:
+        """Text of the number times a factor, with its interval in brackets."""
+        return self._text(partial(number, digits=digits), unit, [factor * x for x in self])
+
+    def change(self) -> str:
         """Text of a ratio as a relative change."""
-        return self._text(lambda value: f"{signed(100 * (value - 1), 0)} %")
+        return self._text(signed, " %", [100 * (x - 1) for x in self])
 
     def part(self) -> str:
         """Text of a share."""
-        return self._text(lambda value: f"{100 * value:.0f} %")
+        return self.text(0, " %", 100.0)
 
-    def degrees(self) -> str:
-        """Text of an angle."""
-        return self._text(lambda value: f"{value:.0f}°")
-
-    def text(self) -> str:
-        """Text of an error."""
-        return self._text(lambda value: f"{value:.2f}")
-
-    def _text(self, form: Callable[[float], str]) -> str:
-        if np.isnan(self.lower):
-            return form(self.value)
-        low, high = (form(each).rstrip(" %°") for each in (self.lower, self.upper))
-        return f"{form(self.value)} [{low}, {high}]"
-
-
-class Verdict(NamedTuple):
-    """What a study shows of a claim.
-
-    Attributes
-    ----------
-    figure : str
-        Our number.
-    holds : bool or None
-        None where the study cannot tell.
-    why : str
-        How it was judged, or what of the difference comes from the virtual tank.
-    """
-
-    figure: str
-    holds: bool | None
-    why: str = ""
+    def _text(self, form: Form, unit: str, values: Sequence[float]) -> str:
+        value, low, high = map(form, values)
+        return f"{value}{unit}" + f" [{low}, {high}]" * bool(np.isfinite(self.lower))
 
 
 def claims_table(results: Results) -> Table:
     """Each claim, our figure, and whether it holds, in the first act."""
-    words = {True: "holds", False: "does not", None: "cannot tell"}
+    verdicts = {True: "holds", False: "does not", None: "cannot tell"}
     rows = []
-    for claim, judge in CLAIMS:
-        found = judge(results)
-        rows.append((claim, found.figure, words[found.holds], found.why))
-    return Table(
-        "claims",
-        "Claims of the paper's results and conclusions",
-        (
-            "the paper says",
-            "here: act (a) unless said",
-            "verdict",
-            "how judged, what is the tank's",
-        ),
-        tuple(rows),
-        "In brackets 95 % intervals by a two-way block bootstrap over training sets and windows; a "
-        "claim whose bound lies inside its interval is one that the study cannot tell. The "
-        "Bayesian model where no other is named. The paper's vessel and tank are others: what does "
-        "not hold here is not refuted there.",
-    )
+    for key, judge in CLAIMS.items():
+        claim, how = words()["claims"][key]
+        figure, holds = judge(results)
+        rows.append((claim, figure, verdicts[holds], how.format(useful=USEFUL)))
+    return table("claims", rows)
 
 
-def all_of(verdicts: list[bool | None]) -> bool | None:
+def all_of(verdicts: Iterable[bool | None]) -> bool | None:
     """Whether all hold: not if one does not, unknown if one is.
 
     Examples
@@ -129,12 +91,18 @@ def all_of(verdicts: list[bool | None]) -> bool | None:
     >>> all_of([True, True]), all_of([True, None]), all_of([None, False])
     (True, None, False)
     """
-    if False in verdicts:
-        return False
-    return None if None in verdicts else True
+    known = list(verdicts)
+    return False if False in known else None if None in known else True
 
 
-def _cells(result: StudyResult, tests: tuple[str, ...], model: str, measure: str) -> FloatArray:
+def opposite(verdict: bool | None) -> bool | None:
+    """The verdict on the contrary."""
+    return None if verdict is None else not verdict
+
+
+def _cells(
+    result: StudyResult, tests: Sequence[str], measure: str = "nrmse", model: str = ENSEMBLE
+) -> FloatArray:
     """Errors over (training, window, channel), NaN where not judged; windows of all test sets."""
     order, _ = training_order(result.groups["training"])
     parts = [
@@ -145,7 +113,7 @@ def _cells(result: StudyResult, tests: tuple[str, ...], model: str, measure: str
 
 
 def _interval(
-    result: StudyResult, tests: tuple[str, ...], statistic: Statistic, *cells: FloatArray
+    result: StudyResult, tests: Sequence[str], statistic: Statistic, *cells: FloatArray
 ) -> Interval:
     """A statistic of cells (training, window, …) with its interval."""
     blocks = blocks_of([result.tests[test] for test in tests], result.groups["training"])
@@ -155,79 +123,70 @@ def _interval(
     return Interval(float(value), float(lower), float(upper))
 
 
+def _flat(drawn: FloatArray) -> FloatArray:
+    """All cells of each series."""
+    return drawn.reshape(len(drawn), -1)
+
+
 def _median(drawn: FloatArray) -> FloatArray:
     """Median over cells (series, training, window, channel) of the average over channels."""
-    return median_of(average_of(drawn).reshape(len(drawn), -1))
-
-
-def _ratio(drawn: FloatArray, other: FloatArray) -> FloatArray:
-    return _median(drawn) / _median(other)
+    return median_of(_flat(average_of(drawn)))
 
 
 def _spread(drawn: FloatArray) -> FloatArray:
     """Inter-quartile range over cells of the average over channels."""
-    averages = average_of(drawn).reshape(len(drawn), -1)
-    quartiles = np.nanquantile(averages, [0.25, 0.75], axis=1)
-    out: FloatArray = quartiles[1] - quartiles[0]
+    low, high = np.nanquantile(_flat(average_of(drawn)), [0.25, 0.75], axis=1)
+    out: FloatArray = high - low
     return out
 
 
-def _columns(result: StudyResult, channels: tuple[str, ...]) -> list[int]:
+def _columns(result: StudyResult, channels: Sequence[str]) -> list[int]:
     return [result.channels.index(name) for name in channels]
 
 
-def _motions(result: StudyResult) -> tuple[str, ...]:
-    return tuple(name for name in result.channels if name not in LOADS)
+def _motions(result: StudyResult) -> list[str]:
+    return [name for name in result.channels if name not in LOADS]
 
 
 def _error(
     result: StudyResult,
-    tests: tuple[str, ...],
-    channels: tuple[str, ...] = (),
+    tests: Sequence[str],
+    channels: Sequence[str] = (),
     measure: str = "nrmse",
     model: str = ENSEMBLE,
 ) -> Interval:
     """Median error of the average over some channels, or over all."""
-    cells = _cells(result, tests, model, measure)
-    picked = _columns(result, channels) if channels else slice(None)
-    return _interval(result, tests, _median, cells[..., picked])
+    picked = _columns(result, channels or result.channels)
+    return _interval(result, tests, _median, _cells(result, tests, measure, model)[..., picked])
 
 
-def _robust(results: Results) -> Verdict:
+def _robust(results: Results) -> Judged:
     result = results["paper"]
-    own, fir = (_error(result, ("irregular",), model=m) for m in (ENSEMBLE, "fir"))
-    worst = float(np.nanmax(average_of(_cells(result, ("irregular",), ENSEMBLE, "nrmse"))))
-    return Verdict(
-        f"median ANRMSE {own.text()}, worst cell {worst:.2f}; FIR {fir.text()}",
-        all_of([own.below(USEFUL), worst < 1.0]),
-        f"Median below {USEFUL:g}, no cell above 1. FIR is a linear filter of the waves.",
+    own, fir = (_error(result, SEA, model=model) for model in (ENSEMBLE, "fir"))
+    worst = float(np.nanmax(average_of(_cells(result, SEA))))
+    words = f"median ANRMSE {own.text()}, worst cell {worst:.2f}; FIR {fir.text()}"
+    return words, all_of([own.below(USEFUL), worst < 1.0])
+
+
+def _trend(results: Results) -> Judged:
+    values, kept = (
+        results[act]
+        .groups["statistics/trend"]["p_value"]
+        .sel(test="irregular", band="all", model=[SINGLE, ENSEMBLE])
+        .values
+        for act in ("paper", "raw")
     )
+    both = (" and ".join(map(probability, each)) for each in (values, kept))
+    return "p = {}; act (b): {}".format(*both), False if values.min() < 0.05 else None
 
 
-def _trend(results: Results) -> Verdict:
-    at = results["paper"].groups["statistics/trend"]["p_value"].sel(test="irregular", band="all")
-    values = [float(at.sel(model=model)) for model in (SINGLE, ENSEMBLE)]
-    raw = results["raw"].groups["statistics/trend"]["p_value"].sel(test="irregular", band="all")
-    kept = [probability(float(raw.sel(model=model))) for model in (SINGLE, ENSEMBLE)]
-    return Verdict(
-        f"p = {' and '.join(map(probability, values))}; act (b): {' and '.join(kept)}",
-        False if min(values) < 0.05 else None,
-        "Mann–Kendall test of ε(t), both models; p below 0.05 is a trend, and above it proves "
-        "none.",
-    )
-
-
-def _any_length(results: Results) -> Verdict:
+def _any_length(results: Results) -> Judged:
     period = float(results["paper"].attrs["encounter_period"])
     length = float(results["paper"].tests["irregular"]["time"].values[-1])
-    return Verdict(
-        f"{length / period:.0f} T̂ were forecast, as in the paper",
-        None,
-        "No longer windows are judged; this tank's drift (18 T̂) is slower than a window.",
-    )
+    return f"{length / period:.0f} T̂ were forecast, as in the paper", None
 
 
-def _share(result: StudyResult, measure: str, channels: tuple[str, ...]) -> Interval:
+def _share(result: StudyResult, measure: str, channels: Sequence[str]) -> Interval:
     """Fraction of the average error that some channels make."""
     picked = _columns(result, channels)
 
@@ -236,275 +195,193 @@ def _share(result: StudyResult, measure: str, channels: tuple[str, ...]) -> Inte
         out: FloatArray = means[:, picked].sum(axis=1) / np.nansum(means, axis=1)
         return out
 
-    cells = _cells(result, ("irregular",), ENSEMBLE, measure)
-    return _interval(result, ("irregular",), statistic, cells)
+    return _interval(result, SEA, statistic, _cells(result, SEA, measure))
 
 
-def _who_errs(results: Results) -> Verdict:
+def _who_errs(results: Results) -> Judged:
     shares = {words: _share(results["paper"], key, LOADS) for key, words in MEASURES.items()}
     raw = _share(results["raw"], "nrmse", SLOW)
-    below = [each.below(0.5) for each in shares.values()]
-    return Verdict(
-        f"loads make {', '.join(f'{each.part()} of {words}' for words, each in shares.items())}; "
-        f"act (b): surge and loads {raw.part()} of ANRMSE",
-        all_of([None if each is None else not each for each in below]),
-        "More than half, by 2 of 11 channels.",
-    )
+    listed = ", ".join(f"{each.part()} of {words}" for words, each in shares.items())
+    holds = all_of(opposite(each.below(0.5)) for each in shares.values())
+    return f"loads make {listed}; act (b): surge and loads {raw.part()} of ANRMSE", holds
 
 
-def _load_divergence(results: Results) -> Verdict:
+def _load_divergence(results: Results) -> Judged:
     at = results["paper"].groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
     loads, others = (
         at.sel(channel=list(names)).mean("channel") for names in (LOADS, _motions(results["paper"]))
     )
-    low, value, high = (
-        float(loads[a] / others[b])
-        for a, b in (("lower", "upper"), ("mean", "mean"), ("upper", "lower"))
+    pairs = (("mean", "mean"), ("lower", "upper"), ("upper", "lower"))
+    ratio = Interval(*(float(loads[a] / others[b]) for a, b in pairs))
+    words = (
+        f"{float(loads['mean']):.4f} against {float(others['mean']):.4f}: a factor of "
+        f"{ratio.value:.0f} [{ratio.lower:.1f}, {ratio.upper:.0f}]"
     )
-    below = Interval(value, low, high).below(10**0.5)
-    return Verdict(
-        f"{float(loads['mean']):.4f} against {float(others['mean']):.4f}: a factor of {value:.0f} "
-        f"[{low:.1f}, {high:.0f}]",
-        None if below is None else not below,
-        "Mean JSD of the loads and of the nine others; a factor above √10. The interval joins the "
-        "bounds of both, which is wide.",
-    )
+    return words, opposite(ratio.below(10**0.5))
 
 
-def _densities(results: Results) -> Verdict:
+def _densities(results: Results) -> Judged:
     result = results["paper"]
     at = result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
-    at = at.sel(channel=list(_motions(result)))
-    within = int((at["mean"] <= at["noise_floor_upper"]).sum())
-    return Verdict(
-        f"{within} of {at.sizes['channel']} motions within the noise of the record",
-        within == at.sizes["channel"],
-        "JSD below the upper bound of the measurement's divergence from itself.",
-    )
+    at = at.sel(channel=_motions(result))
+    within, count = int((at["mean"] <= at["noise_floor_upper"]).sum()), at.sizes["channel"]
+    return f"{within} of {count} motions within the noise of the record", within == count
 
 
 def _against_single(
-    result: StudyResult, tests: tuple[str, ...], statistic: Statistic
+    result: StudyResult, tests: Sequence[str], statistic: Statistic = _median
 ) -> dict[str, Interval]:
-    """A statistic of the ensemble beside the single model, in both measures."""
-    return {
-        words: _interval(
-            result, tests, statistic, *(_cells(result, tests, m, key) for m in (ENSEMBLE, SINGLE))
-        )
-        for key, words in MEASURES.items()
-    }
+    """A statistic of the ensemble over that of the single model, in both measures."""
 
-
-def _better(results: Results) -> Verdict:
-    found = _against_single(results["paper"], ("irregular",), _ratio)
-    return Verdict(
-        ", ".join(f"{words} {each.percent()}" for words, each in found.items()),
-        all_of([each.below(1.0) for each in found.values()]),
-        "Change of the median from the deterministic to the Bayesian model.",
-    )
-
-
-def _dispersion(results: Results) -> Verdict:
-    def statistic(drawn: FloatArray, other: FloatArray) -> FloatArray:
+    def ratio(drawn: FloatArray, other: FloatArray) -> FloatArray:
         with np.errstate(invalid="ignore", divide="ignore"):  # a redraw may hold one cell alone
-            return _spread(drawn) / _spread(other)
+            return statistic(drawn) / statistic(other)
 
-    found = _against_single(results["paper"], ("irregular",), statistic)
-    return Verdict(
-        ", ".join(f"{words} {each.percent()}" for words, each in found.items()),
-        all_of([each.below(1.0) for each in found.values()]),
-        "Change of the inter-quartile range.",
-    )
+    both = {key: [_cells(result, tests, key, m) for m in (ENSEMBLE, SINGLE)] for key in MEASURES}
+    return {MEASURES[key]: _interval(result, tests, ratio, *each) for key, each in both.items()}
 
 
-def _always_better(results: Results) -> Verdict:
+def _better(results: Results, statistic: Statistic) -> Judged:
+    found = _against_single(results["paper"], SEA, statistic)
+    words = ", ".join(f"{words} {each.change()}" for words, each in found.items())
+    return words, all_of(each.below(1.0) for each in found.values())
+
+
+def _always_better(results: Results) -> Judged:
     result = results["paper"]
-    verdicts = [
+    found = [
         each.below(1.0)
         for test in result.tests
-        for each in _against_single(result, (test,), _ratio).values()
+        for each in _against_single(result, (test,)).values()
     ]
-    better, worse = verdicts.count(True), verdicts.count(False)
-    return Verdict(
-        f"better in {better}, worse in {worse}, undecided in {verdicts.count(None)} of "
-        f"{len(verdicts)}",
-        all_of(verdicts),
-        "Four seas, two measures.",
+    better, worse, unknown = (found.count(each) for each in (True, False, None))
+    return f"better in {better}, worse in {worse}, undecided in {unknown} of {len(found)}", all_of(
+        found
     )
 
 
-def _mean(drawn: FloatArray) -> FloatArray:
-    """Mean over cells (series, training, window, channel)."""
-    return average_of(drawn.reshape(len(drawn), -1))
-
-
-def _band(result: StudyResult, channels: tuple[str, ...]) -> tuple[Interval, Interval]:
+def _band(result: StudyResult, channels: Sequence[str]) -> list[Interval]:
     """Part of the instants inside the band of irregular waves, and its width in window SDs."""
     test, picked = result.tests["irregular"], _columns(result, channels)
     order, _ = training_order(result.groups["training"])
     lower, upper = (bound[order][..., picked] for bound in band_of(test, ENSEMBLE, None))
     measured = test["measured"].values[..., picked]
-    judged = test["judged"].values[order][..., None]
     inside = ((measured >= lower) & (measured <= upper)).mean(axis=2)
     width = (upper - lower).mean(axis=2) / measured.std(axis=1, ddof=1)
-    cells = (np.where(judged, each, np.nan) for each in (inside, width))
-    found = [_interval(result, ("irregular",), _mean, each) for each in cells]
-    return found[0], found[1]
+    cells = (np.where(test["judged"].values[order][..., None], x, np.nan) for x in (inside, width))
+    return [_interval(result, SEA, lambda drawn: average_of(_flat(drawn)), each) for each in cells]
 
 
-def _narrow(results: Results) -> Verdict:
-    result = results["paper"]
-    inside, width = _band(result, _motions(result))
-    error = _error(result, ("irregular",), _motions(result))
-    return Verdict(
-        f"motions: {width.text()} SD wide, {inside.part()} of the instants inside 95 %",
-        width.below(USEFUL),
-        f"Width below {USEFUL:g} SD. The median error is {error.value:.2f} SD: the spread of the "
-        "hyperparameters is not the error.",
-    )
+def _narrow(results: Results) -> Judged:
+    inside, width = _band(results["paper"], _motions(results["paper"]))
+    error = _error(results["paper"], SEA, _motions(results["paper"])).value
+    words = f"motions: {width.text()} SD wide, {inside.part()} of the instants inside 95 %"
+    return f"{words}; median error {error:.2f} SD", width.below(USEFUL)
 
 
-def _load_band(results: Results) -> Verdict:
+def _load_band(results: Results) -> Judged:
     inside, _ = _band(results["paper"], LOADS)
-    return Verdict(
-        f"{inside.part()} of the instants of the loads inside 95 %",
-        inside.below(0.9),
-        "Fewer than 90 %.",
-    )
+    return f"{inside.part()} of the instants of the loads inside 95 %", inside.below(0.9)
 
 
-def _slow_loads(results: Results) -> Verdict:
+def _slow_loads(results: Results) -> Judged:
     result = results["raw"]
-    test = result.tests["irregular"]
+    test, picked = result.tests["irregular"], _columns(result, LOADS)
     split = float(result.settings["statistics"]["split_period"])
     frequency = 1 / (split * float(result.attrs["encounter_period"]))
     order, _ = training_order(result.groups["training"])
-    picked = _columns(result, LOADS)
     measured, forecast = (
         split_bands(values[..., picked], float(result.attrs["dt"]), frequency)[0]
         for values in (test["measured"].values, test["mean"].sel(model=ENSEMBLE).values[order])
     )
     errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
-    found = [
-        _interval(result, ("irregular",), _median, errors[..., [column]])
-        for column in range(len(LOADS))
-    ]
-    told = zip(LOADS, found, strict=True)
-    return Verdict(
-        "act (b): " + ", ".join(f"{n.removeprefix('mooring_')} {f.text()}" for n, f in told),
-        all_of([each.below(1.0) for each in found]),
-        "NRMSE of what is slower than the waves; below 1 it beats the mean. Act (a) has none left. "
-        "Drift goes with the square of the waves, which no linear map makes.",
-    )
+    found = {
+        name.removeprefix("mooring_"): _interval(result, SEA, _median, errors[..., [k]])
+        for k, name in enumerate(LOADS)
+    }
+    words = ", ".join(f"{name} {each.text()}" for name, each in found.items())
+    return f"act (b): {words}", all_of(each.below(1.0) for each in found.values())
 
 
-def _peaks(results: Results) -> Verdict:
-    loads = _error(results["paper"], ("irregular",), LOADS, "nammae")
-    return Verdict(
-        f"median NAMMAE of the loads {loads.text()} SD",
-        loads.below(1.0),
-        "Less than one SD. Slap and slack lines of the tank make peaks that no linear model has.",
-    )
+def _peaks(results: Results) -> Judged:
+    loads = _error(results["paper"], SEA, LOADS, "nammae")
+    return f"median NAMMAE of the loads {loads.text()} SD", loads.below(1.0)
 
 
-def _regular(results: Results) -> Verdict:
+def _regular(results: Results) -> Judged:
     result = results["paper"]
-    motions = [_error(result, (test,), _motions(result)) for test in REGULAR]
-    loads = [_error(result, (test,), LOADS) for test in REGULAR]
-    worse = [a.below_other(b) for a, b in zip(motions, loads, strict=True)]
-    return Verdict(
-        f"λ/L 1.5, 2, 3: motions {', '.join(f.text() for f in motions)}; loads "
-        f"{', '.join(f.text() for f in loads)}",
-        all_of([*(each.below(USEFUL) for each in motions), *worse]),
-        f"Median NRMSE of the motions below {USEFUL:g}, of the loads larger, in all three.",
+    motions, loads = (
+        [_error(result, (test,), names) for test in REGULAR] for names in (_motions(result), LOADS)
     )
+    words = [", ".join(each.text() for each in group) for group in (motions, loads)]
+    better = [a.below_other(b) for a, b in zip(motions, loads, strict=True)]
+    holds = all_of([*(each.below(USEFUL) for each in motions), *better])
+    return f"λ/L 1.5, 2, 3: motions {words[0]}; loads {words[1]}", holds
 
 
-def _against_irregular(results: Results) -> Verdict:
-    result = results["paper"]
-    tests = ("irregular", *REGULAR)
+def _against_irregular(results: Results) -> Judged:
+    result, tests = results["paper"], (*SEA, *REGULAR)
     sizes = [result.tests[test].sizes["window"] for test in tests]
     regular = np.repeat([False, *[True] * len(REGULAR)], sizes)
-    labels = np.broadcast_to(regular, (result.groups["training"].sizes["training"], regular.size))
+    shape = (result.groups["training"].sizes["training"], regular.size)
+    labels = np.broadcast_to(regular, shape).astype(float)
 
-    def statistic(drawn: FloatArray, label: FloatArray) -> FloatArray:
-        averages = average_of(drawn).reshape(len(drawn), -1)
-        kind = label.reshape(len(drawn), -1) > 0.5
+    def ratio(drawn: FloatArray, label: FloatArray) -> FloatArray:
+        averages, kind = _flat(average_of(drawn)), _flat(label) > 0.5
         ours, sea = (median_of(np.where(part, averages, np.nan)) for part in (kind, ~kind))
         return ours / sea
 
     found = {
-        words: _interval(
-            result, tests, statistic, _cells(result, tests, ENSEMBLE, key), labels.astype(float)
-        )
+        words: _interval(result, tests, ratio, _cells(result, tests, key), labels)
         for key, words in MEASURES.items()
     }
-    above = found["ANRMSE"].below(1.0)
-    return Verdict(
-        ", ".join(f"{words} {each.percent()}" for words, each in found.items()),
-        all_of([None if above is None else not above, found["NAMMAE"].below(1.0)]),
-        "Median over all regular windows against that in irregular waves.",
-    )
+    words = ", ".join(f"{words} {each.change()}" for words, each in found.items())
+    return words, all_of([opposite(found["ANRMSE"].below(1.0)), found["NAMMAE"].below(1.0)])
 
 
-def _phase(results: Results) -> Verdict:
+def _phase(results: Results) -> Judged:
     result = results["paper"]
     order, _ = training_order(result.groups["training"])
-    cells = np.concatenate(
-        [np.abs(phase_leads(result.groups, test, ENSEMBLE)[order]) for test in REGULAR], axis=1
-    )
-    loads, motions = (
-        cells[..., _columns(result, channels)] for channels in (LOADS, _motions(result))
-    )
-    found = [_interval(result, REGULAR, _every_median, each) for each in (loads, motions)]
-    more = _interval(
-        result, REGULAR, lambda a, b: _every_median(a) - _every_median(b), loads, motions
-    )
-    below = more.below(0.0)
-    return Verdict(
-        f"median |phase|: loads {found[0].degrees()}, motions {found[1].degrees()}",
-        None if below is None else not below,
-        "At the wave's frequency, over the three regular runs.",
-    )
+    leads = [np.abs(phase_leads(result.groups, test, ENSEMBLE)[order]) for test in REGULAR]
+    cells = np.concatenate(leads, axis=1)
+    both = [cells[..., _columns(result, names)] for names in (LOADS, _motions(result))]
+
+    def middle(drawn: FloatArray) -> FloatArray:
+        return median_of(_flat(drawn))
+
+    loads, motions = (_interval(result, REGULAR, middle, each).text(0, "°") for each in both)
+    more = _interval(result, REGULAR, lambda a, b: middle(a) - middle(b), *both)
+    return f"median |phase|: loads {loads}, motions {motions}", opposite(more.below(0.0))
 
 
-def _every_median(drawn: FloatArray) -> FloatArray:
-    """Median over cells and channels (series, training, window, channel)."""
-    return median_of(drawn.reshape(len(drawn), -1))
-
-
-def _stern(results: Results) -> Verdict:
-    result = results["paper"]
-    errors = [_error(result, (test,), ("mooring_stern",)) for test in REGULAR]
-    slack = results["raw"].groups["runs"]["slack"].sel(name="mooring_stern")
-    parts = [f"{100 * float(slack.sel(run=run)):.0f} %" for run in REGULAR]
+def _stern(results: Results) -> Judged:
+    result, line = results["paper"], "mooring_stern"
+    errors = [_error(result, (test,), (line,)) for test in REGULAR]
+    slack = results["raw"].groups["runs"]["slack"].sel(name=line, run=list(REGULAR)).values
+    parts = ", ".join(f"{100 * float(each):.0f} %" for each in slack)
     judged = [each for each in errors if np.isfinite(each.value)]
     falls = [longer.below_other(shorter) for shorter, longer in pairwise(judged)]
-    return Verdict(
-        f"NRMSE {', '.join(e.text() if e.value == e.value else 'only noise' for e in errors)}; "
-        f"slack {', '.join(parts)} of the time",
-        all_of(falls) if falls else None,
-        "λ/L 1.5, 2, 3. The tank's drift force and pretension decide how slack the line is.",
-    )
+    listed = ", ".join(each.text() if each in judged else "only noise" for each in errors)
+    return f"NRMSE {listed}; slack {parts} of the time", all_of(falls) if falls else None
 
 
-CLAIMS: tuple[tuple[str, Callable[[Results], Verdict]], ...] = (
-    ("Reliable and robust prediction for unseen irregular waves", _robust),
-    ("No trend in ε(t) over 15 T̂", _trend),
-    ("The same accuracy for arbitrarily long sequences", _any_length),
-    ("The great majority of the errors arises from the mooring forces", _who_errs),
-    ("JSD of the loads an order of magnitude above the others", _load_divergence),
-    ("Densities of the motions very close, intervals almost always overlapping", _densities),
-    ("The Bayesian model lowers both errors in irregular waves", _better),
-    ("… and their dispersion", _dispersion),
-    ("… consistently, in all conditions", _always_better),
-    ("The uncertainty of the Bayesian model is very low", _narrow),
-    ("Its interval does not cover the mooring loads", _load_band),
-    ("The low-frequency content of the loads is captured", _slow_loads),
-    ("Load peaks are fairly estimated", _peaks),
-    ("Remarkable accuracy for the motions in regular waves too; loads worst", _regular),
-    ("In regular waves ANRMSE slightly higher, NAMMAE lower than in irregular", _against_irregular),
-    ("… with a more pronounced phase error of the loads", _phase),
-    ("The stern load is better predicted in longer waves (less slack)", _stern),
-)
-"""Claims in the order of the paper, with what judges each."""
+CLAIMS: dict[str, Callable[[Results], Judged]] = {
+    "robust": _robust,
+    "trend": _trend,
+    "any_length": _any_length,
+    "who_errs": _who_errs,
+    "load_divergence": _load_divergence,
+    "densities": _densities,
+    "better": partial(_better, statistic=_median),
+    "dispersion": partial(_better, statistic=_spread),
+    "always_better": _always_better,
+    "narrow": _narrow,
+    "load_band": _load_band,
+    "slow_loads": _slow_loads,
+    "peaks": _peaks,
+    "regular": _regular,
+    "against_irregular": _against_irregular,
+    "phase": _phase,
+    "stern": _stern,
+}
+"""What judges each claim, in the order of the paper; ``words.toml`` has the words."""

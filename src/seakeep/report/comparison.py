@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,23 +12,18 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.files import MARK, replacing, write_netcdf
-from seakeep.report.tables import MISSING, Table, change, interval, number, plain_cell
-from seakeep.report.tables import text as text_of
+from seakeep.report.tables import (
+    Number,
+    Table,
+    band_verdict,
+    change,
+    interval,
+    number,
+    numbers,
+    plain_cell,
+    short,
+)
 from seakeep.study.judge import verdict
-
-__all__ = [
-    "band_findings",
-    "comparison_blocks",
-    "difference_blocks",
-    "forecast_header",
-    "forecast_words",
-    "look_ahead_words",
-    "model_blocks",
-    "plain_cells",
-    "write_comparison",
-    "write_differences",
-    "write_forecast",
-]
 
 _SHOWN = {
     "nrmse": ("NRMSE", 3, "anrmse"),
@@ -48,37 +43,29 @@ _IN_UNITS = {
     "band_width": "mean width of band",
 }
 """Columns of a second table, in the unit of the channel."""
-_STORED = (
-    *("nrmse", "nrmse_lower", "nrmse_upper", "training_nrmse", "fit"),
-    *("nammae", "nammae_lower", "nammae_upper", "sd_ratio", "measured_min", "predicted_min"),
-    *("measured_max", "predicted_max", "coverage", "band_width", "relative_band_width"),
-)
-"""Columns of a CSV file."""
-_OF_RUNS = (
-    *("start", "status", "anrmse", "anrmse_lower", "anrmse_upper", "training_anrmse"),
-    *("conditional_on", "look_ahead", "probe_offset", "probe_offset_spread"),
-)
 UNTIL = "waves read until [s]"
 """Column of a forecast's CSV file where the model looks ahead."""
-_OF_BANDS = ("band", "level", "members", "diverged")
-_OF_SCALE = ("scale", "scale_factor")
+HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
+"""First line of the CSV file of models in service."""
 
 
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Comparison of forecasts with measurements, tables per run that fit a terminal."""
     shown = {name: each for name, each in _SHOWN.items() if name in table}
+    heads = [heading for heading, _, _ in shown.values()]
     for run in table["run"].values:
         at = table.sel(run=run)
+        title = "forecast against measurement"
+        if "scale" in at:
+            title += f", full scale (1:{float(at['scale_factor']):g})"
+        if "level" in at:
+            title += f", {_band_words(at)}"
         means = [number(at[mean], digits) if mean else "" for _, digits, mean in shown.values()]
-        yield _by_channel(
-            at,
-            "comparison",
-            _title(at),
-            [heading for heading, _, _ in shown.values()],
-            lambda one: [number(one[key], digits) for key, (_, digits, _) in shown.items()],
-            means,
-            _note(at),
-        )
+
+        def errors(one: xr.Dataset) -> Iterator[str]:
+            return (number(one[key], digits) for key, (_, digits, _) in shown.items())
+
+        yield _by_channel(at, "comparison", title, heads, errors, means, _note(at))
         yield _by_channel(
             at,
             "intervals",
@@ -95,10 +82,9 @@ def _by_channel(
     name: str,
     title: str,
     heads: Sequence[str],
-    cells: Callable[[xr.Dataset], Sequence[str]],
+    cells: Callable[[xr.Dataset], Iterable[str]],
     averages: Sequence[str] = (),
     note: str = "",
-    text_columns: int = 0,
 ) -> Table:
     """A row per channel of a run, with the averages over the channels last."""
     run = at["run"].values
@@ -106,88 +92,74 @@ def _by_channel(
     last = [len(rows)] if averages else []
     if averages:
         rows.append(("average", *averages))
-    numeric = range(1 + text_columns, 1 + len(heads))
     columns = ("channel", *heads)
-    return Table(f"{name}_{run}", f"{run}: {title}", columns, rows, note, numeric, averages=last)
+    return Table(f"{name}_{run}", f"{run}: {title}", columns, rows, note, averages=last)
 
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
     shown = {name: heading for name, heading in _IN_UNITS.items() if name in at}
-    return _by_channel(
-        at,
-        "extremes",
-        title,
-        ("unit", *shown.values()),
-        lambda one: [
-            str(one["channel_units"].values),
-            *(text_of(one[key], digits=None) for key in shown),
-        ],
-        text_columns=1,
-    )
 
+    def cells(one: xr.Dataset) -> list[str]:
+        return [str(one["channel_units"].values), *(short(one[key]) for key in shown)]
 
-def _title(at: xr.Dataset) -> str:
-    said = ["forecast against measurement"]
-    if "scale" in at:
-        said.append(f"full scale (1:{float(at['scale_factor']):g})")
-    if "level" in at:
-        level, kind = 100.0 * float(at["level"]), _kind(str(at["band"].values))
-        said.append(f"{level:g} % {kind}band")
-    return ", ".join(said)
+    return _by_channel(at, "extremes", title, ("unit", *shown.values()), cells)
 
 
 def _note(at: xr.Dataset) -> str:
-    said = []
-    if (slack := int(at["slack_channels"])) > 0:
-        said.append(f"{slack} still channel{'s' * (slack > 1)} left out of the average")
-    if (status := str(at["status"].values)) != "ok":
-        said.append(status)
-    if condition := str(at["conditional_on"].values):
-        said.append(f"conditional on measured {condition}")
-    if ahead := look_ahead_words(float(at["look_ahead"])):
-        said.append(ahead)
-    offset, spread = float(at["probe_offset"]), float(at["probe_offset_spread"])
-    if np.isfinite(offset):
-        known = f" ± {spread:.2g}" if np.isfinite(spread) else ""
-        said.append(f"probe offset {offset:.3g}{known} m")
-    return "; ".join(said)
+    slack, offset, spread = (
+        float(at[key]) for key in ("slack_channels", "probe_offset", "probe_offset_spread")
+    )
+    condition, status = (str(at[key].values) for key in ("conditional_on", "status"))
+    known = f" ± {spread:.2g}" if np.isfinite(spread) else ""
+    said = (
+        f"{slack:.0f} still channel{'s' * (slack > 1)} left out of the average" * (slack > 0),
+        status * (status != "ok"),
+        f"conditional on measured {condition}" * bool(condition),
+        look_ahead_words(float(at["look_ahead"])),
+        f"probe offset {offset:.3g}{known} m" * bool(np.isfinite(offset)),
+    )
+    return "; ".join(filter(None, said))
 
 
 def model_blocks(
     tables: Mapping[str, xr.Dataset], references: Mapping[str, Sequence[str]]
 ) -> Iterator[Table]:
     """Several models beside each other, a table of averages and one of channels per run."""
-    first = next(iter(tables.values()))
+    first, *_ = tables.values()
     heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
     for run in first["run"].values:
         of_run = {name: table.sel(run=run) for name, table in tables.items()}
-        rows, told, ahead = [], [], []
-        for name, at in of_run.items():
-            others = (number(at[key]) for key in ("training_anrmse", "mean_nammae"))
-            rows.append((name, number(at["anrmse"]), interval(at, "anrmse"), *others))
-            if (status := str(at["status"].values)) != "ok":
-                told.append(f"{name}: {status}")
-            if words := look_ahead_words(float(at["look_ahead"])):
-                ahead.append(f"{name} {words}")
-        title, note = f"{run}: models against measurement", "; ".join(told + ahead)
-        yield Table(f"models_{run}", title, heads, rows, note, range(1, len(heads)))
-        if skill := _skill(of_run, references, str(run)):
-            yield skill
+        rows = [
+            (
+                name,
+                number(at["anrmse"]),
+                interval(at, "anrmse"),
+                *(number(at[key]) for key in ("training_anrmse", "mean_nammae")),
+            )
+            for name, at in of_run.items()
+        ]
+        status = {name: str(at["status"].values) for name, at in of_run.items()}
+        ahead = {n: look_ahead_words(float(at["look_ahead"])) for n, at in of_run.items()}
+        told = [f"{name}: {words}" for name, words in status.items() if words != "ok"]
+        told += [f"{name} {words}" for name, words in ahead.items() if words]
+        title = f"{run}: models against measurement"
+        yield Table(f"models_{run}", title, heads, rows, "; ".join(told))
+        yield from _skill(of_run, references, str(run))
         name, at = next(iter(of_run.items()))
-        errors = (("model", "channel"), [each["nrmse"].values for each in of_run.values()])
+        every = (("model", "channel"), [each["nrmse"].values for each in of_run.values()])
         yield _by_channel(
-            at.assign(every=errors),
+            at.assign(every=every),
             "channels",
             "NRMSE",
             [*of_run],
-            lambda one: [*map(number, one["every"])],
+            lambda one: numbers(one["every"]),
         )
         yield _extremes(at, f"extremes of {name}")
 
 
 def _skill(
     of_run: Mapping[str, xr.Dataset], references: Mapping[str, Sequence[str]], run: str
-) -> Table | None:
+) -> Iterator[Table]:
     """Change of the ANRMSE to each model from the best of some references, which have no row."""
     errors = {name: float(at["anrmse"]) for name, at in of_run.items()}
     best = [min((errors[each] for each in names), default=np.nan) for names in references.values()]
@@ -197,57 +169,72 @@ def _skill(
         for name, error in errors.items()
         if name not in known
     ]
-    if not (rows and references):
-        return None
-    heads = ("model", *(f"from {each}" for each in references))
-    title = f"{run}: change of ANRMSE from the baselines'"
-    return Table(f"skill_{run}", title, heads, rows, "", range(1, len(heads)))
+    if rows and references:
+        heads = ("model", *(f"from {each}" for each in references))
+        yield Table(f"skill_{run}", f"{run}: change of ANRMSE from the baselines'", heads, rows)
 
 
 def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Errors of several models run by run, and over all runs their change from the first one."""
     models, runs = ([str(each) for each in table[key].values] for key in ("model", "run"))
+    of = runs[0]
     if len(runs) > 1:
+        of = f"{len(runs)} runs"
+        ordered = table.isel(run=np.argsort(table["wave_period"].values, kind="stable"))
         rows = [
-            (
-                runs[k],
-                f"{period:.3g}" if np.isfinite(period) else MISSING,
-                *map(number, table["anrmse"].values[:, k]),
+            (str(run), short(period, 3), *numbers(errors))
+            for run, period, errors in zip(
+                *(ordered[key].values for key in ("run", "wave_period")),
+                ordered["anrmse"].values.T,
+                strict=True,
             )
-            for k in np.argsort(table["wave_period"].values, kind="stable")
-            for period in [table["wave_period"].values[k]]
         ]
-        rows.append(("mean", "", *map(number, table["all_anrmse"].values)))
-        heads, last = ("run", "waves, s", *models), [len(runs)]
-        title, numeric = f"{len(runs)} runs by wave period: ANRMSE", range(1, len(heads))
-        yield Table("by_run", title, heads, rows, "", numeric, averages=last)
+        rows.append(("mean", "", *numbers(table["all_anrmse"])))
+        heads = ("run", "waves, s", *models)
+        yield Table("by_run", f"{of} by wave period: ANRMSE", heads, rows, averages=[len(runs)])
     changes = []
     for k, name in enumerate(models):
-        value, low, high = (float(table[f"all_{key}"][k]) for key in ("change", "lower", "upper"))
-        known = k > 0 and bool(np.isfinite([low, high]).all())
-        changes.append(
-            (
-                name,
-                number(table["all_anrmse"][k]),
-                change(1 + value) if k else "",
-                *((change(1 + low, 1 + high), verdict(low, high)) if known else ("", "")),
-            )
+        error, *ratios = (
+            float(table[f"all_{key}"][k]) for key in ("anrmse", "change", "lower", "upper")
         )
-    of = f"{len(runs)} runs" if len(runs) > 1 else runs[0]
-    title = f"{of}: change of ANRMSE from {models[0]}"
+        value, low, high = (1 + each for each in ratios)
+        known = k > 0 and bool(np.isfinite([low, high]).all())
+        bounds = (change(low, high), verdict(low - 1, high - 1)) if known else ("", "")
+        changes.append((name, number(error), change(value) if k else "", *bounds))
     note = "Paired intervals over redrawn blocks of the forecast; they hold for these runs."
     heads = ("model", "ANRMSE", "change", "95 %", "verdict")
-    yield Table("differences", title, heads, changes, note, (1, 2, 3))
+    yield Table("differences", f"{of}: change of ANRMSE from {models[0]}", heads, changes, note)
 
 
 def write_differences(table: xr.Dataset, path: Path) -> Path:
     """Write errors of several models as CSV, a row per run and model, and per model for all."""
-    keys = ("anrmse", "anrmse_lower", "anrmse_upper", "change", "lower", "upper", "wave_period")
-    each = table[[*keys]].to_dataframe()
-    every = table[[name for name in table.data_vars if str(name).startswith("all_")]]
-    of_all = every.to_dataframe().rename(columns=lambda name: name.removeprefix("all_"))
-    whole = pd.concat([each.reset_index(), of_all.reset_index().assign(run="")])
-    return _write(whole, ["run", "wave_period", "model"], path)
+    of_all = {name: str(name)[4:] for name in table.data_vars if str(name).startswith("all_")}
+    every = table[[*of_all]].rename(of_all).expand_dims(run=[""])
+    each = table[
+        ["anrmse", "anrmse_lower", "anrmse_upper", "change", "lower", "upper", "wave_period"]
+    ]
+    both = [part.to_dataframe().reset_index() for part in (each, every)]
+    return _write(pd.concat(both), ["run", "wave_period", "model"], path)
+
+
+def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
+    """Write comparison tables as CSV, a row per run and channel, full precision."""
+    frames = [
+        table.transpose("run", "channel").to_dataframe().reset_index().assign(model=name)
+        for name, table in tables.items()
+    ]
+    front = ["run", "channel", "channel_units", "model"]
+    return _write(pd.concat(frames, ignore_index=True), front, path)
+
+
+def write_nowcasts(found: Mapping[str, xr.Dataset], path: Path) -> Path:
+    """Write all errors as CSV, a row per model, run, channel and lead, full precision."""
+    keys = HEADER.split(",")
+    frames = [
+        of_model[keys[4:]].to_dataframe().reset_index().assign(model=model)
+        for model, of_model in found.items()
+    ]
+    return _write(pd.concat(frames)[keys], keys, path)
 
 
 def _write(table: pd.DataFrame, front: Sequence[str], path: Path) -> Path:
@@ -258,57 +245,63 @@ def _write(table: pd.DataFrame, front: Sequence[str], path: Path) -> Path:
     return path
 
 
+def plain_cells(table: pd.DataFrame) -> pd.DataFrame:
+    """A table in which no text is a formula."""
+    return table.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell)
+
+
+def nowcast_blocks(found: Mapping[str, xr.Dataset]) -> Iterator[Table]:
+    """Lead times and errors per channel in service, a table per model and run."""
+    for model, of_model in found.items():
+        share, lead = float(of_model.attrs["share"]), of_model["lead"].values
+        places = [max(round(len(lead) * part) - 1, 0) for part in (0.05, 0.2, 0.5, 1.0)]
+        times = (f"at {number(each)} s" for each in lead[places])
+        columns = ("channel", "lead time s", *times, "in band %")
+        note = (
+            f"errors in training SD over {int(of_model.attrs['starts'])} forecasts, no wave after "
+            f"a start known; lead time: error below {share:g} SD"
+        )
+        for run in of_model["run"].values:
+            rows = []
+            for name in of_model["channel"].values:
+                at = of_model.sel(run=run, channel=name)
+                held = number(at["lead_time"])
+                if float(at["lead_time"]) >= lead[-1] - 1e-9:
+                    held = Number(f"at least {number(lead[-1])}")
+                inside = number(at["coverage"].mean(), 0)
+                rows.append((str(name), held, *numbers(at["error"][places]), inside))
+            yield Table(f"nowcast_{model}_{run}", f"{run}: {model} in service", columns, rows, note)
+
+
 def band_findings(table: xr.Dataset) -> list[str]:
     """Sentences on the bands of an ensemble, one per run; none for a single model."""
-    if "coverage" not in table:
-        return []
     said = []
-    for run in table["run"].values:
-        rows = table.sel(run=run)
-        level, found = 100.0 * float(rows["level"]), float(rows["mean_coverage"])
-        lost, members = int(rows["diverged"]), int(rows["members"])
-        left_out = f"; {lost} of {members} members diverged and are left out" if lost else ""
-        if not np.isfinite(found):
+    for run in table["run"].values if "coverage" in table else ():
+        at = table.sel(run=run)
+        inside, lost, members = (float(at[k]) for k in ("mean_coverage", "diverged", "members"))
+        left_out = f"; {lost:.0f} of {members:.0f} members diverged and are left out" * (lost > 0)
+        if not np.isfinite(inside):
             said.append(f"{run}: there is no band to judge{left_out}.")
             continue
-        words = "as it claims" if abs(found - level) <= 5.0 else "not what it claims"
-        if found < level - 20.0:
-            words = "far too little"
-        kind = str(rows["band"].values)
+        words = band_verdict(inside / 100, float(at["level"]))
         said.append(
-            f"{run}: the {level:g} % {_kind(kind)}band of {members - lost} members holds "
-            f"{found:.0f} % of the measured instants, {words}. {_CARRIES[kind]}{left_out}."
+            f"{run}: the {_band_words(at)} of {members - lost:.0f} members holds "
+            f"{inside:.0f} % of the measured instants, {words}. {_CARRIES[str(at['band'].values)]}"
+            f"{left_out}."
         )
     return said
 
 
-def _kind(band: str) -> str:
-    """Word before a band that is not that of the members."""
-    return "calibrated " if band == "calibrated" else ""
+def _band_words(at: xr.Dataset) -> str:
+    """Level of a band, and its kind where it is not that of the members."""
+    kind = "calibrated " * (str(at["band"].values) == "calibrated")
+    return f"{100 * float(at['level']):g} % {kind}band"
 
 
 _CARRIES = {
     "members": "It carries the spread of the members, and no noise or model error",
     "calibrated": "It carries the errors of the sea and the horizon that it was calibrated on",
 }
-
-
-def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
-    """Write comparison tables as CSV, a row per run and channel, full precision."""
-    frames = []
-    for model, table in tables.items():
-        frame = table[[name for name in _STORED if name in table]].to_dataframe().reset_index()
-        for name in (*_OF_RUNS, *(each for each in (*_OF_BANDS, *_OF_SCALE) if each in table)):
-            frame[name] = frame["run"].map(table[name].to_series())
-        frames.append(frame.assign(model=model) if len(tables) > 1 else frame)
-    whole = pd.concat(frames, ignore_index=True)
-    front = ["run", "channel", "channel_units", *["model"] * (len(tables) > 1)]
-    return _write(whole, front, path)
-
-
-def plain_cells(table: pd.DataFrame) -> pd.DataFrame:
-    """A table in which no text is a formula."""
-    return table.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell)
 
 
 def forecast_header(states: Sequence[str]) -> str:
@@ -342,19 +335,13 @@ def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
 def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
     columns = {}
     for name, variable in forecast.data_vars.items():
-        if "time" not in variable.dims:
-            continue
-        units = variable.attrs.get("units", "")
-        for dim, words in (("statistic", "{}"), ("member", "member {}")):
-            if dim in variable.dims:
-                for each in variable[dim].values:
-                    what = "" if each == "mean" else f" {words.format(each)}"
-                    columns[plain_cell(f"{name}{what} [{units}]")] = variable.sel(
-                        {dim: each}
-                    ).values
-                break
-        else:
-            columns[plain_cell(f"{name} [{units}]")] = variable.values
+        if "time" in variable.dims:
+            of = [dim for dim in ("statistic", "member") if dim in variable.dims]
+            for place in variable[of[0]].values if of else [None]:
+                one = variable.sel({of[0]: place}) if of else variable
+                kind = "member " * ("member" in of)
+                words = f"{name} {kind}{place}" if place not in (None, "mean") else name
+                columns[plain_cell(f"{words} [{variable.attrs.get('units', '')}]")] = one.values
     if (ahead := float(forecast.attrs.get("reads_input_until", 0.0))) > 0.0:
         columns[UNTIL] = (forecast["time"].values + ahead).round(9)
     if forecast.attrs.get("scale") == "full":
@@ -366,8 +353,8 @@ def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
 def forecast_words(forecast: xr.Dataset) -> str:
     """What a forecast of an ensemble holds, for a message; empty for a single model's."""
     if "statistic" in forecast.dims:
-        level = 100.0 * float(forecast.attrs["level"])
-        kept = int(forecast.attrs["members"]) - int(forecast.attrs["diverged"])
-        kind = _kind(str(forecast.attrs.get("band", "members")))
-        return f"mean, std and {level:g} % {kind}band of {kept} members at "
+        attrs = {"band": "members", **forecast.attrs}
+        kept = int(attrs["members"]) - int(attrs["diverged"])
+        words = _band_words(xr.Dataset({key: attrs[key] for key in ("band", "level")}))
+        return f"mean, std and {words} of {kept} members at "
     return f"{forecast.sizes['member']} members at " if "member" in forecast.dims else ""

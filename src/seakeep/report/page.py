@@ -1,33 +1,29 @@
-"""The report: one HTML file that holds everything and asks the network for nothing."""
+"""Pages of sections: one HTML file that holds everything and asks the network for nothing."""
 
 from __future__ import annotations
 
+import base64
 import io
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup, escape
 
 from seakeep.arrays import Progress
 from seakeep.files import MARK, check_output, replacing
-from seakeep.report.html import inline_svg, rendered
-from seakeep.report.section import Drawing, Section
-from seakeep.report.sections import SECTIONS
-from seakeep.report.sections.histories import write_histories
-from seakeep.report.sections.settings import finished
 from seakeep.report.style import figure_style, save_figure
-from seakeep.report.tables import write_csv, write_latex
-from seakeep.study import StudyResult
+from seakeep.report.tables import Table, shade, words, write_csv, write_latex
 from seakeep.study.store import storing
 
 if TYPE_CHECKING:
-    from markupsafe import Markup
+    from jinja2 import Environment
     from matplotlib.figure import Figure
 
-__all__ = ["write_page", "write_report"]
-
-SHORT = re.compile(r"(\.\d)\d+")
 RASTER_DPI = 80
 """Of pictures without vectors: as wide as the page."""
 UNFINISHED = f"""<!DOCTYPE html>
@@ -36,44 +32,85 @@ UNFINISHED = f"""<!DOCTYPE html>
 """
 
 
-def write_report(
-    result: StudyResult, progress: Progress | None = None, pictures: bool = True
-) -> Path:
-    """Write ``report.html`` with its ``figures/``, ``tables/`` and ``histories/``.
-
-    Figures are PNG and SVG, tables CSV and LaTeX; histories are what the interactive plot loads.
+@dataclass(frozen=True)
+class Drawing:
+    """A figure that is drawn when the page is written.
 
     Parameters
     ----------
-    result : StudyResult
-        The study; all is written into its folder.
-    progress : callable, optional
-        Called as ``progress(done, total, what)``.
-    pictures : bool, optional
-        Whether all channels of each run are drawn too: what takes longest.
-
-    Returns
-    -------
-    Path
-        The page.
-
-    Raises
-    ------
-    RequestError
-        If matplotlib is not installed.
-    StorageError
-        If the disk is full or cannot be written.
+    name : str
+        Name of its files.
+    caption : str
+        What it shows.
+    draw : callable
+        Draws it.
+    raster : bool, optional
+        Too many points for vectors: a PNG file beside the page, which links to it.
     """
-    sections = [section for make in SECTIONS if (section := make(result)) is not None]
-    if not pictures:
-        drawn = [tuple(each for each in one.figures if not each.raster) for one in sections]
-        sections = [replace(one, figures=f) for one, f in zip(sections, drawn, strict=True)]
-    stamp = {key: str(result.attrs[key]) for key in ("preset", "seed", "digest", "description")}
-    stamp["finished"] = finished(result)
-    title = f"{result.attrs['study']}: study report"
-    with storing(result.folder):
-        write_histories(result)
-    return write_page(result.folder, title, stamp, sections, progress)
+
+    name: str
+    caption: str
+    draw: Callable[[], Figure]
+    raster: bool = False
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of a page, in the order in which the page shows its parts.
+
+    Parameters
+    ----------
+    key : str
+        Name of its place on the page.
+    title : str
+        Heading.
+    words : sequence of str
+        Paragraphs.
+    points : sequence of str
+        Results, as a list.
+    links : sequence of (str, str)
+        Addresses of other files, and words for them.
+    notices : sequence of str
+        Paragraphs that stand out.
+    terms : sequence of (str, str)
+        Words and what they mean.
+    histories : dict, optional
+        Data of an interactive plot, from :func:`seakeep.report.sections.histories.history_data`.
+    figures : sequence of Drawing
+        Figures.
+    tables : sequence of Table
+        Tables.
+    """
+
+    key: str
+    title: str
+    words: Sequence[str] = ()
+    points: Sequence[str] = ()
+    links: Sequence[tuple[str, str]] = ()
+    notices: Sequence[str] = ()
+    terms: Sequence[tuple[str, str]] = ()
+    histories: dict[str, Any] | None = None
+    figures: Sequence[Drawing] = ()
+    tables: Sequence[Table] = ()
+
+
+def drawing(
+    key: str, draw: Callable[[], Figure], values: Mapping[str, Any] | None = None, name: str = ""
+) -> Drawing:
+    """Figure with the caption of ``words.toml``, and the values that it holds in braces."""
+    return Drawing(name or key, words()["figures"][key].format(**values or {}), draw)
+
+
+def section(
+    key: str, values: Mapping[str, Any] | None = None, more: Sequence[str] = (), **parts: Any
+) -> Section:
+    """Section with the title and paragraphs of ``words.toml``, and `more` paragraphs.
+
+    `values` are what the paragraphs hold in braces, `parts` the other parts of a :class:`Section`.
+    """
+    entry = words()["sections"][key]
+    paragraphs = [each.format(**values or {}) for each in entry.get("words", ())]
+    return Section(key, entry["title"], [*paragraphs, *filter(None, more)], **parts)
 
 
 def write_page(
@@ -83,7 +120,7 @@ def write_page(
     sections: Sequence[Section],
     progress: Progress | None = None,
 ) -> Path:
-    """Write a page of sections into a folder, with its figures and tables; errors as above.
+    """Write a page of sections into a folder, with its figures and tables.
 
     Parameters
     ----------
@@ -102,6 +139,13 @@ def write_page(
     -------
     Path
         The page.
+
+    Raises
+    ------
+    RequestError
+        If matplotlib is not installed.
+    StorageError
+        If the disk is full or cannot be written.
     """
     tell = progress or (lambda done, total, what: None)
     page = folder / "report.html"
@@ -110,8 +154,7 @@ def write_page(
     drawn: dict[str, Markup | None] = {}
     with storing(folder), figure_style():
         if not page.exists():  # figures of an interrupted report are known as ours
-            with replacing(page) as temporary:
-                temporary.write_text(UNFINISHED, encoding="utf-8")
+            _write(page, UNFINISHED)
         for each in ("figures", "tables"):
             (folder / each).mkdir(exist_ok=True)
         for table in (each for section in sections for each in section.tables):
@@ -120,18 +163,40 @@ def write_page(
         for number, drawing in enumerate(drawings):
             tell(number, len(drawings), f"drawing {drawing.name.replace('_', ' ')}")
             drawn[drawing.name] = _drawn(drawing, folder / "figures")
-        text = rendered(
-            "report.html",
-            kind="report",
-            title=title,
-            stamp=stamp,
-            sections=sections,
-            drawn=drawn,
-        )
-        with replacing(page) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        content = {"stamp": stamp, "sections": sections, "drawn": drawn, "files": True}
+        _write(page, rendered("report.html", kind="report", title=title, **content))
     tell(len(drawings), len(drawings), "report written")
     return page
+
+
+def rendered(template: str, **content: Any) -> str:
+    """Page of a template of ``seakeep.report.templates``; what is not ours is escaped."""
+    return _environment().get_template(template).render(**content)
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    made = Environment(
+        loader=PackageLoader("seakeep.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    folder = resources.files("seakeep.report").joinpath("templates")
+    made.globals["source"] = lambda name: Markup(folder.joinpath(name).read_text("utf-8"))
+    made.filters["shade"] = shade
+    made.filters["breakable"] = lambda text: escape(text).replace("_", Markup("_<wbr>"))
+    made.filters["minus"] = lambda text: re.sub(r"(?<![\w)])-(?=\d)", "−", text)
+    return made
+
+
+def inline_picture(png: bytes, words: str) -> Markup:
+    """Element ``<img>`` that holds a picture."""
+    encoded = base64.b64encode(png).decode("ascii")
+    return Markup(f'<img alt="{escape(words)}" src="data:image/png;base64,{encoded}">')
 
 
 def _drawn(drawing: Drawing, folder: Path) -> Markup | None:
@@ -144,14 +209,12 @@ def _drawn(drawing: Drawing, folder: Path) -> Markup | None:
         engine.execute(figure)
         # Without any engine; "none" stands for one, for which each file would be drawn twice.
         figure.set_layout_engine(None)
-    picture = folder / f"{drawing.name}.png"
-    save_figure(figure, picture, figure.dpi)
+    save_figure(figure, folder / f"{drawing.name}.png", figure.dpi)
     if drawing.raster:  # a link
         return None
     text = _svg_text(figure, drawing.name)
-    with replacing(folder / f"{drawing.name}.svg") as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return inline_svg(text, drawing.name, drawing.caption)
+    _write(folder / f"{drawing.name}.svg", text)
+    return _inline_svg(text, drawing)
 
 
 def _svg_text(figure: Figure, name: str) -> str:
@@ -162,4 +225,19 @@ def _svg_text(figure: Figure, name: str) -> str:
     with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     # A tenth of a point is all that can be seen, and half of the file.
-    return re.sub(r' d="[^"]*"', lambda path: SHORT.sub(r"\1", path[0]), buffer.getvalue())
+    shorten = re.compile(r"(\.\d)\d+")
+    return re.sub(r' d="[^"]*"', lambda path: shorten.sub(r"\1", path[0]), buffer.getvalue())
+
+
+def _inline_svg(text: str, drawing: Drawing) -> Markup:
+    """Turn an SVG file into an element that may stand inside a page beside others."""
+    name, label = drawing.name, f"title-{drawing.name}"
+    text = re.sub(r"<(metadata|title)>.*?</\1>", "", text[text.index("<svg") :], flags=re.S)
+    text = re.sub(r'(\bid="|href="#|url\(#)', rf"\1{name}-", text)
+    words = f'<title id="{label}">{escape(drawing.caption)}</title>'
+    return Markup(text.replace(">", f' role="img" aria-labelledby="{label}">{words}', 1))
+
+
+def _write(path: Path, text: str) -> None:
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

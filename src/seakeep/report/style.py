@@ -1,9 +1,9 @@
-"""One look for all figures: colours that survive grey print and colour-blind readers."""
+"""One look and one frame for all figures: colours that survive grey print and colour blindness."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,26 +11,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from seakeep.campaign.settings import long_name_of
-from seakeep.conventions import canonical_channel
+from seakeep.conventions import canonical_channel, displayed
 from seakeep.errors import RequestError
 from seakeep.files import MARK, replacing
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Figure
 
-__all__ = [
-    "COLOURS",
-    "LINES",
-    "PALETTE",
-    "THIN",
-    "axis_label",
-    "figure_style",
-    "new_figure",
-    "plain_text",
-    "prefixed",
-    "save_figure",
-    "shown_unit",
-]
+    from seakeep.study import StudyResult
+
+    Places = Sequence[Axes] | Axes | None
 
 PALETTE = {
     "black": "#000000",
@@ -59,9 +51,10 @@ COLOURS = {
 }
 """By what a line shows."""
 
+DASHED, DOTTED = (0, (4, 1.5)), (0, (1, 1))
 LINES: dict[str, dict[str, Any]] = {
     "measured": {"color": COLOURS["measured"], "linewidth": 1.6, "linestyle": "-"},
-    "forecast": {"color": COLOURS["forecast"], "linewidth": 1.2, "linestyle": (0, (4, 1.5))},
+    "forecast": {"color": COLOURS["forecast"], "linewidth": 1.2, "linestyle": DASHED},
     "ensemble": {
         "color": COLOURS["ensemble"],
         "linewidth": 1.3,
@@ -74,8 +67,31 @@ LINES: dict[str, dict[str, Any]] = {
 THIN: dict[str, Any] = {**LINES["measured"], "linewidth": 0.8}
 """Measured, between a band and its mean: a band is often little wider than a line."""
 
+SERIES: tuple[dict[str, Any], ...] = (
+    {**LINES["forecast"], "marker": "o"},
+    {**LINES["ensemble"], "marker": "s"},
+    *(
+        {"color": PALETTE[colour], "linewidth": 1.2, "linestyle": (0, dash), "marker": marker}
+        for colour, dash, marker in (
+            ("pink", (8, 2), "D"),
+            ("amber", (3, 1, 1, 1, 1, 1), "v"),
+            ("green", (1, 1), "^"),
+            ("sky", (6, 1, 1, 1), "P"),
+            ("brown", (2, 2), "X"),
+            ("slate", (2, 2, 6, 2), "*"),
+            ("violet", (1, 2.5), "p"),
+        )
+    ),
+)
+"""Colour, dash and marker of each of several things of one kind."""
+
+HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
+"""Names of the paper for the averages of the two measures over the channels."""
+
 WIDEST = 18
 """Letters of a label on one line: what the height of a panel holds."""
+NARROWEST = 7.5
+"""Inches: a page stretches figures to its width, and a legend needs room."""
 
 _WITH_PREFIX = ("N", "N m", "Pa", "W")
 """Units whose values run into millions at full scale."""
@@ -97,7 +113,7 @@ _RC: Any = {
 
 @contextmanager
 def figure_style() -> Iterator[None]:
-    """Draw in our style, without touching anybody's global settings."""
+    """Draw in our style, without touching anybody's global settings; a decorator too."""
     try:
         import matplotlib as mpl
     except ImportError as error:
@@ -114,6 +130,46 @@ def new_figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def panels(
+    axes: Places, count: int, most: int, size: tuple[float, float]
+) -> tuple[Figure, list[Any]]:
+    """Axes that are given, as many as needed, or those of a new figure; `size` is that of one.
+
+    A new figure has rows of `most` panels, or of fewer that fill as few rows.
+    """
+    if count == 0:
+        raise RequestError("there is nothing to draw. Name at least one channel or state.")
+    if axes is None:
+        rows = -(-count // most)
+        columns = -(-count // rows)
+        figure = new_figure(max(size[0] * columns, NARROWEST), 0.5 + size[1] * rows)
+        every = list(figure.subplots(rows, columns, squeeze=False).ravel())
+        for spare in every[count:]:
+            spare.remove()
+        return figure, every[:count]
+    given: list[Any] = list(np.ravel(np.array(axes, dtype=object)))
+    if len(given) != count:
+        raise RequestError(
+            f"axes holds {len(given)} Axes and the figure draws {count} panels. Give as many, or "
+            "none."
+        )
+    return given[0].figure, given
+
+
+def legend_outside(figure: Any, *places: Any, side: str = "lower center", **options: Any) -> Any:
+    """Legend beside all panels of what some of them label, in as many columns as fit."""
+    unique: dict[str, Any] = {}
+    for place in places:
+        handles, labels = place.get_legend_handles_labels()
+        unique |= dict(zip(labels, handles, strict=True))
+    if not unique:
+        return None
+    across = max(1, int(13 * figure.get_figwidth() / (6 + max(map(len, unique)))))  # letters
+    columns = min(len(unique), across)
+    loc = f"outside {side}"
+    return figure.legend(unique.values(), unique, loc=loc, ncols=columns, **options)
 
 
 def save_figure(figure: Figure, path: Path, dpi: float | None = None) -> Path:
@@ -137,6 +193,41 @@ def save_figure(figure: Figure, path: Path, dpi: float | None = None) -> Path:
     return path
 
 
+def judged_models(result: StudyResult) -> list[str]:
+    """Models that are no references; all models if there is no other."""
+    own = [m for m in result.models if result.model_settings[m].get("role") != "reference"]
+    return own or result.models
+
+
+def line_of(result: StudyResult, model: str) -> dict[str, Any]:
+    """Line of a model: that of a forecast or an ensemble, in its own colour beyond the first."""
+    kinds = {name: "ensemble" if result.is_ensemble(name) else "forecast" for name in result.models}
+    line = LINES[kinds[model]]
+    first = [name for kind in LINES for name in [n for n in kinds if kinds[n] == kind][:1]]
+    if model in first:
+        return line
+    others = [name for name in kinds if name not in first]
+    return {**line, "color": SERIES[2 + others.index(model) % (len(SERIES) - 2)]["color"]}
+
+
+def model_words(model: str) -> str:
+    """Name of a model for legends.
+
+    Examples
+    --------
+    >>> model_words("bayesian"), model_words("hold_last"), model_words("fir")
+    ('Bayesian', 'hold last', 'FIR')
+    """
+    known = {"bayesian": "Bayesian", "fir": "FIR", "arx": "ARX"}
+    return known.get(model, model.replace("_", " "))
+
+
+def shown(channel: xr.DataArray) -> tuple[float, str]:
+    """Factor to the unit in which a channel is shown, and its label for an axis."""
+    factor, units = displayed(str(channel.attrs.get("units", "")))
+    return factor, axis_label(str(channel.name), units, channel.attrs.get("long_name"))
+
+
 def axis_label(name: str, units: str, long_name: str | None = None) -> str:
     r"""Label of a channel for an axis: words, symbol where it has one, and unit.
 
@@ -155,6 +246,18 @@ def axis_label(name: str, units: str, long_name: str | None = None) -> str:
     symbol = f"${channel.symbol}$ " if channel else ""
     lines = "\n".join(_balanced(plain_text(long_name_of(name, long_name))))
     return f"{lines}\n{symbol}[{shown_unit(units) or '?'}]"
+
+
+def short_label(channel: str) -> str:
+    r"""Symbol of a channel for a crowded axis, else its name.
+
+    Examples
+    --------
+    >>> short_label("pitch_rate"), short_label("torque")
+    ('$\\dot{\\theta}$', 'torque')
+    """
+    known = canonical_channel(channel)
+    return f"${known.symbol}$" if known else channel.replace("_", " ")
 
 
 def plain_text(words: str) -> str:
@@ -196,9 +299,8 @@ def shown_unit(unit: str) -> str:
 
 def _balanced(words: str) -> list[str]:
     """Wrap into as few lines as fit, of lengths as equal as they can be."""
-    lines = textwrap.wrap(words, WIDEST, break_on_hyphens=False)
-    for width in range(1, WIDEST):
-        narrower = textwrap.wrap(words, width, break_long_words=False, break_on_hyphens=False)
-        if len(narrower) == len(lines) and max(map(len, narrower)) <= WIDEST:
-            return narrower
-    return lines
+    wraps = [
+        textwrap.wrap(words, width, break_long_words=width == WIDEST, break_on_hyphens=False)
+        for width in range(1, WIDEST + 1)
+    ]
+    return min((each for each in wraps if max(map(len, each)) <= WIDEST), key=len)

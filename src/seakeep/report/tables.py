@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import csv
-import io
 import re
-from collections.abc import Iterable, Sequence
+import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
+from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, SupportsFloat
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from seakeep.files import replacing
@@ -19,25 +22,15 @@ if TYPE_CHECKING:
     from rich.console import JustifyMethod
     from rich.table import Table as RichTable
 
-__all__ = [
-    "MISSING",
-    "Table",
-    "change",
-    "interval",
-    "latex_text",
-    "number",
-    "plain_cell",
-    "probability",
-    "rich_tables",
-    "shade",
-    "signed",
-    "small_number",
-    "text",
-    "write_csv",
-    "write_latex",
-]
 
-MISSING = "–"
+class Number(str):
+    """Text of a number: a table sets a column of them to the right."""
+
+    __slots__ = ()
+
+
+MISSING = Number("–")
+Form = Callable[[SupportsFloat], Number]
 
 
 @dataclass(frozen=True)
@@ -56,16 +49,19 @@ class Table:
         Cells.
     note : str
         What a reader must know about it.
-    numeric : sequence of int
-        Columns of numbers.
+    numeric : sequence of int, optional
+        Columns of numbers; by default those whose cells are :class:`Number`.
     elsewhere : sequence of int
         Columns that come from another data set.
     averages : sequence of int
         Rows that are averages of others.
+    marked : sequence of int
+        Rows that a page sets apart.
     folded : bool
         Whether a page folds it away until it is wanted.
-    heat : sequence of int
-        Columns of errors whose size a page shows as a shade; such a table stands before figures.
+    heat : int
+        Column of numbers from which on a page shows errors as shades, where it is not 0; such a
+        table stands before figures.
     """
 
     name: str
@@ -73,11 +69,64 @@ class Table:
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
-    numeric: Sequence[int] = ()
+    numeric: Sequence[int] | None = None
     elsewhere: Sequence[int] = ()
     averages: Sequence[int] = ()
+    marked: Sequence[int] = ()
     folded: bool = False
-    heat: Sequence[int] = ()
+    heat: int = 0
+
+    @cached_property
+    def numbers(self) -> frozenset[int]:
+        """Columns that hold numbers."""
+        if self.numeric is not None:
+            return frozenset(self.numeric)
+        columns = ([each for each in column if each] for column in zip(*self.rows, strict=True))
+        return frozenset(
+            k
+            for k, cells in enumerate(columns)
+            if cells and all(isinstance(each, Number) for each in cells)
+        )
+
+
+@cache
+def words() -> dict[str, Any]:
+    """Words of the pages: sections, figures and tables by name."""
+    file = resources.files("seakeep.report").joinpath("templates/words.toml")
+    return tomllib.loads(file.read_text("utf-8"))
+
+
+def table(
+    key: str,
+    rows: Sequence[Sequence[str]],
+    values: Mapping[str, Any] | None = None,
+    more: str = "",
+    **options: Any,
+) -> Table:
+    """Return a table with the words of ``words.toml``.
+
+    Parameters
+    ----------
+    key : str
+        Its place there.
+    rows : sequence of sequence of str
+        Cells.
+    values : mapping, optional
+        What the words hold in braces.
+    more : str, optional
+        What follows the note.
+    **options
+        Other parts of a :class:`Table`, such as ``name``, if it is not the key.
+
+    Returns
+    -------
+    Table
+    """
+    entry = {"name": key, "columns": (), "note": "", **words()["tables"][key], **options}
+    entry["columns"] = tuple(each.format(**values or {}) for each in entry["columns"])
+    entry["title"] = entry["title"].format(**values or {})
+    entry["note"] = entry["note"].format(**values or {}) + more
+    return Table(rows=rows, **entry)
 
 
 SHADES = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
@@ -99,16 +148,30 @@ def shade(text: str) -> int:
     return sum(value >= step for step in SHADES)
 
 
-def number(value: SupportsFloat, digits: int = 3) -> str:
+def number(value: SupportsFloat, digits: int = 3) -> Number:
     """Text of a number; a dash for one that is not finite."""
     value = float(value)
-    if not np.isfinite(value):
-        return MISSING
-    text = f"{value:.{digits}f}"
-    return text.removeprefix("-") if float(text) == 0 else text
+    return Number(f"{value:z.{digits}f}") if np.isfinite(value) else MISSING
 
 
-def small_number(value: SupportsFloat) -> str:
+def numbers(values: npt.ArrayLike, digits: int = 3) -> list[Number]:
+    """Texts of numbers, one after the other."""
+    return [number(each, digits) for each in np.ravel(values)]
+
+
+def short(value: SupportsFloat, digits: int = 4) -> Number:
+    """Text of a number of four significant digits; a dash for one that is not finite.
+
+    Examples
+    --------
+    >>> short(2255.3387), short(0.01), short(float("nan"))
+    ('2255', '0.01', '–')
+    """
+    value = float(value)
+    return Number(f"{value:.{digits}g}") if np.isfinite(value) else MISSING
+
+
+def small_number(value: SupportsFloat) -> Number:
     """Text of a number of four decimals, or as many more as two digits of it need.
 
     Examples
@@ -120,62 +183,75 @@ def small_number(value: SupportsFloat) -> str:
     if not np.isfinite(value) or value == 0:
         return number(value, 0)
     decimals = max(4, 1 - int(np.floor(np.log10(abs(value)))))
-    return f"{value:.{decimals}f}" if decimals <= 7 else f"{value:.1e}"
+    return number(value, decimals) if decimals <= 7 else Number(f"{value:.1e}")
 
 
-def signed(value: SupportsFloat, digits: int) -> str:
+def signed(value: SupportsFloat, digits: int = 0) -> Number:
     """Text of a number with its sign, where anything of it is left after rounding.
 
     Examples
     --------
-    >>> signed(1.4, 0), signed(-0.04, 1), signed(-0.06, 1)
+    >>> signed(1.4), signed(-0.04, 1), signed(-0.06, 1)
     ('+1', '0.0', '-0.1')
     """
     text = number(value, digits)
-    if text == MISSING or float(text) == 0.0:
-        return text.removeprefix("-")
-    return text if float(value) < 0 else f"+{text}"
+    return Number(f"+{text}") if text != MISSING and float(text) > 0 else text
 
 
-def text(
-    value: SupportsFloat, bounds: Sequence[float] | None = None, digits: int | None = 3
-) -> str:
-    """Text of a value with its interval, or with its uncertainty, where that is known.
+def percent(part: SupportsFloat, digits: int = 0) -> Number:
+    """Text of a part of one, in percent and without the sign."""
+    return number(100 * float(part), digits)
 
-    An uncertainty is shown with two digits, and the value to the same place.
 
-    Parameters
-    ----------
-    value : float
-        The value; NaN for an interval alone.
-    bounds : sequence of float, optional
-        Lower and upper bound, or one expanded uncertainty.
-    digits : int, optional
-        Decimals; None for four significant digits.
+def probability(value: SupportsFloat) -> Number:
+    """Text of a p-value."""
+    return Number("< 0.001") if float(value) < 0.001 else number(value)
+
+
+def to(bounds: Iterable[SupportsFloat], form: Form = number) -> Number:
+    """Text of an interval, or a dash.
 
     Examples
     --------
-    >>> text(0.481, (0.421, 0.549)), text(float("nan"), (0.421, 0.549)), text(0.481)
-    ('0.481 (0.421 to 0.549)', '0.421 to 0.549', '0.481')
-    >>> text(2255.3387, (1159.329,)), text(0.01234, (0.00056,)), text(2255.3387, digits=None)
-    ('2300 ± 1200', '0.01234 ± 0.00056', '2255')
+    >>> to([0.421, 0.549]), to([2255.3, 3000.1], short), to([0.4, float("nan")])
+    ('0.421 to 0.549', '2255 to 3000', '–')
     """
-    value = float(value)
-    known = bounds is not None and bool(np.isfinite(bounds).all())
-    if bounds is not None and len(bounds) == 1:
-        if not (known and np.isfinite(value)):
-            return MISSING
-        places = 1 - int(np.floor(np.log10(bounds[0]))) if bounds[0] > 0 else 6
-        both = (round(each, places) for each in (value, bounds[0]))
-        return " ± ".join(number(each, max(places, 0)) for each in both)
-    shown = [f"{each:.4g}" if digits is None else number(each, digits) for each in bounds or ()]
-    whole = f"{value:.4g}" if digits is None and np.isfinite(value) else number(value, digits or 0)
-    if not known:
-        return whole
-    return f"{whole} ({' to '.join(shown)})" if np.isfinite(value) else " to ".join(shown)
+    texts = [form(each) for each in bounds]
+    return MISSING if MISSING in texts else Number(" to ".join(texts))
 
 
-def change(*ratios: float) -> str:
+def interval(at: xr.Dataset, key: str, form: Form = number) -> Number:
+    """Text of the bounds ``KEY_lower`` and ``KEY_upper``."""
+    return to([at[f"{key}_{bound}"] for bound in ("lower", "upper")], form)
+
+
+def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = number) -> Number:
+    """Text of a number, and of others that belong to it, such as bounds, in brackets.
+
+    Examples
+    --------
+    >>> beside(0.481, 0.421, 0.549), beside(-20.4, -35.0, 5.0, form=signed)
+    ('0.481 [0.421, 0.549]', '-20 [-35, +5]')
+    """
+    return Number(f"{form(value)} [{', '.join(map(form, others))}]")
+
+
+def uncertain(value: SupportsFloat, uncertainty: SupportsFloat) -> Number:
+    """Text of a value ± its uncertainty, which has two digits, and the value as many decimals.
+
+    Examples
+    --------
+    >>> uncertain(2255.3387, 1159.329), uncertain(0.01234, 0.00056)
+    ('2300 ± 1200', '0.01234 ± 0.00056')
+    """
+    both = [float(value), float(uncertainty)]
+    if not np.isfinite(both).all():
+        return MISSING
+    places = 1 - int(np.floor(np.log10(both[1]))) if both[1] > 0 else 6
+    return Number(" ± ".join(numbers([round(each, places) for each in both], max(places, 0))))
+
+
+def change(*ratios: SupportsFloat) -> Number:
     """Text of one error over another, or of an interval: in percent, or how many times from 2 on.
 
     Examples
@@ -183,21 +259,25 @@ def change(*ratios: float) -> str:
     >>> change(0.4), change(1.1), change(14.57), change(2.1, 3.05), change(float("nan"))
     ('−60 %', '+10 %', '14.6 times', '2.1 to 3.05 times', '–')
     """
-    if not np.isfinite(ratios).all():
+    values = [float(each) for each in ratios]
+    if not np.isfinite(values).all():
         return MISSING
-    if round(max(ratios), 2) >= 2:
-        return " to ".join(f"{each:.3g}" for each in ratios) + " times"
-    return " to ".join(signed(100 * (each - 1), 0) for each in ratios).replace("-", "−") + " %"
+    if round(max(values), 2) >= 2:
+        return Number(f"{to(values, lambda each: short(each, 3))} times")
+    return Number(f"{to([100 * (each - 1) for each in values], signed)} %".replace("-", "−"))
 
 
-def interval(at: xr.Dataset, key: str, value: SupportsFloat = np.nan) -> str:
-    """Text of the bounds ``KEY_lower`` and ``KEY_upper``, behind a value where one is given."""
-    return text(value, [float(at[f"{key}_{bound}"]) for bound in ("lower", "upper")])
+def band_verdict(inside: float, level: float) -> str:
+    """Whether a band holds the part of the instants that it claims, in words.
 
-
-def probability(value: SupportsFloat) -> str:
-    """Text of a p-value."""
-    return "< 0.001" if float(value) < 0.001 else number(value)
+    Examples
+    --------
+    >>> band_verdict(0.93, 0.95), band_verdict(0.8, 0.95), band_verdict(0.6, 0.95)
+    ('which is what it claims', 'not what it claims', 'far too little')
+    """
+    if abs(inside - level) <= 0.05:
+        return "which is what it claims"
+    return "far too little" if inside < level - 0.2 else "not what it claims"
 
 
 def plain_cell(text: str) -> str:
@@ -217,11 +297,9 @@ def plain_cell(text: str) -> str:
 
 def write_csv(table: Table, path: Path) -> Path:
     """Write a table as CSV (UTF-8)."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerows([*map(plain_cell, row)] for row in (table.columns, *table.rows))
-    with replacing(path) as temporary:
-        temporary.write_text(buffer.getvalue(), encoding="utf-8")
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerows([*map(plain_cell, row)] for row in (table.columns, *table.rows))
     return path
 
 
@@ -231,45 +309,44 @@ def rich_tables(table: Table, width: int) -> list[RichTable]:
     Text wraps between words, numbers are never cut: columns that do not fit stand in further
     blocks, with the columns before the first number again.
     """
-    least = [_least_width(table, k) for k in range(len(table.columns))]
-    first = min(table.numeric, default=len(least))
-    blocks: list[list[int]] = [[*range(first)]]
-    for k in range(first, len(least)):
-        if len(blocks[-1]) > first and _drawn_width(least, [*blocks[-1], k]) > width:
+    from rich import box
+    from rich.table import Table as RichTable
+
+    columns = range(len(table.columns))
+    least = [_least_width(table, k) for k in columns]
+    first = min(table.numbers, default=len(columns))
+
+    def room(block: Iterable[int]) -> int:
+        return width - 1 - sum(least[k] + 2 for k in block)  # two spaces behind each column
+
+    blocks = [[*range(first)]]
+    for k in columns[first:]:
+        if len(blocks[-1]) > first and room([*blocks[-1], k]) < 0:
             blocks.append([*range(first)])
         blocks[-1].append(k)
-    return [_rich_table(table, block, least, width) for block in blocks]
-
-
-def _drawn_width(widths: Sequence[int], columns: Iterable[int]) -> int:
-    return 1 + sum(widths[k] + 2 for k in columns)  # a space, and two behind each column
+    out = []
+    for block in blocks:
+        left, each = max(room(block), 0), RichTable(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+        for k in block:
+            head = table.columns[k]
+            wanted = max(map(len, [head, *(row[k] for row in table.rows)])) - least[k]
+            more = min(left, max(wanted, 0))
+            left -= more
+            side: JustifyMethod = "right" if k in table.numbers else "left"
+            each.add_column(head, justify=side, width=least[k] + more, overflow="fold")
+        for number, row in enumerate(table.rows):
+            bold = "bold" if number in table.averages else None
+            each.add_row(*(row[k] for k in block), style=bold)
+        out.append(each)
+    return out
 
 
 def _least_width(table: Table, k: int) -> int:
     """Characters that a column needs: of its longest number, or of its longest word."""
-    whole = k in table.numeric
+    whole = k in table.numbers
     words = [word for row in table.rows for word in ([row[k]] if whole else row[k].split())]
     longest = max(map(len, [*words, *table.columns[k].split()]), default=0)
     return longest if whole else min(longest, NAME)
-
-
-def _rich_table(
-    table: Table, columns: Sequence[int], least: Sequence[int], width: int
-) -> RichTable:
-    from rich import box
-    from rich.table import Table as RichTable
-
-    out = RichTable(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    room = max(width - _drawn_width(least, columns), 0)
-    for k in columns:
-        longest = max(map(len, [table.columns[k], *(row[k] for row in table.rows)]))
-        more = min(room, max(longest - least[k], 0))
-        room -= more
-        justify: JustifyMethod = "right" if k in table.numeric else "left"
-        out.add_column(table.columns[k], justify=justify, width=least[k] + more, overflow="fold")
-    for k, row in enumerate(table.rows):
-        out.add_row(*(row[j] for j in columns), style="bold" if k in table.averages else None)
-    return out
 
 
 _LATEX = {
@@ -343,6 +420,6 @@ def _latex_columns(table: Table) -> str:
     return "".join(
         rf"p{{{part * length:.2f}\linewidth}}"
         if breaks and length > WIDE
-        else "lr"[k in table.numeric]
+        else "lr"[k in table.numbers]
         for k, length in enumerate(longest)
     )

@@ -1,97 +1,217 @@
-"""Errors over the age of a forecast and against what was drawn; densities; eigenvalues."""
+"""Errors: of cells, runs, members and settings, over the age of a forecast, and densities."""
 
 from __future__ import annotations
 
+import textwrap
 import warnings
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 import scipy
+import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.report.figures.common import (
-    grid_of_axes,
+from seakeep.report.style import (
+    COLOURS,
+    DASHED,
+    HEADING,
+    PALETTE,
+    SERIES,
+    figure_style,
     judged_models,
     legend_outside,
     line_of,
-    model_colour,
     model_words,
+    new_figure,
+    panels,
+    plain_text,
     short_label,
 )
-from seakeep.report.style import COLOURS, PALETTE, figure_style, new_figure
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = [
-    "BAND_WORDS",
-    "LOWEST",
-    "density_figure",
-    "eigenvalue_figure",
-    "error_over_time_figure",
-    "hyperparameter_figure",
-    "member_errors",
-]
+    from seakeep.report.style import Places
 
-
+NARROW = 14
+"""Letters of a test set's label on one line."""
+FEWEST = 10
+"""Values from which on a density is drawn; of fewer, points and box alone."""
+HATCHES = ("", "////", "----", "xxxx", "\\\\\\\\")
+"""Of the boxes of one model after the other."""
+JITTER = np.random.default_rng(7).uniform(-1, 1, 4096)
+"""Sideways places of the single values; the same in every figure."""
+DECADE = 10.0
+"""Ratio of the channels' medians from which on an axis is logarithmic."""
 BAND_WORDS = {"all": "all frequencies", "low": "low frequencies", "wave": "wave frequencies"}
 """Bands of ε(t)."""
-
 HYPERPARAMETERS = {
     "window": "training length",
     "state_delays": "state delay",
     "input_delays": "input delay",
     "ridge": "ridge λ",
 }
-
-
 LOWEST = 0.8
 """Modulus at which the axis ends; what lies below dies out within a few samples."""
 
 
+def draw_box_violin(
+    axes: Any,
+    values: npt.ArrayLike,
+    place: float,
+    width: float,
+    colour: str,
+    hatch: str = "",
+    label: str | None = None,
+) -> float:
+    """Draw one box-violin and return its upper whisker; the hatch sets models apart in grey print.
+
+    A logarithmic axis shows no violin, and no values that are not positive.
+    """
+    logarithmic = axes.get_yscale() == "log"
+    x = np.asarray(values, dtype=float).ravel()
+    x = x[np.isfinite(x) & (not logarithmic or x > 0)]
+    if x.size == 0:
+        return 0.0
+    sideways = place + 0.16 * width * np.resize(JITTER, x.size)
+    axes.scatter(sideways, x, s=7, color=colour, alpha=0.5, linewidths=0, rasterized=True, zorder=2)
+    if x.size >= FEWEST and np.ptp(x) > 0 and not logarithmic:
+        violin = axes.violinplot([x], [place], widths=width, showextrema=False, points=120)
+        for body in violin["bodies"]:
+            body.set(facecolor=colour, edgecolor=colour, alpha=0.18, linewidth=0.6)
+    line = {"color": colour, "linewidth": 0.9}
+    box = {"facecolor": "white", "edgecolor": colour, "hatch": hatch, "alpha": 0.75, "label": label}
+    drawn = axes.boxplot(
+        [x], positions=[place], widths=0.26 * width, capwidths=0.16 * width, showfliers=False,
+        patch_artist=True, manage_ticks=False, zorder=3, boxprops=box, whiskerprops=line,
+        capprops=line, medianprops={"color": colour, "linewidth": 1.8, "solid_capstyle": "butt"},
+    )  # fmt: skip
+    return float(drawn["whiskers"][1].get_ydata()[1])
+
+
+def _cells(result: StudyResult, test: str, model: str, measure: str) -> FloatArray:
+    """Errors of all judged cells, shape (cell, channel)."""
+    data = result.tests[test]
+    errors = data["error"].sel(model=model, measure=measure).values
+    cells: FloatArray = errors[data["judged"].values]
+    return cells
+
+
+@figure_style()
+def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
+    """ANRMSE and NAMMAE of all cells of some test sets, a box-violin per model."""
+    figure = new_figure(max(8.5, 2.0 + 1.7 * len(tests)), 3.6)
+    labels = [_narrow(result.label_of(test)) for test in tests]
+    for axes, (measure, heading) in zip(figure.subplots(1, 2), HEADING.items(), strict=True):
+        columns = {
+            model: [average_of(_cells(result, test, model, measure)) for test in tests]
+            for model in result.models
+        }
+        _draw_boxes(axes, result, columns, labels, heading)
+    legend_outside(figure, axes, side="upper right")
+    return figure
+
+
+@figure_style()
+def channel_boxes(result: StudyResult, test: str) -> Figure:
+    """NRMSE and NAMMAE of all cells of a test set, channel by channel."""
+    figure = new_figure(8.5, 5.6)
+    models, labels = judged_models(result), [short_label(name) for name in result.channels]
+    errors = [[_cells(result, test, model, measure) for model in models] for measure in HEADING]
+    scale = "log" if any(_spans_decades(np.concatenate(cells)) for cells in errors) else "linear"
+    for axes, measure, cells in zip(
+        figure.subplots(2, 1, sharex=True), HEADING, errors, strict=True
+    ):
+        axes.set_yscale(scale)
+        columns = {model: [*each.T] for model, each in zip(models, cells, strict=True)}
+        _draw_boxes(axes, result, columns, labels, measure.upper())
+    legend_outside(figure, axes, side="upper right")
+    return figure
+
+
+def _spans_decades(cells: FloatArray) -> bool:
+    """Whether the channels' medians differ by so much that a common axis would hide most."""
+    known = cells[:, np.isfinite(cells).any(axis=0)]
+    medians = np.nanmedian(known, axis=0)
+    return bool(known.size and medians.max() > DECADE * np.median(medians))
+
+
+def _draw_boxes(
+    axes: Any,
+    result: StudyResult,
+    columns: Mapping[str, Sequence[FloatArray]],
+    labels: Sequence[str],
+    heading: str,
+) -> None:
+    """Draw the box-violins of models beside each other at each label."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    width, tallest = 0.84 / len(columns), 0.0
+    for number, (model, of_model) in enumerate(columns.items()):
+        first = width * (number - 0.5 * (len(columns) - 1))
+        look = line_of(result, model)["color"], HATCHES[number % len(HATCHES)]
+        for place, values in enumerate(of_model):
+            label = None if place else model_words(model)
+            whisker = draw_box_violin(axes, values, first + place, 0.92 * width, *look, label)
+            tallest = max(tallest, whisker)
+    axes.set_xticks(range(len(labels)), labels)
+    axes.set_xlim(-0.6, len(labels) - 0.4)
+    axes.set_ylabel(f"{heading} [measured SD]")
+    axes.grid(axis="x", visible=False)
+    if axes.get_yscale() == "log":
+        every = np.concatenate([each for of_model in columns.values() for each in of_model])
+        low, high = 0.8 * every[every > 0].min(), 1.25 * np.nanmax(every)
+        axes.set_ylim(low, high)
+        if high < 100.0 * low:
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.set_title("logarithmic axis", loc="right", fontsize=7)
+    elif 0 < 3 * tallest < axes.get_ylim()[1]:
+        axes.set_ylim(0, 1.15 * tallest)
+        axes.set_title("values above the axis are not shown", loc="right", fontsize=7)
+    else:
+        axes.set_ylim(bottom=0)
+
+
+def _narrow(label: str) -> str:
+    """A label in lines, parted behind its commas first."""
+    if len(label) <= NARROW:
+        return label
+    return "\n".join(textwrap.fill(part, NARROW) for part in label.replace(", ", ",\n").split("\n"))
+
+
+@figure_style()
 def error_over_time_figure(result: StudyResult) -> Figure:
     """ε(t) of each test set, whole and in bands: mean over all cells with its quartiles."""
-    from matplotlib.lines import Line2D
-
-    with figure_style():
-        tests = list(result.tests)
-        figure = new_figure(8.5, 0.7 + 2.1 * len(tests))
-        grid = figure.subplots(len(tests), len(BAND_WORDS), squeeze=False, sharey="row")
-        for row, test in zip(grid, tests, strict=True):
-            trend = result.groups["statistics/trend"].sel(test=test)
-            tallest = 0.0
-            for each, (band, words) in zip(row, BAND_WORDS.items(), strict=True):
-                tallest = max(tallest, _draw_band(each, result, trend.sel(band=band)))
-                each.set_title(words, loc="left", fontsize=8)
-                each.legend(fontsize=6.5, loc="upper left")
-            row[0].set_ylim(0, 1.6 * tallest if tallest else None)
-            row[0].set_ylabel(f"{result.label_of(test)}\nε [measured SD]")
-        for each in grid[-1]:
-            each.set_xlabel("time in encounter periods")
-        handles = [
-            Line2D([], [], **line_of(result, m), label=model_words(m))
-            for m in judged_models(result)
-        ]
-        figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 5))
-        return figure
-
-
-def _draw_band(axes: Any, result: StudyResult, trend: Any) -> float:
-    """Draw ε(t) of a band for all models; return the largest mean."""
-    time = trend["time"].values / float(result.attrs["encounter_period"])
-    tallest = 0.0
-    for model in judged_models(result):
-        at = trend.sel(model=model)
-        style = line_of(result, model)
-        lower, upper = at["lower_quartile"].values, at["upper_quartile"].values
-        axes.fill_between(time, lower, upper, color=style["color"], alpha=0.15, lw=0)
-        p = float(at["p_value"])
-        words = "trend p < 0.01" if p < 0.01 else f"trend p = {p:.2f}"
-        axes.plot(time, at["error_mean"].values, label=words, **style)
-        tallest = max(tallest, float(np.nanmax(at["error_mean"].values, initial=0.0)))
-    return tallest
+    tests, models = list(result.tests), judged_models(result)
+    lines = {model: line_of(result, model) for model in models}
+    figure = new_figure(8.5, 0.7 + 2.1 * len(tests))
+    grid = figure.subplots(len(tests), len(BAND_WORDS), squeeze=False, sharey="row")
+    for row, test in zip(grid, tests, strict=True):
+        trend = result.groups["statistics/trend"].sel(test=test)
+        time = trend["time"].values / float(result.attrs["encounter_period"])
+        tallest = float(trend["error_mean"].sel(model=models).max())
+        for axes, (band, words) in zip(row, BAND_WORDS.items(), strict=True):
+            for model, line in lines.items():
+                at = trend.sel(band=band, model=model)
+                quartiles = (at[f"{side}_quartile"] for side in ("lower", "upper"))
+                axes.fill_between(time, *quartiles, color=line["color"], alpha=0.15, linewidth=0)
+                p = float(at["p_value"])
+                words_of_p = "p < 0.01" if p < 0.01 else f"p = {p:.2f}"
+                label = f"{model_words(model)}, trend {words_of_p}"
+                axes.plot(time, at["error_mean"], label=label, **line)
+            axes.set_title(words, loc="left", fontsize=8)
+            axes.legend(fontsize=6.5, loc="upper left")
+        row[0].set_ylim(0, 1.6 * tallest if tallest > 0 else None)
+        row[0].set_ylabel(f"{result.label_of(test)}\nε [measured SD]")
+    for axes in grid[-1]:
+        axes.set_xlabel("time in encounter periods")
+    return figure
 
 
 def member_errors(result: StudyResult, test: str, model: str) -> FloatArray:
@@ -106,110 +226,225 @@ def member_errors(result: StudyResult, test: str, model: str) -> FloatArray:
     return out
 
 
+@figure_style()
 def hyperparameter_figure(result: StudyResult, model: str) -> Figure:
     """Error of each member against what was drawn for it, a row per test set."""
-    with figure_style():
-        draws = result.groups[f"draws/{model}"]
-        drawn = [name for name in HYPERPARAMETERS if np.ptp(draws[name].values) > 0]
-        tests = list(result.tests)
-        figure = new_figure(8.5, 0.5 + 1.9 * len(tests))
-        axes = figure.subplots(len(tests), max(len(drawn), 1), squeeze=False, sharey="row")
-        for row, test in zip(axes, tests, strict=True):
-            errors = member_errors(result, test, model)
-            for each, name in zip(row, drawn, strict=False):
-                _scatter(each, draws[name].values, errors, model_colour(result, model))
-            row[0].set_ylabel(f"{result.label_of(test)}\nANRMSE")
-        for each, name in zip(axes[-1], drawn, strict=False):
-            unit = "" if name == "ridge" else f" [{draws[name].attrs['units']}]"
-            each.set_xlabel(HYPERPARAMETERS[name] + unit)
-        return figure
+    draws, tests = result.groups[f"draws/{model}"], list(result.tests)
+    drawn = [name for name in HYPERPARAMETERS if np.ptp(draws[name].values) > 0]
+    colour = line_of(result, model)["color"]
+    figure = new_figure(8.5, 0.5 + 1.9 * len(tests))
+    grid = figure.subplots(len(tests), max(len(drawn), 1), squeeze=False, sharey="row")
+    for row, test in zip(grid, tests, strict=True):
+        errors = member_errors(result, test, model)
+        known = np.isfinite(errors)
+        for axes, name in zip(row, drawn, strict=False):
+            x = draws[name].values
+            axes.scatter(x, errors, s=9, color=colour, alpha=0.6, linewidths=0)
+            if known.sum() > 2 and np.ptp(errors[known]) > 0:
+                rank = float(scipy.stats.spearmanr(x[known], errors[known]).statistic)
+                axes.set_title(f"rank correlation {rank:+.2f}", loc="right", fontsize=7, pad=2)
+        row[0].set_ylabel(f"{result.label_of(test)}\nANRMSE")
+    for axes, name in zip(grid[-1], drawn, strict=False):
+        unit = "" if name == "ridge" else f" [{draws[name].attrs['units']}]"
+        axes.set_xlabel(HYPERPARAMETERS[name] + unit)
+    return figure
 
 
-def _scatter(axes: Any, drawn: FloatArray, errors: FloatArray, colour: str) -> None:
-    axes.scatter(drawn, errors, s=9, color=colour, alpha=0.6, linewidths=0)
-    known = np.isfinite(errors)
-    if known.sum() > 2 and np.ptp(errors[known]) > 0:
-        rank = float(scipy.stats.spearmanr(drawn[known], errors[known]).statistic)
-        axes.set_title(f"rank correlation {rank:+.2f}", loc="right", fontsize=7, pad=2)
-
-
+@figure_style()
 def density_figure(result: StudyResult, model: str) -> Figure:
     """Density of each channel, measured and predicted, each with its 95 % band."""
-    with figure_style():
-        data = result.groups["statistics/densities"].sel(model=model)
-        names = result.channels
-        figure = new_figure(8.5, 0.5 + 1.75 * -(-len(names) // 4))
-        axes = grid_of_axes(figure, len(names), 4)
-        sides = (
-            ("measured", "measured", COLOURS["measured"], "-"),
-            ("predicted", model_words(model), model_colour(result, model), (0, (4, 1.5))),
-        )
-        for each, name in zip(axes, names, strict=True):
-            _draw_density(each, data.sel(channel=name), name, sides)
-        legend_outside(figure, axes[0], side="upper right")
-        return figure
-
-
-def _draw_density(axes: Any, curves: Any, name: str, sides: Any) -> None:
-    x = curves["value"].values
-    centre, spread = np.nan, np.nan
-    weight = curves["measured_mean"].values
-    if np.isfinite(x).all():
+    data = result.groups["statistics/densities"].sel(model=model)
+    colour = line_of(result, model)["color"]
+    sides = (
+        ("measured", "measured", COLOURS["measured"], "-"),
+        ("predicted", model_words(model), colour, DASHED),
+    )
+    figure, places = panels(None, len(result.channels), 4, (2.125, 1.75))
+    for axes, name in zip(places, result.channels, strict=True):
+        curves = data.sel(channel=name)
+        x, weight = curves["value"].values, curves["measured_mean"].values
         weight = weight / weight.sum()
-        centre = float((x * weight).sum())
-        spread = float(np.sqrt((weight * (x - centre) ** 2).sum()))
-    for key, words, colour, dash in sides:
-        z = (x - centre) / spread
-        lower, mean, upper = (
-            curves[f"{key}_{k}"].values * spread for k in ("lower", "mean", "upper")
-        )
-        axes.fill_between(z, lower, upper, color=colour, alpha=0.22, linewidth=0)
-        axes.plot(z, mean, color=colour, linestyle=dash, linewidth=1.3, label=words)
-    axes.set_title(short_label(name), loc="left", pad=2)
-    axes.set_yticks([])
-    axes.set_ylim(bottom=0)
-    axes.set_xlabel("measured SD from the mean", fontsize=7)
-    axes.tick_params(labelsize=7)
+        centre = (x * weight).sum()
+        spread = np.sqrt((weight * (x - centre) ** 2).sum())
+        for key, words, tint, dash in sides:
+            lower, mean, upper = (spread * curves[f"{key}_{k}"] for k in ("lower", "mean", "upper"))
+            z = (x - centre) / spread
+            axes.fill_between(z, lower, upper, color=tint, alpha=0.22, linewidth=0)
+            axes.plot(z, mean, color=tint, linestyle=dash, linewidth=1.3, label=words)
+        axes.set_title(short_label(name), loc="left", pad=2)
+        axes.set_yticks([])
+        axes.set_ylim(bottom=0)
+        axes.set_xlabel("measured SD from the mean", fontsize=7)
+        axes.tick_params(labelsize=7)
+    legend_outside(figure, places[0], side="upper right")
+    return figure
 
 
+@figure_style()
 def eigenvalue_figure(result: StudyResult) -> Figure:
     """Eigenvalues of each model of the first training set, for an ensemble those of all members."""
-    with figure_style():
-        figure = new_figure(8.5, 3.0)
-        plane, decay = figure.subplots(1, 2)
-        circle = np.exp(1j * np.linspace(0, np.pi, 400))
-        plane.plot(circle.real, circle.imag, color=PALETTE["slate"], linewidth=0.8)
-        order = sorted(judged_models(result), key=lambda model: not result.is_ensemble(model))
-        for model in order:
-            data = result.groups[f"eigenvalues/{model}"]
-            values = (data["real"].values + 1j * data["imag"].values).ravel()
-            values = values[np.isfinite(values) & (values.imag >= 0)]
-            _draw_eigenvalues(plane, decay, values, result, model)
-        plane.set_aspect("equal")
-        plane.set_ylim(0, 1.05)
-        plane.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0])
-        plane.set(xlabel="real part", ylabel="imaginary part")
-        decay.axhline(1.0, color=PALETTE["slate"], linewidth=0.8)
-        decay.set(xlabel="frequency [Hz]", ylabel="modulus")
-        decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
-        decay.set_ylim(LOWEST, 1.01)
-        legend = legend_outside(figure, decay, side="upper right", markerscale=2)
-        for handle in filter(None, legend.legend_handles):
-            handle.set_alpha(0.9)
-        return figure
+    figure = new_figure(8.5, 3.0)
+    plane, decay = figure.subplots(1, 2)
+    circle = np.exp(1j * np.linspace(0, np.pi, 400))
+    plane.plot(circle.real, circle.imag, color=PALETTE["slate"], linewidth=0.8)
+    for model in sorted(judged_models(result), key=lambda model: not result.is_ensemble(model)):
+        data, single = result.groups[f"eigenvalues/{model}"], not result.is_ensemble(model)
+        values = (data["real"].values + 1j * data["imag"].values).ravel()
+        values = values[np.isfinite(values) & (values.imag >= 0)]
+        style = {
+            "s": 9 if single else 5,
+            "color": line_of(result, model)["color"],
+            "alpha": 0.9 if single else float(np.clip(12 / data.sizes["member"], 0.12, 0.6)),
+            "linewidths": 0,
+            "rasterized": True,
+            "label": model_words(model),
+        }
+        plane.scatter(values.real, values.imag, **style)
+        frequency = np.angle(values) / (2 * np.pi * float(result.attrs["dt"]))
+        decay.scatter(frequency, np.abs(values), **style)
+    plane.set(aspect="equal", ylim=(0, 1.05), xticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
+    plane.set(xlabel="real part", ylabel="imaginary part")
+    decay.axhline(1.0, color=PALETTE["slate"], linewidth=0.8)
+    decay.set(xlabel="frequency [Hz]", ylabel="modulus", ylim=(LOWEST, 1.01))
+    decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
+    legend = legend_outside(figure, decay, side="upper right", markerscale=2)
+    for handle in filter(None, legend.legend_handles):
+        handle.set_alpha(0.9)
+    return figure
 
 
-def _draw_eigenvalues(plane: Any, decay: Any, values: Any, result: StudyResult, model: str) -> None:
-    single = not result.is_ensemble(model)
-    members = result.groups[f"eigenvalues/{model}"].sizes["member"]
-    style = {
-        "s": 9 if single else 5,
-        "color": model_colour(result, model),
-        "alpha": 0.9 if single else float(np.clip(12 / members, 0.12, 0.6)),
-        "linewidths": 0,
-        "rasterized": True,
-        "label": model_words(model),
-    }
-    plane.scatter(values.real, values.imag, **style)
-    frequency = np.angle(values) / (2 * np.pi * float(result.attrs["dt"]))
-    decay.scatter(frequency, np.abs(values), **style)
+@figure_style()
+def errors(table: xr.Dataset, *, axes: Places = None) -> Figure:
+    """Draw the NRMSE of each channel with its interval, run by run.
+
+    Parameters
+    ----------
+    table : Dataset
+        From :func:`seakeep.study.comparison_table`.
+    axes : Axes, optional
+        One; by default that of a new figure.
+
+    Returns
+    -------
+    Figure
+    """
+    labels = [short_label(str(name)) for name in table["channel"].values]
+    figure, (place,) = panels(axes, 1, 1, (max(4.0, 1.2 + 0.8 * len(labels)), 2.8))
+    _draw_points(place, table.transpose("run", ...), "run", "nrmse", labels)
+    place.set_ylim(bottom=0)
+    place.set_ylabel("NRMSE [SD], 95 % intervals")
+    if axes is None and table.sizes["run"] > 1:
+        legend_outside(figure, place)
+    return figure
+
+
+@figure_style()
+def error_figure(table: xr.Dataset) -> Figure:
+    """ANRMSE of each model in each run with its interval, by wave period.
+
+    The table is that of :func:`seakeep.study.difference_table`.
+    """
+    table = table.isel(run=np.argsort(table["wave_period"].values, kind="stable"))
+    labels = [
+        plain_text(str(run)) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
+        for run, period in zip(table["run"].values, table["wave_period"].values, strict=True)
+    ]
+    figure = new_figure(max(4.5, 1.5 + 0.8 * len(labels)), 3.2)
+    axes = figure.subplots()
+    _draw_points(axes, table, "model", "anrmse", labels)
+    axes.tick_params(axis="x", labelrotation=45 if len(labels) > 8 else 0)
+    found = table["anrmse"].values[np.isfinite(table["anrmse"].values)]
+    if found.size and 0.0 < 10.0 * found.min() < found.max():
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(bottom=0.0)
+    axes.set(xlabel="run, and mean period of its waves", ylabel="ANRMSE [SD], 95 %")
+    legend_outside(figure, axes)
+    return figure
+
+
+def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Sequence[str]) -> None:
+    """Draw an error with its interval at each label, entries of a dimension beside each other."""
+    names = [str(each) for each in table[dim].values]
+    for number, name in enumerate(names):
+        at = table.sel({dim: name})
+        reach = [np.abs(at[f"{key}_{bound}"] - at[key]) for bound in ("lower", "upper")]
+        place = np.arange(len(labels)) + 0.7 * ((number + 0.5) / len(names) - 0.5)
+        style = {**SERIES[number % len(SERIES)], "linestyle": "none", "elinewidth": 0.9}
+        axes.errorbar(place, at[key], reach, label=plain_text(name), markersize=4, **style)
+    axes.set_xticks(range(len(labels)), labels)
+
+
+@figure_style()
+def nowcast_figure(found: Mapping[str, xr.Dataset], run: str) -> Figure:
+    """Error, and the model's own estimate of it, against lead time, a panel per channel."""
+    first = next(iter(found.values()))
+    names, share = list(map(str, first["channel"].values)), float(first.attrs["share"])
+    figure, places = panels(None, len(names), 4, (2.125, 1.7))
+    for axes, name in zip(places, names, strict=True):
+        for number, (model, of_model) in enumerate(found.items()):
+            at, style = of_model.sel(run=run, channel=name), SERIES[1 + number % (len(SERIES) - 1)]
+            line = {"color": style["color"], "linestyle": style["linestyle"] if number else "-"}
+            axes.plot(at["lead"], at["error"], **line, label=f"{model}: error")
+            claimed = {"color": style["color"], "linewidth": 0.7, "alpha": 0.7}
+            axes.plot(at["lead"], at["claimed"], **claimed, label=f"{model}: claimed")
+        axes.axhline(share, color="0.4", linewidth=0.8, linestyle=":", label=f"{share:g} SD")
+        axes.set_title(short_label(name), loc="left", fontsize=8)
+        axes.set(xlim=(0, float(first["lead"].max())), xlabel="lead time [s]")
+        axes.set_ylim(bottom=0)
+        if axes.get_subplotspec().is_first_col():
+            axes.set_ylabel("error [training SD]")
+    legend_outside(figure, places[0], side="upper right")
+    return figure
+
+
+@figure_style()
+def tuning_figure(table: xr.Dataset) -> Figure:
+    """Draw the table of :func:`seakeep.tune`.
+
+    Parameters
+    ----------
+    table : Dataset
+        Over ``trial``: settings, ``ridge``, ``score``, ``lower``, ``upper``, ``chosen``.
+
+    Returns
+    -------
+    Figure
+        One line per candidate with its 95 % intervals; the choice is marked.
+    """
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    truncated = table["rank"].values > 0
+    kinds = [("ridge", "ridge per snapshot pair (1)", ~truncated)]
+    if truncated.any():
+        kinds.append(("rank", "singular values kept (1)", truncated))
+    keys = ("observables", "lead", "state_delays", "input_delays", "alignment")
+    varied = [key for key in keys if len(np.unique(table[key].values)) > 1]
+    names = [
+        ", ".join(f"{key.replace('_', ' ')} {table[key].values[row]}" for key in varied) or "error"
+        for row in range(table.sizes["trial"])
+    ]
+    figure = new_figure(7.0, 4.2)
+    ratios = [2, 1][: len(kinds)]
+    places = figure.subplots(1, len(kinds), sharey=True, squeeze=False, width_ratios=ratios)[0]
+    for axes, (key, words, rows) in zip(places, kinds, strict=True):
+        for number, name in enumerate(dict.fromkeys(names)):
+            part = table.isel(trial=np.flatnonzero((np.array(names) == name) & rows))
+            if part.sizes["trial"]:
+                line = {**SERIES[number % len(SERIES)], "linestyle": "-"}
+                axes.semilogx(part[key], part["score"], **line, markersize=4, label=name)
+                band = {"color": line["color"], "alpha": 0.12}
+                axes.fill_between(part[key], part["lower"], part["upper"], **band)
+        best = table.isel(trial=np.flatnonzero(table["chosen"].values & rows))
+        if best.sizes["trial"]:
+            ring = {"markersize": 11, "fillstyle": "none", "color": "k"}
+            axes.semilogx(best[key], best["score"], "o", **ring, label="chosen")
+        if key == "rank":  # few octaves, each with its number
+            axes.xaxis.set_major_locator(LogLocator(base=2))
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.set_xlabel(words)
+        axes.set_ylim(bottom=0.0)
+        axes.legend(fontsize="small")
+    places[0].set_ylabel("mean NRMSE of free runs (1)")
+    return figure

@@ -2,218 +2,128 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from seakeep.quality import findings_of
-from seakeep.report.figures.spectra import spectrum_figure
-from seakeep.report.quality_sheet import channel_rows, clock_rows, quality_figure
-from seakeep.report.section import Drawing, Section
+from seakeep.report.figures.runs import quality_figure, spectrum_figure
+from seakeep.report.page import Section, drawing, section
+from seakeep.report.quality_sheet import channel_rows, clock_rows, other_findings, run_row
 from seakeep.report.style import shown_unit
-from seakeep.report.tables import Table, number
+from seakeep.report.tables import Number, Table, number, percent, short, table
 from seakeep.study import StudyResult
 from seakeep.waves import phase_speed
-
-__all__ = ["data", "position_table", "wave_table", "waves"]
 
 
 def waves(result: StudyResult) -> Section | None:
     """Return the waves that were tested, where they were measured, and their spectra."""
-    tables = [wave_table(result)] if "spectra" in result.groups else []
-    tables += [positions] if (positions := position_table(result)) is not None else []
-    figures = []
+    tables, figures = wave_tables(result), []
     if "spectra" in result.groups:
         regular = bool(np.isfinite(result.groups["runs"]["wave_frequency"].values).any())
-        figures.append(
-            Drawing(
-                "spectrum",
-                "Power spectral density of the wave elevation: nominal where it is known, and "
-                "measured (mean over the irregular runs, or over all where none is) with the "
-                "paper's Welch segments and with long ones."
-                + (" Vertical lines: the regular waves." if regular else ""),
-                partial(spectrum_figure, result),
-            )
-        )
-    if not (tables or figures):
-        return None
-    return Section("waves", "Waves", figures=tuple(figures), tables=tuple(tables))
+        words = " Vertical lines: the regular waves." * regular
+        figures.append(drawing("spectrum", partial(spectrum_figure, result), {"regular": words}))
+    return section("waves", figures=figures, tables=tables) if tables else None
 
 
-def wave_table(result: StudyResult) -> Table:
-    """Waves of each run as they were measured, and what they are used for."""
-    runs, heights = result.groups["runs"], result.groups["spectra"]["significant_height"]
-    rows = []
-    for name in result.prepared:
-        at = runs.sel(run=name)
-        frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
-        speed = np.nan
-        if np.isfinite(frequency + depth):
-            speed = float(phase_speed(2 * np.pi * frequency, depth))
-        height = float(heights.sel(run=name))
-        # A sine has a height of 2√2 standard deviations, a sea one of 4.
-        height *= np.sqrt(0.5) if np.isfinite(frequency) else 1.0
-        spans = [
-            f"{use} {float(at[f'{use}_begin']):.0f} to {float(at[f'{use}_end']):.0f} s"
-            for use in ("train", "test")
-            if np.isfinite(at[f"{use}_begin"])
-        ]
-        rows.append(
-            (
-                name,
-                str(at["sea_state"].values) or str(at["waves"].values),
-                number(height),
-                number(frequency),
-                number(speed / frequency, 2),
-                number(speed, 2),
-                ", ".join(spans) or "test",
-            )
-        )
-    return Table(
-        "waves",
-        "Waves tested, as measured",
-        ("run", "sea", "height [m]", "frequency [Hz]", "length [m]", "phase speed [m/s]", "used"),
-        rows,
-        f"From {result.groups['spectra'].attrs['channel']}. Height: of regular waves 2√2, of a sea "
-        "4 standard deviations of the elevation. Length and speed: linear theory at the depth of "
-        "the campaign.",
-        (2, 3, 4, 5),
-    )
-
-
-def position_table(result: StudyResult) -> Table | None:
-    """Where the waves were measured; None where no position is known."""
-    run = next(iter(result.prepared.values()))
+def wave_tables(result: StudyResult) -> list[Table]:
+    """Waves of each run as they were measured, and where, as far as known."""
+    tables, run = [], next(iter(result.prepared.values()))
+    if "spectra" in result.groups:
+        tables.append(_wave_table(result))
     used = {str(name) for name in result.groups["channels"]["name"].values}
     rows = [
         (
             str(name),
             str(channel.attrs.get("long_name", name)),
-            f"{float(channel.attrs['x_position']):.2f}",
+            number(channel.attrs["x_position"], 2),
             "yes" if name in used else "",
         )
         for name, channel in run.data_vars.items()
         if "x_position" in channel.attrs
     ]
-    if not rows:
-        return None
-    return Table(
-        "positions",
-        "Positions of the wave probes",
-        ("channel", "words", "x [m]", "used"),
-        rows,
-        str(result.groups["channels"].attrs.get("frame", "")),
-        (2,),
-    )
+    if rows:
+        frame = str(result.groups["channels"].attrs.get("frame", ""))
+        tables.append(table("positions", rows, {"frame": frame}))
+    return tables
 
 
-def data(result: StudyResult) -> Section:
-    """Return channels, and what preparation found in each run."""
-    figures = tuple(
-        Drawing(
-            f"quality_{name}",
-            f"All channels of {name} after preparation, flagged samples marked; "
-            "tinted: a channel in which something was found.",
-            partial(quality_figure, run, {}),
-            raster=True,
-        )
-        for name, run in result.prepared.items()
-    )
-    tables = [_sign_table(result), _run_table(result)]
-    tables += [clocks] if (clocks := _clock_table(result)) is not None else []
-    tables += [_quality_table(result, name) for name in result.prepared]
-    return Section("data", "Data", figures=figures, tables=tuple(tables))
-
-
-def _sign_table(result: StudyResult) -> Table:
-    channels = result.groups["channels"]
-    rows = []
-    for name in map(str, channels["name"].values):
-        use, unit, positive, source = (
-            str(channels[key].sel(name=name).values)
-            for key in ("use", "units", "positive", "source")
-        )
-        rows.append((result.words_of(name), use, shown_unit(unit), positive, source))
-    frame = str(channels.attrs.get("frame", ""))
-    return Table(
-        "signs",
-        "Channels and signs",
-        ("channel", "use", "unit", "positive", "source"),
-        rows,
-        f"Frame: {frame}." if frame else "",
-    )
-
-
-def _run_table(result: StudyResult) -> Table:
-    runs, rows = result.groups["runs"], []
-    for name, run in result.prepared.items():
-        found = findings_of(run)
-        others = [
-            f"{each.channel}: {each.text}" for each in found if each.channel not in run.data_vars
-        ]
-        words = dict.fromkeys(
-            f"{each.channel.replace('_', ' ')} ({each.kind.word})" for each in found
+def _wave_table(result: StudyResult) -> Table:
+    spectra, rows = result.groups["spectra"], []
+    for name in result.prepared:
+        at = result.groups["runs"].sel(run=name)
+        frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
+        known = bool(np.isfinite(frequency + depth))
+        speed = float(phase_speed(2 * np.pi * frequency, depth)) if known else np.nan
+        # A sine has a height of 2√2 standard deviations, a sea one of 4.
+        factor = np.sqrt(0.5) if np.isfinite(frequency) else 1.0
+        spans = ", ".join(
+            f"{use} {float(at[f'{use}_begin']):.0f} to {float(at[f'{use}_end']):.0f} s"
+            for use in ("train", "test")
+            if np.isfinite(at[f"{use}_begin"])
         )
         rows.append(
             (
                 name,
-                str(runs["sea_state"].sel(run=name).values),
-                f"{float(run['time'][0]):.2f} to {float(run['time'][-1]):.2f} s",
-                str(len(found)),
-                ", ".join(words) or "none",
-                "; ".join(others),
+                str(at["sea_state"].values) or str(at["waves"].values),
+                number(factor * float(spectra["significant_height"].sel(run=name))),
+                number(frequency),
+                number(speed / frequency, 2),
+                number(speed, 2),
+                spans or "test",
             )
         )
-    return Table(
-        "runs",
-        "Data quality of the runs, as preparation found it",
-        ("run", "sea state", "part used", "findings", "channel (kind)", "findings of loggers"),
-        rows,
-        "Checks flag and report; nothing is repaired unless the campaign asks for it, and what was "
-        "repaired is in the tables below. A finding concerns the whole record, the part that is "
-        "cut off too.",
-        (3,),
-    )
+    return table("waves", rows, spectra.attrs)
 
 
-def _clock_table(result: StudyResult) -> Table | None:
-    rows = [(n, *row) for n, run in result.prepared.items() for row in clock_rows(run)]
-    if not rows:
-        return None
-    return Table(
-        "clocks",
-        "Clocks of the loggers against the reference",
-        ("run", "logger", "offset", "drift", "from"),
-        rows,
-        "Offset: what the logger's clock reads when the reference reads zero. n: pulses, windows "
-        "or samples that it rests on. ±: one standard error.",
-        folded=True,
-    )
+def data(result: StudyResult) -> Section:
+    """Return channels, and what preparation found in each run."""
+    figures = [
+        replace(
+            drawing("quality", partial(quality_figure, run, {}), {"run": name}, f"quality_{name}"),
+            raster=True,
+        )
+        for name, run in result.prepared.items()
+    ]
+    tables = [_sign_table(result), _run_table(result)]
+    clocks = [(n, *row) for n, run in result.prepared.items() for row in clock_rows(run)]
+    if clocks:
+        tables.append(table("clocks", clocks))
+    tables += [_quality_table(result, name) for name in result.prepared]
+    return section("data", figures=figures, tables=tables)
+
+
+def _sign_table(result: StudyResult) -> Table:
+    channels, rows = result.groups["channels"], []
+    for name in map(str, channels["name"].values):
+        at = channels.sel(name=name)
+        use, unit, *others = (str(at[k].values) for k in ("use", "units", "positive", "source"))
+        rows.append((result.words_of(name), use, shown_unit(unit), *others))
+    frame = channels.attrs.get("frame", "")
+    return table("signs", rows, {"frame": frame and f"Frame: {frame}."})
+
+
+def _run_table(result: StudyResult) -> Table:
+    rows = []
+    for name, run in result.prepared.items():
+        _, span, count, kinds = run_row(name, run)
+        sea = str(result.groups["runs"]["sea_state"].sel(run=name).values)
+        others = "; ".join(other_findings(run))
+        rows.append((name, sea, str(span), count, kinds.replace("_", " ") or "none", others))
+    return table("quality_of_runs", rows, name="runs")
 
 
 def _quality_table(result: StudyResult, name: str) -> Table:
     """Data quality of all channels of a run, those that the study does not use too."""
-    runs, used = result.groups["runs"], set(result.groups["runs"]["name"].values)
-    rows = []
-    for each in channel_rows(result.prepared[name]):
-        frozen = slack = ""
-        if each.channel in used:
+    runs, rows, channels = result.groups["runs"], [], channel_rows(result.prepared[name])
+    for each in channels:
+        use, frozen, slack = "", Number(), Number()
+        if each.channel in runs["name"].values:
             at = runs.sel(run=name, name=each.channel)
-            frozen = f"{100 * float(at['constant']):.2f}"
-            part = float(at["slack"])
-            slack = f"{100 * part:.1f}" if np.isfinite(part) else ""
-        low, high, mean, spread = (f"{value:.4g}" for value in each.numbers)
-        row = (each.words, "yes" if each.channel in used else "", each.unit, mean, spread)
-        rows.append((*row, low, high, frozen, slack, each.flagged, "; ".join(each.found)))
-    return Table(
-        f"quality_{name}",
-        f"Data quality of {name}, channel by channel (SI units)",
-        ("channel", "used", "unit", "mean", "SD", "min", "max", "frozen %", "slack %", "flagged",
-         "found, and done about it"),
-        rows,
-        "After preparation; no value that the study uses is missing, or it would have refused the "
-        "run. Frozen: samples equal to both neighbours. Slack: a load within the SD of its noise. "
-        "Flagged: fraction of the samples.",
-        (3, 4, 5, 6, 7, 8),
-        folded=True,
-    )  # fmt: skip
+            use, frozen = "yes", percent(at["constant"], 2)
+            slack = percent(at["slack"], 1) if np.isfinite(at["slack"]) else slack
+        low, high, *others = map(short, each.numbers)
+        row = (each.words, use, each.unit, *others, low, high, frozen, slack, each.flagged)
+        rows.append((*row, "; ".join(each.found)))
+    marked = [k for k, each in enumerate(channels) if each.found]
+    return table("quality", rows, {"run": name}, name=f"quality_{name}", marked=marked)

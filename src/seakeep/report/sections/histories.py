@@ -13,15 +13,11 @@ import xarray as xr
 
 from seakeep.conventions import displayed, is_elevation
 from seakeep.files import replacing
-from seakeep.report.figures.common import judged_models, line_of, model_words
 from seakeep.report.figures.histories import history_figure, shown_cells
-from seakeep.report.section import Drawing, Section
-from seakeep.report.style import shown_unit
+from seakeep.report.page import Section, drawing, section
+from seakeep.report.style import judged_models, line_of, model_words, shown_unit
 from seakeep.study import StudyResult
 
-__all__ = ["explorer", "histories", "history_data", "pack", "write_histories"]
-
-FOLDER = "histories"
 MOST_MEMBERS = 20
 """Members of a cell that are kept; a screen cannot show more."""
 MISSING = 65535
@@ -30,24 +26,19 @@ MISSING = 65535
 def explorer(result: StudyResult) -> Section | None:
     """Return the interactive plot: all windows and training sets."""
     data = history_data(result)
-    return Section("explore", "Time histories, interactive", histories=data) if data else None
+    return section("explore", histories=data) if data else None
 
 
 def histories(result: StudyResult) -> Section | None:
     """Return figures of the cells that are shown."""
     level = 100 * float(result.settings["statistics"]["level"])
     edges = ", and that band calibrated (dotted)" if result.is_calibrated else ""
-    figures = tuple(
-        Drawing(
-            f"history_{test}_{window:03d}",
-            f"Time histories, {result.label_of(test)}: deviations from the training mean in "
-            "training standard deviations; measured, deterministic forecast, and the ensemble's "
-            f"mean with its {level:g} % band{edges}.",
-            partial(history_figure, result, test, training, window),
-        )
-        for test, training, window in shown_cells(result)
-    )
-    return Section("histories", "Time histories", figures=figures) if figures else None
+    figures = []
+    for test, training, window in shown_cells(result):
+        draw = partial(history_figure, result, test, training, window)
+        words = {"test": result.label_of(test), "level": level, "edges": edges}
+        figures.append(drawing("history", draw, words, f"history_{test}_{window:03d}"))
+    return section("histories", figures=figures) if figures else None
 
 
 def pack(values: npt.ArrayLike) -> dict[str, Any]:
@@ -61,10 +52,9 @@ def pack(values: npt.ArrayLike) -> dict[str, Any]:
     """
     x = np.asarray(values, dtype=float).ravel()
     known = np.isfinite(x)
-    low, high = (float(f(x[known])) for f in (np.min, np.max)) if known.any() else (0.0, 1.0)
+    low, high = (float(x[known].min()), float(x[known].max())) if known.any() else (0.0, 1.0)
     step = (high - low) / (MISSING - 1) or 1.0
-    codes = np.full(x.size, MISSING, dtype="<u2")
-    codes[known] = np.rint((x[known] - low) / step).astype("<u2")
+    codes = np.where(known, np.rint((x - low) / step), MISSING).astype("<u2")
     return {"low": low, "high": high, "data": base64.b64encode(codes.tobytes()).decode()}
 
 
@@ -74,22 +64,26 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
     All other cells lie in files of :func:`write_histories`, which the page loads when they are
     chosen.
     """
-    shown = shown_cells(result)
-    if not shown:
+    cells = shown_cells(result)
+    if not cells:
         return None
-    test, training, window = shown[0]
-    names = list(result.tests)
-    channels, inputs = (
-        [_words(result, name) for name in group] for group in (result.channels, _elevations(result))
+    test, training, window = cells[0]
+    units = _shown(result)
+    channels, waves = (
+        [
+            {"name": name, "label": result.words_of(name), "unit": shown_unit(units[name][1])}
+            for name in group
+        ]
+        for group in (result.channels, _elevations(result))
     )
     return {
         "step": float(result.attrs["dt"]),
         "channels": channels,
-        "waves": inputs,
+        "waves": waves,
         "models": [_model(result, model) for model in judged_models(result)],
-        "tests": [_test(result, name) for name in names],
+        "tests": [_test(result, name) for name in result.tests],
         "open": {
-            "test": names.index(test),
+            "test": list(result.tests).index(test),
             "training": training,
             "window": window,
             "channel": result.channels.index("heave") if "heave" in result.channels else 0,
@@ -100,7 +94,7 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
 
 def write_histories(result: StudyResult) -> None:
     """Write every cell for the interactive plot, a script per test set and training set."""
-    folder = result.folder / FOLDER
+    folder = result.folder / "histories"
     folder.mkdir(exist_ok=True)
     for test, data in result.tests.items():
         for training, judged in enumerate(data["judged"].values):
@@ -113,25 +107,24 @@ def write_histories(result: StudyResult) -> None:
 
 def _elevations(result: StudyResult) -> list[str]:
     """Inputs that are wave elevations."""
-    channels = result.groups["channels"]
-    names = [str(name) for name in channels["name"].values]
+    names = map(str, result.groups["channels"]["name"].values)
     return [name for name in names if is_elevation(name)]
 
 
-def _words(result: StudyResult, name: str) -> dict[str, str]:
-    target = displayed(str(result.groups["channels"]["units"].sel(name=name).values))[1]
-    return {"name": name, "label": result.words_of(name), "unit": shown_unit(target)}
+def _shown(result: StudyResult) -> dict[str, tuple[float, str]]:
+    """Factor to the unit in which each channel is shown, and that unit."""
+    units = result.groups["channels"]["units"]
+    return dict(zip(units["name"].values, map(displayed, units.values), strict=True))
 
 
 def _model(result: StudyResult, model: str) -> dict[str, Any]:
-    line = line_of(result, model)
-    dash = line["linestyle"]
+    line, words = line_of(result, model), model_words(model)
     return {
         "name": model,
-        "label": model_words(model),
-        "mean": f"{model_words(model)} mean" if result.is_ensemble(model) else model_words(model),
+        "label": words,
+        "mean": f"{words} mean" if result.is_ensemble(model) else words,
         "colour": line["color"],
-        "dash": [] if isinstance(dash, str) else list(dash[1]),
+        "dash": list(line["linestyle"][1]),
     }
 
 
@@ -150,41 +143,33 @@ def _test(result: StudyResult, name: str) -> dict[str, Any]:
 
 def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[str, Any]:
     """Waves, measurement, forecasts and errors of a cell, packed."""
-    data, factors = result.tests[test], _factors(result)
+    data, models = result.tests[test], {}
+    factors = [_shown(result)[name][0] for name in result.channels]
+
+    def packed(values: npt.NDArray[Any]) -> list[dict[str, Any]]:
+        """Values (…, channel) in the units that are shown, packed channel by channel."""
+        return [pack(factor * values[..., k]) for k, factor in enumerate(factors)]
+
     shown = data["shown"].values.tolist()
     first = int(np.argmax(data["judged"].values[:, window]))
-    row = shown.index(window) if window in shown and training == first else None
-    models = {}
     for model in judged_models(result):
         one = data.sel(model=model, measure="nrmse")
         keys = ["mean"]
         if result.is_ensemble(model):
             one, keys = one.sel(ensemble=model), ["mean", "lower", "upper"]
-        entry: dict[str, Any] = {
-            key: _packed(factors, one[key].values[training, window]) for key in keys
-        }
-        if row is not None and result.is_ensemble(model):
-            members = one["members"].values[row, : min(MOST_MEMBERS, result.members_of(model))]
-            entry["members"] = _packed(factors, members.astype(float))
+        entry: dict[str, Any] = {key: packed(one[key].values[training, window]) for key in keys}
+        if result.is_ensemble(model) and window in shown and training == first:
+            some = slice(min(MOST_MEMBERS, result.members_of(model)))
+            entry["members"] = packed(
+                one["members"].values[shown.index(window), some].astype(float)
+            )
         errors = one["error"].values[training, window]
         models[model] = entry | {"nrmse": [round(float(e), 3) if e == e else None for e in errors]}
     return {
-        "measured": _packed(factors, data["measured"].values[window]),
+        "measured": packed(data["measured"].values[window]),
         "waves": _waves(result, data, window),
         "models": models,
     }
-
-
-def _factors(result: StudyResult) -> list[float]:
-    """What takes each channel to the unit in which it is shown."""
-    channels = result.groups["channels"]
-    units = dict(zip(channels["name"].values, channels["units"].values, strict=True))
-    return [displayed(str(units[name]))[0] for name in result.channels]
-
-
-def _packed(factors: list[float], values: npt.NDArray[Any]) -> list[dict[str, Any]]:
-    """Values (…, channel) in the units that are shown, packed channel by channel."""
-    return [pack(factor * values[..., k]) for k, factor in enumerate(factors)]
 
 
 def _waves(result: StudyResult, data: xr.Dataset, window: int) -> list[dict[str, Any]]:

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
 
-import numpy as np
-import xarray as xr
-
-from seakeep.report.figures.common import judged_models, model_words
+from seakeep.report.comparison import nowcast_blocks
 from seakeep.report.figures.errors import (
     BAND_WORDS,
     LOWEST,
@@ -17,23 +13,23 @@ from seakeep.report.figures.errors import (
     eigenvalue_figure,
     error_over_time_figure,
     hyperparameter_figure,
+    nowcast_figure,
 )
-from seakeep.report.nowcast import nowcast_blocks, nowcast_figure
-from seakeep.report.section import Drawing, Section
+from seakeep.report.page import Section, drawing, section
 from seakeep.report.sections.summary import by_channel, conditional
-from seakeep.report.tables import MISSING, Table, number, probability, small_number
+from seakeep.report.style import judged_models, model_words
+from seakeep.report.tables import (
+    MISSING,
+    Table,
+    beside,
+    number,
+    probability,
+    short,
+    small_number,
+    table,
+)
 from seakeep.study import StudyResult
 from seakeep.study.judge import VARIANTS
-
-__all__ = [
-    "age",
-    "coverage",
-    "coverage_table",
-    "densities",
-    "divergence_table",
-    "members",
-    "service",
-]
 
 PUBLISHED = {
     "surge": ("0.0026", "0.0010", "0.0061", "0.0052"),
@@ -57,32 +53,20 @@ them.
 """
 
 
-def _ensembles(result: StudyResult) -> list[str]:
-    return [model for model in result.models if result.is_ensemble(model)]
-
-
 def age(result: StudyResult) -> Section:
     """Return the error over the age of a forecast."""
     split = float(result.settings["statistics"]["split_period"])
-    figure = Drawing(
-        "error_over_time",
-        "ε(t): mean over all cells (lines) and quartiles (shaded), with the p-value of its trend "
-        f"test; the error as a whole, and parted at a period of {split:g} T̂ into slow drift and "
-        "waves. Each row has its own scale.",
-        partial(error_over_time_figure, result),
-    )
-    title = "Error over the age of a forecast"
-    return Section("time", title, figures=(figure,), tables=(_trend_table(result),))
+    figure = drawing("error_over_time", partial(error_over_time_figure, result), {"split": split})
+    return section("time", figures=(figure,), tables=(_trend_table(result, split),))
 
 
-def _trend_table(result: StudyResult) -> Table:
-    rows = []
+def _trend_table(result: StudyResult, split: float) -> Table:
+    rows, trend = [], result.groups["statistics/trend"]
+    seconds = split * float(result.attrs["encounter_period"])
     for test in result.tests:
-        data: xr.Dataset = result.groups["statistics/trend"].sel(test=test)
         for band, words in BAND_WORDS.items():
             for model in judged_models(result):
-                at = data.sel(model=model, band=band)
-                interval = ", ".join(small_number(at[key]) for key in ("lower", "upper"))
+                at = trend.sel(test=test, model=model, band=band)
                 rows.append(
                     (
                         result.label_of(test),
@@ -90,201 +74,155 @@ def _trend_table(result: StudyResult) -> Table:
                         model_words(model),
                         number(at["error_mean"].mean()),
                         number(at["change"]),
-                        f"{small_number(at['slope'])} [{interval}]",
+                        beside(at["slope"], at["lower"], at["upper"], form=small_number),
                         number(at["kendall_tau"], 2),
                         probability(at["p_value"]),
                     )
                 )
-    period = float(result.settings["statistics"]["split_period"])
-    seconds = period * float(result.attrs["encounter_period"])
-    return Table(
-        "trend",
-        "Trend of ε(t), whole and in bands",
-        (
-            "test set", "band", "model", "mean ε", "change over the window",
-            "slope [1/s] with 95 %", "Kendall's τ", "p",
-        ),
-        rows,
-        "Block-bootstrap Mann–Kendall test of ε(t) averaged over all cells. A p below 0.05 says "
-        "that the error changes with the age of the forecast; blocks break some of the "
-        "dependence, so slow series are called trends too often (10 to 15 %). The error is parted "
-        f"at a period of {period:g} T̂ ({seconds:.2f} s) into slow drift and waves; both are "
-        "counted in SDs of the whole measured channel." + conditional(result),
-        (3, 4, 5, 6, 7),
-    )  # fmt: skip
+    return table("trend", rows, {"split": split, "seconds": seconds}, conditional(result))
 
 
 def coverage(result: StudyResult) -> Section | None:
     """Return coverage and width of the bands of ensembles."""
-    tables = tuple(
-        coverage_table(result, model, calibrated)
-        for model in _ensembles(result)
-        for calibrated in (False, True)
-        if not calibrated or result.is_calibrated
-    )
-    return Section("coverage", "Coverage of the band", tables=tables) if tables else None
+    kinds = (False, True) if result.is_calibrated else (False,)
+    ensembles = filter(result.is_ensemble, result.models)
+    tables = [coverage_table(result, model, kind) for model in ensembles for kind in kinds]
+    return section("coverage", tables=tables) if tables else None
 
 
 def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
     """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
-    prefix, words = ("calibrated_", "calibrated ") if calibrated else ("", "")
+    prefix = "calibrated_" * calibrated
     found = result.groups["statistics/coverage"].sel(model=model)
-    groups = {test: found.sel(test=test) for test in result.tests}
-    true = any("truth" in data["against"].values for data in groups.values())
-    heads = [
-        f"{result.label_of(test)}: {words}"
-        for test in groups
-        for words in ("inside" + " [of the truth]" * true, "width [SD]")
-    ]
+    true = "truth" in found["against"].values
+    kinds, two = ("inside" + " [of the truth]" * true, "width [SD]"), partial(number, digits=2)
 
     def cells(name: str) -> Iterator[str]:
-        for data in groups.values():
-            at = data.sel(channel=name)
-            first, *others = (number(v, 2) for v in at[f"{prefix}inside"].values)
-            yield first + "".join(f" [{each}]" for each in others)
-            yield number(at[f"{prefix}relative_width"].sel(against="measured"), 2)
+        for test in result.tests:
+            at = found.sel(test=test, channel=name)
+            inside, width = (at[f"{prefix}{key}"] for key in ("inside", "relative_width"))
+            yield beside(*inside, form=two) if true else two(*inside)
+            yield two(width.sel(against="measured"))
 
     level = float(result.settings["statistics"]["level"])
-    note = (
-        f"Fraction of the measured instants inside the band of nominally {level:g} (quantiles of "
-        "the members), and its mean width in measured SD; means over all cells."
-    )
-    if calibrated:
-        found = result.groups["calibration"].sel(ensemble=model)
-        made = "these quantiles, moved outwards by a margin found"
-        if "floor" in found:
-            scale = "a scale learnt from spread, horizon and waves" * ("law" in found)
-            made = (
-                f"the mean, and a factor times {scale or 'the spread of the members'} (with a "
-                "floor of a quarter of the root mean square error) to either side, found"
-            )
-        note += (
-            f" Calibrated: {made} on training data that "
-            "the members had not read, in windows as long as the first test set's. "
-            + _other_lengths(result)
-            + _calibrated_on(found, level)
-            + "The margin guarantees nothing in another kind of sea."
-        )
+    more = _calibrated_words(result, model, level) if calibrated else ""
     if true:
-        note += (
+        more += (
             " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
             "slap; rates are not filtered."
         )
-    title = f"Coverage of the {words}{100 * level:g} % band, {model_words(model)}"
-    return by_channel(result, f"coverage_{prefix}{model}", title, heads, cells, note)
-
-
-def _other_lengths(result: StudyResult) -> str:
-    """Sentence on test sets whose windows are not as long as those that the margin is for."""
-    lengths = {test: float(each["length"]) for test, each in result.settings["tests"].items()}
-    first = next(iter(result.tests))
-    others = [
-        f"{result.label_of(test)} ({lengths[test]:g} T̂)"
-        for test in result.tests
-        if lengths[test] != lengths[first]
-    ]
-    if not others:
-        return ""
-    return f"Those are {lengths[first]:g} T̂ long; the margin is not made for {', '.join(others)}. "
-
-
-def _calibrated_on(found: xr.Dataset, level: float) -> str:
-    """Sentence on how much the calibration of a study rests on."""
-    windows = found["windows"].values
-    if not windows.all():
-        return "Some training sets hold no such window. "
-    said = (
-        f"A training set had {_range_of(windows)} of them; allowing for their dependence, their "
-        f"scores are worth {_range_of(found['blocks'].values)} independent ones. "
+    heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
+    words = {"kind": prefix.replace("_", " "), "level": short(100 * level), "part": level}
+    return by_channel(
+        result,
+        "coverage",
+        cells,
+        {**words, "model": model_words(model)},
+        columns=heads,
+        name=f"coverage_{prefix}{model}",
+        more=more + conditional(result),
     )
-    warranted = float(found["warranted"].min())
-    if warranted < level:
-        said += f"Of some channels that is too few: {warranted:.2f} is guaranteed there. "
-    return said
 
 
-def _range_of(values: np.ndarray[Any, Any]) -> str:
-    low, high = (f"{float(each):.0f}" for each in (values.min(), values.max()))
-    return low if low == high else f"{low} to {high}"
+def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
+    """How the calibrated band is made, what it rests on, and where it is of no use."""
+    found = result.groups["calibration"].sel(ensemble=model)
+    made = "these quantiles, moved outwards by a margin found"
+    if "floor" in found:
+        learnt = "law" in found
+        scale = (
+            "a scale learnt from spread, horizon and waves"
+            if learnt
+            else "the spread of the members"
+        )
+        made = (
+            f"the mean, and a factor times {scale} (with a "
+            "floor of a quarter of the root mean square error) to either side, found"
+        )
+    said = (
+        f" Calibrated: {made} on training data that the members had not read, in windows as long "
+        "as the first test set's. "
+    )
+    lengths = {test: float(each["length"]) for test, each in result.settings["tests"].items()}
+    first = lengths[next(iter(result.tests))]
+    others = [f"{result.label_of(k)} ({n:g} T̂)" for k, n in lengths.items() if n != first]
+    if others:
+        said += f"Those are {first:g} T̂ long; the margin is not made for {', '.join(others)}. "
+    if not found["windows"].all():
+        said += "Some training sets hold no such window. "
+    else:
+        windows, blocks = (
+            " to ".join(dict.fromkeys(f"{each:.0f}" for each in (values.min(), values.max())))
+            for values in (found["windows"].values, found["blocks"].values)
+        )
+        said += (
+            f"A training set had {windows} of them; allowing for their dependence, their "
+            f"scores are worth {blocks} independent ones. "
+        )
+        if (warranted := float(found["warranted"].min())) < level:
+            said += f"Of some channels that is too few: {warranted:.2f} is guaranteed there. "
+    return said + "The margin guarantees nothing in another kind of sea."
 
 
 def densities(result: StudyResult) -> Section:
     """Return densities of measurement and forecasts, and their divergence."""
-    ensembles = _ensembles(result)
-    figures = tuple(
-        Drawing(
-            f"densities_{model}",
-            f"Densities of measurement and {model_words(model)} forecast with the 95 % bands of "
-            "their moving-block bootstrap (paper's settings); area 1 each, no common height.",
-            partial(density_figure, result, model),
-        )
-        for model in (ensembles or result.models[:1])
-    )
+    ensembles = [model for model in result.models if result.is_ensemble(model)]
+    figures = []
+    for model in ensembles or result.models[:1]:
+        draw, words = partial(density_figure, result, model), {"model": model_words(model)}
+        figures.append(drawing("densities", draw, words, f"densities_{model}"))
     order = sorted(judged_models(result), key=lambda model: model not in ensembles)
-    tables = tuple(divergence_table(result, m, variant) for m in order for variant in VARIANTS)
-    return Section("densities", "Densities and their divergence", figures=figures, tables=tables)
+    tables = [divergence_table(result, m, variant) for m in order for variant in VARIANTS]
+    return section("densities", figures=figures, tables=tables)
 
 
 def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     """Jensen–Shannon divergence per channel beside its noise floor and, if asked, the paper's."""
     data = result.groups["statistics/divergence"]
     at = data.sel(model=model, variant=variant)
-    numbers = ("mean", "lower", "upper", "uncertainty", "noise_floor")
+    keys = ("mean", "lower", "upper", "uncertainty", "noise_floor")
     comparable = result.is_ensemble(model) and result.shows_paper
-    paper = PUBLISHED if comparable else {}
-    none = (MISSING,) * 4 if comparable else ()
 
-    def cells(name: str) -> list[str]:
+    def cells(name: str) -> Iterator[str]:
         of_all = name == "average"
         one = at.mean("channel", skipna=False) if of_all else at.sel(channel=name)
-        block = "" if of_all else number(one["block_length"], 0)
-        return [*(small_number(one[key]) for key in numbers), block, *paper.get(name, none)]
+        yield from (small_number(one[key]) for key in keys)
+        yield "" if of_all else number(one["block_length"], 0)
+        if comparable:
+            yield from PUBLISHED.get(name, (MISSING,) * 4)
 
     quantiles = ("EV", "q0.025", "q0.975", "U")
-    heads = (*quantiles, "noise floor", "block (samples)")
-    published = tuple(f"paper: {each}" for each in quantiles) if comparable else ()
-    test = result.label_of(str(data.attrs["test"]))
+    heads = [*quantiles, "noise floor", "block (samples)"]
+    published = [f"paper: {each}" for each in quantiles] if comparable else []
     how = "blocks may cross joins, block length and bandwidth as printed in the paper"
     if variant == "recommended":
         how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
+    more = " The paper's columns are of another vessel in another tank." * comparable
+    test = result.label_of(str(data.attrs["test"]))
     return by_channel(
         result,
-        f"jsd_{model}_{variant}",
-        f"Divergence of the densities, {model_words(model)}, {test}: {variant} variant",
-        (*heads, *published),
+        "jsd",
         cells,
-        f"Nats, 0 to ln 2; {how}. The noise floor is the divergence of the measurement from "
-        "itself under two independent bootstraps: what a record of this length cannot tell from "
-        "none." + " The paper's columns are of another vessel in another tank." * comparable,
-        elsewhere=[1 + len(heads) + k for k in range(len(published))],
+        {"model": model_words(model), "test": test, "variant": variant, "how": how},
+        columns=[*heads, *published],
+        name=f"jsd_{model}_{variant}",
+        more=more + conditional(result),
+        elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
         folded=not result.is_ensemble(model) and any(map(result.is_ensemble, result.models)),
     )
 
 
 def members(result: StudyResult) -> Section | None:
     """Return errors of the members of ensembles over what was drawn, and eigenvalues."""
-    figures = [
-        Drawing(
-            f"hyperparameters_{model}",
-            f"Median ANRMSE of each member of the {model_words(model)} ensemble over all cells, "
-            "against what was drawn for it, with Spearman's rank correlation.",
-            partial(hyperparameter_figure, result, model),
-        )
-        for model in _ensembles(result)
-    ]
+    figures = []
+    for model in filter(result.is_ensemble, result.models):
+        draw, words = partial(hyperparameter_figure, result, model), {"model": model_words(model)}
+        figures.append(drawing("hyperparameters", draw, words, f"hyperparameters_{model}"))
     if any(name.startswith("eigenvalues/") for name in result.groups):
         figures.append(
-            Drawing(
-                "eigenvalues",
-                "Eigenvalues of the models of the first training set: upper half of the complex "
-                "plane, and modulus against frequency. A modulus of 1 neither grows nor decays; "
-                f"those below {LOWEST:g} are left out on the right.",
-                partial(eigenvalue_figure, result),
-            )
+            drawing("eigenvalues", partial(eigenvalue_figure, result), {"lowest": LOWEST})
         )
-    return (
-        Section("members", "Members of the ensemble", figures=tuple(figures)) if figures else None
-    )
+    return section("members", figures=figures) if figures else None
 
 
 def service(result: StudyResult) -> Section | None:
@@ -294,24 +232,9 @@ def service(result: StudyResult) -> Section | None:
     if not found:
         return None
     first = next(iter(found.values()))
-    runs = [str(name) for name in first["run"].values]
-    figures = [
-        Drawing(
-            f"nowcast_{run}",
-            f"{run}: root mean square error in service against lead time, and what the model "
-            f"claims of it, over {int(first.attrs['starts'])} forecasts.",
-            partial(nowcast_figure, found, run),
-        )
-        for run in runs
-    ]
-    words = (
-        "Models of the first training set, played sample by sample. Waves after a start are "
-        "predicted from what the probes have measured until then."
-    )
-    return Section(
-        "service",
-        "In service",
-        (words,),
-        figures=tuple(figures),
-        tables=tuple(nowcast_blocks(found)),
-    )
+    figures = []
+    for run in map(str, first["run"].values):
+        words = {"run": run, "starts": int(first.attrs["starts"])}
+        draw = partial(nowcast_figure, found, run)
+        figures.append(drawing("nowcast", draw, words, f"nowcast_{run}"))
+    return section("service", figures=figures, tables=[*nowcast_blocks(found)])

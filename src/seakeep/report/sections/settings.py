@@ -9,40 +9,29 @@ from typing import Any
 
 import numpy as np
 
-from seakeep.report.figures.common import model_words
-from seakeep.report.section import Section
-from seakeep.report.tables import Table, number
+from seakeep.report.page import Section, section
+from seakeep.report.style import model_words
+from seakeep.report.tables import Table, number, percent, table
 from seakeep.study import StudyResult
 from seakeep.study.plan import windows_overlap
 
-__all__ = [
-    "chosen",
-    "finished",
-    "settings",
-    "test_overlap",
-    "training_overlap",
-    "unequal_training",
-    "versions",
-]
-
 APART = 0.005
 """Windows that share less than this part of their length are apart."""
+UNITS = {
+    **dict.fromkeys(("length", "split_period"), "T̂"),
+    **dict.fromkeys(("state_delays", "input_delays", "window", "lead"), "samples"),
+    **dict.fromkeys(("startup", "encounter_period"), "s"),
+}
+"""Units of settings, by the last part of their key."""
 
 
 def settings(result: StudyResult) -> Section:
     """Return settings, training sets and test windows."""
-    words = (training_overlap(result)[1], test_overlap(result))
-    return Section(
-        "settings",
-        "Settings and windows",
-        words=tuple(filter(None, (_waves_made(result), *words))),
-        tables=(_model_table(result), _settings_table(result), _windows_table(result)),
-    )
-
-
-def _waves_made(result: StudyResult) -> str:
     made = str(result.attrs.get("waves_note", ""))
-    return f"Waves of the virtual tank: {made}." if made else ""
+    waves = f"Waves of the virtual tank: {made}." if made else ""
+    words = (waves, training_overlap(result)[1], test_overlap(result))
+    tables = (_model_table(result), _settings_table(result), _windows_table(result))
+    return section("settings", more=words, tables=tables)
 
 
 def _model_table(result: StudyResult) -> Table:
@@ -54,51 +43,32 @@ def _model_table(result: StudyResult) -> Table:
             setting_text(key, each["value"]),
             each["source"],
         )
-        for model, told in result.model_settings.items()
-        for key, each in told["settings"].items()
+        for model, stated in result.model_settings.items()
+        for key, each in stated["settings"].items()
     ]
-    return Table(
-        "models",
-        "Settings of the models, and where each comes from",
-        ("model", "setting", "value", "from"),
-        rows,
-        "Stated: in the study file. Preset: filled in by the model's preset, or the study's. "
-        "Study: the study's seed. Default: none of them says anything.",
-        folded=True,
-    )
+    return table("models", rows)
 
 
 def _settings_table(result: StudyResult) -> Table:
-    """Settings of the study, defaults included."""
-    told = {k: v for k, v in result.settings.items() if k != "models"}
-    told["statistics"] = {**told["statistics"], "calibrate": result.is_calibrated}
-    rows = [(key, setting_text(key, value)) for key, value in _leaves("", told)]
-    return Table(
-        "settings",
-        "Settings of the study, defaults included",
-        ("setting", "value"),
-        (*_of_the_data(result), *rows),
-        folded=True,
-    )
-
-
-def _of_the_data(result: StudyResult) -> list[tuple[str, str]]:
-    """Period, time step and filters of the prepared runs."""
+    """Settings of the study, defaults included; period, time step and filters of its data first."""
+    every = {key: value for key, value in result.settings.items() if key != "models"}
+    every["statistics"] = {**every["statistics"], "calibrate": result.is_calibrated}
     period, dt = float(result.attrs["encounter_period"]), float(result.attrs["dt"])
     preparation = json.loads(result.attrs["preparation"])
-    stated = result.settings["study"].get("encounter_period")
+    origin = "stated" if every["study"].get("encounter_period") else "measured"
     filters = []
     if preparation["low_pass"]:
-        filters.append(
-            f"low-pass {' to '.join(f'{edge:g}' for edge in preparation['low_pass'])} Hz"
-        )
+        edges = " to ".join(f"{edge:g}" for edge in preparation["low_pass"])
+        filters.append(f"low-pass {edges} Hz")
     if preparation["anti_alias"]:
         filters.append("low-pass below 0.8 of the new Nyquist frequency")
-    return [
-        ("mean encounter period T̂", f"{period:.4f} s, {'stated' if stated else 'measured'}"),
+    rows = [
+        ("mean encounter period T̂", f"{period:.4f} s, {origin}"),
         ("time step", f"{dt:.4g} s, {period / dt:.4g} samples per period"),
         ("filter before resampling", " and ".join(filters) or "none"),
+        *((key, setting_text(key, value)) for key, value in _leaves("", every)),
     ]
+    return table("settings", rows)
 
 
 def _leaves(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -107,14 +77,6 @@ def _leaves(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
             yield from _leaves(f"{prefix}.{key}" if prefix else key, inner)
     elif value not in (None, "", []):
         yield prefix, value
-
-
-UNITS = {
-    **dict.fromkeys(("length", "split_period"), "T̂"),
-    **dict.fromkeys(("state_delays", "input_delays", "window", "lead"), "samples"),
-    **dict.fromkeys(("startup", "encounter_period"), "s"),
-}
-"""Units of settings, by the last part of their key."""
 
 
 def setting_text(key: str, value: Any) -> str:
@@ -142,15 +104,16 @@ def setting_text(key: str, value: Any) -> str:
 
 def _prior_text(prior: dict[str, Any], unit: str) -> str:
     """A prior, or another table, in words; `unit` is that of bare numbers."""
+    lengths = {"T": " T̂", "s": " s"}
     for kind, words in (("uniform", "uniform, "), ("log_uniform", "log-uniform, "), ("fixed", "")):
         if kind in prior:
-            bounds = prior[kind] if isinstance(prior[kind], list) else [prior[kind]]
-            numbers = [str(each).partition(" ") for each in bounds]
-            shared = {"T": " T̂", "s": " s"}.get(numbers[0][2], unit)
-            return words + " to ".join(f"{float(each[0]):.6g}" for each in numbers) + shared
+            given = prior[kind] if isinstance(prior[kind], list) else [prior[kind]]
+            texts = [str(each).partition(" ") for each in given]
+            bounds = " to ".join(f"{float(each[0]):.6g}" for each in texts)
+            return words + bounds + lengths.get(texts[0][2], unit)
     if "distribution" in prior:
         given = ", ".join(f"{key}={each:.6g}" for key, each in prior["parameters"].items())
-        shared = {"T": " T̂", "s": " s"}.get(prior.get("unit", ""), unit)
+        shared = lengths.get(prior.get("unit", ""), unit)
         return f"scipy.stats.{prior['distribution']}({given}){shared}"
     return json.dumps(prior)
 
@@ -158,37 +121,27 @@ def _prior_text(prior: dict[str, Any], unit: str) -> str:
 def _windows_table(result: StudyResult) -> Table:
     """Training sets and test windows."""
     training = result.groups["training"]
-    reads = float(result.attrs["longest_training"])
     every = ", ".join(map(model_words, whole_readers(result)))
     whole = f" (all of it: {every})" if every else ""
     rows = []
-    for name, left, spans in zip(
-        training["training"].values,
-        training["left_out"].values,
-        training_spans(result),
-        strict=True,
-    ):
+    for each, spans in zip(training["training"], training_spans(result), strict=True):
         words = ", ".join(f"{run}, {begin:.2f} to {end:.2f} s" for run, begin, end in spans)
-        rows.append(("training", str(name), words, str(left) or ""))
-    for test, data in result.tests.items():
-        length = float(data["time"].values[-1])
-        rows += [
-            ("test", result.label_of(test), f"{run}, {start:.2f} to {start + length:.2f} s", "")
-            for run, start in zip(data["run"].values, data["start"].values, strict=True)
-        ]
-    return Table(
-        "windows",
-        "Training sets and test windows, the same for all models",
-        ("use", "set", "instants", "left out"),
-        rows,
-        "Of a training set: from the start of its span to its stop. A draw reads the last part, "
-        f"{reads:.2f} s at most, delay history included{whole}. The delay history of a forecast is "
-        "measured data just before the start; it may reach into a training span.",
-        folded=True,
+        left_out = str(training["left_out"].sel(training=each).values)
+        rows.append(("training", str(each.values), words, left_out))
+    rows += [
+        ("test", result.label_of(test), f"{run}, {begin:.2f} to {end:.2f} s", "")
+        for test in result.tests
+        for run, begin, end in _test_spans(result, test)
+    ]
+    return table(
+        "windows", rows, {"reads": float(result.attrs["longest_training"]), "whole": whole}
     )
 
 
-def training_spans(result: StudyResult) -> list[list[tuple[str, float, float]]]:
+Spans = list[tuple[str, float, float]]
+
+
+def training_spans(result: StudyResult) -> list[Spans]:
     """Run, start and end (s) of each span of each training set."""
     training = result.groups["training"]
     runs = [str(run) for run in training["of_run"].values]
@@ -198,14 +151,17 @@ def training_spans(result: StudyResult) -> list[list[tuple[str, float, float]]]:
     ]
 
 
+def _test_spans(result: StudyResult, test: str) -> Spans:
+    """Run, start and end (s) of each window of a test set."""
+    data = result.tests[test]
+    length, runs = float(data["time"].values[-1]), data["run"].values.astype(str)
+    return [(run, s, s + length) for run, s in zip(runs, data["start"].values, strict=True)]
+
+
 def _trained_on(result: StudyResult) -> dict[str, Any]:
     """Stated training length of each model that has one; None where it reads all."""
-    lengths = {}
-    for model, told in result.model_settings.items():
-        known = told["settings"]
-        if "window" in known:
-            lengths[model] = known["window"]["value"]
-    return lengths
+    every = {model: stated["settings"] for model, stated in result.model_settings.items()}
+    return {model: known["window"]["value"] for model, known in every.items() if "window" in known}
 
 
 def whole_readers(result: StudyResult) -> list[str]:
@@ -215,24 +171,22 @@ def whole_readers(result: StudyResult) -> list[str]:
 
 def unequal_training(result: StudyResult) -> str:
     """Sentence on models that learn from different lengths of data; empty where none do."""
-    lengths, whole = _trained_on(result), whole_readers(result)
-    parts = {model: length for model, length in lengths.items() if length is not None}
+    lengths, whole = _trained_on(result), ", ".join(map(model_words, whole_readers(result)))
+    period, parts = float(result.attrs["encounter_period"]), []
+    for model, length in lengths.items():
+        if isinstance(length, dict):
+            parts.append(f"{model_words(model)} from a part ({_prior_text(length, ' samples')})")
+        elif length is not None:
+            periods = length * float(result.attrs["dt"]) / period
+            parts.append(f"{model_words(model)} from a part ({periods:.3g} T̂)")
     if not (whole and parts):
         return ""
-    period = float(result.attrs["encounter_period"])
-    sets = [sum(e - b for _, b, e in spans) / period for spans in training_spans(result)]
-    low, high = f"{min(sets):.0f}", f"{max(sets):.0f}"
-    told = []
-    for model, length in parts.items():
-        if isinstance(length, dict):
-            words = _prior_text(length, " samples")
-        else:
-            words = f"{length * float(result.attrs['dt']) / period:.3g} T̂"
-        told.append(f"{model_words(model)} from a part ({words})")
+    sets = [sum(end - begin for _, begin, end in spans) for spans in training_spans(result)]
+    ends = dict.fromkeys(f"{each / period:.0f}" for each in (min(sets), max(sets)))
     return (
-        f"Models learn from different amounts of data: {', '.join(map(model_words, whole))} from "
-        f"all of a training set ({low if low == high else f'{low} to {high}'} T̂), "
-        f"{', '.join(told)}. Part of the difference between them is one of training data."
+        f"Models learn from different amounts of data: {whole} from all of a training set "
+        f"({' to '.join(ends)} T̂), {', '.join(parts)}. Part of the difference between them is one "
+        "of training data."
     )
 
 
@@ -241,11 +195,10 @@ def training_overlap(result: StudyResult) -> tuple[bool, str]:
     training = result.groups["training"]
     if result.settings["training"]["scheme"] != "halves" or "stop" not in training:
         return False, ""
-    period = float(result.attrs["encounter_period"])
-    length = float(result.attrs["longest_training"])
-    spans = [span for (span,) in training_spans(result)]
-    runs = result.groups["runs"]
-    longest = float(np.nanmax(runs["train_end"].values - runs["train_begin"].values))
+    period, length = (float(result.attrs[k]) for k in ("encounter_period", "longest_training"))
+    spans: Spans = [span for (span,) in training_spans(result)]
+    runs, readers = result.groups["runs"], whole_readers(result)
+    longest = float((runs["train_end"] - runs["train_begin"]).max())
     room = (
         "A training window must hold the largest draw with its delay history, "
         f"{length / period:.1f} T̂ of the {longest / period:.0f} T̂ of the longest training span"
@@ -253,16 +206,18 @@ def training_overlap(result: StudyResult) -> tuple[bool, str]:
     if len(spans) == 1:
         return False, f"{room}; there is one."
     share = windows_overlap([(run, end - length, end) for run, _, end in spans])
-    nested = windows_overlap(spans) if whole_readers(result) else 0.0
-    readers = ", ".join(map(model_words, whole_readers(result)))
-    whole = f" From the start of their spans, as {readers} reads them, they share "
-    whole = f"{whole}{100 * nested:.0f} %." if nested >= APART else ""
+    nested, whole = windows_overlap(spans) if readers else 0.0, ""
+    if nested >= APART:
+        whole = (
+            f" From the start of their spans, as {', '.join(map(model_words, readers))} reads "
+            f"them, they share {percent(nested)} %."
+        )
     if share < APART:
         count = len({run for run, _, _ in spans})
         where = f", which lie in {count} runs," if count > 1 else ""
         return bool(whole), f"{room}; the {len(spans)} windows{where} do not overlap.{whole}"
     return True, (
-        f"{room}: so the {len(spans)} windows share {100 * share:.0f} % of their length with one "
+        f"{room}: so the {len(spans)} windows share {percent(share)} % of their length with one "
         f"another.{whole} They are not independent, and the boxes show the spread over test "
         "windows more than that over training data."
     )
@@ -270,13 +225,12 @@ def training_overlap(result: StudyResult) -> tuple[bool, str]:
 
 def test_overlap(result: StudyResult) -> str:
     """Sentence on test windows that overlap; empty where no two do."""
-    said = []
-    for test, data in result.tests.items():
-        length = float(data["time"].values[-1])
-        pairs = zip(data["run"].values, data["start"].values, strict=True)
-        share = windows_overlap([(str(run), float(s), float(s) + length) for run, s in pairs])
-        if share >= APART:
-            said.append(f"{result.label_of(test)} {100 * share:.0f} %")
+    shares = {test: windows_overlap(_test_spans(result, test)) for test in result.tests}
+    said = [
+        f"{result.label_of(test)} {percent(share)} %"
+        for test, share in shares.items()
+        if share >= APART
+    ]
     if not said:
         return ""
     return (
@@ -292,15 +246,11 @@ def finished(result: StudyResult) -> str:
 
 def versions(result: StudyResult) -> Section:
     """Return digest, seed and versions."""
-    told = [
-        ("study", "study"), ("digest", "digest"), ("campaign", "campaign"),
-        ("campaign digest", "campaign_digest"), ("preset", "preset"), ("seed", "seed"),
-    ]  # fmt: skip
-    rows = [(words, str(result.attrs[key])) for words, key in told]
+    keys = ("study", "digest", "campaign", "campaign_digest", "preset", "seed")
+    rows = [(key.replace("_", " "), str(result.attrs[key])) for key in keys]
     rows.append(("finished", finished(result)))
     rows += [(name, str(each)) for name, each in json.loads(result.attrs["versions"]).items()]
-    table = Table("versions", "Versions and digest", ("what", "value"), rows)
-    return Section("versions", "Versions and digest", tables=(table,))
+    return section("versions", tables=(table("versions", rows),))
 
 
 def chosen(result: StudyResult) -> Section | None:
@@ -308,26 +258,9 @@ def chosen(result: StudyResult) -> Section | None:
     rows = []
     for model in result.models:
         data = result.groups["chosen"].sel(model=model)
-        for name, text, ahead in zip(
-            data["training"].values, data["words"].values, data["look_ahead"].values, strict=True
-        ):
+        columns = (data[key].values for key in ("training", "words", "look_ahead"))
+        for name, text, ahead in zip(*columns, strict=True):
             if text or ahead > 0:
-                note, *tried = str(text).splitlines() or ["stated"]
-                words = "; ".join([note, *map(str.strip, tried)])
+                words = "; ".join(map(str.strip, str(text or "stated").splitlines()))
                 rows.append((model_words(model), str(name), number(ahead, 2), words))
-    if not rows:
-        return None
-    words = (
-        "Settings that are not stated are chosen by free runs on training runs that are held out "
-        "in turn; test windows are never looked at. Mean error with its 95 % interval and the best "
-        "λ of each choice: what an observable is worth is the error of the choice without it. The "
-        "look-ahead is how long after the instant that is forecast the last wave that is read lies."
-    )
-    table = Table(
-        "chosen",
-        "Choices and look-ahead",
-        ("model", "training set", "look-ahead [s]", "chosen"),
-        rows,
-        numeric=(2,),
-    )
-    return Section("chosen", "How settings were chosen", words=(words,), tables=(table,))
+    return section("chosen", tables=(table("chosen", rows),)) if rows else None
