@@ -131,16 +131,3 @@ def test_unknown_unit():
 def test_a_unit_that_would_keep_the_parser_busy_is_refused_at_once(unit):
     with pytest.raises(RequestError, match=r"is not known\."):
         si_unit(unit)
-
-
-def test_units_of_shafts_and_cranes_are_known():
-    assert conversion("rpm", "rad/s") == pytest.approx(0.10471975511965977, rel=1e-14)
-    assert conversion("tonf", "N") == pytest.approx(9806.65, rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("name", "units"),
-    [("eta_fwd_rate", "m/s"), ("eta_us_bow_acceleration", "m/s^2"), ("eta_rate", "m/s")],
-)
-def test_rates_of_elevations_are_no_elevations(name, units):
-    assert canonical_channel(name).units == units

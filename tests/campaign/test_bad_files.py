@@ -348,14 +348,6 @@ class TestLengths:
         (folder / "campaign.toml").write_text(self.TEXT)
         return read_campaign(folder / "campaign.toml").prepare()["r"]
 
-    def test_the_run_is_what_all_recorded(self, tmp_path):
-        with pytest.warns(SeakeepWarning, match=r"r: mru .* at .* s, the other loggers at") as told:
-            run = self.prepared(tmp_path, 2.0, 12.0)
-        assert len(told) == 2  # it began late, and ended early
-        assert float(run["time"][0]) == pytest.approx(2.0)
-        assert float(run["time"][-1]) == pytest.approx(11.95)
-        assert np.isfinite(run["heave"]).all()
-
     def test_loggers_that_never_recorded_together(self, tmp_path):
         with pytest.raises(
             DataError,

@@ -3,7 +3,6 @@
 import pytest
 
 from seakeep.campaign import read_campaign
-from seakeep.campaign.settings import ModelSettings
 from seakeep.errors import RequestError
 from seakeep.study import read_study
 from seakeep.toml import Length
@@ -359,17 +358,9 @@ class TestModels:
         with pytest.raises(RequestError, match=r"no table \[model\]\. Name one of small, band\."):
             campaign.model()
 
-    def test_the_only_one_needs_no_name(self, edited):
-        assert read_campaign(edited(("[model]", "[models.small]"))).model().ridge == 1.0
-
     def test_none(self, edited):
         text = edited().read_text()
         path = edited()
         path.write_text(text[: text.index("[model]")])
         with pytest.raises(RequestError, match=r"no table \[model\]\. Add \[model\] with 'states'"):
             read_campaign(path).model()
-
-    def test_frozen(self):
-        model = ModelSettings(states=("heave",))
-        with pytest.raises(ValueError, match="frozen"):
-            model.ridge = 3.0

@@ -35,16 +35,6 @@ def test_a_file_is_read_in_pieces(tmp_path):
     assert peak < size / 16
 
 
-def test_a_file_that_stays_is_read_once(tmp_path, hashed):
-    path = tmp_path / "a.csv"
-    path.write_text("one")
-    assert sha256_of(path) == sha256_of(path) == hashlib.sha256(b"one").hexdigest()
-    assert hashed == {"a.csv": 1}
-    path.write_text("longer")
-    assert sha256_of(path) == hashlib.sha256(b"longer").hexdigest()
-    assert hashed == {"a.csv": 2}
-
-
 def test_a_campaign_reads_each_file_once_for_its_checksum(tank, edited, hashed):
     # The period is measured on all runs, so that each run depends on the files of all.
     path = edited(("sampling_rate = 10", "steps_per_period = 16"))

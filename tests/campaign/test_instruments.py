@@ -57,20 +57,6 @@ def test_drop_outs_are_masked_and_flagged(prepared):
         assert np.isfinite(run[name].values).all()
 
 
-def test_short_drop_outs_are_bridged_only_when_asked(copied):
-    path = copied(('gaps = "mask"', 'gaps = "bridge"'))
-    run = read_campaign(path).prepare(["regular_2"])["regular_2"]
-    assert np.isfinite(run["eta_us_fwd"].values).all()
-    assert (run["eta_us_fwd_flags"].values & 2).any()
-    assert "bridged by monotone cubics" in run["eta_us_fwd"].attrs["repaired"]
-
-
-def test_refused_without_a_word_about_gaps(copied):
-    path = copied(('gaps = "mask"\n', ""))
-    with pytest.raises(DataError, match=r"or state gaps = 'mask' or 'bridge' in \[preparation\]"):
-        read_campaign(path).prepare(["regular_2"])
-
-
 def test_prepared_files_come_back_as_they_were(copied):
     campaign = read_campaign(copied())
     write_prepared(campaign, names=["regular_2"])
@@ -126,20 +112,6 @@ def test_mistakes(copied, pair, error, message):
     path = copied(pair)
     with pytest.raises(error, match=message):
         read_campaign(path).prepare(["regular_2"])
-
-
-def test_files_that_are_damaged(copied):
-    path = copied()
-    raw = path.parent / "raw" / "regular_2" / "mru.csv"
-    whole = raw.read_bytes()
-    for content, message in (
-        (b"", r"mru\.csv is empty \(0 bytes\)"),
-        (whole[: len(whole) // 2].rsplit(b",", 3)[0] + b"\n", r"mru\.csv"),
-        (b"\x00\x01\x02" * 500, r"mru\.csv holds binary data"),
-    ):
-        raw.write_bytes(content)
-        with pytest.raises((DataError, RequestError), match=message):
-            read_campaign(path).prepare(["regular_2"])
 
 
 def test_the_draft_of_the_raw_files_prepares_as_it_stands(copied):

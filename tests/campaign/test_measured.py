@@ -44,10 +44,12 @@ def test_draft(tmp_path, name):
         assert len(seas) == 8
         assert campaign.test_runs == ["3041_2"]  # T 1.21 s, between 1.158 and 1.238 s
         assert campaign.settings.runs["3041_2"].span[0] > 25  # until then the water is still
+        dead = [n for n, each in campaign.settings.runs.items() if each.role == "unused"]
+        assert len(dead) == 1  # its sway stands still
     told = pytest.warns(SeakeepWarning, match="wm_position is taken as")
     with told if bare else contextlib.nullcontext():
         runs = campaign.prepare()
-    assert len(runs) == len(files)
+    assert len(runs) == len(files) - (name == FLUME)
     assert len({run.attrs["dt"] for run in runs.values()}) == 1
     assert "heave" in campaign.model().states
     assert "eta_1" in campaign.model().inputs

@@ -186,15 +186,6 @@ class TestOutliers:
         told = [each.text for each in findings_of(run) if each.channel == "heave"]
         assert any(t.startswith("outlier: 4 samples") and "replaced" not in t for t in told)
 
-    def test_the_sheet_says_what_was_replaced(self, runs, tmp_path):
-        pytest.importorskip("matplotlib", reason="needs the extra figures")
-        from seakeep.report.quality_sheet import write_quality_sheet
-
-        campaign, run = runs("replace")
-        pages = write_quality_sheet({"first": run}, campaign.settings, "tank", tmp_path)
-        page = pages[0].read_text(encoding="utf-8")
-        assert "repaired: 4 outliers replaced by monotone cubics" in page
-
 
 RATE, PERIOD = 500.0, 1.64
 

@@ -88,16 +88,6 @@ def test_what_is_no_matlab_run(tmp_path, content, error, message):
         read_table(tmp_path / "run.mat")
 
 
-@pytest.mark.parametrize("part", [5, 20, 127, 128, 200, 1500])
-@pytest.mark.parametrize("compressed", [False, True])
-def test_matlab_cut_off(tmp_path, part, compressed):
-    path = tmp_path / "run.mat"
-    io.savemat(path, {"time": T, "heave": HEAVE}, do_compression=compressed)
-    path.write_bytes(path.read_bytes()[:part])
-    with pytest.raises(DataError, match=r"cut off or damaged|holds no channels"):
-        read_table(path)
-
-
 def dataset():
     return xr.Dataset(
         {"heave": ("time", HEAVE, {"units": "mm"}), "wave": ("time", WAVE), "depth": ((), 3.6)},
@@ -198,26 +188,6 @@ def test_hdf5_integers_and_float32(tmp_path):
         file["heave"] = np.arange(5, dtype=np.float32)
     run = read_table(tmp_path / "run.h5")
     assert run["heave"].dtype == run["time"].dtype == np.float64
-
-
-@pytest.mark.parametrize("engine", ["h5netcdf", "scipy"])
-@pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
-def test_netcdf_cut_off(tmp_path, engine, part):
-    path = tmp_path / "run.nc"
-    dataset().to_netcdf(path, engine=engine)
-    raw = path.read_bytes()
-    path.write_bytes(raw[: int(part * len(raw))])
-    with pytest.raises(DataError, match="cannot be read as NetCDF or HDF5: cut off, damaged or of"):
-        read_table(path)
-
-
-def test_netcdf_that_is_none(tmp_path):
-    path = tmp_path / "run.nc"
-    path.write_text("not a NetCDF file")
-    with pytest.raises(
-        DataError, match=r"is not a valid NetCDF file: it holds text and starts with 'not a"
-    ):
-        read_table(path)
 
 
 def test_a_struct_with_its_rate_and_a_note_beside_it(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 import scipy
 
 from seakeep.campaign import read_table
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import DataError
 from seakeep.formats import read_columns
 
 T = np.arange(200) * 0.05
@@ -77,14 +77,12 @@ UNITS = {"heave": "mm", "wave": "m"}
     "content",
     [
         {"time": T, "heave": HEAVE, "wave": WAVE, "units": UNITS},
-        {"time": T[:, None], "heave": HEAVE[None, :], "wave": WAVE[:, None], "units": UNITS},
         {"run": {"time": T, "heave": HEAVE, "wave": WAVE, "units": UNITS}},
         {"data": MATRIX, "names": NAMES, "units": ["s", "mm", "m"]},
-        {"run": {"data": MATRIX, "channels": NAMES, "units": ["s", "mm", "m"]}},
         {"Fs": 20.0, "data": MATRIX[:, 1:], "names": NAMES[1:], "units": ["mm", "m"]},
         {"time": T, "heave": HEAVE, "wave": WAVE, "units": UNITS, "comment": "Größe", "ok": True},
     ],
-    ids=["rows", "columns", "struct", "matrix", "struct of matrix", "rate", "texts"],
+    ids=["rows", "struct", "matrix", "rate", "texts"],
 )
 def test_layouts(tmp_path, content):
     run = read_table(save(tmp_path / "run.mat", **content))
@@ -94,16 +92,6 @@ def test_layouts(tmp_path, content):
     np.testing.assert_array_equal(run["wave"], WAVE)
     assert run["heave"].attrs["units"] == "mm"
     assert set(run.data_vars) == {"heave", "wave"}
-
-
-def test_single_precision_and_integers(tmp_path):
-    run = read_table(
-        save(
-            tmp_path / "run.mat", time=T, heave=HEAVE.astype("f4"), count=np.arange(200, dtype="i4")
-        )
-    )
-    np.testing.assert_array_equal(run["heave"], HEAVE.astype("f4"))
-    assert run["count"].dtype == float
 
 
 def test_a_file_that_matlab_wrote():
@@ -162,31 +150,12 @@ def test_classes_that_are_left_out(tmp_path):
             r"'data' has shape \(3, 200\), which looks transposed; expected \(time, channel\)",
         ),
         ({"time": T, "heave": HEAVE[:-3]}, DataError, r"differ in length \(heave 197, time 200\)"),
-        ({"comment": "nothing"}, DataError, r"holds no channels; found comment\. Save one vector"),
         ({}, DataError, r"holds no channels; found nothing"),
-        ({"heave": HEAVE}, RequestError, "has no column with a usual name of times"),
     ],
 )
 def test_what_is_no_run(tmp_path, content, error, message):
     path = save(tmp_path / "run.mat", **content)
     with pytest.raises(error, match=message):
-        read_table(path)
-
-
-def test_cut_off_foreign_and_empty(tmp_path):
-    path = save(tmp_path / "run.mat", time=T, heave=HEAVE)
-    whole = path.read_bytes()
-    for part in (20, 512, 600, 2000, len(whole) // 2, len(whole) - 100):
-        path.write_bytes(whole[:part])
-        with pytest.raises(
-            DataError, match=r"of version 7\.3: cut off or damaged .* Save it again"
-        ):
-            read_table(path)
-    path.write_bytes(whole[:512] + b"time,heave\n0,1\n" * 100)
-    with pytest.raises(DataError, match=r"version 7\.3: cut off or damaged"):
-        read_table(path)
-    path.write_bytes(b"")
-    with pytest.raises(DataError, match=r"run\.mat is empty \(0 bytes\)"):
         read_table(path)
 
 

@@ -1,7 +1,6 @@
 """ROS 2 bags and MCAP, written by rosbags."""
 
 import builtins
-import shutil
 import sqlite3
 from contextlib import closing
 
@@ -99,14 +98,6 @@ def test_a_standard_message(tmp_path, plugin, what):
     assert not any("covariance" in name for name in units)
 
 
-def test_an_mcap_file_alone(tmp_path):
-    """Without the folder's metadata."""
-    made = save(tmp_path / "bag", mru=imu)
-    alone = tmp_path / "run.mcap"
-    shutil.copy(next(made.glob("*.mcap")), alone)
-    np.testing.assert_array_equal(read_table(alone)["angular_velocity.y"], RATE)
-
-
 def test_the_times_of_reception_on_request(tmp_path):
     run = read_table(save(tmp_path / "bag", mru=imu), FileSettings(time="receive_time"))
     np.testing.assert_allclose(run["time"], T, atol=1e-12)
@@ -178,17 +169,6 @@ def test_nothing_recorded(tmp_path):
         read_table(tmp_path / "none")
 
 
-@pytest.mark.parametrize("part", [0.02, 0.3, 0.7, 0.9])
-@pytest.mark.parametrize("plugin", list(StoragePlugin), ids=lambda plugin: plugin.name)
-def test_cut_off(tmp_path, plugin, part):
-    path = save(tmp_path / "bag", plugin, mru=imu)
-    file = next(each for each in path.iterdir() if each.suffix in (".mcap", ".db3"))
-    whole = file.read_bytes()
-    file.write_bytes(whole[: int(part * len(whole))])
-    with pytest.raises(DataError, match="cannot be read as a recording of ROS 2: cut off, damaged"):
-        read_table(path)
-
-
 def test_messages_that_are_missing(tmp_path):
     """The folder's metadata count more messages than its file holds."""
     path = save(tmp_path / "bag", StoragePlugin.SQLITE3, mru=imu)
@@ -197,27 +177,6 @@ def test_messages_that_are_missing(tmp_path):
         database.commit()
     with pytest.raises(DataError, match="announces 100 messages of the topic '/mru' and holds 60"):
         read_table(path)
-
-
-@pytest.mark.parametrize("name", ["run.mcap", "run.db3"])
-def test_foreign_and_empty(tmp_path, name):
-    path = tmp_path / name
-    path.write_bytes("tid;hiv é\n1;2\n".encode("latin-1"))
-    with pytest.raises(
-        DataError, match=r"is not a valid (MCAP|ROS 2 bag) file: it holds text and starts"
-    ):
-        read_table(path)
-    path.write_bytes(b"")
-    with pytest.raises(DataError, match=r"is empty \(0 bytes\)"):
-        read_table(path)
-
-
-def test_a_folder_that_is_no_bag(tmp_path):
-    with pytest.raises(RequestError, match="is a folder, and only regular files"):
-        read_table(tmp_path)
-    (tmp_path / "metadata.yaml").write_text("a: [", encoding="utf-8")
-    with pytest.raises(DataError, match="cannot be read as a recording of ROS 2"):
-        read_table(tmp_path)
 
 
 def test_the_checksum_of_a_bag_follows_its_files(tmp_path):

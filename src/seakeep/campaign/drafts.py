@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Iterator, Mapping, Sequence
-from operator import attrgetter
 from pathlib import Path
 
 import tomlkit
@@ -19,6 +17,7 @@ from seakeep.campaign.guesses import (
     Guess,
     Sea,
     arranged,
+    dead_motions,
     guess_channels,
     is_trigger,
     seas_of,
@@ -29,7 +28,7 @@ from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import MOTIONS, canonical_channel, is_elevation
 from seakeep.errors import RequestError
 from seakeep.files import MARK, expanded
-from seakeep.formats import Columns, read_columns
+from seakeep.formats import read_columns
 from seakeep.formats.columns import named_unit
 from seakeep.toml import validated
 
@@ -37,8 +36,6 @@ __all__ = ["draft_campaign"]
 
 STEPS = 32
 """Samples per period that the paper takes, and a draft proposes."""
-
-_REMOVE = "prepare warns of it: remove it"
 
 
 def draft_campaign(
@@ -79,26 +76,25 @@ def draft_campaign(
         )
     paths = [Path(file) for file in files]
     known = {key: value for key, value in (options or {}).items() if value is not None}
-    settings = validated(FileSettings, known, "options", "draft").known()
-    tables = [read_columns(path, settings) for path in paths]
-    read = arranged(paths, tables)
+    settings = validated(FileSettings, known, "options", "draft")
+    read = arranged(paths, [read_columns(path, settings.known()) for path in paths])
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
         _refuse(read)
     wave = next(iter(_inputs(guesses)), None)
     seas = {} if wave is None else seas_of(read, guesses, wave)
-    lines = [
-        f"# Draft of a campaign ({MARK}: draft). Read every line that says 'guessed', then",
+    parts = [
+        f"# Draft of a campaign ({MARK}: draft). Read every line that says 'guessed', then\n"
         "# run: seakeep prepare THIS-FILE, and look at the sheet it makes",
-        *_general(read, seas, wave),
+        _general(read, seas, wave),
         *_files(read, known),
         *_channels(guesses),
         *(_instruments(read, guesses) if read[0].logger else ()),
-        *_runs(read, seas, folder),
+        *_runs(read, _roles(read, guesses, seas), seas, folder),
         *_preparation(read, guesses, seas),
         *_model(guesses),
     ]
-    return "\n".join(re.sub(r"[\x00-\x08\x0a-\x1f\x7f]", "?", line) for line in lines) + "\n"
+    return "\n".join(parts) + "\n"
 
 
 def _value(value: object) -> str:
@@ -125,71 +121,72 @@ def _refuse(files: Sequence[File]) -> None:
     )
 
 
-def _general(files: Sequence[File], seas: Mapping[str, Sea], wave: Guess | None) -> Iterator[str]:
+def _general(files: Sequence[File], seas: Mapping[str, Sea], wave: Guess | None) -> str:
     common = Path(os.path.commonpath([file.path.resolve().parent for file in files]))
-    yield from ("", "[campaign]", f"name = {_value(common.name or 'campaign')}")
-    yield "scale_factor = 1.0 # full-scale length over model length"
+    period = "# encounter_period = …  # s; STATE IT: no wave was found"
     if seas:
         run, sea = next(iter(seas.items()))
-        kinds = {_kind(each, seas) for each in seas}
-        which = "the irregular runs" if "irregular" in kinds else "all runs"
-        yield (
+        some = "irregular" in {_kind(each, seas) for each in seas}
+        period = (
             f"# encounter_period = {sea.period:.3g}  # s; left out, it is measured: the mean of "
-            f"{which} (this is that of {run})"
+            f"{'the irregular runs' if some else 'all runs'} (this is that of {run})"
         )
-        if wave is not None and any(sea.noisy for sea in seas.values()):
-            said = f"guessed: without it, noise of {wave.channel} counts as waves"
-            yield f"period_hysteresis = {HYSTERESIS} # {said}"
-    else:
-        yield "# encounter_period = …  # s; STATE IT: no wave was found"
-    yield from ("", "[rig]")
-    yield "# water_depth = …  # m, or inf for deep water; needed where probes are aligned"
-    yield "# [rig.positions]  # channel = x in m along the waves"
+    if wave is not None and any(sea.noisy for sea in seas.values()):
+        said = f"guessed: without it, noise of {wave.channel} counts as waves"
+        period += f"\nperiod_hysteresis = {HYSTERESIS} # {said}"
+    return f"""
+[campaign]
+name = {_value(common.name or "campaign")}
+scale_factor = 1.0 # full-scale length over model length
+{period}
+
+[rig]
+# water_depth = …  # m, or inf for deep water; needed where probes are aligned
+# [rig.positions]  # channel = x in m along the waves"""
+
+
+def _assumed_rate(files: str) -> str:
+    return (
+        f"sampling_rate = 100.0 # ASSUMED: {files} no time column. Correct it\n"
+        "sampling_rate_assumed = true # prepare warns of it: remove it"
+    )
 
 
 def _files(files: Sequence[File], known: Mapping[str, object]) -> Iterator[str]:
     yield from ("", "[files]", *(f"{key} = {_value(value)}" for key, value in known.items()))
-    times, table = {file.time for file in files}, files[0].table
-    if len(times) == 1 and (time := files[0].time) is not None:
-        yield f"time = {_value(time)} # {_why_time(table, time)}"
-    elif not files[0].logger and None in times and table.sampling_rate is None:
-        yield "sampling_rate = 100.0 # ASSUMED: the files have no time column. Correct it"
-        yield f"sampling_rate_assumed = true # {_REMOVE}"
-
-
-def _why_time(table: Columns, time: str) -> str:
-    if time_column(table) is not None:
-        return "guessed from its name"
-    unit, step = time_unit_of(table, time), time_step_of(table, time)
-    rate = "" if step is None else f": {1 / step:.6g} samples per second"
-    return f"guessed: it rises evenly, as times do, in {unit}{rate}. Check it"
+    first, times = files[0], {file.time for file in files}
+    if first.time is not None and len(times) == 1:
+        why = "guessed from its name"
+        if time_column(first.table) is None:
+            unit, step = (of(first.table, first.time) for of in (time_unit_of, time_step_of))
+            rate = "" if step is None else f": {1 / float(step):.6g} samples per second"
+            why = f"guessed: it rises evenly, as times do, in {unit}{rate}. Check it"
+        yield f"time = {_value(first.time)} # {why}"
+    elif not first.logger and None in times and first.table.sampling_rate is None:
+        yield _assumed_rate("the files have")
 
 
 def _channels(guesses: Sequence[Guess]) -> Iterator[str]:
-    yield from ("", "# A channel is sign * (reading + offset), converted to SI.")
-    for guess in guesses:
-        if guess.channel is None:
-            continue
-        canonical = canonical_channel(guess.channel)
+    yield "\n# A channel is sign * (reading + offset), converted to SI."
+    for guess in (each for each in guesses if each.channel is not None):
+        canonical = canonical_channel(str(guess.channel))
         said = f" # guessed: {canonical.long_name}; header '{guess.header}'" if canonical else ""
-        yield from ("", f"[channels.{guess.channel}]", f"column = {_value(guess.column)}{said}")
+        yield f"\n[channels.{guess.channel}]\ncolumn = {_value(guess.column)}{said}"
         if guess.logger:
             yield f"instrument = {_value(guess.logger)}"
-        if guess.named_unit:
+        if guess.unit_from == "name":
             yield f"unit = {_value(guess.unit)} # guessed: its name ends on it. Check it"
-        elif guess.assumed_unit:
+        elif guess.unit_from == "nobody":
             yield f"unit = {_value(guess.unit)} # ASSUMED: the file states none. Correct it"
-            yield f"unit_assumed = true # {_REMOVE}"
-        if canonical is None:
-            # Without a unit that the campaign converts.
-            bare = named_unit(guess.column)[0] if guess.named_unit else guess.column
-            yield f"long_name = {_value(bare)}"
+            yield "unit_assumed = true # prepare warns of it: remove it"
+        if canonical is None:  # without a unit that the campaign converts
+            named = guess.unit_from == "name"
+            yield f"long_name = {_value(named_unit(guess.column)[0] if named else guess.column)}"
         if guess.gaps:
             yield "# it has gaps: see 'gaps' in [preparation]"
     skipped = [guess for guess in guesses if guess.channel is None]
     yield from [""] * bool(skipped)
-    for guess in skipped:
-        yield f"# column '{guess.header}' left out: {guess.why}"
+    yield from (f"# column '{guess.header}' left out: {guess.why}" for guess in skipped)
 
 
 def _instruments(files: Sequence[File], guesses: Sequence[Guess]) -> Iterator[str]:
@@ -197,62 +194,58 @@ def _instruments(files: Sequence[File], guesses: Sequence[Guess]) -> Iterator[st
     loggers = list({file.logger: file for file in reversed(files)}.values())[::-1]
     triggers = {file.logger: next(filter(is_trigger, file.table.values), None) for file in loggers}
     waves = [g.logger for g in guesses if is_elevation(g.channel or "")]
-    reference = (waves or [file.logger for file in loggers])[0]
-    yield from ("", "[instruments]")
+    reference = (waves or list(triggers))[0]
+    yield "\n[instruments]"
     yield f"reference = {_value(reference)} # guessed: its clock is the time of all"
     if not all(triggers.values()):
-        yield "# no trigger was found in all files: clocks are taken as they are. If they differ,"
-        yield "# state in [instruments.NAME] shared = ['OWN COLUMN', \"REFERENCE'S\"] of one signal"
-        yield "# that both record, correlated = [...] of two that go together, or offset (s)"
+        yield """# no trigger was found in all files: clocks are taken as they are. If they differ,
+# state in [instruments.NAME] shared = ['OWN COLUMN', "REFERENCE'S"] of one signal
+# that both record, correlated = [...] of two that go together, or offset (s)"""
     stated = len({file.time for file in loggers}) > 1
     for file in loggers:
-        yield from ("", f"[instruments.{_key(file.logger)}]")
+        yield f"\n[instruments.{_key(file.logger)}]"
         if stated and file.time is not None:
             yield f"time = {_value(file.time)}"
         if file.rate is not None:
             yield f"# {file.rate:.6g} samples per second"
         elif file.time is None:
-            yield "sampling_rate = 100.0 # ASSUMED: the file has no time column. Correct it"
-            yield f"sampling_rate_assumed = true # {_REMOVE}"
+            yield _assumed_rate("the file has")
         if all(triggers.values()):
             name = _value(triggers[file.logger])
             yield f"trigger = {name} # guessed: pulses that all loggers recorded"
 
 
 def _runs(
-    files: Sequence[File], seas: Mapping[str, Sea], folder: Path | str | None
+    files: Sequence[File],
+    roles: Mapping[str, tuple[str, str]],
+    seas: Mapping[str, Sea],
+    folder: Path | str | None,
 ) -> Iterator[str]:
-    names = list(dict.fromkeys(file.run for file in files))
-    loggers = {file.logger for file in files}
-    paths = {n: {f.logger: _relative(f.path, folder) for f in files if f.run == n} for n in names}
-    whole = [name for name in names if set(paths[name]) == loggers]
-    roles = _roles(whole, seas)
-    for name in names:
-        own = paths[name]
-        yield from ("", f"[runs.{_key(name)}]")
-        if set(own) == {""}:
-            yield f"file = {_value(own[''])}"
+    groups = [sea.group for sea in seas.values()]
+    for name, (role, why) in roles.items():
+        own = {file.logger: _relative(file.path, folder) for file in files if file.run == name}
+        is_first, sea = name == files[0].run, seas.get(name)
+        yield f"\n[runs.{_key(name)}]"
+        if "" in own:
+            yield f"file = {_value(own.pop(''))}"
         if kind := _kind(name, seas):
             source = "name" if waves_of_name(name) else "spectrum"
             yield f"waves = {_value(kind)} # guessed from its {source}"
-        lacking = f"it has no file of {', '.join(sorted(loggers - set(own)))}"
-        role, why = roles.get(name, ("unused", lacking))
         yield f"role = {_value(role)} # {why}"
-        if len(names) == 1:
+        if len(roles) == 1:
             yield "# train = [0.0, 60.0]  # s; in place of role, with test = [60.0, inf]"
-        sea, is_first = seas.get(name), name == names[0]
         # Training keeps the onset, since steady waves hold one frequency.
         if sea is not None and sea.start > 0 and role == "test":
             yield f"span = [{sea.start:.2f}, inf] # s; guessed: the waves have come to the vessel"
         elif is_first:
             yield "# span = [10.0, inf]  # s; cut the start-up of the waves off"
-        if sea is not None and sum(sea.group == each.group for each in seas.values()) > 1:
+        if sea is not None and groups.count(sea.group) > 1:
             group = _value(f"waves of {sea.group}")
             yield f"sea_state = {group} # guessed: the same waves come again"
         elif is_first:
             yield "# sea_state = 'A'  # one word for runs in one sea, which studies judge together"
-        if set(own) != {""}:
-            yield from ("", f"[runs.{_key(name)}.files]")
+        if own:
+            yield f"\n[runs.{_key(name)}.files]"
             yield from (f"{_key(logger)} = {_value(path)}" for logger, path in own.items())
 
 
@@ -263,48 +256,62 @@ def _kind(run: str, seas: Mapping[str, Sea]) -> str | None:
     return "regular" if seas[run].regular else "irregular"
 
 
-def _roles(names: Sequence[str], seas: Mapping[str, Sea]) -> dict[str, tuple[str, str]]:
+def _roles(
+    files: Sequence[File], guesses: Sequence[Guess], seas: Mapping[str, Sea]
+) -> dict[str, tuple[str, str]]:
     """Role of each run, and why: irregular runs train, and one whose waves lie within theirs tests.
 
-    Runs without waves are not used, where others have some.
+    Runs without waves are not used, where others have some; nor are those that lack a file, or in
+    which a motion that others show is constant.
     """
-    if len(names) == 1:
-        return {names[0]: ("train", "the only run")}
-    moved = [name for name in names if name in seas or not seas]
+    runs, loggers = dict.fromkeys(file.run for file in files), {file.logger for file in files}
+    dead = dead_motions(files, guesses) if len(runs) > 1 else {}
+    roles, whole = {}, []
+    for name in runs:
+        roles[name] = "unused", "guessed: no waves were found, as in still water or decay tests"
+        lacking = loggers - {file.logger for file in files if file.run == name}
+        if lacking:
+            roles[name] = "unused", f"it has no file of {', '.join(sorted(lacking))}"
+        elif name in dead:
+            why = f"guessed: {dead[name]} is constant, and moves in other runs: a dead sensor?"
+            roles[name] = "unused", why
+        else:
+            whole.append(name)
+    if len(whole) == 1:
+        return roles | {whole[0]: ("train", "the only run")}
+    moved = [name for name in whole if name in seas or not seas]
     irregular = [name for name in moved if _kind(name, seas) != "regular"]
     mixed = 0 < len(irregular) < len(moved)
     order = irregular if mixed else moved
-    tests = _tests_of(order, seas) if len(order) > 1 else set()
+    tests = _tests_of(order, seas) if len(order) > 1 else []
     why = "guessed: one run whose waves lie within those of the others tests, these train"
     if mixed:
         why = "guessed: irregular runs train" + (" but one, the rest tests" if tests else "")
-    unused = ("unused", "guessed: no waves were found, as in still water or decay tests")
-    trains = {name: "train" for name in order if name not in tests}
-    return {n: (trains.get(n, "test"), why) if n in moved else unused for n in names}
+    trains = [name for name in order if name not in tests]
+    return roles | {n: ("train" if n in trains else "test", why) for n in moved}
 
 
-def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> set[str]:
+def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> list[str]:
     """A run whose waves lie within the range of the others', or nearest to it, and its repeats.
 
     Of several regular waves, that with the least distance to the next one in period.
     """
     groups: dict[str, list[str]] = {}
-    for name in names:
-        groups.setdefault(seas[name].group if seas else name, []).append(name)
-    if len(groups) < 2 or not seas:
-        return {names[-1]}
+    for name in names if seas else ():
+        groups.setdefault(seas[name].group, []).append(name)
+    if len(groups) < 2:
+        return [names[-1]]
 
-    def reach(group: list[str]) -> tuple[float, int, float]:
+    def distance(group: list[str]) -> tuple[float, int, float]:
         own, others = seas[group[0]], [seas[name] for name in names if name not in group]
         outside = 0.0
-        for value in (attrgetter("height"), attrgetter("period")):
-            rest = list(map(value, others))
-            outside += math.log(max(min(rest) / value(own), value(own) / max(rest), 1.0))
+        for key in ("height", "period"):
+            value, rest = getattr(own, key), [getattr(sea, key) for sea in others]
+            outside += math.log(max(min(rest) / value, value / max(rest), 1.0))
         nearest = min(abs(math.log(sea.period / own.period)) for sea in others)
         return outside, len(group), nearest if own.regular else -names.index(group[0])
 
-    nearest = min(groups.values(), key=reach)
-    return set(nearest)
+    return min(groups.values(), key=distance)
 
 
 def _relative(path: Path, folder: Path | str | None) -> str:
@@ -320,7 +327,7 @@ def _preparation(
     files: Sequence[File], guesses: Sequence[Guess], seas: Mapping[str, Sea]
 ) -> Iterator[str]:
     """One step for all, no finer than that of the fastest logger, and what to do about gaps."""
-    yield from ("", "[preparation]")
+    yield "\n[preparation]"
     several = bool(files[0].logger)
     rates = [file.rate for file in files if file.rate and math.isfinite(file.rate)]
     shortest = min((sea.period for sea in seas.values()), default=0.0)
@@ -337,11 +344,13 @@ def _preparation(
         yield f"sampling_rate = {rate:#.6g} # Hz; guessed: that of the slowest logger"
     else:
         yield f"# sampling_rate = {min([25.0, *rates]):.6g}  # Hz; left out, the files' own"
-    if gapped := [str(guess.channel) for guess in guesses if guess.channel and guess.gaps]:
-        short = any(guess.gaps == "short" for guess in guesses if guess.channel)
+    if gapped := {
+        str(guess.channel): guess.gaps for guess in guesses if guess.channel and guess.gaps
+    }:
         yield (
-            f"gaps = \"{'bridge' if short else 'mask'}\" # {', '.join(gapped)}: 'mask' flags gaps, "
-            f"'bridge' fills those up to {SHORT_GAP} s and says so"
+            f'gaps = "{"bridge" if "short" in gapped.values() else "mask"}" # '
+            f"{', '.join(gapped)}: 'mask' flags gaps, 'bridge' fills those up to {SHORT_GAP} s "
+            "and says so"
         )
 
 
@@ -349,10 +358,8 @@ def _inputs(guesses: Sequence[Guess]) -> list[Guess]:
     """Wave probes that drive a model: none behind the vessel, without gaps where there are such."""
     waves = [guess for guess in guesses if is_elevation(guess.channel or "")]
     before = [guess for guess in waves if not guess.behind] or waves
-    for gaps in ("", "short"):
-        if whole := [guess for guess in before if guess.gaps == gaps]:
-            return whole
-    return before
+    least = min((guess.gaps for guess in before), key=("", "short", "long").index, default="long")
+    return [guess for guess in before if guess.gaps == least]
 
 
 def _model(guesses: Sequence[Guess]) -> Iterator[str]:
@@ -366,40 +373,37 @@ def _model(guesses: Sequence[Guess]) -> Iterator[str]:
     inputs = [str(guess.channel) for guess in _inputs(guesses) if guess.channel not in states]
     motions = [name for name in mapped if any(name in kind for kind in kinds)]
     loads = [n for n in rest if n.startswith("mooring_") and n not in states]
-    yield from ("", "[model]", 'preset = "recommended"')
-    said = "guessed: the motions that the model forecasts" if any(moved) else _no_motion(guesses)
-    yield f"states = {_value(states)} # {said}"
+    probes = [name for name in mapped if is_elevation(name) and name not in inputs]
+    behind = [name for name in probes if mapped[name].behind]
+    said = "guessed: the motions that the model forecasts"
+    if not any(moved):
+        said = "CORRECT IT: no motion was found; name the files of all loggers to init"
+        if all(guess.column.isdigit() for guess in guesses):
+            said = (
+                "CORRECT IT: the files have no header; give [channels.…] their names, such as "
+                "heave or eta_1, and state units"
+            )
+    yield f'\n[model]\npreset = "recommended"\nstates = {_value(states)} # {said}'
     if still := [name for name in motions if mapped[name].at_rest]:
         yield f"# {', '.join(still)} left out: next to no motion beside the others: restrained?"
-    if gapped := [name for name in motions if mapped[name].gaps == "long"]:
-        yield from _left_out(gapped, "states")
+    yield from _gapped([name for name in motions if mapped[name].gaps == "long"], "states")
     if loads:
-        yield f"# Loads ({', '.join(loads)}) may be added to the states: they are read off the"
-        yield "# motions where a line goes slack and that is better. Judge their extremes."
-    yield f"inputs = {_value(inputs)} # guessed: the waves that drive it"
-    yield "# kind = 'bayesian_hankel_dmdc' # an ensemble: its forecasts have a band"
-    probes = [name for name in mapped if is_elevation(name) and name not in inputs]
-    if behind := [name for name in probes if mapped[name].behind]:
+        yield f"""# Loads ({", ".join(loads)}) may be added to the states: they are read off the
+# motions where a line goes slack and that is better. Judge their extremes."""
+    yield f"""inputs = {_value(inputs)} # guessed: the waves that drive it
+# kind = 'bayesian_hankel_dmdc' # an ensemble: its forecasts have a band"""
+    if behind:
         yield f"# {', '.join(behind)} left out: behind the vessel, by name, where its own waves are"
     else:
         yield "# Remove probes that stand behind the vessel: the waves it makes are not an input."
-    if gapped := [n for n in probes if mapped[n].gaps and n not in behind]:
-        yield from _left_out(gapped, "inputs")
+    yield from _gapped([n for n in probes if mapped[n].gaps and n not in behind], "inputs")
 
 
-def _left_out(names: Sequence[str], key: str) -> Iterator[str]:
-    has = "it has" if len(names) == 1 else "they have"
-    yield (
-        f"# {', '.join(names)} left out: {has} gaps, and a model takes none. To be among the "
-        f"{key}, repair them in the files, or bridge them (gaps, longest_gap in [preparation])."
-    )
-
-
-def _no_motion(guesses: Sequence[Guess]) -> str:
-    """What to do where no column is called as a motion is."""
-    if all(guess.column.isdigit() for guess in guesses):
-        return (
-            "CORRECT IT: the files have no header; give [channels.…] their names, such as heave "
-            "or eta_1, and state units"
+def _gapped(names: Sequence[str], key: str) -> Iterator[str]:
+    """What to do about channels left out for their gaps, if there are any."""
+    if names:
+        has = "it has" if len(names) == 1 else "they have"
+        yield (
+            f"# {', '.join(names)} left out: {has} gaps, and a model takes none. To be among the "
+            f"{key}, repair them in the files, or bridge them (gaps, longest_gap in [preparation])."
         )
-    return "CORRECT IT: no motion was found; name the files of all loggers to init"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -13,7 +13,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
-from seakeep.conventions import MOTIONS, canonical_channel, conversion, si_unit
+from seakeep.conventions import MOTIONS, canonical_channel, conversion, is_elevation, si_unit
 from seakeep.errors import DataError
 from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
@@ -26,6 +26,7 @@ __all__ = [
     "Guess",
     "Sea",
     "arranged",
+    "dead_motions",
     "guess_channels",
     "is_trigger",
     "is_wave",
@@ -35,14 +36,14 @@ __all__ = [
 ]
 
 # What a column may be called: whole words, lower case.
-_WORDS = {"surge": {"surge", "x"}, "sway": {"sway", "y"}, "heave": {"heave", "z"},
-          "roll": {"roll", "phi"}, "pitch": {"pitch", "theta"}, "yaw": {"yaw", "psi"}}  # fmt: skip
-"""The six motions, by their canonical names."""
-_TURNS = {name: _WORDS[name] | {axis} for name, axis in zip(MOTIONS[3:], "xyz", strict=True)}
+_MOTION = {"surge": {"surge", "x"}, "sway": {"sway", "y"}, "heave": {"heave", "z"},
+           "roll": {"roll", "phi", "x"}, "pitch": {"pitch", "theta", "y"},
+           "yaw": {"yaw", "psi", "z"}}  # fmt: skip
 _ACCELERATION = {"acc", "accel", "acceleration", "a", "dd"}
 _RATE = {"rate", "vel", "velocity", "gyro", "speed", "d", "dot"}
 _WAVE = {"wp", "wg", "wave", "waves", "eta", "zeta", "probe", "probes", "gauge", "gauges",
          "elevation", "wavegauge", "waveprobe", "waveheight"}  # fmt: skip
+_PLACE = {"fwd", "cog", "aft", "mid"}
 _LOAD = {"tension", "load", "force", "mooring", "moor", "line", "fairlead"}
 _ENDS = {"bow": "bow", "fwd": "bow", "forward": "bow", "fore": "bow", "stern": "stern",
          "aft": "stern"}  # fmt: skip
@@ -77,7 +78,7 @@ ONE_WAVE = 0.8
 Thirteen measured regular runs have 0.94 to 1.0, irregular ones 0.26 to 0.59."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class File:
     """A file of a run: of which run and which logger; its columns, and that which is time."""
 
@@ -93,26 +94,47 @@ class File:
         step = None if self.time is None else time_step_of(self.table, self.time)
         return self.table.sampling_rate if step is None else 1.0 / step
 
+    @property
+    def start(self) -> float:
+        """First instant, s; zero where the file states none."""
+        times = self.table.values.get(self.time or "", np.zeros(1))
+        unit = time_unit_of(self.table, self.time or "")
+        factor = conversion(unit, "s") if is_unit(unit) else 1.0
+        return factor * float(times[0]) if np.isfinite(times[0]) else 0.0
+
+    def series(self, column: str) -> FloatArray | None:
+        """A column without its gaps; None where there is too little of it, or it is constant."""
+        series = self.table.values.get(column, np.zeros(0))
+        there = np.isfinite(series)
+        if self.rate is None or there.sum() < LONG or not np.ptp(series[there]):
+            return None
+        return over_gaps(series)
+
 
 @dataclass(frozen=True)
 class Guess:
     """A guess for a column; `channel` is None where nothing fits, and `why` says so.
 
-    `named_unit` says that the unit is what the column's name ends on, `at_rest` that the motion is
-    restrained or does not show, `behind` that a probe's name places it behind the vessel.
+    `unit_from` says who states the unit: the file, the end of the column's name, or nobody.
+    `at_rest` says that the motion is restrained or does not show, `behind` that a probe's name
+    places it behind the vessel.
     """
 
     column: str
     header: str
-    unit: str | None
-    channel: str | None
+    unit: str
+    unit_from: Literal["file", "name", "nobody"]
+    channel: str | None = None
     logger: str = ""
     why: str = ""
-    assumed_unit: bool = False
-    named_unit: bool = False
     gaps: Literal["", "short", "long"] = ""
     at_rest: bool = False
     behind: bool = False
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether it is a motion, a rate or an acceleration of the body."""
+        return (self.channel or "").partition("_")[0] in MOTIONS
 
 
 @dataclass(frozen=True)
@@ -131,36 +153,23 @@ class Sea:
     group: str
 
 
-def _series(file: File, column: str) -> FloatArray | None:
-    """A column without its gaps; None where there is too little of it, or it is constant."""
-    series = file.table.values.get(column, np.zeros(0))
-    there = np.isfinite(series)
-    if file.rate is None or there.sum() < LONG or not np.ptp(series[there]):
-        return None
-    return over_gaps(series)
-
-
 @np.errstate(over="ignore", invalid="ignore")
 def seas_of(files: Sequence[File], guesses: Sequence[Guess], wave: Guess) -> dict[str, Sea]:
     """Waves, as one probe recorded them, of each run that has some; decay tests have none."""
-    found = {}
-    for file in files:
-        series = _series(file, wave.column) if file.logger == wave.logger else None
-        if series is not None and (sea := _sea(file, series)) is not None:
-            found[file.run] = sea, series, float(file.rate or 1.0)
-    highest = max((sea.height for sea, *_ in found.values()), default=0.0)
-    found = {run: each for run, each in found.items() if each[0].height > STILL * highest}
-    rate = min((own for *_, own in found.values()), default=1.0)
-    groups = repeated_waves(
-        {
-            run: np.interp(np.arange(0, series.size, own / rate), np.arange(series.size), series)
-            for run, (_, series, own) in found.items()
-        },
-        1.0 / rate,
-    )
+    series = {f: f.series(wave.column) for f in files if f.logger == wave.logger}
+    seas = {f: sea for f, x in series.items() if x is not None and (sea := _sea(f, x)) is not None}
+    highest = max((sea.height for sea in seas.values()), default=0.0)
+    seas = {file: sea for file, sea in seas.items() if sea.height > STILL * highest}
+    rate = min((float(file.rate or 1.0) for file in seas), default=1.0)
+    records = {}
+    for file in seas:
+        x, own = series[file], float(file.rate or 1.0)
+        assert x is not None
+        records[file.run] = np.interp(np.arange(0, x.size, own / rate), np.arange(x.size), x)
+    groups = repeated_waves(records, 1.0 / rate)
     return {
-        run: replace(sea, group=groups[run], start=_start(run, files, guesses))
-        for run, (sea, *_) in found.items()
+        file.run: replace(sea, group=groups[file.run], start=_start(file.run, files, guesses))
+        for file, sea in seas.items()
     }
 
 
@@ -187,23 +196,15 @@ def _start(run: str, files: Sequence[File], guesses: Sequence[Guess]) -> float:
     starts = [0.0]
     for file in (each for each in files if each.run == run):
         for guess in (each for each in guesses if each.logger == file.logger):
-            name, series = str(guess.channel), _series(file, guess.column)
-            if series is None or not (name.startswith("eta_") or name in MOTIONS):
+            name, series = str(guess.channel), file.series(guess.column)
+            if series is None or not (is_elevation(name, rates=True) or name in MOTIONS):
                 continue
             if name in MOTIONS:  # slow drifts hide the start of the waves, and less so in rates
                 series = np.gradient(series)
             if begin := waves_part(series, 1.0).start:
                 step = 1.0 / float(file.rate or 1.0)
-                starts.append(step * begin + _first(file))
+                starts.append(step * begin + file.start)
     return max(starts)
-
-
-def _first(file: File) -> float:
-    """First instant of a file, s; zero where it states none."""
-    times = file.table.values.get(file.time or "", np.zeros(1))
-    unit = time_unit_of(file.table, file.time or "")
-    factor = conversion(unit, "s") if is_unit(unit) else 1.0
-    return factor * float(times[0]) if np.isfinite(times[0]) else 0.0
 
 
 def waves_of_name(run: str) -> str | None:
@@ -219,8 +220,8 @@ def is_trigger(column: str) -> bool:
 
 def is_wave(column: str) -> bool:
     """Whether a column is called as those of wave probes are, and not as a motion."""
-    words = _words(column)
-    return bool(_WAVE & set(words)) and _motion(words, None) is None
+    words = set(_words(column))
+    return bool(_WAVE & words) and not any(_motions(words))
 
 
 def _plain(text: str) -> str:
@@ -270,19 +271,18 @@ def arranged(paths: Sequence[Path], tables: Sequence[Columns]) -> list[File]:
         {n for n in table.names if n != time and not is_trigger(n)}
         for table, time in zip(tables, times, strict=True)
     ]
-    for keys in ([_by_folder(path) for path in paths], _by_name(paths, own)):
+    folders = [_by_folder(path) for path in paths]
+    for keys in (folders, _by_name(paths, own)):
         if _fits(keys, own):
             break
     else:
-        stems = [_stem(path) for path in paths]
-        folders = [_by_folder(path)[0] for path in paths]
-        if len(set(stems)) == 1 and len(set(folders)) > 1:
-            stems = folders
+        stems, above = [_stem(path) for path in paths], [folder for folder, _ in folders]
+        if len(set(stems)) == 1 < len(set(above)):
+            stems = above
         taken: Counter[str] = Counter()
         keys = [(_free(stem, taken), "") for stem in stems]
     return [
-        File(path, run, logger, table, time)
-        for path, (run, logger), table, time in zip(paths, keys, tables, times, strict=True)
+        File(*each) for each in zip(paths, *zip(*keys, strict=True), tables, times, strict=True)
     ]
 
 
@@ -310,71 +310,73 @@ def _free(stem: str, taken: Counter[str]) -> str:
 
 def guess_channels(files: Sequence[File]) -> list[Guess]:
     """Guess a channel for each column of the first file of each logger."""
-    found: list[Guess] = []
+    out: list[Guess] = []
     taken: Counter[str] = Counter()
-    loggers = {file.logger: file for file in reversed(files)}
     for logger in dict.fromkeys(file.logger for file in files):
-        first, same = loggers[logger], [file for file in files if file.logger == logger]
-        for column in first.table.names:
-            if column == first.time or (logger and is_trigger(column)):
-                continue
-            guess = _guess(column, same)
-            if guess.channel is not None:
-                guess = replace(guess, channel=_free(guess.channel, taken))
-            found.append(guess)
-    return _resting(found, files)
-
-
-def _resting(guesses: Sequence[Guess], files: Sequence[File]) -> list[Guess]:
-    """Mark motions, rates and accelerations beside which others of their unit move far more."""
+        same = [file for file in files if file.logger == logger]
+        for column in same[0].table.names:
+            if column != same[0].time and not (logger and is_trigger(column)):
+                guess = _guess(column, same)
+                name = guess.channel and _free(guess.channel, taken)
+                out.append(replace(guess, channel=name))
+    # Motions, rates and accelerations beside which others of their unit move far more.
     sizes = {}
-    for guess in guesses:
-        if guess.channel is not None and guess.channel.partition("_")[0] in MOTIONS:
-            series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
-            spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
-            size = max(float(high - low) for low, high in spans)
-            target = si_unit(str(guess.unit))
-            sizes[guess.channel] = target, size * conversion(str(guess.unit), target)
+    for guess in (each for each in out if each.is_motion):
+        series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
+        spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
+        unit = si_unit(guess.unit)
+        size = max(float(high - low) for low, high in spans) * conversion(guess.unit, unit)
+        sizes[guess.channel] = unit, size
     largest = {unit: max(x for u, x in sizes.values() if u == unit) for unit, _ in sizes.values()}
     rests = {name for name, (unit, size) in sizes.items() if size <= AT_REST * largest[unit]}
-    return [replace(each, at_rest=True) if each.channel in rests else each for each in guesses]
+    return [replace(each, at_rest=each.channel in rests) for each in out]
+
+
+def dead_motions(files: Sequence[File], guesses: Sequence[Guess]) -> dict[str, str]:
+    """Runs in which a motion that others show is constant, as where its sensor is dead."""
+    dead: dict[str, str] = {}
+    for guess in (each for each in guesses if each.is_motion and not each.at_rest):
+        for file in (each for each in files if each.logger == guess.logger):
+            values = file.table.values[guess.column]
+            if np.ptp(values[np.isfinite(values)]) == 0:
+                dead.setdefault(file.run, str(guess.channel))
+    return dead
 
 
 def _guess(column: str, files: Sequence[File]) -> Guess:
     table, logger = files[0].table, files[0].logger
-    header, unit = table.headers.get(column, column), table.units.get(column)
+    header = _printable(table.headers.get(column, column))
     if is_trigger(column):
-        return Guess(column, header, None, None, why="pulses of a trigger")
-    name, named = (column, None) if unit is not None else named_unit(column)
-    if named is not None and si_unit(named) == "s":  # no channel is a time: "Tension_s" is a side
-        name, named = column, None
-    unit = unit if unit is not None else named
+        return Guess(column, header, "-", "nobody", why="pulses of a trigger")
+    name, unit = column, table.units.get(column)
+    stated_by: Literal["file", "name", "nobody"] = "file"
+    if unit is None:
+        bare, named = named_unit(column)
+        stated_by = "nobody"
+        if named is not None and si_unit(named) != "s":  # "Tension_s" is a side, and no time
+            name, unit, stated_by = bare, named, "name"
     why, gaps = _fault(column, files)
     if unit is not None and not is_unit(unit):
         why = why or f"its unit '{unit}' is not known; state unit = '…'"
     # One file per run may be that of one logger, whose name says what it measured.
     channel = None if why else suggest_channel(name, unit, logger or _stem(files[0].path))
     canonical = canonical_channel(channel) if channel else None
-    return Guess(
-        column=column,
-        header=header,
-        unit=unit if unit is not None else (canonical.units if canonical else "-"),
-        channel=channel,
-        logger=logger,
-        why=why,
-        assumed_unit=unit is None,
-        named_unit=named is not None,
-        gaps=gaps,
-        behind=bool(_BEHIND & set(_words(column))),
-    )
+    unit = unit if unit is not None else canonical.units if canonical else "-"
+    behind = bool(_BEHIND & set(_words(column)))
+    return Guess(column, header, unit, stated_by, channel, logger, _printable(why), gaps,
+                 behind=behind)  # fmt: skip
+
+
+def _printable(text: str) -> str:
+    """Text for a comment of TOML, which has one line."""
+    return re.sub(r"[\x00-\x08\x0a-\x1f\x7f]", "?", text)
 
 
 def _fault(column: str, files: Sequence[File]) -> tuple[str, Literal["", "short", "long"]]:
     """Why a column cannot be a channel, if it cannot; and what gaps it has."""
     if column in files[0].table.faults:
         return "not all of it are numbers, or its name is there twice", ""
-    bad = [f for f in files if f.table.find(column) is None or column in f.table.faults]
-    if bad:
+    if bad := [f for f in files if column not in f.table.values]:
         return f"missing or unusable in {_listed(bad)}", ""
     missing = [~np.isfinite(f.table.values[column]) for f in files]
     if gapped := [f for f, m in zip(files, missing, strict=True) if m.mean() > 1 - USABLE]:
@@ -396,9 +398,8 @@ def _rising_column(table: Columns) -> str | None:
     """
     for column, series in table.values.items():
         unit = table.units.get(column) or named_unit(column)[1]
-        if unit is not None and not (is_unit(unit) and si_unit(unit) == "s"):
-            continue
-        if _step_of(series) not in (None, 1.0):
+        is_time = unit is None or (is_unit(unit) and si_unit(unit) == "s")
+        if is_time and _step_of(series) not in (None, 1.0):
             return column
     return None
 
@@ -423,28 +424,31 @@ def _words(column: str) -> list[str]:
     return [word for word in re.split(r"[^A-Za-z0-9]+", spaced.lower()) if word]
 
 
-def _fits_unit(name: str, dimension: str | None) -> bool:
-    canonical = canonical_channel(name)
-    return canonical is not None and dimension in (None, canonical.units)
-
-
-def _motion(words: Sequence[str], dimension: str | None) -> str | None:
-    """Canonical motion that words and unit speak for."""
+def _motions(words: set[str]) -> Iterator[str]:
+    """Canonical motions that words may mean, the likeliest first."""
     # Of two sensors of one acceleration, neither is the motion of the body; nor is a load.
-    if set(words) & (set(_SIDES) | _LOAD):
-        return None
-    turns = dimension is not None and dimension.startswith("rad")
-    names: dict[str, set[str]] = {**_WORDS, **(_TURNS if turns else {})}
-    for motion, known in names.items():
-        if not known & set(words):
-            continue
-        suffix = "_acceleration" if _ACCELERATION & set(words) else ""
-        suffix = suffix or ("_rate" if _RATE & set(words) else "")
-        others: tuple[str, ...] = () if dimension is None else ("", "_rate", "_acceleration")
-        for each in (suffix, *others):
-            if _fits_unit(motion + each, dimension):
-                return motion + each
-    return None
+    if words & (set(_SIDES) | _LOAD):
+        return
+    said = "_acceleration" if words & _ACCELERATION else "_rate" if words & _RATE else ""
+    for motion, known in _MOTION.items():
+        if known & words:
+            yield from (motion + each for each in (said, "", "_rate", "_acceleration"))
+
+
+def _channels(words: Sequence[str], dimension: str | None, logger: str) -> Iterator[str]:
+    """Canonical channels that words, unit and logger may mean, the likeliest first."""
+    known = set(words)
+    numbers = [word for word in words if word.isdigit()]
+    if _WAVE & known:
+        yield "eta_" + ("_".join([w for w in words if w in _PLACE] + numbers) or "1")
+    if dimension == "m" and _WAVE & set(_words(logger)):
+        yield "eta_" + "_".join(words)
+    yield from _motions(known)
+    if _LOAD & known and not known & set().union(*_MOTION.values()):
+        ends = [_ENDS[word] for word in words if word in _ENDS]
+        sides = [_SIDES[word] for word in words if word in _SIDES]
+        if place := list(dict.fromkeys(ends)) or sides or numbers:
+            yield "mooring_" + "_".join(place)
 
 
 def suggest_channel(column: str, unit: str | None, logger: str = "") -> str:
@@ -454,26 +458,14 @@ def suggest_channel(column: str, unit: str | None, logger: str = "") -> str:
     """
     words = _words(column)
     dimension = None if unit is None else si_unit(unit)
-    numbers = [word for word in words if word.isdigit()]
-    sides = [_SIDES[word] for word in words if word in _SIDES]
 
-    if _WAVE & set(words):
-        place = [w for w in words if w in ("fwd", "cog", "aft", "mid")] + numbers
-        name = "eta_" + ("_".join(place) or "1")
-        if _fits_unit(name, dimension):
-            return name
-    if dimension == "m" and _WAVE & set(_words(logger)):
-        return "eta_" + "_".join(words)
-    if motion := _motion(words, dimension):
-        return motion
-    if _LOAD & set(words) and not any(known & set(words) for known in _WORDS.values()):
-        ends = list(dict.fromkeys(_ENDS[word] for word in words if word in _ENDS))
-        if ends := ends or sides or numbers:
-            name = "mooring_" + "_".join(ends)
-            if _fits_unit(name, dimension):
-                return name
+    def fits(name: str) -> bool:
+        canonical = canonical_channel(name)
+        return canonical is not None and dimension in (None, canonical.units)
+
+    if suggested := next(filter(fits, _channels(words, dimension, logger)), None):
+        return suggested
     free = "_".join(words) or "channel"
     free = free if not free[0].isdigit() else f"column_{free}"
-    canonical = canonical_channel(free)
     taken = free == "time" or free.endswith("_flags")
-    return f"{free}_signal" if taken or (canonical and not _fits_unit(free, dimension)) else free
+    return f"{free}_signal" if taken or (canonical_channel(free) and not fits(free)) else free
