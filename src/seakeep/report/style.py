@@ -218,7 +218,7 @@ def model_words(model: str) -> str:
     >>> model_words("bayesian"), model_words("hold_last"), model_words("fir")
     ('Bayesian', 'hold last', 'FIR')
     """
-    known = {"bayesian": "Bayesian", "fir": "FIR", "arx": "ARX"}
+    known = {"bayesian": "Bayesian", "fir": "FIR", "fir_ahead": "FIR, 2 T̂ ahead", "arx": "ARX"}
     return known.get(model, model.replace("_", " "))
 
 

@@ -345,11 +345,13 @@ kind = "mean"
 [models.hold_last]
 kind = "hold_last"
 
-[models.fir]
+[models.fir]  # with the data, the look-ahead and the input map of the models above
+kind = "fir"{beside}
+
+[models.fir_ahead]
 kind = "fir"
-preset = "recommended"
 lead = "2 T"  # the same windows in all acts
-input_delays = "5 T"  # of them 3 T before the instant{alignment}
+input_delays = "5 T"  # of them 3 T before the instant{ahead}
 
 [tests.irregular]
 waves = "irregular"
@@ -364,6 +366,14 @@ n_series = {series}
 [output]
 paper = true
 """
+RECOMMENDED_FIR = """
+input_delays = "3 T"
+lead = "0.75 T"
+alignment = { mode = "dispersion", surge = "predicted" }
+observables = [
+    { kind = "slow_squares", of = "eta_cog", cutoff = "1 /T", lead = "0.75 T" },
+    { kind = "powers", of = ["eta_fwd", "eta_cog"], powers = [2, 3] },
+]"""
 REGULAR_TEST = """
 [tests.{name}]
 runs = ["{name}"]
@@ -378,11 +388,14 @@ def study_text(act: Act, size: Size, seed: int) -> str:
     """Study file of an act."""
     training = 'scheme = "leave_out"\nleave_out = "run"'
     alignment, members = "", min(size.members, CALIBRATED)
+    beside = RECOMMENDED_FIR
+    ahead = '\nalignment = { mode = "dispersion", surge = "measured" }'
     if act.preset == "paper":
         training = f'scheme = "halves"\nwindows = {size.training}\nplacement = "random"'
         surge, members = "surge_with_drift" if act.without_drift else "surge", size.members
         how = f'mode = "effective", surge = "measured", surge_channel = "{surge}"'
-        alignment = f"\nalignment = {{ {how} }}"
+        alignment = ahead = f"\nalignment = {{ {how} }}"
+        beside = f'\ninput_delays = "5 T"\nwindow = "20 T"{alignment}'
     regular = [
         REGULAR_TEST.format(name=name, ratio=ratio, tests=size.tests, startup=STARTUP)
         for name, ratio in REGULAR.items()
@@ -397,6 +410,8 @@ def study_text(act: Act, size: Size, seed: int) -> str:
         seed=seed,
         training=training,
         alignment=alignment,
+        beside=beside,
+        ahead=ahead,
         members=members,
         tests=size.tests,
         regular="".join(regular),
