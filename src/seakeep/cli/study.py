@@ -93,7 +93,7 @@ def reproduce(
     Example: seakeep reproduce --quick --out quick
     """
     from seakeep.models.executor import on_this_machine, submitting
-    from seakeep.report.acts import acts_table
+    from seakeep.report.acts import finding, short_table
     from seakeep.study.reproduce import ACTS, Size
     from seakeep.study.reproduce import reproduce as reproduce_study
 
@@ -119,7 +119,8 @@ def reproduce(
                         tell(done, len(pages), "drawing the pages of the acts")
                         each.result()
         page = _write_reproduction(out, found, executor)
-    print_table(acts_table(found), note=False)
+    print_table(short_table(found))
+    show(finding(found))
     for act in (act for act in ACTS if act.name in found):
         show(f"{act.title}: {act.sentence}")
     show(f"\nReport: {page}")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from seakeep.arrays import Progress
-from seakeep.report.claims import claims_table
+from seakeep.report.claims import REGULAR, SEA, SINGLE, claims_table, error_of
 from seakeep.report.figures.histories import acts_figure
 from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import wave_tables
@@ -17,7 +17,7 @@ from seakeep.report.sections.judgements import divergence_table
 from seakeep.report.sections.settings import finished
 from seakeep.report.sections.summary import heat_table
 from seakeep.report.style import judged_models, model_words
-from seakeep.report.tables import Table, numbers, table
+from seakeep.report.tables import Number, Table, number, numbers, table
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import average_of
@@ -81,16 +81,97 @@ def _played(results: Results) -> list[Act]:
 
 
 def _summary(results: Results) -> Section:
+    """What the acts found: one sentence, one figure, one short table; the whole one is folded."""
     repeats = [result.groups.get("repeats") for result in results.values()]
     return section(
         "summary",
-        more=(NOTE,),
+        more=(finding(results), still_water(results), NOTE),
         points=[f"{act.title}. {act.sentence}" for act in _played(results)],
         figures=(drawing("acts", partial(acts_figure, results)),),
-        tables=(acts_table(results),),
+        tables=(short_table(results), acts_table(results)),
         # Once what several studies warn of.
         notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each is not None)),
     )
+
+
+ROWS = (
+    ("raw", "deterministic", "(b) the paper's model"),
+    ("raw", "fir", "(b) FIR beside it"),
+    ("recommended", "deterministic", "(c) recommended"),
+    ("recommended", "bayesian", "(c) its ensemble"),
+    ("recommended", "fir", "(c) FIR beside it"),
+)
+"""Rows of the short table, besides that of the last measured state."""
+
+
+def short_table(results: Results) -> Table:
+    """Median errors on the channels as measured: the models, and the best that compare with them.
+
+    Parameters
+    ----------
+    results : mapping of str to StudyResult
+        By act.
+
+    Returns
+    -------
+    Table
+        At most six rows; a cell holds the error of the wave channels and of the slow ones.
+    """
+    last = list(results)[-1]
+    rows = [
+        (words, *(" / ".join(pair) for pair in _pairs(results[act], model)))
+        for act, model, words in (*ROWS, (last, "hold_last", "last measured state"))
+        if act in results
+    ]
+    first = results[last]
+    seas = [first.label_of(test).removeprefix("regular, ") for test in first.tests]
+    return table("short", rows, columns=("model", *seas), numeric=range(1, 1 + len(seas)))
+
+
+def finding(results: Results) -> str:
+    """The conclusion on irregular waves in one sentence, with 95 % intervals."""
+    errors = {act: error_of(results[act], SEA, model=SINGLE).text() for act in results}
+    still = error_of(list(results.values())[-1], SEA, model="hold_last").text()
+    parts = [
+        words.format(errors[act])
+        for act, words in {
+            "recommended": "the recommended model errs {} SD of the measurement",
+            "raw": "the paper's procedure {} on the same channels and windows",
+            "paper": "and {} without the slow drift",
+        }.items()
+        if act in errors
+    ]
+    return f"In irregular waves {', '.join(parts)}; the last measured state errs {still}."
+
+
+def still_water(results: Results) -> str:
+    """Errors of surge in regular waves in metres: there the window's SD says little."""
+    if (result := results.get("recommended")) is None:
+        return ""
+    parts = []
+    for test in REGULAR:
+        at = result.tests[test].sel(channel="surge")
+        spread = float(at["measured"].std("time", ddof=1).median())
+        error = at["error"].sel(model=SINGLE, measure="training_nrmse").where(at["judged"])
+        metres = float(error.median()) * float(at["training_std"].median())
+        parts.append(f"{number(metres, 3)} m ({number(spread, 3)} m)")
+    trained = number(float(at["training_std"].median()), 3)
+    return (
+        "In regular waves drift stands nearly still, at a mean far from that of the training. "
+        f"There the recommended model errs by {', '.join(parts)} in surge at λ/L 1.5, 2 and 3; in "
+        f"parentheses the SD of the window, by which NRMSE divides. In training surge has an SD of "
+        f"{trained} m."
+    )
+
+
+def _pairs(result: StudyResult, model: str) -> list[list[Number]]:
+    """Median errors of a model per sea, of the wave channels and of the slow ones."""
+    pairs = []
+    for data in result.tests.values():
+        cells = data["error"].sel(model=model, measure="nrmse").values[data["judged"].values]
+        slow = np.isin(data["channel"].values.astype(str), SLOW)
+        pairs.append(numbers([np.nanmedian(average_of(cells[:, k])) for k in (~slow, slow)], 2))
+    return pairs
 
 
 def acts_table(results: Results) -> Table:
@@ -99,14 +180,10 @@ def acts_table(results: Results) -> Table:
     for act in _played(results):
         result = results[act.name]
         for model in result.models:
-            row: list[str] = [act.letter, model_words(model)]
-            for data in result.tests.values():
-                cells = (
-                    data["error"].sel(model=model, measure="nrmse").values[data["judged"].values]
-                )
-                slow = np.isin(data["channel"].values.astype(str), SLOW)
-                row += numbers([np.nanmedian(average_of(cells[:, k])) for k in (~slow, slow)], 2)
-            rows.append(tuple(row))
+            pairs = _pairs(result, model)
+            rows.append(
+                (act.letter, model_words(model), *(each for pair in pairs for each in pair))
+            )
     seas = [first.label_of(test).removeprefix("regular, ") for test in first.tests]
     reading = [a.letter for a in _played(results) if results[a.name].attrs["conditional_on"]]
     conditions = ""

@@ -148,7 +148,7 @@ def _motions(result: StudyResult) -> list[str]:
     return [name for name in result.channels if name not in LOADS]
 
 
-def _error(
+def error_of(
     result: StudyResult,
     tests: Sequence[str],
     channels: Sequence[str] = (),
@@ -162,7 +162,7 @@ def _error(
 
 def _robust(results: Results) -> Judged:
     result = results["paper"]
-    own, fir = (_error(result, SEA, model=model) for model in (ENSEMBLE, "fir"))
+    own, fir = (error_of(result, SEA, model=model) for model in (ENSEMBLE, "fir"))
     worst = float(np.nanmax(average_of(_cells(result, SEA))))
     words = f"median ANRMSE {own.text()}, worst cell {worst:.2f}; FIR {fir.text()}"
     return words, all_of([own.below(USEFUL), worst < 1.0])
@@ -274,7 +274,7 @@ def _band(result: StudyResult, channels: Sequence[str]) -> list[Interval]:
 
 def _narrow(results: Results) -> Judged:
     inside, width = _band(results["paper"], _motions(results["paper"]))
-    error = _error(results["paper"], SEA, _motions(results["paper"])).value
+    error = error_of(results["paper"], SEA, _motions(results["paper"])).value
     words = f"motions: {width.text()} SD wide, {inside.part()} of the instants inside 95 %"
     return f"{words}; median error {error:.2f} SD", width.below(USEFUL)
 
@@ -304,14 +304,15 @@ def _slow_loads(results: Results) -> Judged:
 
 
 def _peaks(results: Results) -> Judged:
-    loads = _error(results["paper"], SEA, LOADS, "nammae")
+    loads = error_of(results["paper"], SEA, LOADS, "nammae")
     return f"median NAMMAE of the loads {loads.text()} SD", loads.below(1.0)
 
 
 def _regular(results: Results) -> Judged:
     result = results["paper"]
     motions, loads = (
-        [_error(result, (test,), names) for test in REGULAR] for names in (_motions(result), LOADS)
+        [error_of(result, (test,), names) for test in REGULAR]
+        for names in (_motions(result), LOADS)
     )
     words = [", ".join(each.text() for each in group) for group in (motions, loads)]
     better = [a.below_other(b) for a, b in zip(motions, loads, strict=True)]
@@ -356,7 +357,7 @@ def _phase(results: Results) -> Judged:
 
 def _stern(results: Results) -> Judged:
     result, line = results["paper"], "mooring_stern"
-    errors = [_error(result, (test,), (line,)) for test in REGULAR]
+    errors = [error_of(result, (test,), (line,)) for test in REGULAR]
     slack = results["raw"].groups["runs"]["slack"].sel(name=line, run=list(REGULAR)).values
     parts = ", ".join(f"{100 * float(each):.0f} %" for each in slack)
     judged = [each for each in errors if np.isfinite(each.value)]

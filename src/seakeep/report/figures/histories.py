@@ -53,8 +53,8 @@ LABEL = 8
 """Points of a label: the longest line of one fits beside its panel."""
 ACROSS = 84
 """Letters of a legend that stand beside each other over a panel."""
-CHANNELS = ("heave", "surge")
-"""One that moves with the waves, and one that drifts."""
+CHANNELS = ("surge", "mooring_bow")
+"""What drifts, and the load that this makes."""
 
 Values = npt.ArrayLike | xr.DataArray
 
@@ -450,8 +450,8 @@ def _standard(at: xr.Dataset, values: Any) -> Any:
 
 @figure_style()
 def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
-    """Channels (columns) in the same window of irregular waves, act by act (rows)."""
-    acts = [act for act in ACTS if act.name in results]
+    """Channels as measured (columns) in one window of irregular waves, act by act (rows)."""
+    acts = [act for act in ACTS if act.name in results and not act.without_drift]
     figure = new_figure(8.5, 0.7 + 1.3 * len(acts))
     grid = figure.subplots(len(acts), len(CHANNELS), sharex=True, squeeze=False)
     for row, act in zip(grid, acts, strict=True):
