@@ -41,8 +41,6 @@ from seakeep.arrays import FloatArray
 
 PANEL = 64
 """Rows, about, in which a Gram matrix is made: few enough to stay in cache."""
-RESPONSES = 24
-"""Instants whose responses are one product with a Toeplitz matrix of the weights."""
 BLOCK_WIDTH = 96
 """Columns of the block of lags that is laid out: wide enough for BLAS, small enough for cache."""
 
@@ -297,9 +295,6 @@ def lagged_sums(left: FloatArray, series: FloatArray, first: int, lags: int) -> 
     """
     count, channels = left.shape[0], series.shape[1]
     out = np.empty((left.shape[1], lags * channels))
-    if out.size == 0 or count == 0:
-        out[:] = 0.0
-        return out
     blocks = -(-lags // max(1, BLOCK_WIDTH // channels))
     depth = -(-lags // blocks)
     rows = count + (blocks - 1) * depth
@@ -329,26 +324,11 @@ def lagged_sums(left: FloatArray, series: FloatArray, first: int, lags: int) -> 
 def lagged_response(series: FloatArray, weights: FloatArray, first: int, count: int) -> FloatArray:
     r"""Response :math:`\sum_l g_l^T b_{k+i-l}` for i = 0 … `count` − 1.
 
-    Some instants at a time: the samples that they reach, side by side, times a Toeplitz matrix of
-    the weights.
-
-    `series` is b, `weights` g with lag zero first, and `first` the sample k.
+    `series` is b, `weights` g in one row, with lag zero first, and `first` the sample k.
     """
-    channels = series.shape[1]
-    lags = weights.size // channels if channels else 0
-    if lags == 0:
-        return np.zeros(count)
-    blocks = -(-count // RESPONSES)
-    reached = np.zeros((blocks * RESPONSES + lags - 1, channels))
-    reached[: count + lags - 1] = series[first - lags + 1 : first + count]
-    width = (RESPONSES + lags - 1) * channels
-    step, number = RESPONSES * reached.strides[0], reached.itemsize
-    samples = np.lib.stride_tricks.as_strided(
-        reached, shape=(blocks, width), strides=(step, number), writeable=False
-    )
-    # Rows one sample longer than a block's, end to end: cut at its width, each stands a sample
-    # further right than the one before.
-    shifted = np.zeros((RESPONSES, width + channels))
-    shifted[:, : weights.size] = weights.reshape(lags, channels)[::-1].reshape(-1)
-    toeplitz = shifted.reshape(-1)[: RESPONSES * width].reshape(RESPONSES, width)
-    return np.asarray(samples @ toeplitz.T).reshape(-1)[:count]
+    lags = weights.size // series.shape[1]
+    reached = series[first - lags + 1 : first + count]
+    out = np.zeros(count)
+    for channel, own in zip(reached.T, weights.reshape(lags, -1).T, strict=True):
+        out += np.convolve(channel, own, mode="valid")
+    return out
