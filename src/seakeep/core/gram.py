@@ -127,8 +127,8 @@ class PrimalSystem:
 
     Parameters
     ----------
-    gram : ndarray, shape (p + room, p + room)
-        Upper triangle of C in its first p rows and columns.
+    gram : ndarray, shape (p, p)
+        Upper triangle of C.
     right : ndarray, shape (N, p)
         Products of the next states (the newest block alone) with the regressors.
     heads : ndarray, shape (channels, p)
@@ -160,11 +160,10 @@ def gram_trace(pieces: Sequence[Piece], delays: Sequence[int]) -> float:
     return total
 
 
-def primal_system(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0) -> PrimalSystem:
+def primal_system(pieces: Sequence[Piece], delays: Sequence[int]) -> PrimalSystem:
     r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`.
 
-    `delays` holds those of each group; `room` counts rows and columns to leave beyond the Gram
-    matrix.
+    `delays` holds those of each group.
     """
     groups = lay_out(pieces[0], delays)
     size, width = groups[-1].stop, groups[-1].head.stop
@@ -190,8 +189,8 @@ def primal_system(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0)
             right[:, group.rows] += sums[targets, group.channels :]
             entering[group.older] = _recent(x, start - 1, group.lags - 1)
             leaving[group.older] = _recent(x, end, group.lags - 1)
-    gram = np.empty((size + room, size + room))
-    _fill_primal(gram[:size, :size], heads, edges, groups)
+    gram = np.empty((size, size))
+    _fill_primal(gram, heads, edges, groups)
     return PrimalSystem(gram, right, heads, edges, groups)
 
 
@@ -219,11 +218,8 @@ def _fill_primal(
                     row[:, other.older] += above[:, other.newer]
 
 
-def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0) -> FloatArray:
-    r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs.
-
-    `room` counts rows and columns to leave beyond it, for right-hand sides.
-    """
+def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int]) -> FloatArray:
+    r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs."""
     groups = lay_out(pieces[0], delays)
     width = groups[-1].head.stop
     ends = np.cumsum([0, *(piece.count for piece in pieces)])
@@ -243,9 +239,8 @@ def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0)
         for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
             for x, weights in zip(piece.series, newest, strict=True):
                 head[begin:stop] += lagged_response(x, weights, piece.first, piece.count)
-    size = len(steps)
-    gram = np.empty((size + room, size + room))
-    _fill_snapshots(gram[:size, :size], heads, steps, signed, ends)
+    gram = np.empty((len(steps), len(steps)))
+    _fill_snapshots(gram, heads, steps, signed, ends)
     return gram
 
 
