@@ -391,18 +391,12 @@ def _run_shifting(
     forcing = _forced(rows, propagator.output_input).reshape(number, windows, width)
     samples = np.empty((windows, number * width + size))
     samples[:, number * width :] = start
-    if windows == 1:
-        line, output = samples[0], propagator.output_state
-        for at in range((number - 1) * width, -1, -width):
-            piece = line[at : at + width]
-            np.dot(output, line[at + width : at + width + size], out=piece)
-            piece += forcing[at // width, 0]
-    else:
-        transposed = np.ascontiguousarray(propagator.output_state.T)
-        for block in range(number - 1, -1, -1):
-            at = block * width
-            state = samples[:, at + width : at + width + size]
-            samples[:, at : at + width] = state @ transposed + forcing[block]
+    transposed = propagator.output_state.T
+    for block in range(number - 1, -1, -1):
+        at = block * width
+        state, piece = samples[:, at + width : at + width + size], forcing[block]
+        piece += state @ transposed
+        samples[:, at : at + width] = piece
     return samples[:, : number * width], samples[:, :size]
 
 
