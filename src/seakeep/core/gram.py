@@ -29,18 +29,15 @@ Only upper triangles are made; what stands below the diagonal is not meaningful.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
 
-PANEL = 64
-"""Rows, about, in which a Gram matrix is made: few enough to stay in cache."""
 BLOCK_WIDTH = 96
 """Columns of the block of lags that is laid out: wide enough for BLAS, small enough for cache."""
 
@@ -189,33 +186,21 @@ def primal_system(pieces: Sequence[Piece], delays: Sequence[int]) -> PrimalSyste
             right[:, group.rows] += sums[targets, group.channels :]
             entering[group.older] = _recent(x, start - 1, group.lags - 1)
             leaving[group.older] = _recent(x, end, group.lags - 1)
-    gram = np.empty((size, size))
-    _fill_primal(gram, heads, edges, groups)
-    return PrimalSystem(gram, right, heads, edges, groups)
-
-
-def _fill_primal(
-    gram: FloatArray, heads: FloatArray, edges: FloatArray, groups: Sequence[Group]
-) -> None:
-    # Panel by panel: the product of the edges from the panel's diagonal block on, heads over it,
-    # then the running sums while it is in cache. Sums take whole blocks, so that of the diagonal
-    # blocks the lower halves are made too; what is left of them is memory as it was found, and
-    # must never be read.
+    # The product of the edges, heads over it, then the running sums.
     signed = edges.copy()
     signed[1::2] *= -1.0
+    gram = edges.T @ signed
     for number, group in enumerate(groups):
         later, N = groups[number + 1 :], group.channels
-        for begin, stop in _panels(group.start, group.stop, N):
-            np.matmul(edges[:, begin:stop].T, signed[:, begin:], out=gram[begin:stop, begin:])
+        gram[group.newest, group.start :] = heads[group.head, group.start :]
+        for other in later:
+            gram[group.rows, other.newest] = heads[other.head, group.rows].T
+        for at in range(group.start + N, group.stop, N):
+            above, row = gram[at - N : at], gram[at : at + N]
+            row[:, at : group.stop] += above[:, at - N : group.stop - N]
             for other in later:
-                gram[begin:stop, other.newest] = heads[other.head, begin:stop].T
-            if begin == group.start:
-                gram[group.newest, begin:] = heads[group.head, begin:]
-            for at in range(max(begin, group.start + N), stop, N):
-                above, row = gram[at - N : at], gram[at : at + N]
-                row[:, at : group.stop] += above[:, at - N : group.stop - N]
-                for other in later:
-                    row[:, other.older] += above[:, other.newer]
+                row[:, other.older] += above[:, other.newer]
+    return PrimalSystem(gram, right, heads, edges, groups)
 
 
 def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int]) -> FloatArray:
@@ -239,42 +224,22 @@ def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int]) -> FloatArray:
         for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
             for x, weights in zip(piece.series, newest, strict=True):
                 head[begin:stop] += lagged_response(x, weights, piece.first, piece.count)
-    gram = np.empty((len(steps), len(steps)))
-    _fill_snapshots(gram, heads, steps, signed, ends)
-    return gram
-
-
-def _fill_snapshots(
-    gram: FloatArray,
-    heads: FloatArray,
-    steps: FloatArray,
-    signed: FloatArray,
-    ends: npt.NDArray[np.int64],
-) -> None:
     # As above, with blocks of one; each run has a first row, and a first column above it.
+    gram: FloatArray = steps @ signed
     runs = list(pairwise(ends.tolist()))
     for run, (first, last) in enumerate(runs):
-        others, above = runs[run + 1 :], gram[first, first:last]
-        for begin, stop in _panels(first, last, 1):
-            np.matmul(steps[begin:stop], signed[:, begin:], out=gram[begin:stop, begin:])
-            if begin == first:
-                gram[first, first:] = heads[run, first:]
-            for later in range(run + 1, len(runs)):
-                gram[begin:stop, runs[later][0]] = heads[later, begin:stop]
-            for at in range(max(begin, first + 1), stop):
-                row = gram[at, at:last]
-                np.add(row, above[:-1], out=row)
-                above = row
-                for other, end in others:
-                    row = gram[at, other + 1 : end]
-                    row += gram[at - 1, other : end - 1]
-
-
-def _panels(begin: int, end: int, block: int) -> Iterator[tuple[int, int]]:
-    """Ranges of about ``PANEL`` rows, in whole blocks."""
-    height = max(block, PANEL // max(block, 1) * block)
-    for at in range(begin, end, max(height, 1)):
-        yield at, min(at + height, end)
+        later, above = runs[run + 1 :], gram[first, first:last]
+        gram[first, first:] = heads[run, first:]
+        for number, (other, _) in enumerate(later, run + 1):
+            gram[first:last, other] = heads[number, first:last]
+        for at in range(first + 1, last):
+            row = gram[at, at:last]
+            row += above[:-1]
+            above = row
+            for other, end in later:
+                row = gram[at, other + 1 : end]
+                row += gram[at - 1, other : end - 1]
+    return gram
 
 
 def _recent(series: FloatArray, at: int, lags: int) -> FloatArray:
