@@ -151,9 +151,10 @@ def gram_trace(pieces: Sequence[Piece], delays: Sequence[int]) -> float:
         for series, delay in zip(piece.series, delays, strict=True):
             # Only what the snapshots reach: what stands before may be a gap.
             reached = series[piece.first - delay : piece.first + piece.count]
-            energy = np.zeros(len(reached) + 1)
-            np.cumsum(np.einsum("tc,tc->t", reached, reached), out=energy[1:])
-            total += float(np.sum(energy[piece.count :]) - np.sum(energy[: delay + 1]))
+            # Each sample counts as often as there are lags at which a snapshot holds it.
+            up = np.arange(1.0, len(reached) + 1)
+            times = np.minimum(np.minimum(up, up[::-1]), min(piece.count, delay + 1))
+            total += float(times @ np.einsum("tc,tc->t", reached, reached))
     return total
 
 
