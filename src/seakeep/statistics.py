@@ -126,16 +126,19 @@ def moving_block_bootstrap(
         return bootstrap.moving_block_bootstrap(
             series, n_series, block_length, rng, segments=segments
         )
-    whole = series.to_dataset(name="series") if isinstance(series, xr.DataArray) else series
-    for name in channel_names(whole, "series"):
-        finite(whole[name].transpose("time", ...).values, f"channel '{name}'")
+    alone = isinstance(series, xr.DataArray)
+    whole: Any = series.to_dataset(name="series") if alone else series
+    whole = whole[channel_names(whole, "series")]
+    for name, channel in whole.items():
+        finite(channel.transpose("time", ...).values, f"channel '{name}'")
     positions = bootstrap.bootstrap_indices(
-        series.sizes["time"], n_series, block_length, rng, segments
+        whole.sizes["time"], n_series, block_length, rng, segments
     )
-    drawn = series.drop_vars("time", errors="ignore").isel(
-        time=xr.DataArray(positions, dims=("draw", "time"))
-    )
-    return drawn.assign_coords(time=series["time"]) if "time" in series.coords else drawn
+    at = xr.DataArray(positions, dims=("draw", "time"))
+    drawn = whole.drop_vars("time", errors="ignore").isel(time=at)
+    if "time" in whole.coords:
+        drawn = drawn.assign_coords(time=whole["time"])
+    return drawn["series"].rename(series.name) if alone else drawn
 
 
 @_labelled(divergence.jsd_interval, "predicted", "measured")

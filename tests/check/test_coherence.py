@@ -128,16 +128,6 @@ def test_chance_is_not_counted_as_coherence():
     assert np.mean(noise.unexplained() / noise.outputs) == pytest.approx(1.0, abs=0.01)
 
 
-def test_circles_of_the_response_cover_as_they_say():
-    rng = RNG(3)
-    u = rng.standard_normal((2000, 1))
-    x = 0.8 * u + rng.standard_normal((2000, 500))
-    gain, radius = cross_spectra([(u, x)], 1.0, 100).gain()
-    inside = np.abs(gain[10, 0] - 0.8) < radius[10, 0]
-    # 500 repetitions know a coverage of 95 % to 1 % (one SD).
-    assert 0.92 <= inside.mean() <= 0.98
-
-
 def test_what_cannot_be_judged_says_why(run):
     model = fitted(run)
     regular = run.assign_attrs(waves="regular")

@@ -145,7 +145,6 @@ def test_saturation_recurs_at_the_end_of_the_range():
 @pytest.mark.parametrize(
     ("length", "values", "kind"),
     [
-        (3, [-999.0], "OUTLIERS"),
         (3, [-99.9], "OUTLIERS"),
         (10, [900.0, -700.0, 500.0, -300.0, 800.0], "OUTLIERS"),
         (300, None, "STUCK"),

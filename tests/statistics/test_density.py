@@ -30,11 +30,6 @@ def test_the_papers_bandwidth_lacks_the_divisor():
     )
 
 
-def test_a_line_that_is_mostly_slack_has_a_bandwidth():
-    line = np.where(np.arange(100) % 5 == 0, NORMAL[:100], 0.0)
-    assert kernel_bandwidth(line) == pytest.approx(1.06 * line.std(ddof=1) * 100**-0.2)
-
-
 @pytest.mark.oracle
 @pytest.mark.parametrize("rule", ["paper", "silverman", 0.4])
 @pytest.mark.parametrize("series", [NORMAL, PEAKY, FLAT])

@@ -109,10 +109,10 @@ def test_where_runs_are_left_out_each_is_forecast_by_the_others_and_the_test_run
 @pytest.mark.parametrize(
     ("training", "unread", "judged"),
     [
-        ('scheme = "pooled"\nruns = ["first"]', {"pooled": 0}, False),
+        ('scheme = "pooled"\nruns = ["first"]', {"pooled": False}, False),
         (
             'scheme = "leave_out"\nruns = ["first", "second", "unseen"]',
-            {"without first": 0, "without second": 0, "without unseen": 3},
+            {"without first": False, "without second": False, "without unseen": True},
             True,
         ),
     ],
@@ -129,7 +129,7 @@ def test_sets_without_a_window_that_is_not_read_or_tests_have_no_margin(
     kept = found.groups["calibration"].sel(ensemble="bayesian")
     assert list(kept["training"].values) == list(unread)
     windows = kept["windows"].values > 0
-    assert windows.tolist() == [count > 0 for count in unread.values()]
+    assert windows.tolist() == list(unread.values())
     np.testing.assert_array_equal(kept["margin"].notnull().all("channel"), windows)
     table = found.groups["statistics/coverage"].sel(
         test="unseen", channel="average", against="measured"

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import seakeep
-from seakeep import BayesianHankelDMDc, Uniform
 from seakeep.campaign.store import write_prepared
 from seakeep.cli import main
 from seakeep.errors import RequestError, SeakeepWarning
@@ -182,25 +181,6 @@ def test_an_ensemble_learns_inside_the_training_span(halves, train_on):
         assert len(set(ensemble.draws.last_sample.values)) > 1
     else:
         assert (first, stop) == (pytest.approx(150.0 - longest), pytest.approx(150.0))
-
-
-def test_the_same_table_gives_the_members_that_python_gives(halves):
-    model = f"{WINDOWED}\nwindow = {{ uniform = ['10 T', '20 T'] }}"
-    whole = campaign(halves, model)
-    ensemble = fit_campaign(whole)
-    spec = BayesianHankelDMDc(
-        encounter_period=whole.encounter_period(),
-        window=Uniform("10 T", "20 T"),
-        state_delays="0.2 T",
-        input_delays=Uniform("1 T", "3 T"),
-        ridge=1e-9,
-        n_members=4,
-        seed=7,
-    )
-    run = whole.prepare()["all"].sel(time=slice(None, 100.0 + 1e-6))
-    expected = spec.fit({"all": run}, ["heave"], ["eta_fwd"])
-    assert expected.members == ensemble.members
-    np.testing.assert_array_equal(ensemble.member(2).A, expected.member(2).A)
 
 
 @pytest.fixture

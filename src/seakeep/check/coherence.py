@@ -27,8 +27,6 @@ from seakeep.errors import DataError, RequestError
 from seakeep.models import Model
 from seakeep.models.labelled import mean_period
 
-__all__ = ["coherence"]
-
 LONGEST = 64
 """Most encounter periods of a segment of Welch's method: long ones resolve a lightly damped
 response."""

@@ -24,9 +24,6 @@ from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models import Model
 from seakeep.models.labelled import check_channels
 
-__all__ = ["CHECKS", "Checked", "check_model"]
-
-
 Check = Callable[..., xr.Dataset]
 
 

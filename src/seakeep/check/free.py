@@ -16,8 +16,6 @@ from seakeep.models import Model
 from seakeep.models.labelled import channel_matrix
 from seakeep.models.linear import modes as modes_of
 
-__all__ = ["decay", "measured_decay", "modes"]
-
 LONGEST, SHORTEST = 20000, 200
 """Samples of a decay."""
 

@@ -24,33 +24,6 @@ from seakeep.waves import wavenumber
 
 T = TypeVar("T")
 
-__all__ = [
-    "FreeRun",
-    "Known",
-    "Part",
-    "beside",
-    "driven",
-    "free_runs",
-    "free_windows",
-    "gathered",
-    "irregular",
-    "is_regular",
-    "judged",
-    "no_energy",
-    "of_part",
-    "ratio",
-    "read_off",
-    "reference_probe",
-    "regressors",
-    "samples_in",
-    "single_model",
-    "units_of",
-    "used_parts",
-    "wave_turns",
-    "whole_span",
-    "window_of",
-]
-
 
 class Part(NamedTuple):
     """The longest stretch without gaps of what a campaign uses of a run, in physical units.

@@ -16,8 +16,6 @@ from seakeep.errors import SeakeepError
 from seakeep.models import Model
 from seakeep.signals import zero_up_crossings
 
-__all__ = ["statistics"]
-
 HOURS = 3.0
 KINDS = ("measured", "forecast")
 PLACES = 161

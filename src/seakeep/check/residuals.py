@@ -24,8 +24,6 @@ from seakeep.errors import DataError
 from seakeep.models import Model
 from seakeep.models.labelled import channel_matrix, mean_period
 
-__all__ = ["residuals"]
-
 BANDS = {"slow": (0.0, 0.5), "wave": (0.5, 2.0), "above": (2.0, np.inf)}
 """Bands, in cycles per encounter period."""
 SEGMENT = 8

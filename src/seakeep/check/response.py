@@ -32,8 +32,6 @@ from seakeep.models.following import Following
 from seakeep.models.inputs import Chain, Lead
 from seakeep.models.labelled import mean_period
 
-__all__ = ["measured_response", "response", "transfer", "validation"]
-
 WAVE = "wave"
 """Name of the input that is a wave which passes all probes."""
 LONGEST = 32

@@ -14,8 +14,6 @@ from seakeep.models import Model, outside_training
 from seakeep.signals import encounter_period
 from seakeep.waves import wavenumber
 
-__all__ = ["validity"]
-
 
 def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Height, period, steepness and drift of each run, and what lies outside the training.

@@ -24,8 +24,6 @@ from seakeep.models.inputs import Chain
 from seakeep.models.interface import Span
 from seakeep.models.labelled import mean_period
 
-__all__ = ["drift"]
-
 PERIODS = 32
 """Encounter periods in which all probing waves repeat: differences are multiples of its inverse."""
 DIFFERENCES = 4

@@ -12,8 +12,6 @@ from seakeep.check.parts import FreeRun, Known, beside, free_runs, is_regular, j
 from seakeep.metrics import anrmse_differences
 from seakeep.models import Model
 
-__all__ = ["LIMITS", "worth"]
-
 LIMITS = (0.1, 0.3, 0.7)
 """NRMSE at which the use of a forecast changes: 99, 91 and 51 % of the variance are explained."""
 

@@ -29,20 +29,15 @@ Only upper triangles are made; what stands below the diagonal is not meaningful.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
 
-PANEL = 64
-"""Rows, about, in which a Gram matrix is made: few enough to stay in cache."""
-RESPONSES = 24
-"""Instants whose responses are one product with a Toeplitz matrix of the weights."""
 BLOCK_WIDTH = 96
 """Columns of the block of lags that is laid out: wide enough for BLAS, small enough for cache."""
 
@@ -129,8 +124,8 @@ class PrimalSystem:
 
     Parameters
     ----------
-    gram : ndarray, shape (p + room, p + room)
-        Upper triangle of C in its first p rows and columns.
+    gram : ndarray, shape (p, p)
+        Upper triangle of C.
     right : ndarray, shape (N, p)
         Products of the next states (the newest block alone) with the regressors.
     heads : ndarray, shape (channels, p)
@@ -156,17 +151,17 @@ def gram_trace(pieces: Sequence[Piece], delays: Sequence[int]) -> float:
         for series, delay in zip(piece.series, delays, strict=True):
             # Only what the snapshots reach: what stands before may be a gap.
             reached = series[piece.first - delay : piece.first + piece.count]
-            energy = np.zeros(len(reached) + 1)
-            np.cumsum(np.einsum("tc,tc->t", reached, reached), out=energy[1:])
-            total += float(np.sum(energy[piece.count :]) - np.sum(energy[: delay + 1]))
+            # Each sample counts as often as there are lags at which a snapshot holds it.
+            up = np.arange(1.0, len(reached) + 1)
+            times = np.minimum(np.minimum(up, up[::-1]), min(piece.count, delay + 1))
+            total += float(times @ np.einsum("tc,tc->t", reached, reached))
     return total
 
 
-def primal_system(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0) -> PrimalSystem:
+def primal_system(pieces: Sequence[Piece], delays: Sequence[int]) -> PrimalSystem:
     r"""Gram matrix :math:`\hat Y \hat Y^T` and right-hand side :math:`X' \hat Y^T`.
 
-    `delays` holds those of each group; `room` counts rows and columns to leave beyond the Gram
-    matrix.
+    `delays` holds those of each group.
     """
     groups = lay_out(pieces[0], delays)
     size, width = groups[-1].stop, groups[-1].head.stop
@@ -192,40 +187,25 @@ def primal_system(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0)
             right[:, group.rows] += sums[targets, group.channels :]
             entering[group.older] = _recent(x, start - 1, group.lags - 1)
             leaving[group.older] = _recent(x, end, group.lags - 1)
-    gram = np.empty((size + room, size + room))
-    _fill_primal(gram[:size, :size], heads, edges, groups)
+    # The product of the edges, heads over it, then the running sums.
+    signed = edges.copy()
+    signed[1::2] *= -1.0
+    gram = edges.T @ signed
+    for number, group in enumerate(groups):
+        later, N = groups[number + 1 :], group.channels
+        gram[group.newest, group.start :] = heads[group.head, group.start :]
+        for other in later:
+            gram[group.rows, other.newest] = heads[other.head, group.rows].T
+        for at in range(group.start + N, group.stop, N):
+            above, row = gram[at - N : at], gram[at : at + N]
+            row[:, at : group.stop] += above[:, at - N : group.stop - N]
+            for other in later:
+                row[:, other.older] += above[:, other.newer]
     return PrimalSystem(gram, right, heads, edges, groups)
 
 
-def _fill_primal(
-    gram: FloatArray, heads: FloatArray, edges: FloatArray, groups: Sequence[Group]
-) -> None:
-    # Panel by panel: the product of the edges from the panel's diagonal block on, heads over it,
-    # then the running sums while it is in cache. Sums take whole blocks, so that of the diagonal
-    # blocks the lower halves are made too; what is left of them is memory as it was found, and
-    # must never be read.
-    signed = edges.copy()
-    signed[1::2] *= -1.0
-    for number, group in enumerate(groups):
-        later, N = groups[number + 1 :], group.channels
-        for begin, stop in _panels(group.start, group.stop, N):
-            np.matmul(edges[:, begin:stop].T, signed[:, begin:], out=gram[begin:stop, begin:])
-            for other in later:
-                gram[begin:stop, other.newest] = heads[other.head, begin:stop].T
-            if begin == group.start:
-                gram[group.newest, begin:] = heads[group.head, begin:]
-            for at in range(max(begin, group.start + N), stop, N):
-                above, row = gram[at - N : at], gram[at : at + N]
-                row[:, at : group.stop] += above[:, at - N : group.stop - N]
-                for other in later:
-                    row[:, other.older] += above[:, other.newer]
-
-
-def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0) -> FloatArray:
-    r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs.
-
-    `room` counts rows and columns to leave beyond it, for right-hand sides.
-    """
+def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int]) -> FloatArray:
+    r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs."""
     groups = lay_out(pieces[0], delays)
     width = groups[-1].head.stop
     ends = np.cumsum([0, *(piece.count for piece in pieces)])
@@ -245,43 +225,22 @@ def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int], room: int = 0)
         for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
             for x, weights in zip(piece.series, newest, strict=True):
                 head[begin:stop] += lagged_response(x, weights, piece.first, piece.count)
-    size = len(steps)
-    gram = np.empty((size + room, size + room))
-    _fill_snapshots(gram[:size, :size], heads, steps, signed, ends)
-    return gram
-
-
-def _fill_snapshots(
-    gram: FloatArray,
-    heads: FloatArray,
-    steps: FloatArray,
-    signed: FloatArray,
-    ends: npt.NDArray[np.int64],
-) -> None:
     # As above, with blocks of one; each run has a first row, and a first column above it.
+    gram: FloatArray = steps @ signed
     runs = list(pairwise(ends.tolist()))
     for run, (first, last) in enumerate(runs):
-        others, above = runs[run + 1 :], gram[first, first:last]
-        for begin, stop in _panels(first, last, 1):
-            np.matmul(steps[begin:stop], signed[:, begin:], out=gram[begin:stop, begin:])
-            if begin == first:
-                gram[first, first:] = heads[run, first:]
-            for later in range(run + 1, len(runs)):
-                gram[begin:stop, runs[later][0]] = heads[later, begin:stop]
-            for at in range(max(begin, first + 1), stop):
-                row = gram[at, at:last]
-                np.add(row, above[:-1], out=row)
-                above = row
-                for other, end in others:
-                    row = gram[at, other + 1 : end]
-                    row += gram[at - 1, other : end - 1]
-
-
-def _panels(begin: int, end: int, block: int) -> Iterator[tuple[int, int]]:
-    """Ranges of about ``PANEL`` rows, in whole blocks."""
-    height = max(block, PANEL // max(block, 1) * block)
-    for at in range(begin, end, max(height, 1)):
-        yield at, min(at + height, end)
+        later, above = runs[run + 1 :], gram[first, first:last]
+        gram[first, first:] = heads[run, first:]
+        for number, (other, _) in enumerate(later, run + 1):
+            gram[first:last, other] = heads[number, first:last]
+        for at in range(first + 1, last):
+            row = gram[at, at:last]
+            row += above[:-1]
+            above = row
+            for other, end in later:
+                row = gram[at, other + 1 : end]
+                row += gram[at - 1, other : end - 1]
+    return gram
 
 
 def _recent(series: FloatArray, at: int, lags: int) -> FloatArray:
@@ -297,9 +256,6 @@ def lagged_sums(left: FloatArray, series: FloatArray, first: int, lags: int) -> 
     """
     count, channels = left.shape[0], series.shape[1]
     out = np.empty((left.shape[1], lags * channels))
-    if out.size == 0 or count == 0:
-        out[:] = 0.0
-        return out
     blocks = -(-lags // max(1, BLOCK_WIDTH // channels))
     depth = -(-lags // blocks)
     rows = count + (blocks - 1) * depth
@@ -329,26 +285,11 @@ def lagged_sums(left: FloatArray, series: FloatArray, first: int, lags: int) -> 
 def lagged_response(series: FloatArray, weights: FloatArray, first: int, count: int) -> FloatArray:
     r"""Response :math:`\sum_l g_l^T b_{k+i-l}` for i = 0 … `count` − 1.
 
-    Some instants at a time: the samples that they reach, side by side, times a Toeplitz matrix of
-    the weights.
-
-    `series` is b, `weights` g with lag zero first, and `first` the sample k.
+    `series` is b, `weights` g in one row, with lag zero first, and `first` the sample k.
     """
-    channels = series.shape[1]
-    lags = weights.size // channels if channels else 0
-    if lags == 0:
-        return np.zeros(count)
-    blocks = -(-count // RESPONSES)
-    reached = np.zeros((blocks * RESPONSES + lags - 1, channels))
-    reached[: count + lags - 1] = series[first - lags + 1 : first + count]
-    width = (RESPONSES + lags - 1) * channels
-    step, number = RESPONSES * reached.strides[0], reached.itemsize
-    samples = np.lib.stride_tricks.as_strided(
-        reached, shape=(blocks, width), strides=(step, number), writeable=False
-    )
-    # Rows one sample longer than a block's, end to end: cut at its width, each stands a sample
-    # further right than the one before.
-    shifted = np.zeros((RESPONSES, width + channels))
-    shifted[:, : weights.size] = weights.reshape(lags, channels)[::-1].reshape(-1)
-    toeplitz = shifted.reshape(-1)[: RESPONSES * width].reshape(RESPONSES, width)
-    return np.asarray(samples @ toeplitz.T).reshape(-1)[:count]
+    lags = weights.size // series.shape[1]
+    reached = series[first - lags + 1 : first + count]
+    out = np.zeros(count)
+    for channel, own in zip(reached.T, weights.reshape(lags, -1).T, strict=True):
+        out += np.convolve(channel, own, mode="valid")
+    return out

@@ -14,10 +14,6 @@ costs a few large products and saves many small ones.
 of :math:`O_K` costs little: its product with the shift moves it by N, and that with the N rows of
 Â is its first block times them.
 
-*Mirrored* Â: ridge on all rows makes those of the delayed states :math:`P - \lambda P (C + \lambda
-I)^{-1}`, so they are symmetric but for their last N columns. One window alone is bound by reading
-Â from memory, and half of it need not be read: a fifth of the time of the free run.
-
 A long run is taken in pieces, so that what is held beside the result does not grow with its length.
 """
 
@@ -25,11 +21,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import blas
 
 from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import RequestError
@@ -50,10 +45,6 @@ GEMM_RATE = 50.0
 """Floating-point operations per nanosecond in products of large matrices (rough)."""
 SKINNY_COST = (4000.0, 0.1, 0.055)
 """Nanoseconds of a product of a square matrix with w rows: fixed, per entry, per entry and row."""
-LINE = 8
-"""Numbers in a line of cache: BLAS is a tenth faster on a mirrored Â of whole lines."""
-MIRRORED_ENTRY = 0.065
-"""Nanoseconds per entry of a product of a mirrored matrix with one row."""
 MOST_DOUBLINGS = 6
 
 
@@ -228,8 +219,7 @@ def _steps(b: FloatArray, inputs: FloatArray) -> int:
 class _Propagator:
     """K steps as one: O, P and, where the outputs are not the state, A_K and B_K.
 
-    Outputs stand newest first; P and B_K are one matrix for each group of inputs. `state` is
-    A_K, or the upper half of a mirrored Â.
+    Outputs stand newest first; P and B_K are one matrix for each group of inputs. `state` is A_K.
     """
 
     steps: int
@@ -237,7 +227,6 @@ class _Propagator:
     output_input: Arrays
     state: FloatArray | None = None
     state_input: Arrays = ()
-    is_mirrored: bool = False
 
 
 def _propagator(
@@ -253,18 +242,11 @@ def _propagator(
             return propagator
         return _shifting_propagator(a, b, channels, 1)
     width = sum(group.shape[1] for group in b)
-    delayed = a[count:, : len(a) - count]
-    is_mirrored = windows == 1 and delayed.size > 1 and np.array_equal(delayed, delayed.T)
-    times = _doublings(len(a), width, windows, steps, is_mirrored)
+    times = _doublings(len(a), width, windows, steps)
     propagator = _square_propagator(a, b, count, channels, times)
     assert propagator.state is not None
     if times and not np.isfinite(propagator.state).all():
-        propagator, is_mirrored = _square_propagator(a, b, count, channels, 0), False
-    if is_mirrored and not times:
-        padded = len(a) + (-len(a)) % LINE
-        half = np.zeros((padded, padded))
-        half[: len(a) - count, : len(a)] = a[count:]
-        return replace(propagator, state=half, is_mirrored=True)
+        propagator = _square_propagator(a, b, count, channels, 0)
     return propagator
 
 
@@ -299,13 +281,12 @@ def _shifting_propagator(
     return _Propagator(steps, output_state, output_input)
 
 
-def _doublings(size: int, inputs: int, windows: int, steps: int, is_mirrored: bool) -> int:
+def _doublings(size: int, inputs: int, windows: int, steps: int) -> int:
     """How often to double the step of a square model so that the free run costs least."""
     fixed, entry, row = SKINNY_COST
     best, least, preparation = 0, np.inf, 0.0
     for times in range(MOST_DOUBLINGS + 1):
-        each = MIRRORED_ENTRY if is_mirrored and not times else entry
-        once = fixed + size * size * (each + row * (windows - 1))
+        once = fixed + size * size * (entry + row * (windows - 1))
         blocks = -(-steps // 2**times)
         forcing = 2.0 * blocks * windows * size * inputs / GEMM_RATE
         cost = preparation + blocks * once + forcing
@@ -352,9 +333,7 @@ def _run(propagator: _Propagator, start: FloatArray, inputs: Arrays, steps: int)
     held += 0 if propagator.state is None else 2 * size
     blocks = -(-steps // K)
     most = max(1, PIECE // (held * windows))
-    advance = _run_mirrored if propagator.is_mirrored else _run_square
-    if propagator.state is None:
-        advance = _run_shifting
+    advance = _run_shifting if propagator.state is None else _run_square
     out = np.empty((windows, blocks * K, width // K))
     state = start
     for first in range(0, blocks, most):
@@ -412,18 +391,12 @@ def _run_shifting(
     forcing = _forced(rows, propagator.output_input).reshape(number, windows, width)
     samples = np.empty((windows, number * width + size))
     samples[:, number * width :] = start
-    if windows == 1:
-        line, output = samples[0], propagator.output_state
-        for at in range((number - 1) * width, -1, -width):
-            piece = line[at : at + width]
-            np.dot(output, line[at + width : at + width + size], out=piece)
-            piece += forcing[at // width, 0]
-    else:
-        transposed = np.ascontiguousarray(propagator.output_state.T)
-        for block in range(number - 1, -1, -1):
-            at = block * width
-            state = samples[:, at + width : at + width + size]
-            samples[:, at : at + width] = state @ transposed + forcing[block]
+    transposed = propagator.output_state.T
+    for block in range(number - 1, -1, -1):
+        at = block * width
+        state, piece = samples[:, at + width : at + width + size], forcing[block]
+        piece += state @ transposed
+        samples[:, at : at + width] = piece
     return samples[:, : number * width], samples[:, :size]
 
 
@@ -443,23 +416,3 @@ def _run_square(
     outputs += _forced(rows, propagator.output_input)
     newest_first = outputs.reshape(number, windows, -1).transpose(1, 0, 2)
     return np.ascontiguousarray(newest_first).reshape(windows, -1), states[0]
-
-
-def _run_mirrored(
-    propagator: _Propagator, start: FloatArray, rows: Arrays
-) -> tuple[FloatArray, FloatArray]:
-    number, size, N = len(rows[0]), start.shape[1], len(propagator.output_state)
-    assert propagator.state is not None
-    # A row holds a state and, after it, what the symmetric product says beyond the oldest delay.
-    padded = len(propagator.state)
-    states = np.zeros((number + 1, padded + N))
-    states[number, :size] = start[0]
-    states[:number, :size] = _forced(rows, propagator.state_input)
-    symmetric, newest = propagator.state.T, np.ascontiguousarray(propagator.output_state).T
-    before = states[number]
-    for row in states[number - 1 :: -1]:
-        y = row[N:]
-        blas.dsymv(1.0, symmetric, before[:padded], beta=1.0, y=y, overwrite_y=1, lower=1)
-        blas.dgemv(1.0, newest, before[:size], beta=1.0, y=row[:N], overwrite_y=1, trans=1)
-        before = row
-    return states[:number, :N].reshape(1, -1), states[:1, :size]

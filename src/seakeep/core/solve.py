@@ -284,15 +284,13 @@ class _Delayed:
         if self.all_rows:
             system = primal_system(self.pieces, self.delays)
             return _all_rows(system, _factor(system.gram, ridge), ridge)
-        if ridge >= GRAM_LIMIT * self.trace:
-            room = self.pieces[0].states.shape[1]
-            system = primal_system(self.pieces, self.delays, room)
-            return np.ascontiguousarray(_solve_beside(system.gram, system.right, ridge))
-        # λ is small: residuals of the data correct what the Gram matrix lost.
         system = primal_system(self.pieces, self.delays)
         factor = _factor(system.gram, ridge)
-        regressors, targets = self.matrices()
         found = _solved(factor, system.right)
+        if ridge >= GRAM_LIMIT * self.trace:
+            return found
+        # λ is small: residuals of the data correct what the Gram matrix lost.
+        regressors, targets = self.matrices()
         for _ in range(CORRECTIONS):
             right = (targets - found @ regressors) @ regressors.T - ridge * found
             found += _solved(factor, right)
@@ -307,8 +305,9 @@ class _Delayed:
         """
         targets = np.concatenate([piece.targets for piece in self.pieces])
         N = targets.shape[1]
+        factor = _factor(snapshot_gram(self.pieces, self.delays), ridge)
         if not self.all_rows:
-            weights = _solve_beside(snapshot_gram(self.pieces, self.delays, N), targets.T, ridge).T
+            weights = _solved(factor, targets.T.copy()).T
             top, at = np.zeros((N, self.rows)), 0
             for piece in self.pieces:
                 own = weights[at : at + piece.count]
@@ -316,7 +315,6 @@ class _Delayed:
                 for series, group in zip(piece.series, self.groups, strict=True):
                     top[:, group.rows] += lagged_sums(own, series, piece.first, group.lags)
             return top
-        factor = _factor(snapshot_gram(self.pieces, self.delays), ridge)
         stacked = np.concatenate([self.matrices()[0], targets.T])
         half = blas.dtrsm(1.0, factor, stacked.T, lower=1, overwrite_b=1)
         regressors, newest = half[:, : self.rows], half[:, self.rows :]
@@ -326,18 +324,17 @@ class _Delayed:
         return out
 
 
-def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
+def _factor(gram: FloatArray, ridge: float) -> FloatArray:
     """Lower Cholesky factor, in Fortran order, of the upper triangle `gram` plus λ; in its place.
 
-    The triangle above the factor keeps what stood there. `beside` counts the last rows that are
-    not of a Gram matrix.
+    The triangle above the factor keeps what stood there.
     """
     size = len(gram)
     gram.reshape(-1)[:: size + 1] += ridge
     factor, failed = lapack.dpotrf(gram.T, lower=1, overwrite_a=1, clean=0)
     if failed:
         raise np.linalg.LinAlgError(
-            f"the Gram matrix of {size - beside} rows with ridge {ridge:g} is not positive "
+            f"the Gram matrix of {size} rows with ridge {ridge:g} is not positive "
             "definite. Raise ridge, or use method='svd'."
         )
     return np.asarray(factor)
@@ -346,25 +343,6 @@ def _factor(gram: FloatArray, ridge: float, beside: int = 0) -> FloatArray:
 def _solved(factor: FloatArray, rows: FloatArray) -> FloatArray:
     """Rows times the inverse of a matrix, by its lower Cholesky factor; in their place."""
     return np.asarray(lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0]).T
-
-
-def _solve_beside(padded: FloatArray, right: FloatArray, ridge: float) -> FloatArray:
-    """`right` times the inverse of a Gram matrix plus λ, shape of `right`.
-
-    The Gram matrix M − λI stands at the head of `padded`, and the right-hand sides R are put
-    beside it, so that Cholesky does the forward half of the solution on its way: the factor of
-    [M Rᵀ; R κI] starts with that of M, and R L⁻ᵀ stands below. κ is so large that what it is
-    reduced by does not count.
-    """
-    count, size = right.shape
-    padded[:size, size:] = right.T
-    padded[size:, size:] = 0.0
-    np.fill_diagonal(padded[size:, size:], np.finfo(float).max / 4)
-    factor = _factor(padded, ridge, count)
-    half = np.zeros((count, len(padded)))
-    half[:, :size] = padded[:size, size:].T
-    solved = blas.dtrsm(1.0, factor, half.T, lower=1, trans_a=1, overwrite_b=1)
-    return np.asarray(solved).T[:, :size]
 
 
 def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import scipy
-from scipy import fft
 
 from seakeep.arrays import FloatArray, IntArray, as_pair, positive, time_step
 from seakeep.errors import DataError, RequestError
@@ -176,12 +175,9 @@ def peak_place(values: FloatArray) -> float:
 
 def _correlation(a: FloatArray, b: FloatArray, lags: IntArray) -> FloatArray:
     """Correlation of a(t) and b(t + lag) over their common samples."""
-    size = fft.next_fast_len(2 * a.size, real=True)
 
     def summed(x: FloatArray, y: FloatArray) -> FloatArray:
-        product = np.conj(fft.rfft(x, size)) * fft.rfft(y, size)
-        out: FloatArray = fft.irfft(product, size)[lags]  # negative lags stand at the end
-        return out
+        return np.asarray(scipy.signal.correlate(y, x, method="fft")[a.size - 1 + lags])
 
     one = np.ones(a.size)
     count = a.size - np.abs(lags)
@@ -189,8 +185,7 @@ def _correlation(a: FloatArray, b: FloatArray, lags: IntArray) -> FloatArray:
     power_a = summed(a**2, one) / count - mean_a**2
     power_b = summed(one, b**2) / count - mean_b**2
     covariance = summed(a, b) / count - mean_a * mean_b
-    result: FloatArray = covariance / np.sqrt(np.maximum(power_a * power_b, 1e-300))
-    return result
+    return np.asarray(covariance / np.sqrt(np.maximum(power_a * power_b, 1e-300)))
 
 
 def parabola_peak(before: float, here: float, after: float) -> tuple[float, float]:

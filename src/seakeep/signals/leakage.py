@@ -155,12 +155,7 @@ def _even(waves: ComplexArray) -> bool:
 
 def _correlation(reference: ComplexArray, piece: ComplexArray) -> ComplexArray:
     """Normalised correlation of a piece with a reference at each place where it fits whole."""
-    places = reference.size - piece.size + 1
-    size = fft.next_fast_len(reference.size + piece.size)
-    product = fft.fft(piece, size) * np.conj(fft.fft(reference, size))
-    # Entry −p of the inverse holds Σ piece(t) conj(reference(t + p)).
-    raw = fft.ifft(product)
-    summed = raw[-np.arange(places)]
+    summed = np.conj(scipy.signal.correlate(reference, piece, mode="valid", method="fft"))
     power = np.cumsum(np.concatenate([[0.0], np.abs(reference) ** 2]))
     energy = power[piece.size :] - power[: -piece.size]
     norm = np.sqrt(np.maximum(energy * float(np.sum(np.abs(piece) ** 2)), 1e-300))

@@ -302,7 +302,7 @@ def onto_uniform(
     out = np.full((int(place[-1]) + 1, *x.shape[1:]), np.nan)
     grid = begin + step * np.arange(out.shape[0])
     out[place] = x
-    if not report.gaps and not report.jittered:
+    if report.uniform:
         return t.copy(), out
     if report.jittered:
         there = np.isfinite(out.reshape(out.shape[0], -1)).all(axis=1)

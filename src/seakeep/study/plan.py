@@ -449,15 +449,14 @@ def _check_channels(name: str, run: xr.Dataset, channels: list[str]) -> None:
 
 def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:
     """Warn once for a study, of the model and training set that hold the fewest slow periods."""
-    least = None
+    trained = {}
     for model, spec in plan.specs.items():
         snapshots = needs_of([spec], plan.dt).snapshots
         longest = (snapshots - 1) * plan.dt if snapshots > 1 else float("inf")
-        for training in plan.training if getattr(spec, "standardize", False) else ():
-            trained = sum(min(stop - begin, longest) for _, begin, stop in training.spans)
-            if least is None or trained < least[0]:
-                least = trained, f"the training windows of '{model}' in '{training.name}'"
-    if least is None:
-        return
-    parts = trained_parts(plan.training, runs)
-    warn_of_slow_motions(parts, list(plan.states), least[0], plan.encounter_period, least[1])
+        for each in plan.training if getattr(spec, "standardize", False) else ():
+            seconds = sum(min(stop - begin, longest) for _, begin, stop in each.spans)
+            trained[f"the training windows of '{model}' in '{each.name}'"] = seconds
+    if trained:
+        where = min(trained, key=trained.__getitem__)
+        parts, states = trained_parts(plan.training, runs), list(plan.states)
+        warn_of_slow_motions(parts, states, trained[where], plan.encounter_period, where)
