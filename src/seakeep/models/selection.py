@@ -28,7 +28,7 @@ from seakeep.models.engine import Dynamics, model_runs, read_windows
 from seakeep.models.executor import Progress, in_order
 from seakeep.models.following import LEAD
 from seakeep.models.inputs import FittedAlignment, ProbeAlignment
-from seakeep.models.interface import Scale
+from seakeep.models.interface import Scale, Signature
 from seakeep.models.members import spectral_radius
 from seakeep.models.observables import Observable, Powers, SlowSquares, named
 from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOuts, readouts_asked
@@ -156,6 +156,16 @@ class Problem:
         """Samples that delayed regressors look ahead too far."""
         return self.widest.lead - candidate.lead
 
+    @property
+    def reader(self) -> Signature:
+        """What windows are read for; units were compared when the runs were gathered."""
+        found = self.data.signature(self.widest)
+        states, inputs = (
+            tuple(replace(label, units="") for label in labels)
+            for labels in (found.state_labels, found.input_labels)
+        )
+        return replace(found, state_labels=states, input_labels=inputs)
+
     def parts(self, candidate: HankelSettings) -> tuple[BoolArray, BoolArray, BoolArray]:
         """Which states (all), delayed and direct regressors a candidate has."""
         chain, direct = self.data.input_map, list[bool]()
@@ -166,7 +176,7 @@ class Problem:
             (delayed if each.delayed else direct).extend(columns)
         direct += [True] * (chain.follows is not None)  # the slow surge squared
         states = np.ones(len(self.data.state_labels), dtype=bool)
-        return states, np.array(delayed), np.array(direct, dtype=bool)
+        return states, np.array(delayed, dtype=bool), np.array(direct, dtype=bool)
 
     def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
         """What is tried of a candidate: the λ, or ranks below its number of columns."""
@@ -253,14 +263,14 @@ class Problem:
         rest = [other for other in range(len(self.groups)) if other != run]
         others = [other for other in rest if self.groups[other] != self.groups[run]]
         dynamics, coefficients = self.models(candidate, levels, others or rest)
-        name, reader = data.names[run], data.signature(self.widest)
+        name = data.names[run]
         begin = data.first_instants[run] - data.windows[run].first * data.dt
         states = data.state_scale.physical(data.states[run])
         for steps in horizons:
             if not (starts := self.starts(run, steps)).size:
                 continue
             places = [(name, begin + at * data.dt) for at in starts]
-            windows = read_windows(reader, self.runs, places, steps)
+            windows = read_windows(self.reader, self.runs, places, steps)
             last = windows.delayed.shape[1] - self.ahead(candidate)
             windows = replace(
                 windows,
