@@ -414,12 +414,12 @@ class Selected(Generic[Chosen]):
         keys = ["observables", "lead", "state_delays", "input_delays"]
         if len({row["alignment"] for row in self.rows}) > 1:
             keys.append("alignment")
-        groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
-        for row in self.rows:
-            candidate = (*(row[key] for key in keys), row["rank"] > 0)
-            groups.setdefault(candidate, []).append(row)
+
+        def candidate(row: dict[str, Any]) -> tuple[Any, ...]:
+            return (*(row[key] for key in keys), row["rank"] > 0)
+
         lines = [self.note]
-        for values, part in groups.items():
+        for values, part in itertools.groupby(self.rows, candidate):
             best = min(part, key=lambda row: (not row["chosen"], row["score"]))
             what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=False))
             level = f"rank {best['rank']}" if best["rank"] else f"ridge {best['ridge']:g}"
@@ -924,9 +924,9 @@ def _rows_of(
         drawn = rng.integers(count, size=(DRAWS, count))
         weights = trial.weights[drawn]
         totals = (trial.scores[:, drawn] * weights).sum(axis=2) / weights.sum(axis=1)
-        lower, upper = np.quantile(totals, [0.025, 0.975], axis=1)
         aligned, is_rank = candidate.alignment, candidate.rank is not None
-        for number, (own, score) in enumerate(zip(trial.levels, trial.means, strict=True)):
+        bounds = np.quantile(totals, [0.025, 0.975], axis=1)
+        for own, score, low, high in zip(trial.levels, trial.means, *bounds, strict=True):
             yield {
                 "state_delays": candidate.state_delays,
                 "input_delays": candidate.input_delays,
@@ -936,7 +936,7 @@ def _rows_of(
                 "ridge": 0.0 if is_rank else own,
                 "rank": int(own) if is_rank else 0,
                 "score": float(score),
-                "lower": float(lower[number]),
-                "upper": float(upper[number]),
+                "lower": float(low),
+                "upper": float(high),
                 "chosen": candidate == taken and own == level,
             }
