@@ -15,7 +15,7 @@ from seakeep.models.registry import KINDS, is_ensemble, load_model
 from seakeep.models.settings import Select
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 from seakeep.models.summaries import summarize
-from seakeep.models.validity import Waves, compare_waves, outside_training
+from seakeep.models.validity import outside_training
 
 __all__ = [
     "KINDS",
@@ -46,8 +46,6 @@ __all__ = [
     "SlowSquares",
     "Spec",
     "Uniform",
-    "Waves",
-    "compare_waves",
     "estimate_probe_offset",
     "is_ensemble",
     "load_live",

@@ -12,7 +12,7 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -24,11 +24,11 @@ from seakeep.core.gram import Piece, primal_system
 from seakeep.core.path import ridge_path, truncated_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.engine import Dynamics, model_runs, read_groups
+from seakeep.models.engine import Dynamics, model_runs, read_windows
 from seakeep.models.executor import Progress, in_order
 from seakeep.models.following import LEAD
 from seakeep.models.inputs import FittedAlignment, ProbeAlignment
-from seakeep.models.interface import Scale
+from seakeep.models.interface import Scale, Signature
 from seakeep.models.members import spectral_radius
 from seakeep.models.observables import Observable, Powers, SlowSquares, named
 from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOuts, readouts_asked
@@ -57,6 +57,8 @@ On the virtual tank and on both measured sets the best lies between 3e-5 and 3e-
 within half a decade of it."""
 Settings = TypeVar("Settings", bound=HankelSettings)
 Chosen = TypeVar("Chosen")
+Given = tuple[Mapping[str, xr.Dataset], Sequence[str], Sequence[str]]
+"""Training runs, states and inputs."""
 Changes = dict[str, Any]
 """Settings of a candidate that differ from those of the best so far."""
 Columns = tuple[ProbeAlignment | None, int | None]
@@ -115,6 +117,14 @@ class Trial:
         return result
 
 
+class FreeRuns(NamedTuple):
+    """Free runs, shape (level, window, steps, N), what was measured, and the training SD."""
+
+    predicted: FloatArray
+    measured: FloatArray
+    spread: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Training runs with the regressors of all candidates of one alignment.
@@ -146,6 +156,16 @@ class Problem:
         """Samples that delayed regressors look ahead too far."""
         return self.widest.lead - candidate.lead
 
+    @property
+    def reader(self) -> Signature:
+        """What windows are read for; units were compared when the runs were gathered."""
+        found = self.data.signature(self.widest)
+        states, inputs = (
+            tuple(replace(label, units="") for label in labels)
+            for labels in (found.state_labels, found.input_labels)
+        )
+        return replace(found, state_labels=states, input_labels=inputs)
+
     def parts(self, candidate: HankelSettings) -> tuple[BoolArray, BoolArray, BoolArray]:
         """Which states (all), delayed and direct regressors a candidate has."""
         chain, direct = self.data.input_map, list[bool]()
@@ -156,7 +176,7 @@ class Problem:
             (delayed if each.delayed else direct).extend(columns)
         direct += [True] * (chain.follows is not None)  # the slow surge squared
         states = np.ones(len(self.data.state_labels), dtype=bool)
-        return states, np.array(delayed), np.array(direct, dtype=bool)
+        return states, np.array(delayed, dtype=bool), np.array(direct, dtype=bool)
 
     def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
         """What is tried of a candidate: the λ, or ranks below its number of columns."""
@@ -233,29 +253,24 @@ class Problem:
         return [run for run in runs if any(self.starts(run, k).size for k in self.horizons)]
 
     def free_runs(
-        self,
-        candidate: HankelSettings,
-        levels: Sequence[float],
-        run: int,
-        horizons: Sequence[int],
-    ) -> tuple[Dynamics, list[tuple[FloatArray, FloatArray]]]:
-        """Free runs on a run by models of others, and what was measured there.
+        self, candidate: HankelSettings, levels: Sequence[float], run: int, horizons: Sequence[int]
+    ) -> Iterator[FreeRuns]:
+        """Free runs on a run by models of others, for each horizon that fits.
 
-        Runs of other groups teach, if there are any. For each horizon that fits the arrays have
-        the shapes (level, window, steps, N) and (window, steps, N).
+        Runs of other groups teach, if there are any.
         """
         data, (_, delayed, direct) = self.data, self.parts(candidate)
         rest = [other for other in range(len(self.groups)) if other != run]
         others = [other for other in rest if self.groups[other] != self.groups[run]]
         dynamics, coefficients = self.models(candidate, levels, others or rest)
-        name, window = data.names[run], data.windows[run]
-        begin = data.first_instants[run] - window.first * data.dt
-        starts = [(each, k) for k in horizons if (each := self.starts(run, k)).size]
-        places = [([(name, begin + at * data.dt) for at in each], k) for each, k in starts]
+        name = data.names[run]
+        begin = data.first_instants[run] - data.windows[run].first * data.dt
         states = data.state_scale.physical(data.states[run])
-        found = []
-        read = read_groups(data.signature(self.widest), self.runs, places)
-        for windows, (each, steps) in zip(read, starts, strict=True):
+        for steps in horizons:
+            if not (starts := self.starts(run, steps)).size:
+                continue
+            places = [(name, begin + at * data.dt) for at in starts]
+            windows = read_windows(self.reader, self.runs, places, steps)
             last = windows.delayed.shape[1] - self.ahead(candidate)
             windows = replace(
                 windows,
@@ -263,16 +278,15 @@ class Problem:
                 direct=windows.direct[..., direct[: windows.direct.shape[2]]],
                 table=None if windows.table is None else windows.table[..., delayed],
             )
-            measured = np.stack([states[at + 1 : at + 1 + steps] for at in each])
-            found.append((model_runs(dynamics, coefficients, [windows])[0], measured))
-        return dynamics, found
+            (predicted,) = model_runs(dynamics, coefficients, [windows])
+            measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
+            yield FreeRuns(predicted, measured, dynamics.state_scale.std)
 
     def judge(self, candidate: HankelSettings, fold: int) -> Scores:
         """Judge free runs on a run that is held out, over all horizons that fit."""
         levels = self.levels(candidate)
-        dynamics, found = self.free_runs(candidate, levels, fold, self.horizons)
-        spread, scores = dynamics.state_scale.std, [np.empty((len(levels), 0))]
-        for predicted, measured in found:
+        scores = [np.empty((len(levels), 0))]
+        for predicted, measured, spread in self.free_runs(candidate, levels, fold, self.horizons):
             with np.errstate(over="ignore", invalid="ignore"):
                 errors = metrics.nrmse(predicted=predicted, measured=measured, training_std=spread)
             judged = ~metrics.is_slack(predicted=measured, measured=measured, training_std=spread)
@@ -287,15 +301,13 @@ class Problem:
         """Free runs, end to end, on each run by the model of the others, standardised."""
         deviations = self.data.state_scale.deviations
         for run in range(len(self.groups)) if len(self.groups) > 1 else ():
-            for predicted, measured in self.free_runs(candidate, [level], run, [steps])[1]:
+            for predicted, measured, _ in self.free_runs(candidate, [level], run, [steps]):
                 yield Held(run, deviations(predicted[0]), deviations(measured))
 
 
 def _problem(
     settings: HankelSettings,
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
+    given: Given,
     folds: Mapping[str, str] | int,
     ridges: Iterable[float],
     horizons: tuple[int, ...],
@@ -318,6 +330,7 @@ def _problem(
         ridge=1.0,
         standardize=True,
     )
+    runs, states, inputs = given
     chain = widest.input_map(dict(runs), states, inputs, settings.window)
     before = max(widest.state_delays, chain.history(widest.input_delays))
     after = max(chain.lead_samples - 1, 0)
@@ -401,12 +414,12 @@ class Selected(Generic[Chosen]):
         keys = ["observables", "lead", "state_delays", "input_delays"]
         if len({row["alignment"] for row in self.rows}) > 1:
             keys.append("alignment")
-        groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
-        for row in self.rows:
-            candidate = (*(row[key] for key in keys), row["rank"] > 0)
-            groups.setdefault(candidate, []).append(row)
+
+        def candidate(row: dict[str, Any]) -> tuple[Any, ...]:
+            return (*(row[key] for key in keys), row["rank"] > 0)
+
         lines = [self.note]
-        for values, part in groups.items():
+        for values, part in itertools.groupby(self.rows, candidate):
             best = min(part, key=lambda row: (not row["chosen"], row["score"]))
             what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=False))
             level = f"rank {best['rank']}" if best["rank"] else f"ridge {best['ridge']:g}"
@@ -535,7 +548,7 @@ def select(
     RequestError
         If `vary` names something else, or the delay rows are not exact.
     """
-    data = runs, states, inputs
+    given = runs, states, inputs
     labels = labelled.common_labels(runs, states)
     readouts = readouts_asked(settings.readouts, labels)
     _check_asked(settings, vary, readouts)
@@ -550,15 +563,15 @@ def select(
         settings = replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot")
     offered = [settings.observables]
     if "observables" in vary and not settings.observables:
-        offered = _defaults(settings, *data, samples * step, folds == "sea_state")
-    variants = list(_variants(settings, *data, vary, samples))
+        offered = _defaults(settings, given, samples * step, folds == "sea_state")
+    variants = list(_variants(settings, given, vary, samples))
     apart = folds if isinstance(folds, int) else groups_of(runs, folds, inputs)
     horizons = tuple(max(round(each * samples), 1) for each in horizon)
     base = replace(settings, readouts=(), **variants[0])
     for observables in offered:  # runs may be too short for the longest
         steps = [*_steps(observables, vary, samples, variants)]
         every = replace(base, observables=observables)
-        problems = _problems(every, steps, *data, apart, ridges or RIDGES, horizons)
+        problems = _problems(every, steps, given, apart, ridges or RIDGES, horizons)
         if len(problems) == len(variants):
             break
     else:
@@ -567,7 +580,7 @@ def select(
             f"ridge {settings.ridge:g} per snapshot pair: no window of "
             f"{round(min(horizon) * samples)} samples can be held out of runs of at most {longest}"
         )
-        fitted = _learnt(readouts, None, settings, 0.0, 0, *data)
+        fitted = _learnt(readouts, None, settings, 0.0, 0, given)
         complete = replace(settings, readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
     trials: dict[Settings, Trial] = {}
@@ -587,7 +600,7 @@ def select(
         f"; without {named(left)} {trials[less].means.min():.3f}" for left, less in without.items()
     )
     problem = problems[_columns_of(taken)]
-    fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), *data)
+    fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
     if taken.rank is None:
         complete = replace(taken, ridge=level, readouts=_asked(settings, fitted, vary))
     else:
@@ -603,9 +616,7 @@ def select(
 def _problems(
     base: HankelSettings,
     steps: Sequence[Sequence[Changes]],
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
+    given: Given,
     folds: Mapping[str, str] | int,
     ridges: Sequence[float],
     horizons: tuple[int, ...],
@@ -619,7 +630,7 @@ def _problems(
     for variant in steps[-1]:
         start = replace(base, **variant)
         lengths = tried | ({"lead": []} if "lead" in variant else {})
-        problem = _problem(start, runs, states, inputs, folds, ridges, horizons, lengths)
+        problem = _problem(start, given, folds, ridges, horizons, lengths)
         if problem is not None and problem.folds():
             found[_columns_of(start)] = problem
     return found
@@ -715,9 +726,7 @@ def _learnt(
     candidate: HankelSettings,
     level: float,
     steps: int,
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
+    given: Given,
 ) -> tuple[FittedReadOut, ...]:
     """Fit read-outs to runs, and to forecasts of what is held out, if anything can be."""
     if not readouts:
@@ -725,7 +734,7 @@ def _learnt(
     if problem is not None:
         return fit_readouts(readouts, problem.data, list(problem.held(candidate, level, steps)))
     settings = replace(candidate, ridge=1.0, standardize=True)
-    return fit_readouts(readouts, gather(runs, states, inputs, None, settings), ())
+    return fit_readouts(readouts, gather(*given, None, settings), ())
 
 
 def readouts_for(
@@ -759,7 +768,7 @@ def readouts_for(
     readouts = readouts_asked(settings.readouts, labelled.common_labels(runs, states))
     stacked = [each for each in readouts if each.kind != "hinge"]
     if not stacked:
-        return _learnt(readouts, None, settings, 0.0, 0, runs, states, inputs)
+        return _learnt(readouts, None, settings, 0.0, 0, (runs, states, inputs))
     ridge = float(settings.ridge)
     if ridge == 0.0:
         raise RequestError(
@@ -771,8 +780,9 @@ def readouts_for(
         runs = {name: run.isel(time=slice(-settings.window, None)) for name, run in runs.items()}
         settings = replace(settings, window=None)
     apart = 3 if len(runs) == 1 else groups_of(runs, "auto", inputs)
-    problem = _problem(settings, runs, states, inputs, apart, (ridge,), (steps,), {})
-    return _learnt(readouts, problem, settings, ridge, steps, runs, states, inputs)
+    given = runs, states, inputs
+    problem = _problem(settings, given, apart, (ridge,), (steps,), {})
+    return _learnt(readouts, problem, settings, ridge, steps, given)
 
 
 def default_observables(
@@ -805,18 +815,16 @@ def default_observables(
 
 def _defaults(
     settings: HankelSettings,
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
+    given: Given,
     period: float,
     unseen: bool,
 ) -> list[tuple[Observable, ...]]:
     """Observables to choose among, and fewer of them for runs that are too short."""
     aligned, lead = settings.alignment, None
     if aligned is not None and aligned.surge == "predicted":
-        is_left_out = aligned.optional and aligned.missing(runs, states, inputs)
+        is_left_out = aligned.optional and aligned.missing(*given)
         lead = None if is_left_out else int(settings.lead)
-    defaults = default_observables(inputs, period, unseen, lead)
+    defaults = default_observables(given[2], period, unseen, lead)
     return list(dict.fromkeys([defaults, defaults[1:], ()]))
 
 
@@ -842,9 +850,7 @@ def _steps(
 
 def _variants(
     settings: HankelSettings,
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
+    given: Given,
     vary: Sequence[str],
     period: float,
 ) -> Iterator[Changes]:
@@ -853,7 +859,7 @@ def _variants(
     leads += [round(part * period) for part in LEADS if part > LEAD and "lead" in vary]
     alignments = [settings.alignment]
     if "alignment" in vary:
-        alignments = _alignments(settings.alignment, runs, states, inputs)
+        alignments = _alignments(settings.alignment, given)
     for each in alignments:
         if each is None or each.surge != "predicted":
             yield {"alignment": each}
@@ -863,9 +869,7 @@ def _variants(
 
 def _alignments(
     stated: ProbeAlignment | None,
-    runs: Mapping[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
+    given: Given,
 ) -> list[ProbeAlignment | None]:
     """Alignments that these runs allow and that differ, the stated one first, and none.
 
@@ -880,11 +884,13 @@ def _alignments(
         replace(base, mode="effective", surge="none", highest_frequency=None),
     ):
         try:
-            fitted = made.fit(runs, states, inputs, None)
+            fitted = made.fit(*given, None)
         except (RequestError, DataError):
             continue  # no depth, no positions, or no surge among the states
         assert isinstance(fitted, FittedAlignment)
-        if made.surge == "predicted" or any(np.any(fitted.offsets(run)) for run in runs.values()):
+        if made.surge == "predicted" or any(
+            np.any(fitted.offsets(run)) for run in given[0].values()
+        ):
             found.append(made)
     found.append(None)
     first = None if stated is None else base
@@ -918,9 +924,9 @@ def _rows_of(
         drawn = rng.integers(count, size=(DRAWS, count))
         weights = trial.weights[drawn]
         totals = (trial.scores[:, drawn] * weights).sum(axis=2) / weights.sum(axis=1)
-        lower, upper = np.quantile(totals, [0.025, 0.975], axis=1)
         aligned, is_rank = candidate.alignment, candidate.rank is not None
-        for number, (own, score) in enumerate(zip(trial.levels, trial.means, strict=True)):
+        bounds = np.quantile(totals, [0.025, 0.975], axis=1)
+        for own, score, low, high in zip(trial.levels, trial.means, *bounds, strict=True):
             yield {
                 "state_delays": candidate.state_delays,
                 "input_delays": candidate.input_delays,
@@ -930,7 +936,7 @@ def _rows_of(
                 "ridge": 0.0 if is_rank else own,
                 "rank": int(own) if is_rank else 0,
                 "score": float(score),
-                "lower": float(lower[number]),
-                "upper": float(upper[number]),
+                "lower": float(low),
+                "upper": float(high),
                 "chosen": candidate == taken and own == level,
             }

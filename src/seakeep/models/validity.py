@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,91 +17,13 @@ from seakeep.models import labelled, store
 from seakeep.models.interface import Model, Signature
 from seakeep.waves import GRAVITY
 
-__all__ = ["Coverage", "Waves", "compare_waves", "outside_training"]
+__all__ = ["Coverage", "outside_training"]
 
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
 CYCLES = 5.0
 """Periods from which on a spectrum shows which waves it holds."""
-
-
-@dataclass(frozen=True)
-class Waves:
-    """An input of a forecast beside that of the training.
-
-    Parameters
-    ----------
-    channel : str
-        The input.
-    period : float
-        Period of the band that holds most of its energy, s.
-    trained : (float, float)
-        Shortest and longest period of the bands that were trained, s; where `period` lies in a
-        gap between them, those on either side of it.
-    outside : float
-        Fraction of its energy in bands that were not trained, 0 to 1.
-    is_gap : bool
-        Whether `period` lies between trained periods without being one of them.
-    height, steepness : float
-        Four SDs, of regular waves 2√2, and that over the length in deep water of a wave of the
-        mean period; NaN of an input that is no wave elevation.
-    highest, steepest : float
-        Largest ones of a training run; NaN where the model's file does not hold them.
-    units : str
-        Of the height.
-    """
-
-    channel: str
-    period: float
-    trained: tuple[float, float]
-    outside: float
-    is_gap: bool
-    height: float
-    highest: float
-    steepness: float
-    steepest: float
-    units: str = ""
-
-    @property
-    def is_untrained(self) -> bool:
-        """Whether most of the energy lies at periods that were not trained."""
-        return self.outside > 0.5
-
-    @property
-    def text(self) -> str:
-        """A sentence; empty where the waves are those of the training."""
-        if not self.is_untrained:
-            return ""
-        low, high = self.trained
-        where, word = ("between", "and") if self.is_gap else ("outside", "to")
-        nothing = ", with none between" * self.is_gap
-        return (
-            f"{self.channel}: the dominant period of {self.period:.3g} s lies {where} the periods "
-            f"that trained the model ({low:.3g} {word} {high:.3g} s{nothing}); "
-            f"{100 * self.outside:.0f} % of the energy is at periods it has not seen"
-        )
-
-    def reasons(self, duration: float) -> tuple[str, str, str]:
-        """Sentences on period, height and steepness over a time (s); empty where trained.
-
-        The height of n irregular waves scatters by about 0.85/√n (one SD): two of that, and a
-        tenth, are no reason.
-        """
-        margin = 1.1 + 1.7 * np.sqrt(self.period / duration)
-        height = steepness = ""
-        if self.height > margin * self.highest:
-            unit = f" {self.units}" if self.units else ""
-            height = (
-                f"{self.channel}: a height of {self.height:.3g}{unit}, trained "
-                f"up to {self.highest:.3g}{unit}"
-            )
-        if self.steepness > margin * self.steepest:
-            steepness = (
-                f"{self.channel}: a steepness in deep water of {self.steepness:.3g}, trained up to "
-                f"{self.steepest:.3g}"
-            )
-        return self.text, height, steepness
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +39,8 @@ class Coverage:
     shares : ndarray, shape (channel, band)
         Fraction of the energy in each band.
     heights, steepnesses : ndarray, shape (channel,)
-        Largest ones of a window; see :class:`Waves`.
+        Largest ones of a window: four SDs, of regular waves 2√2, and that over the length in deep
+        water of a wave of the mean period.
     """
 
     channels: tuple[str, ...]
@@ -150,37 +73,51 @@ class Coverage:
         result: BoolArray = inside & known[:, np.clip(band, 0, self.shares.shape[1] - 1)]
         return result
 
-    def compare(self, inputs: FloatArray, dt: float, units: Sequence[str]) -> list[Waves]:
-        """Compare the inputs (time, channel) of a forecast with those of training."""
+    def compare(
+        self, inputs: FloatArray, dt: float, duration: float, units: Sequence[str]
+    ) -> Iterator[tuple[str, str, str]]:
+        """Say in what the inputs (time, channel) of a forecast differ from those of training.
+
+        Yields sentences on period, height and steepness of each input that moves for five periods
+        or more of a `duration` in s; empty where it was trained. The height of n irregular waves
+        scatters by about 0.85/√n (one SD): two of that, and a tenth, are no reason.
+        """
         found = _shares(band_energy(inputs, dt, self.first, self.shares.shape[1]))
         edges = band_edges(self.first, self.shares.shape[1])
         periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])
-        heights, steep = _heights(inputs, dt)
-        out = []
-        for column, channel in enumerate(self.channels):
-            trained = np.flatnonzero(self.shares[column] >= TRAINED)
-            if not trained.size or not found[column].any():
+        rows = zip(self.channels, units, self.shares, found, strict=True)
+        measures = zip(*_heights(inputs, dt), self.heights, self.steepnesses, strict=True)
+        for (channel, unit, taught, own), numbers in zip(rows, measures, strict=True):
+            trained, known = np.flatnonzero(taught >= TRAINED), _with_neighbours(taught >= TRAINED)
+            peak = int(np.argmax(own))
+            repeats = duration / periods[peak]
+            if not trained.size or not own.any() or repeats <= CYCLES:
                 continue  # a constant has no period
-            known = _with_neighbours(self.shares[column] >= TRAINED)
-            peak = int(np.argmax(found[column]))
-            low, high = trained[0], trained[-1]
-            if is_gap := bool(low < peak < high and not known[peak]):
+            period = height = steepness = ""
+            low, high, where, word, nothing = trained[0], trained[-1], "outside", "to", ""
+            if low < peak < high and not known[peak]:
                 low, high = trained[trained < peak][-1], trained[trained > peak][0]
-            out.append(
-                Waves(
-                    channel=channel,
-                    period=float(periods[peak]),
-                    trained=(float(periods[high]), float(periods[low])),
-                    outside=float(found[column][~known].sum()),
-                    is_gap=is_gap,
-                    height=float(heights[column]),
-                    highest=float(self.heights[column]),
-                    steepness=float(steep[column]) if is_elevation(channel) else np.nan,
-                    steepest=float(self.steepnesses[column]),
-                    units=units[column],
+                where, word, nothing = "between", "and", ", with none between"
+            if (outside := own[~known].sum()) > 0.5:
+                period = (
+                    f"{channel}: the dominant period of {periods[peak]:.3g} s lies {where} the "
+                    f"periods that trained the model ({periods[high]:.3g} {word} "
+                    f"{periods[low]:.3g} s{nothing}); {100 * outside:.0f} % of the energy is at "
+                    "periods it has not seen"
                 )
-            )
-        return out
+            margin, (high_here, steep_here, highest, steepest) = 1.1 + 1.7 / repeats**0.5, numbers
+            if high_here > margin * highest:
+                unit = f" {unit}" if unit else ""
+                height = (
+                    f"{channel}: a height of {high_here:.3g}{unit}, trained up to "
+                    f"{highest:.3g}{unit}"
+                )
+            if is_elevation(channel) and steep_here > margin * steepest:
+                steepness = (
+                    f"{channel}: a steepness in deep water of {steep_here:.3g}, trained up to "
+                    f"{steepest:.3g}"
+                )
+            yield period, height, steepness
 
     def to_variables(self) -> dict[str, Any]:
         """Variables of a file."""
@@ -201,8 +138,8 @@ class Coverage:
         return cls(tuple(signature.inputs), first, *(store.numbers(dataset, key) for key in keys))
 
 
-def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> list[Waves]:
-    """Compare the waves that drive a forecast with those that trained the model.
+def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) -> list[str]:
+    """Say in what a forecast lies outside the training: period, height, steepness, mean surge.
 
     Parameters
     ----------
@@ -217,8 +154,8 @@ def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> li
 
     Returns
     -------
-    list of Waves
-        One per input that moves; ``text`` is a sentence where the waves are others.
+    list of str
+        A sentence for each reason; none where the forecast is shorter than five periods.
     """
     coverage: Coverage | None = getattr(model, "coverage", None)
     if coverage is None or not model.inputs:
@@ -230,29 +167,10 @@ def compare_waves(model: Model, run: xr.Dataset, start: float, steps: int) -> li
     values = labelled.channel_matrix(run, model.inputs, name, slice(first, at + steps))
     if len(values) < 2 or not np.all(np.isfinite(values)):
         return []
-    units = [label.units for label in model.signature.input_labels]
-    return coverage.compare(values, model.dt, units)
-
-
-def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) -> list[str]:
-    """Say in what a forecast lies outside the training: period, height, steepness, mean surge.
-
-    Parameters
-    ----------
-    model, run, start, steps
-        As for :func:`compare_waves`.
-
-    Returns
-    -------
-    list of str
-        A sentence for each reason; none where the forecast is shorter than five periods.
-    """
-    duration = steps * model.dt
-    waves = [w for w in compare_waves(model, run, start, steps) if duration > CYCLES * w.period]
-    reasons = [each.reasons(duration) for each in waves]
-    told = ["; ".join(filter(None, of)) for of in zip(*reasons, strict=True)]
+    duration, units = steps * model.dt, [label.units for label in model.signature.input_labels]
+    waves = list(coverage.compare(values, model.dt, duration, units))
+    told = ["; ".join(filter(None, of)) for of in zip(*waves, strict=True)]
     if waves and "surge" in model.states and "surge" in run:
-        time = run["time"].values
         surge = run["surge"].values[(time > start) & (time <= start + duration + 1e-6)]
         scale, at = model.signature.state_scale, model.states.index("surge")
         low, high = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
