@@ -92,7 +92,7 @@ ACTS = (
     Act(
         "raw",
         "(b)",
-        "the same on raw channels",
+        "the paper's procedure on raw channels",
         "The same models in the same windows forecast the channels as measured, drift included.",
         "paper",
     ),
