@@ -8,7 +8,6 @@ was not measured (:mod:`seakeep.core.kalman`); a forecast starts from its estima
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
 import math
 from collections import deque
@@ -709,11 +708,20 @@ class Live:
 
     def _parts(self) -> list[FloatArray]:
         """Views of all that samples and forecasts to come read."""
-        taken = self._count.taken
-        kept = [self._rows(each, max(taken - self._record, 0), taken) for each in self._kept]
-        updates = [each for each in self._pending() if each is not self._as_it_is]
-        state = (self._history, self._free, self._innovation, self._squares)
-        return [*kept, *itertools.chain(*updates), *state, self._filter.covariance]
+        taken, signature = self._count.taken, self.signature
+        taps = 0 if self._follows is None else self._follows.place.taps.size
+        longest = max(signature.state_delays, signature.input_delays, taps)
+        tail = max(taken - (self._ahead + longest + 4), 0)
+        kept = [self._rows(each, tail, taken) for each in self._kept if each != "u"]
+        updates = [update for update in self._pending() if update is not self._as_it_is]
+        state = [self._history, self._free, self._innovation, self._squares]
+        state.append(self._filter.covariance)
+        return [
+            self._known_inputs(),
+            *kept,
+            *(each for update in updates for each in update),
+            *state,
+        ]
 
     @cached_property
     def _identity(self) -> str:
