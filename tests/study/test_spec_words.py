@@ -1,6 +1,6 @@
 """What a result says of its models is words that another run would say too."""
 
-from seakeep.report.sections.settings import setting_text
+from seakeep.report.sections.data import setting_text
 from seakeep.study import read_study, run_study
 
 
