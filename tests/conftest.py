@@ -145,8 +145,9 @@ def empty_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sheets with empty pictures: tests/report looks at these, and each takes a second or two."""
     pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
     from seakeep.report import quality_sheet as sheet
+    from seakeep.report.style import new_figure
 
-    monkeypatch.setattr(sheet, "quality_figure", lambda run, agreements: sheet.new_figure(1, 1))
+    monkeypatch.setattr(sheet, "quality_figure", lambda run, agreements: new_figure(1, 1))
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ def test_the_page_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     play(PAGE, "measurement_chain.md")
     sheet = (tmp_path / "virtual/prepared/quality.html").read_text(encoding="utf-8")
-    assert re.search(r"<td>regular_2</td><td[^>]*>not prepared</td>", sheet)
+    assert re.search(r"<td>regular_<wbr>2</td><td[^>]*>not prepared</td>", sheet)
 
 
 def test_functions_and_keys_of_the_table_exist():

@@ -16,10 +16,8 @@ from seakeep.errors import RequestError
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
-from matplotlib.figure import Figure
 
 from seakeep.report.check_page import check_sections
-from seakeep.report.figures import checks
 
 
 @pytest.fixture(scope="module")
@@ -170,13 +168,3 @@ def test_a_state_that_stands_still_is_drawn(judged):
     for each in judged["flat"]:
         for drawing in each.figures:
             drawing.draw().canvas.draw()
-
-
-def test_figures_draw_on_axes_that_are_given():
-    figure = Figure()
-    with pytest.raises(RequestError, match="axes holds 1 Axes and the figure draws 2 panels"):
-        checks.panels(figure.subplots(), 2, 3, (1, 1))
-    axes = figure.subplots(1, 2)
-    same, places = checks.panels(axes, 2, 3, (1, 1))
-    assert same is figure
-    assert np.all(np.array(places) == axes)

@@ -15,12 +15,18 @@ from tutorial_study import put_tutorial
 
 from seakeep.errors import RequestError
 from seakeep.files import check_report
-from seakeep.report.sections.errors import error_table, errors
+from seakeep.report.sections.data import settings as settings_of
+from seakeep.report.sections.data import test_overlap as overlap_of_tests
+from seakeep.report.sections.data import training_overlap, unequal_training
+from seakeep.report.sections.errors import (
+    PUBLISHED,
+    age,
+    coverage_table,
+    divergence_table,
+    error_table,
+    errors,
+)
 from seakeep.report.sections.histories import history_data, pack
-from seakeep.report.sections.judgements import PUBLISHED, age, coverage_table, divergence_table
-from seakeep.report.sections.settings import settings as settings_of
-from seakeep.report.sections.settings import test_overlap as overlap_of_tests
-from seakeep.report.sections.settings import training_overlap, unequal_training
 from seakeep.report.sections.summary import (
     findings,
     glossary,
@@ -33,7 +39,7 @@ from seakeep.study import StudyResult, read_result, read_study, run_study
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
 
-from seakeep.report.figures.errors import FEWEST, draw_box_violin, eigenvalue_figure
+from seakeep.report.figures.errors import FEWEST, draw_box_violin
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Drawing, Section, write_page
 from seakeep.report.sections import write_report
@@ -258,13 +264,6 @@ def _renamed(channels):
     return channels.assign_coords(name=names).assign(
         channel=("channel", states), long_name=("name", words)
     )
-
-
-def test_the_legend_of_the_eigenvalues_stands_over_none_of_them(result):
-    figure = eigenvalue_figure(result)
-    figure.draw_without_rendering()
-    (legend,) = figure.legends
-    assert all(legend.get_window_extent().y0 >= axes.get_window_extent().y1 for axes in figure.axes)
 
 
 def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(result):

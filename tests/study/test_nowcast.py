@@ -53,7 +53,7 @@ def test_a_study_judges_its_models_in_service(study, result):
 def test_the_report_shows_it(result):
     pytest.importorskip("matplotlib")
     from seakeep.report.comparison import nowcast_blocks
-    from seakeep.report.sections.judgements import service
+    from seakeep.report.sections.errors import service
 
     section = service(result)
     assert [each.name for each in section.figures] == ["nowcast_unseen"]

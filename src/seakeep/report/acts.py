@@ -12,9 +12,8 @@ from seakeep.arrays import Progress
 from seakeep.report.claims import REGULAR, SEA, SINGLE, claims_table, error_of
 from seakeep.report.figures.histories import acts_figure
 from seakeep.report.page import Section, drawing, section, write_page
-from seakeep.report.sections.data import wave_tables
-from seakeep.report.sections.judgements import divergence_table
-from seakeep.report.sections.settings import finished
+from seakeep.report.sections.data import finished, wave_tables
+from seakeep.report.sections.errors import divergence_table
 from seakeep.report.sections.summary import heat_table
 from seakeep.report.style import judged_models, model_words
 from seakeep.report.tables import Number, Table, number, numbers, table

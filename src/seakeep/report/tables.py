@@ -149,7 +149,13 @@ def shade(text: str) -> int:
 
 
 def number(value: SupportsFloat, digits: int = 3) -> Number:
-    """Text of a number; a dash for one that is not finite."""
+    """Text of a number; a dash for one that is not finite.
+
+    Examples
+    --------
+    >>> number(-0.0004), number(-0.4), number(float("nan"))
+    ('0.000', '-0.400', '–')
+    """
     value = float(value)
     return Number(f"{value:z.{digits}f}") if np.isfinite(value) else MISSING
 
@@ -378,6 +384,8 @@ def latex_text(text: str) -> str:
     '50 \\% of $\\lambda$\\_max'
     >>> latex_text("τ̂ of τ")
     '$\\hat\\tau$ of $\\tau$'
+    >>> latex_text("-0.12 [-0.3, 0.1] a-1")
+    '$-$0.12 [$-$0.3, 0.1] a-1'
     """
     text = re.sub(r"(?<![\w)])-(?=\d)", "−", text)
     return _KNOWN.sub(lambda found: _LATEX[found[0]], text)

@@ -412,8 +412,6 @@ def tuning_figure(table: xr.Dataset) -> Figure:
     Figure
         One line per candidate with its 95 % intervals; the choice is marked.
     """
-    from matplotlib.ticker import LogLocator, NullFormatter
-
     truncated = table["rank"].values > 0
     kinds = [("ridge", "ridge per snapshot pair (1)", ~truncated)]
     if truncated.any():
@@ -425,8 +423,7 @@ def tuning_figure(table: xr.Dataset) -> Figure:
         for row in range(table.sizes["trial"])
     ]
     figure = new_figure(7.0, 4.2)
-    ratios = [2, 1][: len(kinds)]
-    places = figure.subplots(1, len(kinds), sharey=True, squeeze=False, width_ratios=ratios)[0]
+    places = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
     for axes, (key, words, rows) in zip(places, kinds, strict=True):
         for number, name in enumerate(dict.fromkeys(names)):
             part = table.isel(trial=np.flatnonzero((np.array(names) == name) & rows))
@@ -439,10 +436,6 @@ def tuning_figure(table: xr.Dataset) -> Figure:
         if best.sizes["trial"]:
             ring = {"markersize": 11, "fillstyle": "none", "color": "k"}
             axes.semilogx(best[key], best["score"], "o", **ring, label="chosen")
-        if key == "rank":  # few octaves, each with its number
-            axes.xaxis.set_major_locator(LogLocator(base=2))
-            axes.xaxis.set_major_formatter("{x:g}")
-            axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel(words)
         axes.set_ylim(bottom=0.0)
         axes.legend(fontsize="small")

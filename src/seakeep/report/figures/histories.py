@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.campaign.settings import long_name_of
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError
 from seakeep.models import summarize
@@ -149,12 +148,13 @@ def overlay_figure(comparison: Comparison | Mapping[str, Comparison]) -> Figure:
         each.margins(x=0.01)
     for row, name in zip(axes, states, strict=False):
         parts = [part for each in compared for part in (each.measured, each.forecast, each.band)]
-        factor, units = _prefix([part[name] for part in parts if part is not None])
+        largest = max(float(np.abs(part[name]).max()) for part in parts if part is not None)
+        attrs = first.measured[name].attrs
+        factor, units = prefixed(str(attrs.get("units", "")), largest)
         curves = [_curve(each, key, name, factor, several) for key, each in several.items()]
         for place, span in zip(row, spans, strict=True):
             draw_history(place, time, factor * first.measured[name], curves, span)
-        label = axis_label(name, units, first.measured[name].attrs.get("long_name"))
-        row[0].set_ylabel(label, fontsize=LABEL)
+        row[0].set_ylabel(axis_label(name, units, attrs.get("long_name")), fontsize=LABEL)
         judged = _judgement([table.sel(channel=name) for table in tables])
         row[0].set_title(judged, loc="right", fontsize=8, pad=2)
     for row, names in zip(axes[len(states) :], groups.values(), strict=True):
@@ -175,12 +175,6 @@ def overlay_figure(comparison: Comparison | Mapping[str, Comparison]) -> Figure:
     legend_outside(figure, *axes[0])
     figure.suptitle(_title(compared), x=0.01, ha="left")
     return figure
-
-
-def _prefix(channels: Sequence[xr.DataArray]) -> tuple[float, str]:
-    """Factor and unit in which channels of one unit are shown: large loads in kN or MN."""
-    largest = max(float(np.abs(each).max()) for each in channels)
-    return prefixed(str(channels[0].attrs.get("units", "")), largest)
 
 
 def _curve(
@@ -242,28 +236,24 @@ def _period_if_long(comparison: Comparison) -> float | None:
 
 def _draw_inputs(axes: Any, inputs: xr.Dataset, period: float | None) -> None:
     """Inputs of one unit; beyond the first, colours and dashes set them apart."""
-    factor, _ = _prefix(list(inputs.data_vars.values()))
     time = inputs["time"].values
     for number, (name, each) in enumerate(inputs.data_vars.items()):
-        stated = each.attrs.get("long_name")
-        label = name if stated in (None, long_name_of(str(name), None)) else plain_text(str(stated))
-        other = SERIES[(number + 1) % len(SERIES)]
-        line = {
-            **LINES["input"],
-            **({k: other[k] for k in ("color", "linestyle")} if number else {}),
-        }
+        line = {**LINES["input"], "label": plain_text(str(each.attrs.get("long_name", name)))}
+        if number:
+            other = SERIES[(number + 1) % len(SERIES)]
+            line |= {"color": other["color"], "linestyle": other["linestyle"]}
         if period is None:
-            axes.plot(time, factor * each, label=label, **line)
+            axes.plot(time, each, **line)
         else:
-            _envelope(axes, time, (factor * each, factor * each), period, **line)
+            _envelope(axes, time, (each, each), period, **line)
     axes.axhline(0.0, color=COLOURS["input"], linewidth=0.4)
 
 
 def _input_label(inputs: xr.Dataset) -> str:
-    channels = list(inputs.data_vars.values())
-    _, units = _prefix(channels)
-    if len(channels) == 1:
-        return axis_label(str(channels[0].name), units, channels[0].attrs.get("long_name"))
+    first, *others = inputs.data_vars.values()
+    units = str(first.attrs.get("units", ""))
+    if not others:
+        return axis_label(str(first.name), units, first.attrs.get("long_name"))
     waves = all(is_elevation(str(name)) for name in inputs.data_vars)
     return f"{'wave elevations' if waves else 'inputs'}\n[{shown_unit(units) or '?'}]"
 

@@ -16,6 +16,7 @@ from seakeep.report.style import (
     COLOURS,
     DASHED,
     PALETTE,
+    SERIES,
     figure_style,
     new_figure,
     plain_text,
@@ -53,15 +54,6 @@ WELCH: dict[str, tuple[str, Any]] = {
     "recommended": (COLOURS["ensemble"], "-"),
 }
 """Colour and dash of a measured spectrum, by how it is estimated."""
-MODES = {
-    "surge": ("x", "blue"),
-    "heave": ("z", "vermilion"),
-    "pitch": (r"\theta", "green"),
-    "piston": (r"\zeta_p", "pink"),
-    "slosh": (r"\zeta_s", "slate"),
-}
-"""Symbol and colour of each motion of the tank's vessel."""
-
 Curve = tuple[FloatArray, FloatArray]
 
 
@@ -240,13 +232,12 @@ def hydrodynamics_figure(rig: Rig, settings: TankSettings) -> Figure:
     figure = new_figure(9.0, 8.4)
     grid = figure.subplots(4, len(hydro.names), sharex="row", squeeze=False)
     for i, name in enumerate(hydro.names):
-        symbol, colour = MODES[name]
-        tint = PALETTE[colour]
+        tint = SERIES[i % len(SERIES)]["color"]
         for axes, point, line in zip(grid[:3, i], points, lines, strict=True):
             axes.plot(omega, point[:, i], ".", color=tint, markersize=3)
             axes.plot(fine, line[:, i], color=tint, linewidth=1.0)
         grid[3, i].plot(waves, motion[:, i] / (slope if name == "pitch" else 1.0), color=tint)
-        grid[0, i].set_title(f"{name} ${symbol}$")
+        grid[0, i].set_title(name)
     for axes in grid.flat:
         for frequency in _regular_waves(settings):
             axes.axvline(frequency, color=COLOURS["start"], linewidth=1.0, linestyle=(0, (6, 3)))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from seakeep.arrays import Progress
 from seakeep.report.page import Section, write_page
-from seakeep.report.sections import data, errors, histories, judgements, settings, summary
+from seakeep.report.sections import data, errors, histories, summary
 from seakeep.study import StudyResult
 from seakeep.study.store import storing
 
@@ -19,17 +19,17 @@ SECTIONS: list[Callable[[StudyResult], Section | None]] = [
     errors.regular,
     histories.explorer,
     histories.histories,
-    judgements.age,
-    judgements.coverage,
+    errors.age,
+    errors.coverage,
     errors.bands,
-    judgements.service,
-    judgements.densities,
-    judgements.members,
+    errors.service,
+    errors.densities,
+    errors.members,
     data.waves,
     data.data,
-    settings.chosen,
-    settings.settings,
-    settings.versions,
+    data.chosen,
+    data.settings,
+    data.versions,
     summary.glossary,
 ]
 """A section is one function here; where it has nothing to show it returns None."""
@@ -61,7 +61,7 @@ def write_report(
         drawn = [[each for each in one.figures if not each.raster] for one in sections]
         sections = [replace(one, figures=f) for one, f in zip(sections, drawn, strict=True)]
     stamp = {key: str(result.attrs[key]) for key in ("preset", "seed", "digest", "description")}
-    stamp["finished"] = settings.finished(result)
+    stamp["finished"] = data.finished(result)
     with storing(result.folder):
         histories.write_histories(result)
     title = f"{result.attrs['study']}: study report"

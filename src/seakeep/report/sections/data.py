@@ -1,18 +1,23 @@
-"""Data of the study: waves, channels and signs, quality of the runs, clocks."""
+"""What a study used: waves, channels, runs and their quality, settings, windows, versions."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
 from dataclasses import replace
+from datetime import datetime
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from seakeep.report.figures.runs import quality_figure, spectrum_figure
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.quality_sheet import channel_rows, clock_rows, other_findings, run_row
-from seakeep.report.style import shown_unit
+from seakeep.report.style import model_words, shown_unit
 from seakeep.report.tables import Number, Table, number, percent, short, table
 from seakeep.study import StudyResult
+from seakeep.study.plan import windows_overlap
 from seakeep.waves import phase_speed
 
 
@@ -127,3 +132,254 @@ def _quality_table(result: StudyResult, name: str) -> Table:
         rows.append((*row, "; ".join(each.found)))
     marked = [k for k, each in enumerate(channels) if each.found]
     return table("quality", rows, {"run": name}, name=f"quality_{name}", marked=marked)
+
+
+APART = 0.005
+"""Windows that share less than this part of their length are apart."""
+UNITS = {
+    **dict.fromkeys(("length", "split_period"), "T̂"),
+    **dict.fromkeys(("state_delays", "input_delays", "window", "lead"), "samples"),
+    **dict.fromkeys(("startup", "encounter_period"), "s"),
+}
+"""Units of settings, by the last part of their key."""
+
+
+def settings(result: StudyResult) -> Section:
+    """Return settings, training sets and test windows."""
+    made = str(result.attrs.get("waves_note", ""))
+    waves = f"Waves of the virtual tank: {made}." if made else ""
+    words = (waves, training_overlap(result)[1], test_overlap(result))
+    tables = (_model_table(result), _settings_table(result), _windows_table(result))
+    return section("settings", more=words, tables=tables)
+
+
+def _model_table(result: StudyResult) -> Table:
+    """Each setting of each model, with where it comes from."""
+    rows = [
+        (
+            model_words(model),
+            key.replace("_", " "),
+            setting_text(key, each["value"]),
+            each["source"],
+        )
+        for model, stated in result.model_settings.items()
+        for key, each in stated["settings"].items()
+    ]
+    return table("models", rows)
+
+
+def _settings_table(result: StudyResult) -> Table:
+    """Settings of the study, defaults included; period, time step and filters of its data first."""
+    every = {key: value for key, value in result.settings.items() if key != "models"}
+    every["statistics"] = {**every["statistics"], "calibrate": result.is_calibrated}
+    period, dt = float(result.attrs["encounter_period"]), float(result.attrs["dt"])
+    preparation = json.loads(result.attrs["preparation"])
+    origin = "stated" if every["study"].get("encounter_period") else "measured"
+    filters = []
+    if preparation["low_pass"]:
+        edges = " to ".join(f"{edge:g}" for edge in preparation["low_pass"])
+        filters.append(f"low-pass {edges} Hz")
+    if preparation["anti_alias"]:
+        filters.append("low-pass below 0.8 of the new Nyquist frequency")
+    rows = [
+        ("mean encounter period T̂", f"{period:.4f} s, {origin}"),
+        ("time step", f"{dt:.4g} s, {period / dt:.4g} samples per period"),
+        ("filter before resampling", " and ".join(filters) or "none"),
+        *((key, setting_text(key, value)) for key, value in _leaves("", every)),
+    ]
+    return table("settings", rows)
+
+
+def _leaves(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _leaves(f"{prefix}.{key}" if prefix else key, inner)
+    elif value not in (None, "", []):
+        yield prefix, value
+
+
+def setting_text(key: str, value: Any) -> str:
+    """A setting as people read it, with its unit.
+
+    Examples
+    --------
+    >>> setting_text("state_delays", {"log_uniform": ["0.5 T", "1.5 T"]})
+    'log-uniform, 0.5 to 1.5 T̂'
+    >>> setting_text("tests.irregular.length", 15.0), setting_text("window", None)
+    ('15 T̂', 'all samples')
+    """
+    name = key.rpartition(".")[2]
+    if value is None:
+        return "all samples" if name == "window" else "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(setting_text("", each) for each in value)
+    unit = f" {UNITS[name]}" if name in UNITS else ""
+    if isinstance(value, dict):
+        return _prior_text(value, unit)
+    return f"{value:.6g}{unit}" if isinstance(value, float) else f"{value}{unit}"
+
+
+def _prior_text(prior: dict[str, Any], unit: str) -> str:
+    """A prior, or another table, in words; `unit` is that of bare numbers."""
+    lengths = {"T": " T̂", "s": " s"}
+    for kind, words in (("uniform", "uniform, "), ("log_uniform", "log-uniform, "), ("fixed", "")):
+        if kind in prior:
+            given = prior[kind] if isinstance(prior[kind], list) else [prior[kind]]
+            texts = [str(each).partition(" ") for each in given]
+            bounds = " to ".join(f"{float(each[0]):.6g}" for each in texts)
+            return words + bounds + lengths.get(texts[0][2], unit)
+    if "distribution" in prior:
+        given = ", ".join(f"{key}={each:.6g}" for key, each in prior["parameters"].items())
+        shared = lengths.get(prior.get("unit", ""), unit)
+        return f"scipy.stats.{prior['distribution']}({given}){shared}"
+    return json.dumps(prior)
+
+
+def _windows_table(result: StudyResult) -> Table:
+    """Training sets and test windows."""
+    training = result.groups["training"]
+    every = ", ".join(map(model_words, whole_readers(result)))
+    whole = f" (all of it: {every})" if every else ""
+    rows = []
+    for each, spans in zip(training["training"], training_spans(result), strict=True):
+        words = ", ".join(f"{run}, {begin:.2f} to {end:.2f} s" for run, begin, end in spans)
+        left_out = str(training["left_out"].sel(training=each).values)
+        rows.append(("training", str(each.values), words, left_out))
+    rows += [
+        ("test", result.label_of(test), f"{run}, {begin:.2f} to {end:.2f} s", "")
+        for test in result.tests
+        for run, begin, end in _test_spans(result, test)
+    ]
+    return table(
+        "windows", rows, {"reads": float(result.attrs["longest_training"]), "whole": whole}
+    )
+
+
+Spans = list[tuple[str, float, float]]
+
+
+def training_spans(result: StudyResult) -> list[Spans]:
+    """Run, start and end (s) of each span of each training set."""
+    training = result.groups["training"]
+    runs = [str(run) for run in training["of_run"].values]
+    return [
+        [(run, b, e) for run, b, e in zip(runs, *edges, strict=True) if np.isfinite(b)]
+        for edges in zip(training["begin"].values, training["end"].values, strict=True)
+    ]
+
+
+def _test_spans(result: StudyResult, test: str) -> Spans:
+    """Run, start and end (s) of each window of a test set."""
+    data = result.tests[test]
+    length, runs = float(data["time"].values[-1]), data["run"].values.astype(str)
+    return [(run, s, s + length) for run, s in zip(runs, data["start"].values, strict=True)]
+
+
+def _trained_on(result: StudyResult) -> dict[str, Any]:
+    """Stated training length of each model that has one; None where it reads all."""
+    every = {model: stated["settings"] for model, stated in result.model_settings.items()}
+    return {model: known["window"]["value"] for model, known in every.items() if "window" in known}
+
+
+def whole_readers(result: StudyResult) -> list[str]:
+    """Models that read all of a training set, for any length."""
+    return [model for model, length in _trained_on(result).items() if length is None]
+
+
+def unequal_training(result: StudyResult) -> str:
+    """Sentence on models that learn from different lengths of data; empty where none do."""
+    lengths, whole = _trained_on(result), ", ".join(map(model_words, whole_readers(result)))
+    period, parts = float(result.attrs["encounter_period"]), []
+    for model, length in lengths.items():
+        if isinstance(length, dict):
+            parts.append(f"{model_words(model)} from a part ({_prior_text(length, ' samples')})")
+        elif length is not None:
+            periods = length * float(result.attrs["dt"]) / period
+            parts.append(f"{model_words(model)} from a part ({periods:.3g} T̂)")
+    if not (whole and parts):
+        return ""
+    sets = [sum(end - begin for _, begin, end in spans) for spans in training_spans(result)]
+    ends = dict.fromkeys(f"{each / period:.0f}" for each in (min(sets), max(sets)))
+    return (
+        f"Models learn from different amounts of data: {whole} from all of a training set "
+        f"({' to '.join(ends)} T̂), {', '.join(parts)}. Part of the difference between them is one "
+        "of training data."
+    )
+
+
+def training_overlap(result: StudyResult) -> tuple[bool, str]:
+    """Whether training windows share a part that counts, and a sentence on it."""
+    training = result.groups["training"]
+    if result.settings["training"]["scheme"] != "halves" or "stop" not in training:
+        return False, ""
+    period, length = (float(result.attrs[k]) for k in ("encounter_period", "longest_training"))
+    spans: Spans = [span for (span,) in training_spans(result)]
+    runs, readers = result.groups["runs"], whole_readers(result)
+    longest = float((runs["train_end"] - runs["train_begin"]).max())
+    room = (
+        "A training window must hold the largest draw with its delay history, "
+        f"{length / period:.1f} T̂ of the {longest / period:.0f} T̂ of the longest training span"
+    )
+    if len(spans) == 1:
+        return False, f"{room}; there is one."
+    share = windows_overlap([(run, end - length, end) for run, _, end in spans])
+    nested, whole = windows_overlap(spans) if readers else 0.0, ""
+    if nested >= APART:
+        whole = (
+            f" From the start of their spans, as {', '.join(map(model_words, readers))} reads "
+            f"them, they share {percent(nested)} %."
+        )
+    if share < APART:
+        count = len({run for run, _, _ in spans})
+        where = f", which lie in {count} runs," if count > 1 else ""
+        return bool(whole), f"{room}; the {len(spans)} windows{where} do not overlap.{whole}"
+    return True, (
+        f"{room}: so the {len(spans)} windows share {percent(share)} % of their length with one "
+        f"another.{whole} They are not independent, and the boxes show the spread over test "
+        "windows more than that over training data."
+    )
+
+
+def test_overlap(result: StudyResult) -> str:
+    """Sentence on test windows that overlap; empty where no two do."""
+    shares = {test: windows_overlap(_test_spans(result, test)) for test in result.tests}
+    said = [
+        f"{result.label_of(test)} {percent(share)} %"
+        for test, share in shares.items()
+        if share >= APART
+    ]
+    if not said:
+        return ""
+    return (
+        f"Test windows overlap; the mean share of one that others cover too: {', '.join(said)}. "
+        "Errors over them are not independent."
+    )
+
+
+def finished(result: StudyResult) -> str:
+    """Day and time at which the study was finished, as people read them."""
+    return f"{datetime.fromisoformat(str(result.attrs['created'])):%Y-%m-%d %H:%M:%S %Z}"
+
+
+def versions(result: StudyResult) -> Section:
+    """Return digest, seed and versions."""
+    keys = ("study", "digest", "campaign", "campaign_digest", "preset", "seed")
+    rows = [(key.replace("_", " "), str(result.attrs[key])) for key in keys]
+    rows.append(("finished", finished(result)))
+    rows += [(name, str(each)) for name, each in json.loads(result.attrs["versions"]).items()]
+    return section("versions", tables=(table("versions", rows),))
+
+
+def chosen(result: StudyResult) -> Section | None:
+    """Return how settings were chosen; None where all are stated and no model looks ahead."""
+    rows = []
+    for model in result.models:
+        data = result.groups["chosen"].sel(model=model)
+        columns = (data[key].values for key in ("training", "words", "look_ahead"))
+        for name, text, ahead in zip(*columns, strict=True):
+            if text or ahead > 0:
+                words = "; ".join(map(str.strip, str(text or "stated").splitlines()))
+                rows.append((model_words(model), str(name), number(ahead, 2), words))
+    return section("chosen", tables=(table("chosen", rows),)) if rows else None

@@ -1,4 +1,4 @@
-"""Errors of all cells: averages, channels, scales, regular waves, and bands of ensembles."""
+"""Errors of cells: averages, channels, scales, age, bands, densities, members, service."""
 
 from __future__ import annotations
 
@@ -8,13 +8,37 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from seakeep.report.figures.errors import FEWEST, average_boxes, channel_boxes
+from seakeep.report.comparison import nowcast_blocks
+from seakeep.report.figures.errors import (
+    BAND_WORDS,
+    FEWEST,
+    LOWEST,
+    average_boxes,
+    channel_boxes,
+    density_figure,
+    eigenvalue_figure,
+    error_over_time_figure,
+    hyperparameter_figure,
+    nowcast_figure,
+)
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.sections.summary import by_channel, conditional, overview_table
 from seakeep.report.style import HEADING, judged_models, model_words
-from seakeep.report.tables import Number, Table, beside, number, percent, short, signed, table
+from seakeep.report.tables import (
+    MISSING,
+    Number,
+    Table,
+    beside,
+    number,
+    percent,
+    probability,
+    short,
+    signed,
+    small_number,
+    table,
+)
 from seakeep.study import StudyResult
-from seakeep.study.judge import average_of, verdict
+from seakeep.study.judge import VARIANTS, average_of, verdict
 
 SELDOM = 0.01
 """Part of a run's samples below which a slack line is not worth a word."""
@@ -231,3 +255,212 @@ def _of_all(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title:
     ]
     words = {"band": title}
     return table("bands_by_channel", rows, words, conditional(result), name=f"{name}_channels")
+
+
+PUBLISHED = {
+    "surge": ("0.0026", "0.0010", "0.0061", "0.0052"),
+    "heave": ("0.0031", "0.0013", "0.0061", "0.0049"),
+    "pitch": ("0.0035", "0.0017", "0.0076", "0.0059"),
+    "surge_rate": ("0.0021", "0.0007", "0.0063", "0.0057"),
+    "heave_rate": ("0.0036", "0.0015", "0.0075", "0.0060"),
+    "pitch_rate": ("0.0041", "0.0011", "0.0106", "0.0095"),
+    "surge_acceleration": ("0.0045", "0.0028", "0.0073", "0.0045"),
+    "heave_acceleration": ("0.0071", "0.0030", "0.0140", "0.0110"),
+    "pitch_acceleration": ("0.0086", "0.0028", "0.0181", "0.0153"),
+    "mooring_bow": ("0.0186", "0.0099", "0.0302", "0.0203"),
+    "mooring_stern": ("0.0274", "0.0185", "0.0387", "0.0202"),
+    "average": ("0.0077", "0.0040", "0.0139", "0.0099"),
+}
+"""Divergence that the paper publishes, BHDMDc of the CK-14e in irregular waves: EV and quantiles
+0.025 and 0.975 of the bootstrap, and their difference U.
+
+They come from another vessel in another tank; they are for orientation, and nothing is tuned to
+them.
+"""
+
+
+def age(result: StudyResult) -> Section:
+    """Return the error over the age of a forecast."""
+    split = float(result.settings["statistics"]["split_period"])
+    figure = drawing("error_over_time", partial(error_over_time_figure, result), {"split": split})
+    return section("time", figures=(figure,), tables=(_trend_table(result, split),))
+
+
+def _trend_table(result: StudyResult, split: float) -> Table:
+    rows, trend = [], result.groups["statistics/trend"]
+    seconds = split * float(result.attrs["encounter_period"])
+    for test in result.tests:
+        for band, words in BAND_WORDS.items():
+            for model in judged_models(result):
+                at = trend.sel(test=test, model=model, band=band)
+                rows.append(
+                    (
+                        result.label_of(test),
+                        words,
+                        model_words(model),
+                        number(at["error_mean"].mean()),
+                        number(at["change"]),
+                        beside(at["slope"], at["lower"], at["upper"], form=small_number),
+                        number(at["kendall_tau"], 2),
+                        probability(at["p_value"]),
+                    )
+                )
+    return table("trend", rows, {"split": split, "seconds": seconds}, conditional(result))
+
+
+def coverage(result: StudyResult) -> Section | None:
+    """Return coverage and width of the bands of ensembles."""
+    kinds = (False, True) if result.is_calibrated else (False,)
+    ensembles = filter(result.is_ensemble, result.models)
+    tables = [coverage_table(result, model, kind) for model in ensembles for kind in kinds]
+    return section("coverage", tables=tables) if tables else None
+
+
+def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
+    """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
+    prefix = "calibrated_" * calibrated
+    found = result.groups["statistics/coverage"].sel(model=model)
+    true = "truth" in found["against"].values
+    kinds, two = ("inside" + " [of the truth]" * true, "width [SD]"), partial(number, digits=2)
+
+    def cells(name: str) -> Iterator[str]:
+        for test in result.tests:
+            at = found.sel(test=test, channel=name)
+            inside, width = (at[f"{prefix}{key}"] for key in ("inside", "relative_width"))
+            yield beside(*inside, form=two) if true else two(*inside)
+            yield two(width.sel(against="measured"))
+
+    level = float(result.settings["statistics"]["level"])
+    more = _calibrated_words(result, model, level) if calibrated else ""
+    if true:
+        more += (
+            " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
+            "slap; rates are not filtered."
+        )
+    heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
+    words = {"kind": prefix.replace("_", " "), "level": short(100 * level), "part": level}
+    return by_channel(
+        result,
+        "coverage",
+        cells,
+        {**words, "model": model_words(model)},
+        columns=heads,
+        name=f"coverage_{prefix}{model}",
+        more=more + conditional(result),
+    )
+
+
+def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
+    """How the calibrated band is made, what it rests on, and where it is of no use."""
+    found = result.groups["calibration"].sel(ensemble=model)
+    made = "these quantiles, moved outwards by a margin found"
+    if "floor" in found:
+        learnt = "law" in found
+        scale = (
+            "a scale learnt from spread, horizon and waves"
+            if learnt
+            else "the spread of the members"
+        )
+        made = (
+            f"the mean, and a factor times {scale} (with a "
+            "floor of a quarter of the root mean square error) to either side, found"
+        )
+    said = (
+        f" Calibrated: {made} on training data that the members had not read, in windows as long "
+        "as the first test set's. "
+    )
+    lengths = {test: float(each["length"]) for test, each in result.settings["tests"].items()}
+    first = lengths[next(iter(result.tests))]
+    others = [f"{result.label_of(k)} ({n:g} T̂)" for k, n in lengths.items() if n != first]
+    if others:
+        said += f"Those are {first:g} T̂ long; the margin is not made for {', '.join(others)}. "
+    if not found["windows"].all():
+        said += "Some training sets hold no such window. "
+    else:
+        windows, blocks = (
+            " to ".join(dict.fromkeys(f"{each:.0f}" for each in (values.min(), values.max())))
+            for values in (found["windows"].values, found["blocks"].values)
+        )
+        said += (
+            f"A training set had {windows} of them; allowing for their dependence, their "
+            f"scores are worth {blocks} independent ones. "
+        )
+        if (warranted := float(found["warranted"].min())) < level:
+            said += f"Of some channels that is too few: {warranted:.2f} is guaranteed there. "
+    return said + "The margin guarantees nothing in another kind of sea."
+
+
+def densities(result: StudyResult) -> Section:
+    """Return densities of measurement and forecasts, and their divergence."""
+    ensembles = [model for model in result.models if result.is_ensemble(model)]
+    figures = []
+    for model in ensembles or result.models[:1]:
+        draw, words = partial(density_figure, result, model), {"model": model_words(model)}
+        figures.append(drawing("densities", draw, words, f"densities_{model}"))
+    order = sorted(judged_models(result), key=lambda model: model not in ensembles)
+    tables = [divergence_table(result, m, variant) for m in order for variant in VARIANTS]
+    return section("densities", figures=figures, tables=tables)
+
+
+def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
+    """Jensen–Shannon divergence per channel beside its noise floor and, if asked, the paper's."""
+    data = result.groups["statistics/divergence"]
+    at = data.sel(model=model, variant=variant)
+    keys = ("mean", "lower", "upper", "uncertainty", "noise_floor")
+    comparable = result.is_ensemble(model) and result.shows_paper
+
+    def cells(name: str) -> Iterator[str]:
+        of_all = name == "average"
+        one = at.mean("channel", skipna=False) if of_all else at.sel(channel=name)
+        yield from (small_number(one[key]) for key in keys)
+        yield "" if of_all else number(one["block_length"], 0)
+        if comparable:
+            yield from PUBLISHED.get(name, (MISSING,) * 4)
+
+    quantiles = ("EV", "q0.025", "q0.975", "U")
+    heads = [*quantiles, "noise floor", "block (samples)"]
+    published = [f"paper: {each}" for each in quantiles] if comparable else []
+    how = "blocks may cross joins, block length and bandwidth as printed in the paper"
+    if variant == "recommended":
+        how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
+    more = " The paper's columns are of another vessel in another tank." * comparable
+    test = result.label_of(str(data.attrs["test"]))
+    return by_channel(
+        result,
+        "jsd",
+        cells,
+        {"model": model_words(model), "test": test, "variant": variant, "how": how},
+        columns=[*heads, *published],
+        name=f"jsd_{model}_{variant}",
+        more=more + conditional(result),
+        elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
+        folded=not result.is_ensemble(model) and any(map(result.is_ensemble, result.models)),
+    )
+
+
+def members(result: StudyResult) -> Section | None:
+    """Return errors of the members of ensembles over what was drawn, and eigenvalues."""
+    figures = []
+    for model in filter(result.is_ensemble, result.models):
+        draw, words = partial(hyperparameter_figure, result, model), {"model": model_words(model)}
+        figures.append(drawing("hyperparameters", draw, words, f"hyperparameters_{model}"))
+    if any(name.startswith("eigenvalues/") for name in result.groups):
+        figures.append(
+            drawing("eigenvalues", partial(eigenvalue_figure, result), {"lowest": LOWEST})
+        )
+    return section("members", figures=figures) if figures else None
+
+
+def service(result: StudyResult) -> Section | None:
+    """Return errors against lead time of models that were judged in service."""
+    groups = {model: result.groups.get(f"nowcast/{model}") for model in result.models}
+    found = {model: each for model, each in groups.items() if each is not None}
+    if not found:
+        return None
+    first = next(iter(found.values()))
+    figures = []
+    for run in map(str, first["run"].values):
+        words = {"run": run, "starts": int(first.attrs["starts"])}
+        draw = partial(nowcast_figure, found, run)
+        figures.append(drawing("nowcast", draw, words, f"nowcast_{run}"))
+    return section("service", figures=figures, tables=[*nowcast_blocks(found)])

@@ -13,7 +13,7 @@ from seakeep.conventions import canonical_channel
 from seakeep.report.figures.errors import FEWEST
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Section, drawing, section
-from seakeep.report.sections.settings import test_overlap, training_overlap, unequal_training
+from seakeep.report.sections.data import test_overlap, training_overlap, unequal_training
 from seakeep.report.style import HEADING, judged_models, model_words
 from seakeep.report.tables import (
     Number,

@@ -1,0 +1,113 @@
+"""Sections of a study whose numbers can be worked out by hand."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep.report.sections.data import chosen
+from seakeep.report.sections.errors import bands, regular, scales
+from seakeep.study import StudyResult
+from seakeep.study.judge import MEASURES, band_parts, box_table
+
+
+@pytest.fixture
+def result():
+    """An ensemble in one window of two channels: a wave of SD 2, and a load that stands still."""
+    time, names = np.arange(1, 13), ["heave", "load"]
+    wave = np.where(time % 2, 2.0, -2.0) * np.sqrt(11 / 12)  # SD 2 with ddof = 1
+    measured = np.stack([wave, np.full(12, 5.0)], axis=1)[None]
+    dims = ("training", "window", "time", "channel")
+    lower, upper = np.full((1, 1, 12, 2), -10.0), np.full((1, 1, 12, 2), 10.0)
+    upper[..., :4, 0] = -9.0  # the first third of the horizon misses the wave
+    errors = [[[[0.3, np.nan]]], [[[0.3, np.nan]]], [[[0.075, 1.525]]]]
+    test = xr.Dataset(
+        {
+            "measured": (dims[1:], measured),
+            "judged": (("training", "window"), [[True]]),
+            "training_std": (("training", "channel"), [[8.0, 0.5]]),
+            "lower": (("ensemble", *dims), lower[None]),
+            "upper": (("ensemble", *dims), upper[None]),
+            "error": (("model", "measure", "training", "window", "channel"), [errors]),
+            "run": ("window", ["short"]),
+        },
+        coords={"channel": names, "time": time, "model": ["m"], "ensemble": ["m"]}
+        | {"measure": list(MEASURES)},
+    )
+    settings = {"tests": {"t": {"label": "regular, λ/L 1.5"}}, "statistics": {"level": 0.95}}
+    channels = xr.Dataset(
+        {"units": ("name", ["m", "N"]), "long_name": ("name", ["heave", "stern line"])},
+        coords={"name": names, "channel": names},
+    )
+    groups = {
+        "channels": channels,
+        "runs": xr.Dataset({"slack": (("run", "name"), [[np.nan, 0.512]])})
+        .assign_coords(run=["short"], name=names),
+        "tests/t": test,
+        "statistics/boxes": box_table(test).expand_dims(test=["t"]),
+        "statistics/bands": band_parts(test, None, 0.95).expand_dims(test=["t"]),
+    }  # fmt: skip
+    attrs = {"settings": json.dumps(settings), "models": json.dumps({"m": {"ensemble": True}})}
+    return StudyResult(None, attrs, groups)
+
+
+def with_group(result, **groups):
+    named = {name.replace("__", "/"): group for name, group in groups.items()}
+    return replace(result, groups={**result.groups, **named})
+
+
+def test_errors_stand_in_both_standard_deviations(result):
+    (table,) = scales(result).tables
+    assert table.rows == [
+        ("heave", "0.25", "0.300 (0.075)"),
+        ("stern line", "0.00", "– (1.525)"),
+        ("average", "", "0.300 (0.800)"),
+    ]
+
+
+def test_bands_stand_by_horizon_and_channel(result):
+    parts, channels = bands(result).tables
+    inside = {row[1]: row[2:4] for row in parts.rows}
+    assert inside["all"] == ("0.83", "0.67 (heave)")
+    assert inside["first third"] == ("0.50", "0.00 (heave)")
+    assert inside["last third"] == ("1.00", "1.00 (heave)")
+    heave = {row[1]: row for row in channels.rows}["heave [m]"]
+    width = (4 * 1.0 + 8 * 20.0) / 12
+    assert heave[3] == f"{width / 2:.2f}"
+    # 2/0.05 times the distance to the bound at -9, of crests and troughs in turn, in a third.
+    assert float(heave[4]) == pytest.approx(width + 40 * 9 / 3, rel=4e-3)  # three digits
+    single = {**result.attrs, "models": json.dumps({"m": {"ensemble": False}})}
+    assert bands(replace(result, attrs=single)) is None
+
+
+@pytest.mark.parametrize(("size", "share"), [(1.0, "62 %"), (0.0, "–")])
+def test_errors_in_regular_waves_are_taken_apart_and_a_slack_line_is_named(result, size, share):
+    # 0.16 of 0.16 + 0.09 + 0.01 of the mean square is the offset's; without an error, of nothing.
+    parts = {"error_offset": 0.4, "error_wave": 0.3, "error_rest": 0.1}
+    values = {key: size * part for key, part in parts.items()}
+    values |= {"amplitude_ratio": 0.9, "phase_lead": -5.0}
+    response = xr.Dataset(
+        {key: (("test", "model", "channel"), np.full((1, 1, 2), x)) for key, x in values.items()},
+        coords={"test": ["t"], "model": ["m"], "channel": result.channels},
+    )
+    section = regular(with_group(result, statistics__response=response))
+    (table,) = section.tables
+    assert table.columns[2:] == (
+        "λ/L 1.5: amplitude", "λ/L 1.5: phase [°]", "λ/L 1.5: offset [SD]", "λ/L 1.5: share"
+    )  # fmt: skip
+    assert table.rows[0] == ("heave", "m", "0.90", "-5", f"{0.4 * size:.2f}", share)
+    assert "stern line in 51 % of short." in section.words[0]
+
+
+def test_choices_stand_with_the_look_ahead(result):
+    tried = "ridge 0.001: the best\n  0.3 ridge 0.001, observables none"
+    group = xr.Dataset(
+        {"words": ("training", [tried, ""]), "look_ahead": ("training", [1.5, 0.0])},
+        coords={"training": ["a", "b"]},
+    ).expand_dims(model=["m"])
+    (table,) = chosen(with_group(result, chosen=group)).tables
+    words = "ridge 0.001: the best; 0.3 ridge 0.001, observables none"
+    assert table.rows == [("m", "a", "1.50", words)]
+    assert chosen(with_group(result, chosen=group.isel(training=[1]))) is None
