@@ -36,12 +36,6 @@ MOST_TERMS = 4000
 """Polynomials in the distance of a carried wave: each takes as much memory as the record."""
 MOST_PADDING = 10_000_000
 """Samples by which a record is continued at either end: 80 MB each."""
-MOST_STEPS = 10_000_000
-"""Samples per column of a raw file of the tank, and steps of a simulated run: 80 MB per column."""
-MOST_PRODUCTS = 2e10
-"""Samples times wave components of the tank: some minutes of work per wave probe."""
-MOST_LAGS = 20_000
-"""Steps of the tank's radiation kernel."""
 
 
 def too_large(asked: str, count: float, most: float, what: str, mend: str) -> str | None:

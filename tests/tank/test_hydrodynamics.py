@@ -171,9 +171,9 @@ def test_file_of_another_convention_is_refused(tmp_path):
 
 
 def test_incomplete_and_damaged_files_are_refused(tmp_path):
-    with pytest.raises(RequestError, match=r"misses damping\. Build the file again"):
+    with pytest.raises(RequestError, match=r"misses damping, .*Build the file again"):
         load_hydrodynamics(changed(tmp_path, lambda d: d.drop_vars("damping")))
-    with pytest.raises(RequestError, match="not finite in added_mass"):
+    with pytest.raises(RequestError, match=r"misses added_mass, .* not finite"):
         load_hydrodynamics(
             changed(tmp_path, lambda d: d.assign(added_mass=d.added_mass.where(d.omega > 1)))
         )
@@ -249,7 +249,7 @@ def test_another_hull_is_built_and_played_from_a_settings_file(tmp_path, capsys)
     assert "kB" in capsys.readouterr().out
     made = load_hydrodynamics(out)
     assert made.names == ("surge", "heave", "pitch")
-    assert made.attrs["vessel_mass"] == 55.0
+    assert made.mass[0, 0] == 55.0
     played = play_run(read_tank(settings), "one")
     assert played.motion.names == made.names
     assert 0.01 < played.motion.position[1, -500:].std() < 0.05

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from seakeep.report.figures.spectra import mean_spectrum
-from seakeep.report.style import COLOURS, PALETTE, axis_label, figure_style, new_figure
+from seakeep.report.style import (
+    COLOURS,
+    PALETTE,
+    axis_label,
+    figure_style,
+    new_figure,
+    save_figure,
+)
 from seakeep.signals import wave_spectrum
 from seakeep.tank.dynamics import Rig
 from seakeep.tank.hydrodynamics import excitation_at, kernel_coefficients, response
+from seakeep.tank.play import play_run, truth
 from seakeep.tank.realised import Realised, paper_peak
 from seakeep.tank.seas import spectral_density
 from seakeep.tank.settings import TankSettings
@@ -22,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["hydrodynamics_figure", "run_figure", "spectrum_figure"]
+__all__ = ["hydrodynamics_figure", "run_figure", "spectrum_figure", "write_tank_figures"]
 
 SYMBOLS = {
     "surge": "x",
@@ -163,3 +172,16 @@ def _distinct(data: xr.Dataset) -> list[str]:
         if not name.endswith("_crest"):
             first.setdefault(data[name].attrs.get("x_position", name), name)
     return list(first.values())
+
+
+def write_tank_figures(
+    settings: TankSettings, rig: Rig, realised: Sequence[Realised], folder: Path
+) -> list[Path]:
+    """Draw coefficients, spectrum (where a sea is irregular) and each run into a folder."""
+    written = [save_figure(hydrodynamics_figure(rig, settings), folder / "hydrodynamics.png")]
+    if any(each.irregular for each in realised):
+        written.append(save_figure(spectrum_figure(settings, realised), folder / "spectrum.png"))
+    for each in realised:
+        data = truth(play_run(settings, each.run, rig), each.run, 0.02)
+        written.append(save_figure(run_figure(data), folder / f"run_{each.run}.png"))
+    return written

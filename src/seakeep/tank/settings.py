@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from seakeep.campaign.settings import ChannelName, RunName
-from seakeep.errors import MissingFileError, RequestError
+from seakeep.errors import RequestError
 from seakeep.files import read_bytes
-from seakeep.sizes import MOST_LAGS, MOST_PRODUCTS, MOST_STEPS, too_large
 from seakeep.tank.moorings import LineSettings
-from seakeep.toml import Count, Finite, Mistake, NotNegative, Pair, Positive, Table, validated
-from seakeep.toml import read_toml as read_table
+from seakeep.toml import Count, Finite, NotNegative, Pair, Positive, Table, read_toml, validated
 
 __all__ = [
     "ClockSettings",
@@ -38,10 +35,23 @@ __all__ = [
     "with_waves",
 ]
 
+
+def _rising(band: tuple[float, float]) -> tuple[float, float]:
+    if band[0] >= band[1]:
+        raise ValueError("must be [low, high] in Hz with low < high")
+    return band
+
+
 Logger = Literal["wave_probes", "mru", "loads", "video"]
+Band = Annotated[Pair, AfterValidator(_rising)]
 Below = Annotated[float, Field(lt=0, ge=-1e4)]
 Panels = Annotated[int, Field(ge=4, le=100)]
 Depth = Annotated[float, Field(ge=0.01, le=1e4, description="a depth of 0.01 to 10 000 m")]
+# Beyond these bounds a typing mistake would ask for hours of work, or for all memory.
+Step = Annotated[float, Field(ge=1e-4, le=1.0)]
+Memory = Annotated[float, Field(gt=0, le=200.0)]
+Rate = Annotated[float, Field(gt=0, le=1e4)]
+RunTime = Annotated[float, Field(gt=0, le=1e5)]
 
 
 class PoolGeometry(Table):
@@ -92,14 +102,8 @@ class FacilitySettings(Table):
 
     water_depth: Depth = 3.6
     density: Positive = 1000.0
-    wave_band: Pair = (0.1, 1.4)
+    wave_band: Band = (0.1, 1.4)
     greatest_height: Positive = 0.45
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.wave_band[0] >= self.wave_band[1]:
-            raise ValueError("wave_band must be [low, high] in Hz with low < high")
-        return self
 
 
 class DampingSettings(Table):
@@ -140,9 +144,9 @@ class DriftSettings(Table):
 class SimulationSettings(Table):
     """Time integration (s)."""
 
-    step: Positive = 0.01
+    step: Step = 0.01
     ramp: Positive = 10.0
-    kernel_length: Positive = 12.0
+    kernel_length: Memory = 12.0
 
 
 class SpectrumSettings(Table):
@@ -159,14 +163,12 @@ class SpectrumSettings(Table):
     frequencies: Annotated[tuple[Positive, ...], Field(strict=False)] = ()
     densities: Annotated[tuple[NotNegative, ...], Field(strict=False)] = ()
     file: str = ""
-    band: Pair = (0.28, 1.13)
+    band: Band = (0.28, 1.13)
     components: Annotated[Count, Field(le=20_000)] = 100
     spacing: Literal["equal", "jittered"] = "jittered"
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        if self.band[0] >= self.band[1]:
-            raise ValueError("band must be [low, high] in Hz with low < high")
         if self.kind != "table":
             if self.height is None or self.peak_period is None:
                 raise ValueError(f"a {self.kind} spectrum needs height (m) and peak_period (s)")
@@ -190,8 +192,8 @@ class RunPlan(Table):
     height: Positive | None = None
     nominal_height: Positive | None = None
     unsteadiness: Annotated[float, Field(ge=0, le=0.5)] = 0.04
-    startup: NotNegative = 60.0
-    duration: Positive = 210.0
+    startup: Annotated[float, Field(ge=0, le=1e5)] = 60.0
+    duration: RunTime = 210.0
     role: Literal["train", "test", "both"] = "both"
     sea_state: str = ""
 
@@ -213,7 +215,7 @@ class RunPlan(Table):
 class ClockSettings(Table):
     """Rate of a logger (Hz), its clock's offset (s) and drift (parts per million)."""
 
-    rate: Positive
+    rate: Rate
     offset: Annotated[float, Field(gt=-1e3, lt=1e3)] = 0.0
     drift: Annotated[float, Field(gt=-1e4, lt=1e4)] = 0.0
 
@@ -275,32 +277,6 @@ class TankSettings(Table):
     runs: dict[RunName, RunPlan]
 
 
-def _too_large(settings: TankSettings) -> Iterator[Mistake]:
-    """What would take more memory or time than a virtual campaign should."""
-    simulation = settings.simulation
-    step = f"steps of simulation.step = {simulation.step:g} s"
-    mend = "Shorten the kernel, or take a larger step."
-    lags = simulation.kernel_length / simulation.step
-    if words := too_large(f"{simulation.kernel_length:g} s are", lags, MOST_LAGS, step, mend):
-        yield Mistake(("simulation", "kernel_length"), words)
-    for name, run in settings.runs.items():
-        asked, mend = f"{run.length:g} s with the start-up are", "Shorten the run, or take a larger"
-        steps = run.length / simulation.step
-        if words := too_large(asked, steps, MOST_STEPS, step, f"{mend} step."):
-            yield Mistake(("runs", name, "duration"), words)
-        for logger, clock in settings.instruments.clocks.items():
-            asked, mend = f"{clock.rate:g} Hz make", "Lower the rate, or shorten the run."
-            samples, what = clock.rate * run.length, f"samples of run {name} ({run.length:g} s)"
-            if words := too_large(asked, samples, MOST_STEPS, what, mend):
-                yield Mistake(("instruments", "clocks", logger, "rate"), words)
-        count = 3 if run.spectrum is None else run.spectrum.components
-        finest = max(settings.instruments.clocks["wave_probes"].rate, 1.0 / simulation.step)
-        asked, mend = f"{count} components make", "Take fewer components, or shorten the run."
-        products, what = count * finest * run.length, "values of wave components"
-        if words := too_large(asked, products, MOST_PRODUCTS, what, mend):
-            yield Mistake(("runs", name, "spectrum", "components"), words)
-
-
 def validate_tank(table: dict[str, Any], source: Path | str = "the tank settings") -> TankSettings:
     """Validate a table of settings, as read from TOML.
 
@@ -309,7 +285,7 @@ def validate_tank(table: dict[str, Any], source: Path | str = "the tank settings
     RequestError
         With one line per mistake: key, value received, remedy.
     """
-    return validated(TankSettings, table, source, "tank", _too_large)
+    return validated(TankSettings, table, source, "tank")
 
 
 def read_tank(path: Path | str) -> TankSettings:
@@ -333,7 +309,7 @@ def read_tank(path: Path | str) -> TankSettings:
         If the file does not exist, is not TOML, or holds a wrong setting.
     """
     source = Path(path)
-    merged = _merge(_default_table(), read_table(source, "tank"), ())
+    merged = _merge(_default_table(), read_toml(source, "tank"), ())
     for name, run in merged["runs"].items() if isinstance(merged["runs"], dict) else ():
         spectrum = run.get("spectrum") if isinstance(run, dict) else None
         if isinstance(spectrum, dict) and spectrum.get("file"):
@@ -348,26 +324,17 @@ def read_tank(path: Path | str) -> TankSettings:
 def _spectrum_of(path: Path, where: str) -> dict[str, Any]:
     """Keys of a spectrum from a file of two columns."""
     try:
-        lines = read_bytes(path).decode("utf-8").splitlines()
-        rows = [line for line in lines if line.strip() and not line.startswith("#")]
-        heading = bool(rows) and rows[0].partition(",")[0].strip(" +.0123456789eE-") != ""
-        table = np.loadtxt(rows[heading:], delimiter=",", ndmin=2)
-    except MissingFileError as error:
-        raise RequestError(
-            f"{where}.spectrum.file: {error} The path is relative to the settings file."
-        ) from error
-    except ValueError as error:
+        text = read_bytes(path).decode("utf-8").strip()
+        heading = not text.lstrip("+.")[:1].isdigit()
+        lines = text.splitlines()[heading:]
+        frequencies, densities = np.loadtxt(lines, delimiter=",", ndmin=2, unpack=True)
+    except ValueError as error:  # of our own too, where the file is missing
         raise RequestError(
             f"{where}.spectrum.file: {path} cannot be read ({error}). Two columns of numbers are "
-            "needed, frequency (Hz) and density (m²/Hz), with a comma between."
+            "needed, frequency (Hz) and density (m²/Hz), with a comma between; the path is "
+            "relative to the settings file."
         ) from error
-    if table.shape[1:] != (2,):
-        raise RequestError(
-            f"{where}.spectrum.file: {path} has {table.shape[1]} columns; two are needed, "
-            "frequency (Hz) and density (m²/Hz)."
-        )
-    frequencies, densities = table.T.tolist()
-    return {"kind": "table", "frequencies": frequencies, "densities": densities}
+    return {"kind": "table", "frequencies": frequencies.tolist(), "densities": densities.tolist()}
 
 
 _REPLACED = {("runs",), ("moorings",), ("instruments", "probes"), ("instruments", "slap")}
