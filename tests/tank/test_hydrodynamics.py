@@ -1,6 +1,5 @@
 import shutil
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ import xarray as xr
 from seakeep.errors import RequestError
 from seakeep.tank.hull import hull_mesh, hydrostatics
 from seakeep.tank.hydrodynamics import (
-    KERNEL_LENGTH,
     excitation_at,
     kernel_coefficients,
     load_hydrodynamics,
@@ -139,19 +137,9 @@ def test_infinite_mass_does_not_depend_on_the_frequency(hydro):
     assert np.linalg.eigvalsh(hydro.mass + kernel.infinite_mass).min() > 0
 
 
-def test_kernel_is_bounded_in_length(hydro):
-    kernel = radiation_kernel(hydro, 0.02)
-    assert kernel.lags[-1] == pytest.approx(KERNEL_LENGTH)
-    assert kernel.values.shape == (601, 5, 5)
-
-
 def test_frequencies_outside_the_file_are_refused(hydro):
     with pytest.raises(RequestError, match=r"leave the band of the hydrodynamics file, 0\.3 to 15"):
         excitation_at(hydro, [1.0, 16.0])
-
-
-def test_shipped_file_is_small():
-    assert shipped_hydrodynamics().stat().st_size <= 200_000
 
 
 def changed(tmp_path, change):
@@ -211,17 +199,6 @@ def test_coefficients_are_reproduced_by_the_builder(hydro):
     outgoing = outgoing[0] + 1j * outgoing[1]
     # Written in single precision; the least elements are sums that all but cancel.
     assert outgoing == pytest.approx(hydro.far_field[at], abs=1e-6 * np.abs(outgoing).max())
-
-
-def test_response_can_take_the_kernels_coefficients(hydro, rig):
-    omega = np.array([3.0, 4.5])
-    from_file = response(hydro, omega, rig.linear_damping)
-    from_kernel = response(hydro, omega, rig.linear_damping, kernel=rig.kernel)
-    added, damping = kernel_coefficients(rig.kernel, hydro.omega)
-    same = replace(hydro, added_mass=added, damping=damping)
-    # Splines between tabulated kernel coefficients, against the kernel itself.
-    assert response(same, omega, rig.linear_damping) == pytest.approx(from_kernel, rel=1e-3)
-    assert np.abs(from_file[:, :3]) == pytest.approx(np.abs(from_kernel[:, :3]), rel=0.01)
 
 
 COARSE = "panels_along = 6\npanels_across = 6\npanels_down = 3\npanels_bottom = 2\n"
