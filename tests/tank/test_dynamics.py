@@ -21,7 +21,7 @@ from seakeep.tank.dynamics import (
 )
 from seakeep.tank.hydrodynamics import far_field_at, response
 from seakeep.tank.seas import Sea, irregular_sea, regular_sea
-from seakeep.tank.settings import DriftSettings, VesselSettings
+from seakeep.tank.settings import DriftSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
 
 pytest.importorskip("numba", reason="needs the extra tank")
@@ -352,7 +352,7 @@ def test_other_vessels_need_no_code(settings, hydro):
         pool=None,
     )
     lines = {"single": settings.moorings["bow"].model_copy(update={"pretension": 0.0})}
-    other = settings.model_copy(update={"moorings": lines, "vessel": VesselSettings()})
+    other = settings.model_copy(update={"moorings": lines})
     rig = assemble_rig(other, plain)
     motion = simulate(rig, regular_sea(2.8, 0.1, 0.0, 3.6, np.random.default_rng(1)), 30.0)
     assert motion.names == ("surge", "heave", "pitch")

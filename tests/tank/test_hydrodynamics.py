@@ -16,8 +16,10 @@ from seakeep.tank.hydrodynamics import (
     response,
     shipped_hydrodynamics,
 )
-from seakeep.tank.settings import HullSettings
+from seakeep.tank.settings import default_settings
 from seakeep.waves import GRAVITY, phase_speed, wavelength_to_frequency
+
+HULL = default_settings().hull
 
 
 def test_phase_speeds_of_the_papers_table():
@@ -27,13 +29,12 @@ def test_phase_speeds_of_the_papers_table():
 
 
 def test_mesh_is_the_one_of_the_shipped_coefficients(hydro):
-    assert hull_mesh(HullSettings()).digest == hydro.attrs["mesh_sha256"]
+    assert hull_mesh(HULL).digest == hydro.attrs["mesh_sha256"]
 
 
 def test_mesh_has_the_mass_area_and_trim_asked_for():
-    hull = HullSettings()
-    mesh = hull_mesh(hull)
-    statics = hydrostatics(mesh, hull)
+    mesh = hull_mesh(HULL)
+    statics = hydrostatics(mesh, HULL)
     # Solved by root finding to 1e-12 m of draft.
     assert statics.volume == pytest.approx(0.0607, rel=1e-9)
     assert statics.waterplane == pytest.approx(0.9035, rel=1e-9)
@@ -42,7 +43,7 @@ def test_mesh_has_the_mass_area_and_trim_asked_for():
 
 
 def test_mesh_is_closed_below_the_surface():
-    mesh = hull_mesh(HullSettings())
+    mesh = hull_mesh(HULL)
     corners = mesh.vertices[mesh.faces]
     first = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     second = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 0])
@@ -53,7 +54,7 @@ def test_mesh_is_closed_below_the_surface():
 
 
 def test_hull_without_a_pool():
-    hull = HullSettings(pool=None, waterplane_area=1.05)
+    hull = HULL.model_copy(update={"pool": None, "waterplane_area": 1.05})
     mesh = hull_mesh(hull)
     assert not mesh.pool_lid.any()
     assert hydrostatics(mesh, hull).volume == pytest.approx(0.0607, rel=1e-9)
@@ -61,9 +62,9 @@ def test_hull_without_a_pool():
 
 def test_impossible_hulls_are_refused():
     with pytest.raises(RequestError, match=r"no waterline of 1\.34 × 0\.86 m has a net area of 2"):
-        hull_mesh(HullSettings(waterplane_area=2.0))
+        hull_mesh(HULL.model_copy(update={"waterplane_area": 2.0}))
     with pytest.raises(RequestError, match=r"no draft between .* displaces 5 m³.*Check the mass"):
-        hull_mesh(HullSettings(mass=5000.0))
+        hull_mesh(HULL.model_copy(update={"mass": 5000.0}))
 
 
 def test_coefficients_are_reciprocal(hydro):
@@ -186,7 +187,7 @@ def test_coefficients_are_reproduced_by_the_builder(hydro):
     pytest.importorskip("capytaine", reason="needs the extra tank-build")
     from seakeep.tank.build import build_hydrodynamics
 
-    made = build_hydrodynamics(HullSettings(), frequencies=[6.0])
+    made = build_hydrodynamics(HULL, frequencies=[6.0])
     at = int(np.argmin(np.abs(hydro.omega - 6.0)))
     assert made.attrs["mesh_sha256"] == hydro.attrs["mesh_sha256"]
     for name, shipped in (("added_mass", hydro.added_mass), ("damping", hydro.damping)):
@@ -239,4 +240,4 @@ def test_missing_solver_names_the_extra(monkeypatch):
 
     monkeypatch.setitem(sys.modules, "capytaine", None)
     with pytest.raises(RequestError, match=r"pip install 'seakeep\[tank-build\]'"):
-        build_hydrodynamics(HullSettings())
+        build_hydrodynamics(HULL)

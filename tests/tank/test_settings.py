@@ -29,16 +29,6 @@ def test_hydrodynamics_file_is_found_beside_the_settings(tmp_path):
         load_hydrodynamics(settings.vessel.hydrodynamics)
 
 
-def test_default_hull_settings_are_those_of_the_default_file():
-    from seakeep.tank.settings import HullSettings, InstrumentPlan
-
-    settings = default_settings()
-    assert settings.hull == HullSettings()
-    for name in ("rate_noise", "angle_noise", "heave_noise", "surge_noise", "load_noise"):
-        default = InstrumentPlan.model_fields[name].default
-        assert getattr(settings.instruments, name) == default
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [

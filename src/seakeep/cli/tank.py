@@ -17,14 +17,14 @@ def tank(
         Path | None, typer.Option("-o", "--out", help="Folder for raw files and campaign.toml.")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, max=2**64 - 1, help="Seed of waves and noise.")
+        int | None, typer.Option(min=0, max=2**64 - 1, help="Seed of waves and noise.")
     ] = None,
     settings: Annotated[
         Path | None,
-        typer.Option("--settings", help="Tank settings (TOML); by default the CK-14e's."),
+        typer.Option(help="Tank settings (TOML); by default the CK-14e's."),
     ] = None,
     run: Annotated[
-        list[str] | None, typer.Option("--run", help="Play this run only; may be repeated.")
+        list[str] | None, typer.Option(help="Play this run only; may be repeated.")
     ] = None,
     kind: Annotated[
         Literal["csv", "nc"], typer.Option("--raw-format", help="Format of the raw files.")
@@ -35,10 +35,10 @@ def tank(
     ] = False,
     spacing: Annotated[
         Literal["equal", "jittered"] | None,
-        typer.Option("--spacing", help="Frequencies of irregular seas; jittered never repeat."),
+        typer.Option(help="Frequencies of irregular seas; jittered never repeat."),
     ] = None,
     video: Annotated[
-        list[str] | None, typer.Option("--video", help="Render this run's side view as MP4.")
+        list[str] | None, typer.Option(help="Render this run's side view as MP4.")
     ] = None,
     figures: Annotated[
         bool, typer.Option("--figures", help="Draw runs, spectrum and coefficients as well.")
