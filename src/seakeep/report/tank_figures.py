@@ -19,8 +19,8 @@ from seakeep.report.style import (
     save_figure,
 )
 from seakeep.signals import wave_spectrum
-from seakeep.tank.dynamics import Rig
-from seakeep.tank.hydrodynamics import excitation_at, kernel_coefficients, response
+from seakeep.tank.dynamics import Rig, linear_response
+from seakeep.tank.hydrodynamics import excitation_at, kernel_coefficients
 from seakeep.tank.play import play_run, truth
 from seakeep.tank.realised import Realised, paper_peak
 from seakeep.tank.seas import spectral_density
@@ -64,7 +64,7 @@ def hydrodynamics_figure(rig: Rig, settings: TankSettings) -> Figure:
     added, damping = kernel_coefficients(rig.kernel, fine)
     force = np.abs(excitation_at(hydro, fine))
     waves = np.linspace(1.6, 9.0, 600)
-    motion = np.abs(response(hydro, waves, rig.linear_damping, rig.mooring_stiffness, rig.kernel))
+    motion = np.abs(linear_response(rig, waves))
     slope = wavenumber(waves, hydro.water_depth)
     with figure_style():
         figure = new_figure(9.0, 8.4)
