@@ -31,8 +31,6 @@ CAMPAIGN, RAW, TRUTH = "campaign", "raw file", "truth"
 
 FIRST_LINE = r"time \[s\],(trigger \[V\]|lamp \[-\]|\w+ \[mm\]),.*"
 """First line of a raw text file."""
-DECIMALS = {"s": 6, "m": 5, "mm": 2}
-"""Decimals of a column by its unit; four in all others."""
 MOTIONS = {
     "heave": ("heave", "m"),
     "pitch": ("pitch", "deg"),
@@ -74,26 +72,27 @@ def write_record(record: xr.Dataset, path: Path) -> Path:
 
     A sample that an instrument lost is an empty field in CSV, NaN in NetCDF.
     """
-    time = record["time"].values
-    heads, units = [], []
-    rounded = record.copy()
-    for name, column in {"time": record["time"], **record.data_vars}.items():
-        units.append(str(column.attrs["units"]))
-        heads.append(_header(str(name), units[-1]))
-        if name != "time":
-            rounded[name] = column.round(DECIMALS.get(units[-1], 4))
+    rounded = record.map(lambda column: column.round(_decimals(column)), keep_attrs=True)
     if path.suffix == ".nc":
         write_dataset(rounded.assign_attrs({MARK: RAW}), path)
         return path
+    time = record["time"].values
     # As many decimals as the clock's readings need, up to six.
     exact = (d for d in range(1, 6) if np.allclose(np.round(time[:4], d), time[:4], atol=1e-9))
-    decimals = [next(exact, 6), *(DECIMALS.get(unit, 4) for unit in units[1:])]
+    decimals = [next(exact, 6), *map(_decimals, record.values())]
     # Adding zero turns the −0.0 of rounding into 0.0.
-    table = np.column_stack([time.round(decimals[0]), *rounded.data_vars.values()]) + 0.0
-    text = io.StringIO()
-    np.savetxt(text, table, [f"%.{d}f" for d in decimals], ",", header=",".join(heads), comments="")
-    write_text(path, text.getvalue().replace("nan", ""))
+    table = np.column_stack([time.round(decimals[0]), *rounded.values()]) + 0.0
+    rows = io.StringIO()
+    np.savetxt(rows, table, [f"%.{d}f" for d in decimals], ",")
+    heads = [_header(str(name), column.attrs["units"]) for name, column in record.items()]
+    head = ",".join([_header("time", "s"), *heads])
+    write_text(path, f"{head}\n{rows.getvalue().replace('nan', '')}")
     return path
+
+
+def _decimals(column: xr.DataArray) -> int:
+    """Decimals that a logger writes."""
+    return {"m": 5, "mm": 2}.get(column.attrs["units"], 4)
 
 
 def write_dataset(data: xr.Dataset, path: Path) -> None:
