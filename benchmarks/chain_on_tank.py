@@ -104,8 +104,8 @@ def noise_alone(delivered: Delivered, name: str, folder: Path, period: float) ->
     )
     raw = folder / "raw" / name
     raw.mkdir(parents=True, exist_ok=True)
-    for record in record_run(still, generator(settings, name, "instruments")):
-        write_record(record, raw, "csv")
+    for logger, record in record_run(still, generator(settings, name, "instruments")).items():
+        write_record(record, raw / f"{logger}.csv")
     text = delivered.campaign.path.read_text(encoding="utf-8")
     stated = text.replace("[campaign]", f"[campaign]\nencounter_period = {period!r}", 1)
     path = folder / "campaign.toml"

@@ -97,10 +97,12 @@ def channels() -> dict[str, tuple[np.ndarray, float]]:
     out = {f"tutorial, {name}": (raw[name].to_numpy(), step) for name in map(str, raw.data_vars)}
     settings = default_settings()
     played = play_run(settings, "irregular_1", check_settings(settings))
-    for record in record_run(played, generator(settings, "irregular_1", "instruments")):
-        for name in TANK.get(record.name, ()):
-            values = record.columns[name].values[record.time >= WAVES_FROM][:LONGEST]
-            out[f"tank, {name}"] = over_gaps(values), float(record.time[1] - record.time[0])
+    records = record_run(played, generator(settings, "irregular_1", "instruments"))
+    for logger, names in TANK.items():
+        time = records[logger]["time"].values
+        for name in names:
+            values = records[logger][name].values[time >= WAVES_FROM][:LONGEST]
+            out[f"tank, {name}"] = over_gaps(values), float(time[1] - time[0])
     return out
 
 

@@ -127,11 +127,10 @@ def kinds(x: np.ndarray, trusted: np.ndarray, dt: float) -> set[str]:
 def heaves(settings, rig, name: str) -> tuple[np.ndarray, np.ndarray, float]:
     """Heave of a run as measured, as integrated from the accelerometer, and the step (s)."""
     played = play_run(settings, name, rig)
-    records = {r.name: r for r in record_run(played, generator(settings, name, "instruments"))}
-    mru = records["mru"]
-    dt = float(mru.time[1])
-    trusted = integrate(mru.columns["acceleration_z"].values, dt, (0.2, 5.0), 2)
-    return mru.columns["heave"].values, trusted, dt
+    mru = record_run(played, generator(settings, name, "instruments"))["mru"]
+    dt = float(mru["time"][1])
+    trusted = integrate(mru["acceleration_z"].values, dt, (0.2, 5.0), 2)
+    return mru["heave"].values, trusted, dt
 
 
 def table(seeds: int, names: list[str] | None = None) -> str:

@@ -332,10 +332,11 @@ def tank():
         run_figure,
         tank_spectrum_figure,
     )
+    from seakeep.signals.panel import opencv
     from seakeep.tank.play import check_settings, play_run, truth
     from seakeep.tank.realised import realise
     from seakeep.tank.settings import default_settings
-    from seakeep.tank.video import check_video, side_view
+    from seakeep.tank.video import side_view
 
     settings = default_settings()
     rig = check_settings(settings)
@@ -346,7 +347,7 @@ def tank():
     channels = ["eta_kn_fwd", "surge", "heave", "pitch", "piston", "mooring_bow", "mooring_stern"]
     run = truth(played["irregular_1"], "irregular_1", 0.05)
     save(run_figure(run, channels), HERE / "tank_run.png")
-    cv2 = check_video()
+    cv2 = opencv("drawing a frame")
     frame = next(side_view(played["irregular_1"], np.random.default_rng(0), [88.8]))
     small = cv2.resize(frame, (640, 360), interpolation=cv2.INTER_AREA)
     cv2.imwrite(str(HERE / "tank_side_view.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, 85])

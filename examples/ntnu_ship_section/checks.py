@@ -72,21 +72,10 @@ def camera(campaign, runs):
         seen = signals.band_pass(seen, dt, BAND)
         lags = []
         for first in range(500, run.sizes["time"] - 250, 250):
-            lags.append(_lag(run["heave"].values[first : first + 250], seen[first : first + 250]))
-        print(f"{name}  " + " ".join(f"{lag * dt:6.2f}" for lag in lags))
-
-
-def _lag(reference, other, reach=15):
-    """Samples by which `other` comes late, to a fraction of one by a parabola."""
-    inner = slice(reach, reference.size - reach)
-    fixed = reference[inner]
-    shifts = range(-reach, reach + 1)
-    alike = np.array(
-        [np.corrcoef(fixed, other[reach + k : other.size - reach + k])[0, 1] for k in shifts]
-    )
-    peak = int(np.clip(np.argmax(alike), 1, alike.size - 2))
-    a, b, c = alike[peak - 1 : peak + 2]
-    return peak - reach + 0.5 * (a - c) / (a - 2 * b + c)
+            piece = slice(first, first + 250)
+            lag, _ = signals.correlation_peak(run["heave"][piece], seen[piece], dt, (-0.6, 0.6))
+            lags.append(lag)
+        print(f"{name}  " + " ".join(f"{lag:6.2f}" for lag in lags))
 
 
 def means(campaign, runs):

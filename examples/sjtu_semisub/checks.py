@@ -13,6 +13,7 @@ from scipy import signal
 
 import seakeep
 from seakeep.study import compare, fit_campaign
+from seakeep.study.plan import between
 from seakeep.waves import phase_speed
 
 HERE = Path(__file__).parent
@@ -53,7 +54,8 @@ def probe_offset(campaign, model):
         model.settings,
         alignment=seakeep.ProbeAlignment(mode="effective", surge="none", celerity=celerity),
     )
-    train = between(campaign.prepare(["Data01"])["Data01"])
+    train = campaign.prepare(["Data01"])["Data01"]
+    train = between(train, train.attrs["train_span"])
     by_lag = lagging.fit(train, model.states, model.inputs)
     for one, unit, factor in ((model, "m", 1.0), (by_lag, "s", 1 / celerity)):
         found = seakeep.estimate_probe_offset(one, run, SPAN)
@@ -64,12 +66,6 @@ def probe_offset(campaign, model):
             f"{factor * found.offset:.3g} ± {factor * found.spread:.2g} {unit} (95 %: {low:.3g} to "
             f"{high:.3g}), NRMSE {corrected:.3f}, {corrected / uncorrected:.2f} of the uncorrected"
         )
-
-
-def between(run):
-    """The part of a run that trains."""
-    begin, end = run.attrs["train_span"]
-    return run.sel(time=slice(begin, end + 1e-6))
 
 
 def linear_bound(campaign, model):

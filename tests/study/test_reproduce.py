@@ -33,7 +33,6 @@ from seakeep.study.reproduce import (
 
 pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
 from seakeep.tank.delivery import campaign_text, write_record
-from seakeep.tank.instruments import Column, Record
 from seakeep.tank.settings import default_settings
 
 SMALL = Size(training=2, tests=2, members=2, series=4)
@@ -66,10 +65,10 @@ def record(name, seconds, rng):
         "mooring_stern": ("N", 2 - waves(2.5, amplitude=0.1) - 0.4 * drift),
     }
     noisy = {
-        key: Column(unit, x + 0.01 * x.std() * rng.standard_normal(x.size), 6)
+        key: ("time", x + 0.01 * x.std() * rng.standard_normal(x.size), {"units": unit})
         for key, (unit, x) in values.items()
     }
-    return Record(name, t, noisy)
+    return xr.Dataset(noisy, coords={"time": ("time", t, {"units": "s"})})
 
 
 def play_small(settings, out, progress=None):
@@ -80,9 +79,8 @@ def play_small(settings, out, progress=None):
     files = {}
     for name, run in settings.runs.items():
         made = record(name, run.length, rng)
-        files[name] = {name: f"raw/{write_record(made, out / 'raw', 'nc').name}"}
-        true = xr.Dataset({"heave": ("time", made.columns["heave"].values)}, {"time": made.time})
-        true.to_netcdf(out / "truth" / f"{name}.nc", engine="h5netcdf")
+        files[name] = {name: f"raw/{write_record(made, out / 'raw' / f'{name}.nc').name}"}
+        made[["heave"]].to_netcdf(out / "truth" / f"{name}.nc", engine="h5netcdf")
     (out / "campaign.toml").write_text(campaign_text(settings, files, "nc", True), "utf-8")
 
 

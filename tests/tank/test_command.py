@@ -67,8 +67,3 @@ def test_a_picture_of_the_user_stays(run, tmp_path):
 def test_nothing_to_do_is_said(run):
     with pytest.raises(RequestError, match="nothing to do: give --out DIR"):
         run()
-
-
-def test_help_has_an_example(run):
-    done = run("--help")
-    assert "seakeep tank --out" in done.stdout

@@ -4,7 +4,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
-from scipy.interpolate import CubicSpline
 
 import seakeep.tank
 from seakeep.errors import RequestError
@@ -20,9 +19,9 @@ from seakeep.tank.dynamics import (
     simulate,
     tensions,
 )
-from seakeep.tank.hydrodynamics import excitation_at, far_field_at, response
+from seakeep.tank.hydrodynamics import far_field_at, response
 from seakeep.tank.seas import Sea, irregular_sea, regular_sea
-from seakeep.tank.settings import DriftSettings, VesselSettings
+from seakeep.tank.settings import DriftSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
 
 pytest.importorskip("numba", reason="needs the extra tank")
@@ -59,35 +58,6 @@ def test_response_in_time_is_that_in_frequency(linear_rig):
     # The issue's bound; it grants 4 % to heave at λ/L 1.5, where opposite forces of buoyancy and
     # pool all but cancel.
     assert error.max() < 0.01
-
-
-def test_difference_to_the_solver_is_its_own_lack_of_reciprocity(linear_rig):
-    """Heave at λ/L 1.5 and surge at λ/L 1 are small differences of large forces."""
-    hydro, losses = linear_rig.hydro, linear_rig.linear_damping
-    omega = wavelength_to_frequency([1.4, 2.1], 3.6)
-
-    def small_ones(added, damping):
-        given = CubicSpline(hydro.omega, np.stack([added, damping], axis=1))(omega)
-        w = omega[:, None, None]
-        dynamic = hydro.stiffness - w**2 * (hydro.mass + given[:, 0])
-        dynamic = dynamic - 1j * w * (given[:, 1] + losses)
-        force = excitation_at(hydro, omega)[..., None]
-        motion = np.linalg.solve(dynamic, force)[..., 0]
-        return np.array([motion[0, 0], motion[1, 1]])
-
-    played = response(hydro, omega, losses, kernel=linear_rig.kernel)
-    played = np.array([played[0, 0], played[1, 1]])
-    matrices = hydro.added_mass, hydro.damping
-    solver = small_ones(*matrices)
-    turned = small_ones(*(m.swapaxes(1, 2) for m in matrices))
-    reciprocal = small_ones(*(0.5 * (m + m.swapaxes(1, 2)) for m in matrices))
-    # Phase included, the played motion is 4 and 2 % off the solver's ...
-    assert np.all(np.abs(played / solver - 1.0) > [0.03, 0.015])
-    # ... and so are, by 5 %, the solver's own coefficients with rows and columns exchanged, which
-    # nature holds equal ...
-    assert np.all(np.abs(turned / solver - 1.0) > 0.045)
-    # ... while the symmetric part, which the time domain needs, is met: 1.2 and 0.5 %.
-    assert np.all(np.abs(played / reciprocal - 1.0) < [0.013, 0.007])
 
 
 def test_response_in_time_is_the_loops_own_model(linear_rig):
@@ -155,11 +125,12 @@ def energy(rig, motion):
     return kinetic + static + stored
 
 
-@pytest.mark.parametrize("dof", [0, 1, 2, 3])
-def test_energy_goes_into_radiated_waves_alone(ideal_rig, calm, dof):
+# The last one begins beyond the slack of the stern line.
+@pytest.mark.parametrize(("dof", "size"), [(0, 0.05), (1, 0.05), (2, 0.05), (3, 0.05), (0, 1.0)])
+def test_energy_goes_into_radiated_waves_alone(ideal_rig, calm, dof, size):
     start = np.zeros((2, 5))
-    start[0, dof] = 0.05
-    motion = simulate(ideal_rig, calm, 30.0, start)
+    start[0, dof] = size
+    motion = simulate(ideal_rig, calm, 60.0, start)
     work = cumulative_simpson(
         np.sum(motion.memory * motion.velocity, axis=0), dx=ideal_rig.step, initial=0.0
     )
@@ -169,18 +140,8 @@ def test_energy_goes_into_radiated_waves_alone(ideal_rig, calm, dof):
     # A passive kernel takes energy out, whatever the motion was so far.
     assert work.min() > -1e-6 * total[0]
     assert work[-1] > 0
-
-
-def test_every_line_holds_its_energy(ideal_rig, calm):
-    start = np.zeros((2, 5))
-    start[0, 0] = 1.0  # beyond the stern line's slack
-    motion = simulate(ideal_rig, calm, 60.0, start)
-    assert tensions(ideal_rig, motion.position, motion.velocity)[1].min() == 0.0
-    work = cumulative_simpson(
-        np.sum(motion.memory * motion.velocity, axis=0), dx=ideal_rig.step, initial=0.0
-    )
-    total = energy(ideal_rig, motion) + work
-    assert np.abs(total - total[0]).max() < 1e-3 * total[0]
+    slack = tensions(ideal_rig, motion.position, motion.velocity)[1].min() == 0.0
+    assert slack == (size == 1.0)
 
 
 def test_halving_the_step_changes_little(settings, rig, hydro):
@@ -338,16 +299,6 @@ def test_runs_start_anywhere_on_the_time_axis(linear_rig):
     assert fast[0] == pytest.approx(fast[1], rel=1e-3)
 
 
-def test_what_a_run_holds_grows_linearly(rig):
-    sea = small_sea(np.linspace(1.8, 7.1, 100), 0.003)
-    short, long = (
-        sum(np.asarray(each).nbytes for each in vars(simulate(rig, sea, length)).values())
-        for length in (50.0, 200.0)
-    )
-    # Four times the length, and one sample more at the end.
-    assert long / short == pytest.approx(4.0, rel=1e-3)
-
-
 def test_divergence_names_time_and_degree_of_freedom(rig):
     sea = regular_sea(2.1, 40.0, 0.0, 3.6, np.random.default_rng(0))
     with pytest.raises(
@@ -356,11 +307,6 @@ def test_divergence_names_time_and_degree_of_freedom(rig):
         r"Lower the waves",
     ):
         simulate(rig, sea, 60.0)
-
-
-def test_wrong_start_is_refused(rig, calm):
-    with pytest.raises(RequestError, match=r"shape \(2, 5\); received \(5,\)\. Transpose"):
-        simulate(rig, calm, 1.0, np.zeros(5))
 
 
 def with_settings(settings, **tables):
@@ -406,7 +352,7 @@ def test_other_vessels_need_no_code(settings, hydro):
         pool=None,
     )
     lines = {"single": settings.moorings["bow"].model_copy(update={"pretension": 0.0})}
-    other = settings.model_copy(update={"moorings": lines, "vessel": VesselSettings()})
+    other = settings.model_copy(update={"moorings": lines})
     rig = assemble_rig(other, plain)
     motion = simulate(rig, regular_sea(2.8, 0.1, 0.0, 3.6, np.random.default_rng(1)), 30.0)
     assert motion.names == ("surge", "heave", "pitch")

@@ -1,6 +1,5 @@
 import shutil
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ import xarray as xr
 from seakeep.errors import RequestError
 from seakeep.tank.hull import hull_mesh, hydrostatics
 from seakeep.tank.hydrodynamics import (
-    KERNEL_LENGTH,
     excitation_at,
     kernel_coefficients,
     load_hydrodynamics,
@@ -18,8 +16,10 @@ from seakeep.tank.hydrodynamics import (
     response,
     shipped_hydrodynamics,
 )
-from seakeep.tank.settings import HullSettings
+from seakeep.tank.settings import default_settings
 from seakeep.waves import GRAVITY, phase_speed, wavelength_to_frequency
+
+HULL = default_settings().hull
 
 
 def test_phase_speeds_of_the_papers_table():
@@ -29,13 +29,12 @@ def test_phase_speeds_of_the_papers_table():
 
 
 def test_mesh_is_the_one_of_the_shipped_coefficients(hydro):
-    assert hull_mesh(HullSettings()).digest == hydro.attrs["mesh_sha256"]
+    assert hull_mesh(HULL).digest == hydro.attrs["mesh_sha256"]
 
 
 def test_mesh_has_the_mass_area_and_trim_asked_for():
-    hull = HullSettings()
-    mesh = hull_mesh(hull)
-    statics = hydrostatics(mesh, hull)
+    mesh = hull_mesh(HULL)
+    statics = hydrostatics(mesh, HULL)
     # Solved by root finding to 1e-12 m of draft.
     assert statics.volume == pytest.approx(0.0607, rel=1e-9)
     assert statics.waterplane == pytest.approx(0.9035, rel=1e-9)
@@ -44,7 +43,7 @@ def test_mesh_has_the_mass_area_and_trim_asked_for():
 
 
 def test_mesh_is_closed_below_the_surface():
-    mesh = hull_mesh(HullSettings())
+    mesh = hull_mesh(HULL)
     corners = mesh.vertices[mesh.faces]
     first = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     second = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 0])
@@ -55,7 +54,7 @@ def test_mesh_is_closed_below_the_surface():
 
 
 def test_hull_without_a_pool():
-    hull = HullSettings(pool=None, waterplane_area=1.05)
+    hull = HULL.model_copy(update={"pool": None, "waterplane_area": 1.05})
     mesh = hull_mesh(hull)
     assert not mesh.pool_lid.any()
     assert hydrostatics(mesh, hull).volume == pytest.approx(0.0607, rel=1e-9)
@@ -63,9 +62,9 @@ def test_hull_without_a_pool():
 
 def test_impossible_hulls_are_refused():
     with pytest.raises(RequestError, match=r"no waterline of 1\.34 × 0\.86 m has a net area of 2"):
-        hull_mesh(HullSettings(waterplane_area=2.0))
+        hull_mesh(HULL.model_copy(update={"waterplane_area": 2.0}))
     with pytest.raises(RequestError, match=r"no draft between .* displaces 5 m³.*Check the mass"):
-        hull_mesh(HullSettings(mass=5000.0))
+        hull_mesh(HULL.model_copy(update={"mass": 5000.0}))
 
 
 def test_coefficients_are_reciprocal(hydro):
@@ -139,19 +138,9 @@ def test_infinite_mass_does_not_depend_on_the_frequency(hydro):
     assert np.linalg.eigvalsh(hydro.mass + kernel.infinite_mass).min() > 0
 
 
-def test_kernel_is_bounded_in_length(hydro):
-    kernel = radiation_kernel(hydro, 0.02)
-    assert kernel.lags[-1] == pytest.approx(KERNEL_LENGTH)
-    assert kernel.values.shape == (601, 5, 5)
-
-
 def test_frequencies_outside_the_file_are_refused(hydro):
     with pytest.raises(RequestError, match=r"leave the band of the hydrodynamics file, 0\.3 to 15"):
         excitation_at(hydro, [1.0, 16.0])
-
-
-def test_shipped_file_is_small():
-    assert shipped_hydrodynamics().stat().st_size <= 200_000
 
 
 def changed(tmp_path, change):
@@ -171,9 +160,9 @@ def test_file_of_another_convention_is_refused(tmp_path):
 
 
 def test_incomplete_and_damaged_files_are_refused(tmp_path):
-    with pytest.raises(RequestError, match=r"misses damping\. Build the file again"):
+    with pytest.raises(RequestError, match=r"misses damping, .*Build the file again"):
         load_hydrodynamics(changed(tmp_path, lambda d: d.drop_vars("damping")))
-    with pytest.raises(RequestError, match="not finite in added_mass"):
+    with pytest.raises(RequestError, match=r"misses added_mass, .* not finite"):
         load_hydrodynamics(
             changed(tmp_path, lambda d: d.assign(added_mass=d.added_mass.where(d.omega > 1)))
         )
@@ -198,7 +187,7 @@ def test_coefficients_are_reproduced_by_the_builder(hydro):
     pytest.importorskip("capytaine", reason="needs the extra tank-build")
     from seakeep.tank.build import build_hydrodynamics
 
-    made = build_hydrodynamics(HullSettings(), frequencies=[6.0])
+    made = build_hydrodynamics(HULL, frequencies=[6.0])
     at = int(np.argmin(np.abs(hydro.omega - 6.0)))
     assert made.attrs["mesh_sha256"] == hydro.attrs["mesh_sha256"]
     for name, shipped in (("added_mass", hydro.added_mass), ("damping", hydro.damping)):
@@ -211,17 +200,6 @@ def test_coefficients_are_reproduced_by_the_builder(hydro):
     outgoing = outgoing[0] + 1j * outgoing[1]
     # Written in single precision; the least elements are sums that all but cancel.
     assert outgoing == pytest.approx(hydro.far_field[at], abs=1e-6 * np.abs(outgoing).max())
-
-
-def test_response_can_take_the_kernels_coefficients(hydro, rig):
-    omega = np.array([3.0, 4.5])
-    from_file = response(hydro, omega, rig.linear_damping)
-    from_kernel = response(hydro, omega, rig.linear_damping, kernel=rig.kernel)
-    added, damping = kernel_coefficients(rig.kernel, hydro.omega)
-    same = replace(hydro, added_mass=added, damping=damping)
-    # Splines between tabulated kernel coefficients, against the kernel itself.
-    assert response(same, omega, rig.linear_damping) == pytest.approx(from_kernel, rel=1e-3)
-    assert np.abs(from_file[:, :3]) == pytest.approx(np.abs(from_kernel[:, :3]), rel=0.01)
 
 
 COARSE = "panels_along = 6\npanels_across = 6\npanels_down = 3\npanels_bottom = 2\n"
@@ -249,7 +227,7 @@ def test_another_hull_is_built_and_played_from_a_settings_file(tmp_path, capsys)
     assert "kB" in capsys.readouterr().out
     made = load_hydrodynamics(out)
     assert made.names == ("surge", "heave", "pitch")
-    assert made.attrs["vessel_mass"] == 55.0
+    assert made.mass[0, 0] == 55.0
     played = play_run(read_tank(settings), "one")
     assert played.motion.names == made.names
     assert 0.01 < played.motion.position[1, -500:].std() < 0.05
@@ -262,4 +240,4 @@ def test_missing_solver_names_the_extra(monkeypatch):
 
     monkeypatch.setitem(sys.modules, "capytaine", None)
     with pytest.raises(RequestError, match=r"pip install 'seakeep\[tank-build\]'"):
-        build_hydrodynamics(HullSettings())
+        build_hydrodynamics(HULL)

@@ -11,7 +11,7 @@ import xarray as xr
 
 from seakeep.campaign import read_campaign
 from seakeep.errors import RequestError
-from seakeep.tank.play import check_settings, generator, noisy_truth, play, play_run, truth
+from seakeep.tank.play import check_settings, generator, play, play_run, truth
 from seakeep.tank.settings import SpectrumSettings
 
 pytest.importorskip("numba", reason="needs the extra tank")
@@ -188,13 +188,3 @@ def test_seas_beyond_the_coefficients_are_refused(short):
     bad = short.model_copy(update={"facility": facility, "runs": {"wide": run}})
     with pytest.raises(RequestError, match=r"runs\.wide: frequencies .* leave the band"):
         check_settings(bad)
-
-
-def test_noisy_truth_has_the_papers_channels(short, rig):
-    data = noisy_truth(short, "irregular_1", 0.05, rig)
-    assert data.sizes["time"] == 601
-    clean = truth(play_run(short, "irregular_1", rig), "irregular_1", 0.05)
-    error = data["mooring_bow"] - clean["mooring_bow"]
-    assert float(error.std()) == pytest.approx(0.03, rel=0.15)  # 601 samples: 3 % a deviation
-    assert data["heave"].attrs["units"] == "m"
-    assert data.attrs["water_depth"] == 3.6

@@ -1,11 +1,7 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings as budget
-from hypothesis import strategies as st
 
 from seakeep.errors import RequestError
-from seakeep.signals import significant_height
 from seakeep.tank.seas import (
     BLOCK,
     Sea,
@@ -115,22 +111,6 @@ def test_unsteadiness_spreads_the_heights():
         spreads.append(envelope.std() / envelope.mean())
     # Two sidebands of a part ε each: the envelope's deviation is ε.
     assert spreads == pytest.approx([0.03, 0.05], rel=0.05)
-
-
-@budget(deadline=None, max_examples=25)
-@given(
-    height=st.floats(0.01, 0.4),
-    period=st.floats(1.0, 3.0),
-    count=st.integers(50, 400),
-    seed=st.integers(0, 2**31),
-)
-def test_any_sea_has_the_energy_of_its_components(height, period, count, seed):
-    spectrum = SpectrumSettings(height=height, peak_period=period, components=count)
-    sea = irregular_sea(spectrum, 3.6, np.random.default_rng(seed))
-    eta = sea.elevation(1.3, np.arange(0, 3000.0, 0.173))
-    stated = 4 * np.sqrt(0.5 * np.sum(sea.amplitude**2))
-    # Components closer than the inverse of the record do not average out: a few per cent.
-    assert significant_height(eta) == pytest.approx(stated, rel=0.15)
 
 
 @pytest.mark.parametrize(

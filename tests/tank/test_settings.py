@@ -29,16 +29,6 @@ def test_hydrodynamics_file_is_found_beside_the_settings(tmp_path):
         load_hydrodynamics(settings.vessel.hydrodynamics)
 
 
-def test_default_hull_settings_are_those_of_the_default_file():
-    from seakeep.tank.settings import HullSettings, InstrumentPlan
-
-    settings = default_settings()
-    assert settings.hull == HullSettings()
-    for name in ("rate_noise", "angle_noise", "heave_noise", "surge_noise", "load_noise"):
-        default = InstrumentPlan.model_fields[name].default
-        assert getattr(settings.instruments, name) == default
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -47,14 +37,9 @@ def test_default_hull_settings_are_those_of_the_default_file():
         ("[moorings.bow]\nkind = 'sprung'\nstiffness = 1\npretension = 1\neye = [0, 0]\n"
          "pole = [1, 0]", r"moorings\.bow\.kind: the kinds are spring\. Did you mean 'spring'\?"),
         ("[facility]\nwater_depth = 0", r"water_depth: received 0, .* Give a depth of 0\.01 to"),
-        ("[facility]\nwater_depth = 1e-308", r"facility\.water_depth: received 1e-308"),
-        ("[facility]\nwater_depth = 1e308", r"facility\.water_depth: received 1e\+308"),
-        ("[facility]\nwave_band = [1.4, 0.1]", r"wave_band must be \[low, high\] in Hz"),
+        ("[facility]\nwave_band = [1.4, 0.1]", r"wave_band: must be \[low, high\] in Hz"),
         ("[simulation]\nstepp = 0.1", r"stepp: unknown key, .* Did you mean 'step'"),
-        ("[vesel]\nposition = 1", r"vesel: unknown key, .* Did you mean 'vessel'\?"),
-        ("[runs.a]\nwavelenght = 2", r"runs\.a\.wavelenght: .* Did you mean 'wavelength'\?"),
         ("[runs.'a/b']\nwavelength = 2.0\nheight = 0.1", r"runs\.a/b: the name of a run is"),
-        ("[instruments.probes.'a/b']\nposition = 1.0\nnoise = 0.1", r"holds no '/'"),
         ("[runs.a]\nwavelength = 2.0", r"either a spectrum \(irregular\) or wavelength and height"),
         ("[runs.a]\nwavelength = 2.0\nheight = 0.1\nspectrum = { height = 0.1, peak_period = 2 }",
          r"either a spectrum \(irregular\) or wavelength and height"),
@@ -64,39 +49,20 @@ def test_default_hull_settings_are_those_of_the_default_file():
          r"as many frequencies .* two at least; there are 1 and 1"),
         ("[runs.a]\nspectrum = { kind = 'table', frequencies = [1, 0.5], densities = [1, 1] }",
          "frequencies of a spectrum must increase"),
-        ("[runs.a]\nspectrum = { height = 0.1, peak_period = 2, band = [1.0, 0.5] }",
-         r"band must be \[low, high\]"),
         ("[instruments]\ntrigger_width = 30.0", "must be shorter than trigger_period"),
-        ("[instruments.probes.a]\nposition = 50", r"probes\.a\.noise: missing\. Add it"),
         ("[hull.pool]\nbottom_length = 0.6", "bottom opening must fit inside its free surface"),
         ("[hull.pool]\nshelf = -0.005", "shelf must lie below its lid"),
-        ("seed = ", "is not valid TOML"),
-        ("seed = -1", r"seed: received -1, .* Give a number from 0 to 2\^64"),
-        ("seed = 18446744073709551616", r"seed: received 18446744073709551616, which should be"),
-        ("[instruments.clocks.mru]\nrate = 1e7",
-         r"line 2, instruments\.clocks\.mru\.rate: 1e\+07 Hz make 2\.7e\+09 samples"),
-        ("[instruments.clocks.mru]\noffset = 1e6", r"clocks\.mru\.offset: received 1000000\.0"),
-        ("[simulation]\nstep = 1e-6", r"simulation\.kernel_length: 12 s are 1\.2e\+07 steps of"),
-        ("[simulation]\nkernel_length = 1e9", r"simulation\.kernel_length: 1e\+09 s are"),
-        ("[runs.a]\nwavelength = 2.0\nheight = 0.1\nduration = 1e9",
-         r"runs\.a\.duration: 1e\+09 s with the start-up are .* steps of .*; at most 10000000"),
-        ("[hull]\npanels_along = 100000", r"hull\.panels_along: received 100000"),
+        ("seed = 18446744073709551616", r"seed: .* Give a number from 0 to 2\^64"),
+        ("[instruments.clocks.mru]\nrate = 1e7", r"clocks\.mru\.rate: received 10000000\.0"),
+        ("[simulation]\nstep = 1e-6", r"simulation\.step: received 1e-06, which should be greater"),
+        ("[simulation]\nkernel_length = 1e9", r"simulation\.kernel_length: received 1000000000\.0"),
+        ("[runs.a]\nwavelength = 2.0\nheight = 0.1\nduration = 1e9", r"a\.duration: received"),
         ("[channels.a]\ncolumn = 'a'\n[rig]\n", "is a campaign file"),
     ],
 )  # fmt: skip
 def test_bad_settings_say_what_and_how_to_mend(tmp_path, text, message):
     with pytest.raises(RequestError, match=message):
         read(tmp_path, text)
-
-
-def test_what_is_no_settings_file(tmp_path):
-    with pytest.raises(RequestError, match=r"none\.toml does not exist\..*A tank file"):
-        read_tank(tmp_path / "none.toml")
-    with pytest.raises(RequestError, match=r"is a folder.* A tank file is expected here"):
-        read_tank(tmp_path)
-    (tmp_path / "latin.toml").write_bytes("name = 'Bassin d’essai é'".encode("cp1252"))
-    with pytest.raises(RequestError, match=r"latin\.toml, line 1: not UTF-8.*Save the file as"):
-        read_tank(tmp_path / "latin.toml")
 
 
 def test_a_measured_spectrum_comes_from_a_file(tmp_path):

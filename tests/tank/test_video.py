@@ -86,14 +86,3 @@ def test_a_filmed_campaign_is_prepared(filmed, tmp_path):
     assert "# Filmed: raw/one/side_view.mp4" in campaign.path.read_text(encoding="utf-8")
     assert write_prepared(campaign)
     assert "surge" in load_prepared(campaign)["one"]
-
-
-def test_missing_opencv_names_the_extra(monkeypatch):
-    import sys
-
-    from seakeep.errors import RequestError
-    from seakeep.signals.panel import opencv
-
-    monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(RequestError, match=r"pip install 'seakeep\[video\]'"):
-        opencv("rendering")

@@ -65,22 +65,25 @@ def _options(
     """Read the options before the verb; ``main`` looks for --debug itself."""
 
 
-app.command("tank")(tank.tank)
-app.command("init")(campaigns.init)
-app.command("prepare")(campaigns.prepare)
-app.command("tune")(tuning.tune)
-app.command("fit")(modelling.fit)
-app.command("calibrate")(calibrating.calibrate)
-app.command("forecast")(modelling.forecast)
-app.command("compare")(modelling.compare)
-app.command("export")(exporting.export)
-app.command("check")(checking.check)
-app.command("study")(studying.study)
-app.command("report")(studying.report)
-app.command("reproduce")(studying.reproduce)
+for _verb in (
+    tank.tank,
+    campaigns.init,
+    campaigns.prepare,
+    tuning.tune,
+    modelling.fit,
+    calibrating.calibrate,
+    modelling.forecast,
+    modelling.compare,
+    exporting.export,
+    checking.check,
+    studying.study,
+    studying.report,
+    studying.reproduce,
+    tracking.track,
+    information.info,
+):
+    app.command()(_verb)
 app.add_typer(campaigns.datasets, name="datasets")
-app.command("track")(tracking.track)
-app.command("info")(information.info)
 
 
 def _kept(leaving: BaseException) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from seakeep.cli.console import progress_bar, results, say
+from seakeep.cli.options import CampaignFile
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import check_output, is_there, replacing
 
@@ -29,18 +30,14 @@ def init(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier draft.")] = False,
     skip_rows: Annotated[
-        int | None, typer.Option("--skip-rows", min=0, help="Lines to skip above the header.")
+        int | None, typer.Option(min=0, help="Lines to skip above the header.")
     ] = None,
     delimiter: Annotated[
         Literal[",", ";", "tab", "blank"] | None,
-        typer.Option("--delimiter", help="Mark between columns."),
+        typer.Option(help="Mark between columns."),
     ] = None,
-    decimal: Annotated[
-        Literal[".", ","] | None, typer.Option("--decimal", help="Decimal mark.")
-    ] = None,
-    group: Annotated[
-        str | None, typer.Option("--group", help="Group of HDF5 or TDMS, topic of ROS.")
-    ] = None,
+    decimal: Annotated[Literal[".", ","] | None, typer.Option(help="Decimal mark.")] = None,
+    group: Annotated[str | None, typer.Option(help="Group of HDF5 or TDMS, topic of ROS.")] = None,
 ) -> None:
     """Draft a campaign file from measured files' headers.
 
@@ -68,7 +65,7 @@ def init(
 
 
 def prepare(
-    campaign: Annotated[Path, typer.Argument(help="Campaign file.", metavar="CAMPAIGN.toml")],
+    campaign: CampaignFile,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -100,10 +97,13 @@ def prepare(
     from seakeep.campaign import read_campaign, write_prepared
     from seakeep.campaign.store import prepared_folder
     from seakeep.campaign.survey import as_one
+    from seakeep.report.quality_sheet import SHEET
 
     read = read_campaign(campaign)
-    if sheet:
-        _check_sheet(read, prepared_folder(read, out))
+    folder = prepared_folder(read, out)
+    for name in ("quality.html", *(f"quality_{run}.png" for run in read.runs)):
+        if sheet and is_there(folder / name):
+            check_output(folder / name, SHEET)
     with progress_bar("Preparing") as progress:
         failures: dict[str, SeakeepError] = {}
         files = write_prepared(read, out, progress=progress, anew=anew, failures=failures)
@@ -111,7 +111,7 @@ def prepare(
         typer.echo(str(path))
     if files:
         _report_runs(read, files, failures, sheet)
-    if out is not None and out.resolve() != prepared_folder(read).resolve():
+    if folder.resolve() != prepared_folder(read).resolve():
         say(
             f"Note: fit, forecast and compare look for prepared runs in {prepared_folder(read)} "
             f"alone, and prepare anew what is not there. Those in {out} are for load_prepared.",
@@ -119,15 +119,6 @@ def prepare(
         )
     if failures:
         raise as_one(failures)
-
-
-def _check_sheet(read: Campaign, folder: Path) -> None:
-    """Refuse, before any work, to replace files of the user by those of the sheet."""
-    from seakeep.report.quality_sheet import SHEET
-
-    if is_there(folder) and folder.is_dir():
-        for name in ("quality.html", *(f"quality_{run}.png" for run in read.runs)):
-            check_output(folder / name, SHEET)
 
 
 def _report_runs(
@@ -213,7 +204,7 @@ def _fetch(
     name: Annotated[str, typer.Argument(help="Name of the data set.")],
     to: Annotated[
         Path | None,
-        typer.Option("--to", help="Data folder; by default SEAKEEP_DATA_DIR."),
+        typer.Option(help="Data folder; by default SEAKEEP_DATA_DIR."),
     ] = None,
 ) -> None:
     """Fetch a data set from its origin and check it; the one command that uses the network.

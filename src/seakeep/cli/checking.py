@@ -19,9 +19,7 @@ def check(
     campaign: CampaignFile,
     run: Annotated[
         list[str] | None,
-        typer.Option(
-            "--run", help="Name of a run (repeatable); by default all that a check can use."
-        ),
+        typer.Option(help="Name of a run (repeatable); by default all that a check can use."),
     ] = None,
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder for the page, its figures and tables.")

@@ -20,7 +20,7 @@ def export(
     model: ModelFile,
     c: Annotated[
         Path | None,
-        typer.Option("--c", help="Folder for C99 sources: a library of two files.", metavar="DIR"),
+        typer.Option(help="Folder for C99 sources: a library of two files.", metavar="DIR"),
     ] = None,
     estimator: Annotated[
         bool,
@@ -28,25 +28,23 @@ def export(
     ] = False,
     fmu: Annotated[
         Path | None,
-        typer.Option("--fmu", help="FMU 2.0 for co-simulation to write.", metavar="FILE.fmu"),
+        typer.Option(help="FMU 2.0 for co-simulation to write.", metavar="FILE.fmu"),
     ] = None,
     onnx: Annotated[
         Path | None,
-        typer.Option("--onnx", help="ONNX graph to write.", metavar="FILE.onnx"),
+        typer.Option(help="ONNX graph to write.", metavar="FILE.onnx"),
     ] = None,
     mat: Annotated[
         Path | None,
-        typer.Option("--mat", help="State-space system for MATLAB.", metavar="FILE.mat"),
+        typer.Option(help="State-space system for MATLAB.", metavar="FILE.mat"),
     ] = None,
     steps: Annotated[
         int | None,
-        typer.Option(
-            "--steps", help="Instants that the ONNX graph forecasts; by default 1.", min=1
-        ),
+        typer.Option(help="Instants that the ONNX graph forecasts; by default 1.", min=1),
     ] = None,
     member: Annotated[
         int | None,
-        typer.Option("--member", help="For an ensemble: the member to export, from 0.", min=0),
+        typer.Option(help="For an ensemble: the member to export, from 0.", min=0),
     ] = None,
 ) -> None:
     """Write a model for another host: C, FMU, ONNX, MATLAB.
@@ -105,9 +103,9 @@ def _single(file: Path, member: int | None) -> Model:
 def _binary(fmu: Path) -> str:
     from seakeep.hosts.fmu import compiler
 
-    if compiler() is None:
-        return (
-            f"{fmu} holds sources alone: no C compiler was found (cc, gcc, clang, or CC). Export "
-            "it where there is one, or with a host that compiles the sources."
-        )
-    return f"{fmu} holds a binary for this platform, and the sources for others."
+    if compiler() is not None:
+        return f"{fmu} holds a binary for this platform, and the sources for others."
+    return (
+        f"{fmu} holds sources alone: no C compiler was found (cc, gcc, clang, or CC). Export it "
+        "where there is one, or with a host that compiles the sources."
+    )

@@ -43,6 +43,7 @@ FOR_ENSEMBLES = (
     "is for ensembles, and {} holds a single model. Leave it out, or fit an ensemble (kind = "
     "'bayesian_hankel_dmdc' in [model])."
 )
+NO_BAND = "belongs to the band, and --members writes the members without it. Leave one of them out."
 NO_NOWCAST = (
     "and --nowcast do not go together: forecasts start all over the runs, one after the other, "
     "with the band of the filter, and their errors are in training SDs. Leave one of them out."
@@ -87,11 +88,10 @@ def fit(
 def forecast(
     model: ModelFile,
     campaign: CampaignFile,
-    run: Annotated[str, typer.Option("--run", help="Name of the run.")],
+    run: Annotated[str, typer.Option(help="Name of the run.")],
     start: Annotated[
         str,
         typer.Option(
-            "--start",
             help="Instant of the last measured state, s or encounter periods such as '20 T'.",
         ),
     ],
@@ -110,7 +110,6 @@ def forecast(
     ahead: Annotated[
         Literal["refuse", "predict"],
         typer.Option(
-            "--ahead",
             help="If the waves end before the model's look-ahead: 'refuse', or 'predict' them "
             "from their record.",
         ),
@@ -150,14 +149,7 @@ def forecast(
     identified = load_model(model)
     read = read_campaign(campaign)
     check_output(out, "forecast", read_files(read, model), forecast_header(identified.states))
-    if not is_ensemble(identified):
-        given = {"--level": level is not None, "--band": band is not None, "--members": members}
-        _refuse(given | {"--scheduler": scheduler is not None}, FOR_ENSEMBLES.format(model))
-    elif members and (level is not None or band is not None):
-        raise RequestError(
-            f"--{'level' if band is None else 'band'} belongs to the band, and --members writes "
-            "the members without it. Leave one of them out."
-        )
+    band_options = _band({str(model): identified}, level, band, scheduler, members)
     prepared = load_prepared(read, names=[run])[run]
     warn_of_runs([prepared], [*identified.states, *identified.inputs])
     first = instant_of(start, read, [prepared], "--start")
@@ -171,13 +163,16 @@ def forecast(
             member_executor(workers, scheduler) as executor,
             progress_bar("Forecasting") as progress,
         ):
-            how: dict[str, Any] = {"ahead": ahead, "executor": executor, "progress": progress}
-            if members:
-                result = identified.forecast(prepared, first, count, **how)
-            else:
-                result = identified.forecast_summary(
-                    prepared, first, count, **_band({str(model): identified}, level, band), **how
-                )
+            play = identified.forecast if members else identified.forecast_summary
+            result = play(
+                prepared,
+                first,
+                count,
+                **({} if members else band_options),
+                ahead=ahead,
+                executor=executor,
+                progress=progress,
+            )
     else:
         result = identified.forecast(prepared, start=first, steps=count, ahead=ahead)
     scaled = ""
@@ -209,12 +204,11 @@ def compare(
     campaign: CampaignFile,
     run: Annotated[
         list[str] | None,
-        typer.Option("--run", help="Name of a run (repeatable); by default the test runs."),
+        typer.Option(help="Name of a run (repeatable); by default the test runs."),
     ] = None,
     start: Annotated[
         str | None,
         typer.Option(
-            "--start",
             help="Instant of the last measured state, s or encounter periods such as '20 T'; by "
             "default the first possible one.",
         ),
@@ -440,17 +434,21 @@ def _band(
     level: float | None,
     band: str | None,
     scheduler: str | None = None,
+    members: bool = False,
 ) -> dict[str, Any]:
     """Level and kind of band that were asked for; a calibrated one knows its level."""
     from seakeep.models import is_ensemble
 
     ensembles = [each for each in models.values() if is_ensemble(each)]
+    given = {"--level": level is not None, "--band": band is not None, "--members": members}
     if not ensembles:
-        given = {"--level": level is not None, "--band": band is not None}
         alone = FOR_ENSEMBLES.format(", ".join(models))
         _refuse(given | {"--scheduler": scheduler is not None}, alone)
+    if members:
+        del given["--members"]
+        _refuse(given, NO_BAND)
     kept = [each.calibration for each in ensembles if each.calibration is not None]
-    if kept and band is None:
+    if kept and band is None and not members:
         say(
             "Note: the ensemble is calibrated, and the band shown is that of its members. "
             "--band calibrated shows the calibrated one."

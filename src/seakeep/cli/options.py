@@ -30,7 +30,6 @@ FullScale = Annotated[
 Level = Annotated[
     float | None,
     typer.Option(
-        "--level",
         help="For an ensemble: probability between the bounds of the band; by default 0.95, or "
         "what a calibrated band was made for.",
     ),
@@ -38,14 +37,12 @@ Level = Annotated[
 Steps = Annotated[
     str | None,
     typer.Option(
-        "--steps",
         help="Number of instants, or encounter periods such as '15 T'; by default to the end.",
     ),
 ]
 Workers = Annotated[
     int | None,
     typer.Option(
-        "--workers",
         help="Processes for the members of a large ensemble; by default this process alone.",
         min=1,
     ),
@@ -60,7 +57,6 @@ ModelKey = Annotated[
 Scheduler = Annotated[
     str | None,
     typer.Option(
-        "--scheduler",
         help="Scheduler of a running Dask cluster to use instead: tcp://HOST:8786.",
         metavar="ADDRESS",
     ),

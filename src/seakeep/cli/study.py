@@ -22,7 +22,6 @@ Preset = Literal["paper", "recommended"]
 Workers = Annotated[
     int | None,
     typer.Option(
-        "--workers",
         help="Processes on this machine, each on one core; by default one per core.",
         min=1,
         metavar="N",
@@ -75,11 +74,11 @@ def reproduce(
     ] = False,
     preset: Annotated[
         Preset | None,
-        typer.Option("--preset", help="The acts of this preset alone."),
+        typer.Option(help="The acts of this preset alone."),
     ] = None,
     seed: Annotated[
         int,
-        typer.Option("--seed", help="Seed of waves, noise, windows, draws.", min=0, max=2**64 - 1),
+        typer.Option(help="Seed of waves, noise, windows, draws.", min=0, max=2**64 - 1),
     ] = 0,
     workers: Workers = None,
     scheduler: Scheduler = None,

@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 import math
-import struct
-import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from seakeep.cli.console import progress_bar, say
 from seakeep.errors import RequestError
-from seakeep.files import MARK, check_output, replacing, write_netcdf
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from seakeep.signals import MotionAgreement, Track
-
-TRACK, SHEET = "track", "contact sheet"
-HEADER = r"time \[s\],surge \[m\],heave \[m\],pitch \[deg\],centroid_x \[pixel\],"
-DECIMALS = {"s": 6, "m": 6, "deg": 5, "pixel": 3, "pixel^2": 1, "1": 4}
+from seakeep.files import check_output
 
 
 def track(
@@ -101,12 +90,11 @@ def track(
     ] = 4.0,
     mru: Annotated[
         Path | None,
-        typer.Option("--mru", help="Record with heave and pitch to compare with."),
+        typer.Option(help="Record with heave and pitch to compare with."),
     ] = None,
     max_lag: Annotated[
         float | None,
         typer.Option(
-            "--max-lag",
             help="Longest lag searched against --mru, s; by default 10, or a quarter of the "
             "record.",
         ),
@@ -124,8 +112,19 @@ def track(
         raise RequestError(f"{out} ends in '{out.suffix}'; a track is written as .csv or .nc.")
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise RequestError(f"a contact sheet is written as PNG; received {sheet}.")
+    from seakeep.report.track import (
+        CONTACT_SHEET,
+        HEADER,
+        TRACK,
+        agreement_words,
+        track_text,
+        track_words,
+        write_contact_sheet,
+        write_track,
+    )
+
     inputs = [each for each in (video, mru) if each is not None]
-    for place, kind in ((out, TRACK), (sheet, SHEET)):
+    for place, kind in ((out, TRACK), (sheet, CONTACT_SHEET)):
         if place is not None:
             check_output(place, kind, inputs, HEADER)
     from seakeep.campaign import read_table
@@ -149,114 +148,14 @@ def track(
     with progress_bar("Tracking") as progress:
         track = track_video(video, settings, progress)
     if sheet is not None:
-        with replacing(sheet) as temporary:
-            temporary.write_bytes(_marked(contact_sheet(video, track)))
-    tracked = _labelled(track)
+        write_contact_sheet(contact_sheet(video, track), sheet)
     if out is None:
-        typer.echo(_as_csv(tracked), nl=False)
+        typer.echo(track_text(track), nl=False)
     else:
-        with replacing(out) as temporary:
-            if out.suffix == ".nc":
-                write_netcdf(temporary, tracked.assign_attrs({MARK: TRACK}))
-            else:
-                temporary.write_text(_as_csv(tracked), encoding="utf-8", newline="\n")
-    _summary(track, [path for path in (out, sheet) if path is not None])
+        write_track(track, out)
+    say(track_words(track))
+    if written := [str(path) for path in (out, sheet) if path is not None]:
+        say("Wrote " + ", ".join(written))
     if reference is not None:
-        _compare(track, reference, max_lag)
-
-
-def _labelled(track: Track) -> xr.Dataset:
-    import xarray as xr
-
-    from seakeep.signals.tracking import FLAGS, LABELS
-
-    data = {
-        name: ("time", values, {"units": LABELS[name][0], "long_name": LABELS[name][1]})
-        for name, values in track.channels.items()
-    }
-    time = ("time", track.time, {"units": "s", "long_name": "time"})
-    out = xr.Dataset(data, {"time": time}, dict(track.attributes))
-    out["flag"].attrs |= {"flag_values": list(FLAGS.values()), "flag_meanings": " ".join(FLAGS)}
-    return out
-
-
-def _marked(picture: bytes) -> bytes:
-    """PNG with a comment, before its last chunk of twelve bytes, that says what it is."""
-    text = b"tEXtComment\0" + f"{MARK}: {SHEET}".encode("ascii")
-    chunk = struct.pack(">I", len(text) - 4) + text + struct.pack(">I", zlib.crc32(text))
-    return picture[:-12] + chunk + picture[-12:]
-
-
-def _as_csv(tracked: xr.Dataset) -> str:
-    """Columns with units in brackets; angles in degrees, as loggers write them; NaN is empty."""
-    import numpy as np
-    import pandas as pd
-
-    columns = {}
-    for name, values in {"time": tracked["time"], **tracked.data_vars}.items():
-        unit, numbers = str(values.attrs["units"]), values.to_numpy()
-        if unit == "rad":
-            unit, numbers = "deg", np.rad2deg(numbers)
-        if np.issubdtype(numbers.dtype, np.floating):
-            numbers = np.round(numbers, DECIMALS[unit]) + 0.0
-        columns[f"{name} [{'-' if unit == '1' else unit}]"] = numbers
-    text: str = pd.DataFrame(columns).to_csv(index=False, lineterminator="\n")
-    return text
-
-
-def _summary(track: Track, written: list[Path]) -> None:
-    from seakeep.signals.tracking import FLAGS
-
-    flagged = [
-        f"{count} {name}"
-        for name, code in FLAGS.items()
-        if name != "good" and (count := int((track["flag"] == code).sum()))
-    ]
-    facts = track.attributes
-    say(
-        f"{track.time.size} frames at {facts['frame_rate']:g} Hz; flagged: "
-        f"{', '.join(flagged) or 'none'} ({int(track['bridged'].sum())} bridged); "
-        f"{1e3 * facts['metres_per_pixel']:.4g} mm per pixel ({facts['calibration']}); "
-        f"{facts['camera']}."
-    )
-    if written:
-        say("Wrote " + ", ".join(map(str, written)))
-
-
-def _compare(track: Track, reference: xr.Dataset, max_lag: float | None) -> None:
-    from seakeep.conventions import conversion, displayed
-    from seakeep.signals import compare_motion
-    from seakeep.signals.tracking import LABELS
-
-    for name in ("heave", "pitch"):
-        other, unit = reference[name], LABELS[name][0]
-        factor = conversion(str(other.attrs.get("units", unit)), unit, f"'{name}'")
-        time = reference["time"].to_numpy()
-        found = compare_motion(track[name], track.time, factor * other.to_numpy(), time, max_lag)
-        shown, unit = (1e3, "mm") if unit == "m" else displayed(unit)
-        say(
-            f"{name} against the MRU: correlation {found.correlation:.4f}, video late by "
-            f"{found.lag:+.3f} s, RMS difference {shown * found.rms:.3g} {unit}, "
-            f"{found.samples} samples"
-        )
-        if doubt := _doubt(found):
-            say(f"Note: {name}: {doubt}", style="yellow")
-
-
-def _doubt(found: MotionAgreement) -> str:
-    """Why the lag may be wrong; empty if there is no reason."""
-    searched = f"the lags searched (within {found.max_lag:g} s)"
-    if found.at_limit:
-        return f"the lag is at the end of {searched}; the true one may be longer. Raise --max-lag."
-    if found.ambiguous:
-        return (
-            f"at {found.rival_lag:+.3f} s the correlation is {found.rival_correlation:.4f}, nearly "
-            "as high: the lag is known only up to whole wave periods. Let a trigger that both "
-            "recorded decide (--lamp), or take an irregular run."
-        )
-    if not found.enclosed:
-        return (
-            f"{searched} do not reach a wave period ({found.period:.3g} s) beyond this one, where "
-            "the two may fit better. Raise --max-lag."
-        )
-    return ""
+        for words, style in agreement_words(track, reference, max_lag):
+            say(words, style=style)

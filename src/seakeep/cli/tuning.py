@@ -27,7 +27,6 @@ def tune(
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            "--vary",
             help="What to choose beside the ridge: observables, lead, input_delays, state_delays, "
             "rank, alignment, readouts. Repeat it for several. Default: observables, which are "
             "chosen too where the file leaves them open.",

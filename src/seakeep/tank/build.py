@@ -14,13 +14,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, SeakeepError
-from seakeep.tank.hull import HullMesh, Hydrostatics, hull_mesh, hydrostatics
-from seakeep.tank.hydrodynamics import CONVENTIONS, save_hydrodynamics
-from seakeep.tank.settings import HullSettings, PoolGeometry
+from seakeep.tank.delivery import write_dataset
+from seakeep.tank.hull import HullMesh, hull_mesh, hydrostatics
+from seakeep.tank.hydrodynamics import CONVENTIONS, POOL_MODES, RIGID
+from seakeep.tank.settings import HullSettings, default_settings, read_tank
 from seakeep.waves import GRAVITY, group_speed, wavenumber
 
 __all__ = ["build_hydrodynamics", "default_frequencies"]
@@ -34,17 +36,6 @@ def default_frequencies() -> FloatArray:
     """Return the fifty frequencies of the shipped file, rad/s: dense where the pool resonates."""
     slow, middle = np.arange(0.3, 2.0, 0.4), np.arange(2.0, 9.0, 0.25)
     return np.round(np.concatenate([slow, middle, np.arange(9.0, 15.01, 6 / 16)]), 6)
-
-
-def _solver() -> Any:
-    try:
-        import capytaine
-    except ImportError as error:
-        raise RequestError(
-            "hydrodynamic coefficients need capytaine, which is not installed. "
-            "Install the extra: pip install 'seakeep[tank-build]'. The tank itself runs without."
-        ) from error
-    return capytaine
 
 
 def _modes(mesh: HullMesh, hull: HullSettings, centres: FloatArray) -> dict[str, FloatArray]:
@@ -64,16 +55,6 @@ def _modes(mesh: HullMesh, hull: HullSettings, centres: FloatArray) -> dict[str,
     return modes
 
 
-def _mass_matrix(hull: HullSettings, density: float) -> FloatArray:
-    """Inertia of the vessel and of the thin layer of water above the pool's lid."""
-    inertia = [hull.mass, hull.mass, hull.mass * hull.pitch_gyradius**2]
-    if hull.pool is not None:
-        layer = density * hull.pool.length * hull.pool.beam * -hull.pool.lid
-        inertia[0] += layer
-        inertia += [layer, 0.5 * layer]
-    return np.diag(inertia)
-
-
 def build_hydrodynamics(
     hull: HullSettings,
     frequencies: npt.ArrayLike | None = None,
@@ -86,9 +67,14 @@ def build_hydrodynamics(
     Frequencies are angular (rad/s), by default :func:`default_frequencies`; depth in m, density
     in kg/m³. Raises RequestError if capytaine is not installed or the hull cannot be built.
     """
-    cpt = _solver()
+    try:
+        import capytaine as cpt
+    except ImportError as error:
+        raise RequestError(
+            "hydrodynamic coefficients need capytaine, which is not installed. "
+            "Install the extra: pip install 'seakeep[tank-build]'. The tank itself runs without."
+        ) from error
     mesh = hull_mesh(hull, density)
-    statics = hydrostatics(mesh, hull, density)
     surface = cpt.Mesh(mesh.vertices, mesh.faces, auto_clean=False, auto_check=False)
     lid = cpt.Mesh(*mesh.internal_lid, auto_clean=False, auto_check=False)
     modes = _modes(mesh, hull, np.asarray(surface.faces_centers))
@@ -105,11 +91,13 @@ def build_hydrodynamics(
     solver = cpt.BEMSolver(green_function=green, method="direct")
     results = solver.solve_all(problems, progress_bar=progress, _check_wavelength=False)
     solved = cpt.assemble_dataset(results, hydrostatics=False)
-    data = _dataset(solved, hull, list(modes), statics, density)
     far_field = _far_field(results, surface, list(modes), water_depth, density)
-    # Single precision: the panels leave 1 %.
-    return data.assign(far_field=(FAR_FIELD, far_field.astype("f4"))).assign_attrs(
-        _attributes(hull, mesh, statics, water_depth, density)
+    data = _dataset(solved, hull, mesh, density)
+    data["far_field"] = FAR_FIELD, far_field.astype("f4")  # single precision: panels leave 1 %
+    return data.assign_attrs(
+        water_depth=water_depth,
+        density=density,
+        solver=f"capytaine {metadata.version('capytaine')}, method direct",
     )
 
 
@@ -127,6 +115,12 @@ def _far_field(
     )
     angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     along = np.stack([np.cos(angle), np.sin(angle)])
+
+    def rank(result: Any) -> int:
+        """Diffraction first, then the motions in their order."""
+        dof = getattr(result, "radiating_dof", None)
+        return 0 if dof is None else 1 + names.index(dof)
+
     by_omega: dict[float, list[Any]] = {}
     for result in results:
         by_omega.setdefault(float(result.omega), []).append(result)
@@ -141,7 +135,7 @@ def _far_field(
         kochin = np.stack([
             outward @ (result.potential[: areas.size] * areas)
             - (wave * profile) @ (result.boundary_condition[: areas.size] * areas)
-            for result in sorted(group, key=lambda r: _rank(r, names))
+            for result in sorted(group, key=rank)
         ])  # fmt: skip
         kappa = k * GRAVITY / (2 * omega * speed)
         scale = density * (omega * kappa) ** 2 * speed / (4 * np.pi * GRAVITY * k)
@@ -152,84 +146,50 @@ def _far_field(
     return forms
 
 
-def _rank(result: Any, names: list[str]) -> int:
-    """Diffraction first, then the motions in their order."""
-    dof = getattr(result, "radiating_dof", None)
-    return 0 if dof is None else 1 + names.index(dof)
-
-
-def _dataset(
-    solved: xr.Dataset, hull: HullSettings, names: list[str], statics: Hydrostatics, density: float
-) -> xr.Dataset:
-    """Put the solver's results and the matrices of inertia and restoring together."""
-    both = {"radiating_dof": names, "influenced_dof": names}
+def _dataset(solved: xr.Dataset, hull: HullSettings, mesh: HullMesh, density: float) -> xr.Dataset:
+    """Put the solver's results, the matrices of inertia and restoring, and dimensions together."""
+    statics = hydrostatics(mesh, hull, density)
+    inertia = [hull.mass, hull.mass, hull.mass * hull.pitch_gyradius**2]
+    stiffness = statics.stiffness
+    dimensions = {}
+    if (pool := hull.pool) is not None:
+        area = pool.length * pool.beam
+        layer = density * area * -pool.lid  # the thin layer of water above the lid
+        inertia = [inertia[0] + layer, *inertia[1:], layer, 0.5 * layer]
+        springs = density * GRAVITY * area * np.array([1.0, 0.5])
+        stiffness = scipy.linalg.block_diag(stiffness, np.diag(springs))
+        opening = pool.bottom_length * pool.bottom_beam
+        dimensions = {"pool_centre": pool.centre, "pool_area": area, "pool_opening": opening}
+    names = [*RIGID, *POOL_MODES][: len(inertia)]
     order = ("omega", "influenced_dof", "radiating_dof")
+    both = {"radiating_dof": names, "influenced_dof": names}
     force = (solved["Froude_Krylov_force"] + solved["diffraction_force"]).sel(
         influenced_dof=names, wave_direction=0.0
     )
-    force = force.transpose("omega", "influenced_dof")
-    stiffness = np.zeros((len(names), len(names)))
-    stiffness[:3, :3] = statics.stiffness
-    if hull.pool is not None:
-        area = hull.pool.length * hull.pool.beam
-        stiffness[3, 3], stiffness[4, 4] = density * GRAVITY * area * np.array([1.0, 0.5])
-    parts = np.stack([force.values.real, force.values.imag])
+    excitation = force.transpose("omega", "influenced_dof").values
     return xr.Dataset(
         {
             "added_mass": (order, solved["added_mass"].sel(both).transpose(*order).values),
             "damping": (order, solved["radiation_damping"].sel(both).transpose(*order).values),
-            "excitation": (("part", *order[:2]), parts),
-            "mass": (order[1:], _mass_matrix(hull, density)),
+            "excitation": (("part", *order[:2]), np.stack([excitation.real, excitation.imag])),
+            "mass": (order[1:], np.diag(inertia)),
             "stiffness": (order[1:], stiffness),
         },
-        coords={
-            "omega": solved["omega"].values,
-            "part": ["re", "im"],
-            "influenced_dof": names,
-            "radiating_dof": names,
+        coords={"omega": solved["omega"].values, "part": ["re", "im"], **both},
+        attrs={
+            **CONVENTIONS,
+            **dimensions,
+            "centre_of_gravity": hull.centre_of_gravity,
+            "draft": mesh.draft,
+            "waterplane_area": statics.waterplane,
+            "mesh_sha256": mesh.digest,
+            "hull_settings": hull.model_dump_json(),
         },
     )
 
 
-def _attributes(
-    hull: HullSettings,
-    mesh: HullMesh,
-    statics: Hydrostatics,
-    depth: float,
-    density: float,
-) -> dict[str, Any]:
-    pool = hull.pool or PoolGeometry()
-    pool_area = pool.length * pool.beam if hull.pool is not None else 0.0
-    return {
-        **CONVENTIONS,
-        "water_depth": depth,
-        "density": density,
-        "gravity": GRAVITY,
-        "vessel_mass": hull.mass,
-        "centre_of_gravity": hull.centre_of_gravity,
-        "draft": mesh.draft,
-        "midship": mesh.midship,
-        "waterline_exponent": mesh.exponent,
-        "displaced_volume": statics.volume,
-        "waterplane_area": statics.waterplane,
-        "waterline_beam": hull.beam_waterline,
-        "pool_centre": pool.centre,
-        "pool_area": pool_area,
-        "pool_opening": pool.bottom_length * pool.bottom_beam if pool_area else 0.0,
-        "pool_length": pool.length,
-        "panels": len(mesh.faces),
-        "panels_of_internal_lid": len(mesh.internal_lid[1]),
-        "mesh_sha256": mesh.digest,
-        "hull_settings": hull.model_dump_json(),
-        "solver": f"capytaine {metadata.version('capytaine')}, method direct",
-        "versions": ", ".join(f"{n} {metadata.version(n)}" for n in ("numpy", "scipy", "xarray")),
-    }
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Build the file of the default hull (or of the ``[hull]`` table of a settings file)."""
-    from seakeep.tank.settings import default_settings, read_tank
-
     parser = argparse.ArgumentParser(prog="python -m seakeep.tank.build", description=__doc__)
     parser.add_argument("settings", nargs="?", type=Path, help="tank settings (TOML)")
     parser.add_argument("-o", "--out", type=Path, default=Path("hydrodynamics.nc"))
@@ -246,7 +206,7 @@ def main(arguments: list[str] | None = None) -> int:
             settings.facility.density,
             progress=sys.stderr.isatty(),
         )
-        save_hydrodynamics(data, options.out)
+        write_dataset(data, options.out)
     except SeakeepError as error:
         sys.stderr.write(f"Error: {error}\n")
         return error.exit_status

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,6 @@ import tomlkit
 import xarray as xr
 
 from seakeep.files import MARK, replacing, write_netcdf
-from seakeep.tank.instruments import Record
 from seakeep.tank.settings import RunPlan, TankSettings
 from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, SIDE_VIEW
 
@@ -31,7 +31,6 @@ CAMPAIGN, RAW, TRUTH = "campaign", "raw file", "truth"
 
 FIRST_LINE = r"time \[s\],(trigger \[V\]|lamp \[-\]|\w+ \[mm\]),.*"
 """First line of a raw text file."""
-ROWS_AT_ONCE = 20_000
 MOTIONS = {
     "heave": ("heave", "m"),
     "pitch": ("pitch", "deg"),
@@ -68,43 +67,32 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _csv(record: Record) -> str:
-    heads = [_header("time", "s")]
-    heads += [_header(name, column.unit) for name, column in record.columns.items()]
-    # As many decimals as the clock's readings need, up to six.
-    start = record.time[:4]
-    needed = (d for d in range(1, 6) if np.allclose(np.round(start, d), start, atol=1e-9))
-    decimals = [next(needed, 6)] + [c.decimals for c in record.columns.values()]
-    line = ",".join(f"%.{d}f" for d in decimals) + "\n"
-    columns = [record.time] + [c.values for c in record.columns.values()]
-    # Adding zero turns the −0.0 of rounding into 0.0.
-    table = np.column_stack([np.round(c, d) for c, d in zip(columns, decimals, strict=True)]) + 0.0
-    parts = [",".join(heads) + "\n"]
-    for first in range(0, len(table), ROWS_AT_ONCE):
-        rows = table[first : first + ROWS_AT_ONCE]
-        parts.append(((line * len(rows)) % tuple(rows.ravel().tolist())).replace("nan", ""))
-    return "".join(parts)
-
-
-def write_record(record: Record, folder: Path, kind: str) -> Path:
-    """Write one logger's record to a folder that exists, as ``"csv"`` or ``"nc"``.
+def write_record(record: xr.Dataset, path: Path) -> Path:
+    """Write one logger's record to a folder that exists, by its suffix as ``.csv`` or ``.nc``.
 
     A sample that an instrument lost is an empty field in CSV, NaN in NetCDF.
     """
-    path = folder / f"{record.name}.{kind}"
-    if kind == "csv":
-        write_text(path, _csv(record))
+    rounded = record.map(lambda column: column.round(_decimals(column)), keep_attrs=True)
+    if path.suffix == ".nc":
+        write_dataset(rounded.assign_attrs({MARK: RAW}), path)
         return path
-    data = xr.Dataset(
-        {
-            name: ("time", np.round(column.values, column.decimals), {"units": column.unit})
-            for name, column in record.columns.items()
-        },
-        coords={"time": ("time", record.time, {"units": "s"})},
-        attrs={MARK: RAW},
-    )
-    write_dataset(data, path)
+    time = record["time"].values
+    # As many decimals as the clock's readings need, up to six.
+    exact = (d for d in range(1, 6) if np.allclose(np.round(time[:4], d), time[:4], atol=1e-9))
+    decimals = [next(exact, 6), *map(_decimals, record.values())]
+    # Adding zero turns the −0.0 of rounding into 0.0.
+    table = np.column_stack([time.round(decimals[0]), *rounded.values()]) + 0.0
+    rows = io.StringIO()
+    np.savetxt(rows, table, [f"%.{d}f" for d in decimals], ",")
+    heads = [_header(str(name), column.attrs["units"]) for name, column in record.items()]
+    head = ",".join([_header("time", "s"), *heads])
+    write_text(path, f"{head}\n{rows.getvalue().replace('nan', '')}")
     return path
+
+
+def _decimals(column: xr.DataArray) -> int:
+    """Decimals that a logger writes."""
+    return {"m": 5, "mm": 2}.get(column.attrs["units"], 4)
 
 
 def write_dataset(data: xr.Dataset, path: Path) -> None:
@@ -122,55 +110,18 @@ def _filtered(settings: TankSettings) -> dict[str, str]:
     return {name: f"eta_{short[name]}" if unique else f"eta_{name}_filtered" for name in short}
 
 
-def _inputs(settings: TankSettings) -> list[str]:
-    """Return the channels that drive a model: the first probe downstream and one at rest."""
-    channels, place = _filtered(settings), settings.vessel.position
-    at = {name: settings.instruments.probes[name].position for name in channels}
-    if not at:
-        return []
-    near = min(at, key=lambda name: abs(at[name] - place))
-    return [channels[name] for name in dict.fromkeys((min(at, key=lambda n: at[n]), near))]
-
-
-def _channels(settings: TankSettings, probes: list[str], kind: str) -> dict[str, dict[str, str]]:
-    columns = {f"eta_{name}": (name, "mm") for name in probes} | MOTIONS
-    columns["surge"] = ("surge", "m")
-    columns |= {f"mooring_{name}": (f"mooring_{name}", "N") for name in settings.moorings}
-    channels = {
-        channel: {"column": _header(name, unit) if kind == "csv" else name, "unit": unit}
-        for channel, (name, unit) in columns.items()
-    }
-    channels["surge"]["long_name"] = "surge, tracked in the video"
-    return channels
-
-
-def _instruments(settings: TankSettings) -> dict[str, Any]:
-    """Each logger has a clock of its own; all record the same trigger pulses."""
-    tables: dict[str, Any] = {"reference": "wave_probes"}
-    for name, clock in settings.instruments.clocks.items():
-        trigger, unit = ("lamp", "-") if name == "video" else ("trigger", "V")
-        tables[name] = {"sampling_rate": clock.rate, "trigger": trigger, "trigger_unit": unit}
-    tables["video"] |= {
-        "metres_per_pixel": METRES_PER_PIXEL,
-        "panel": list(PANEL),
-        "panel_height": PANEL_HEIGHT,
-    }
-    return tables
-
-
 def _run(run: RunPlan, files: Mapping[str, str], one_logger: bool) -> dict[str, Any]:
     waves = "regular" if run.spectrum is None else "irregular"
     begin, end = run.startup, run.length
     middle = 0.5 * (begin + end)
+    loggers = {key: path for key, path in files.items() if key != SIDE_VIEW}
+    named = {"file": next(iter(loggers.values()))} if one_logger else {"files": loggers}
     table: dict[str, Any] = {"sea_state": run.sea_state or waves, "waves": waves}
     if run.role == "both":
         table |= {"train": [begin, middle], "test": [middle, end]}
     else:
         table |= {"role": run.role, "span": [begin, end]}
-    loggers = {key: path for key, path in files.items() if key != SIDE_VIEW}
-    if one_logger:
-        return {"file": next(iter(loggers.values()))} | table
-    return table | {"files": loggers}
+    return named | table if one_logger else table | named
 
 
 def campaign_text(
@@ -185,10 +136,32 @@ def campaign_text(
     every = settings.instruments.probes
     probes = [name for name in every if not (one_logger and every[name].dropouts)]
     filtered = _filtered(settings)
-    positions = {f"eta_{name}": every[name].position for name in probes}
-    positions |= {channel: every[name].position for name, channel in filtered.items()}
-    low_passed = {channel: {"from": f"eta_{n}"} | LOW_PASS for n, channel in filtered.items()}
-    states = [*STATES, *(f"mooring_{name}" for name in settings.moorings)]
+    place = {name: every[name].position for name in filtered}
+    inputs = []
+    if place:  # the first probe downstream, and the one nearest to the vessel
+        near = min(place, key=lambda name: abs(place[name] - settings.vessel.position))
+        inputs = list(dict.fromkeys(filtered[n] for n in (min(place, key=place.__getitem__), near)))
+    lines = [f"mooring_{name}" for name in settings.moorings]
+    columns = {f"eta_{name}": (name, "mm") for name in probes} | MOTIONS
+    columns |= {"surge": ("surge", "m")} | {line: (line, "N") for line in lines}
+    channels = {
+        channel: {"column": _header(name, unit) if kind == "csv" else name, "unit": unit}
+        for channel, (name, unit) in columns.items()
+    }
+    channels["surge"]["long_name"] = "surge, tracked in the video"
+    instruments: dict[str, Any] = {"reference": "wave_probes"}
+    for logger, clock in settings.instruments.clocks.items():  # all record the same pulses
+        trigger, unit = ("lamp", "-") if logger == "video" else ("trigger", "V")
+        instruments[logger] = {
+            "sampling_rate": clock.rate,
+            "trigger": trigger,
+            "trigger_unit": unit,
+        }
+    instruments["video"] |= {
+        "metres_per_pixel": METRES_PER_PIXEL,
+        "panel": list(PANEL),
+        "panel_height": PANEL_HEIGHT,
+    }
     tables: dict[str, Any] = {
         "campaign": {
             "name": settings.name,
@@ -199,17 +172,21 @@ def campaign_text(
             "water_depth": settings.facility.water_depth,
             "wave_direction": 0.0,
             "frame": "x downstream, z up, pitch positive bow up; surge from the place at rest",
-            "positions": positions,
+            "positions": {f"eta_{name}": every[name].position for name in probes}
+            | {filtered[name]: position for name, position in place.items()},
         },
-        "channels": _channels(settings, probes, kind),
-        "derived": low_passed | DERIVED,
-        "instruments": _instruments(settings),
+        "channels": channels,
+        "derived": {filtered[n]: {"from": f"eta_{n}"} | LOW_PASS for n in filtered} | DERIVED,
+        "instruments": instruments,
         "runs": {n: _run(run, files[n], one_logger) for n, run in settings.runs.items()},
         "preparation": {"preset": "paper", "gaps": "mask"},
         "model": {
-            "kind": "hankel_dmdc", "preset": "paper", "states": states, "inputs": _inputs(settings),
+            "kind": "hankel_dmdc",
+            "preset": "paper",
+            "states": [*STATES, *lines],
+            "inputs": inputs,
         },
-    }  # fmt: skip
+    }
     if one_logger:
         del tables["instruments"], tables["preparation"]["gaps"]
     document = tomlkit.document()

@@ -382,11 +382,6 @@ def simulate(
     waves, excitation, *drift = _wave_arrays(rig, sea)
     pairs, kernel = _kernel_arrays(rig)
     state = np.zeros((2, dofs)) if start is None else np.array(start, dtype=float)
-    if state.shape != (2, dofs):
-        raise RequestError(
-            f"start needs position and velocity of {', '.join(rig.names)}, shape (2, {dofs}); "
-            f"received {state.shape}. Transpose or complete it."
-        )
     q, v, a, memory, slow, failed, which = loop.integrate(
         steps,
         rig.step,

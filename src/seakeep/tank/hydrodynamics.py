@@ -19,7 +19,7 @@ import xarray as xr
 
 from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError
-from seakeep.files import reading, replacing, write_netcdf
+from seakeep.files import reading
 
 __all__ = [
     "CONVENTIONS",
@@ -32,7 +32,6 @@ __all__ = [
     "load_hydrodynamics",
     "radiation_kernel",
     "response",
-    "save_hydrodynamics",
 ]
 
 
@@ -47,7 +46,7 @@ CONVENTIONS = {
 """Attributes that a file of coefficients must carry, with these values."""
 
 RIGID = ("surge", "heave", "pitch")
-DEGREES = (*RIGID, "piston", "slosh")
+POOL_MODES = ("piston", "slosh")
 VARIABLES = ("added_mass", "damping", "excitation", "mass", "stiffness", "far_field")
 TAIL_END = 40.0  # rad/s; the damping is continued as ω⁻³ from the last frequency to here
 POOL_TAPER = (9.0, 12.0)  # rad/s; above 12 rad/s the solver's pool rows are not clean
@@ -56,12 +55,11 @@ KERNEL_LENGTH = 12.0  # s
 
 @dataclass(frozen=True)
 class Pool:
-    """Moon pool: centre (m), area of its free surface and of its opening (m²), length (m)."""
+    """Moon pool: centre (m), area of its free surface and of its opening (m²)."""
 
     centre: float
     area: float
     opening: float
-    length: float
 
 
 @dataclass(frozen=True)
@@ -111,12 +109,6 @@ class Kernel:
     damping: FloatArray
 
 
-def save_hydrodynamics(data: xr.Dataset, path: Path | str) -> None:
-    """Write coefficients to NetCDF under a temporary name, then rename."""
-    with replacing(Path(path)) as temporary:
-        write_netcdf(temporary, data)
-
-
 def shipped_hydrodynamics(name: str = "ck14e.nc") -> Path:
     """Path of a file of coefficients that ships with the package."""
     return Path(str(resources.files("seakeep.tank").joinpath("data", name)))
@@ -147,16 +139,14 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
                 f"the tank needs {expected!r}. Convert the coefficients, or build the file with "
                 "python -m seakeep.tank.build."
             )
-    missing = [name for name in VARIABLES if name not in data]
-    if missing:
-        raise RequestError(f"{source} misses {', '.join(missing)}. Build the file again.")
-    bad = [name for name in VARIABLES if not np.all(np.isfinite(data[name].values))]
+    bad = [n for n in VARIABLES if n not in data or not np.isfinite(data[n].values).all()]
     if bad:
         raise RequestError(
-            f"{source} holds values that are not finite in {', '.join(bad)}. Build the file again."
+            f"{source} misses {', '.join(bad)}, or holds values there that are not finite. Build "
+            "the file again."
         )
     names = tuple(str(n) for n in data["influenced_dof"].values)
-    if names not in (RIGID, DEGREES):
+    if names not in (RIGID, (*RIGID, *POOL_MODES)):
         raise RequestError(
             f"{source} has the degrees of freedom {', '.join(names)}; the tank needs "
             f"{', '.join(RIGID)}, with piston and slosh after them for a hull with a moon pool."
@@ -164,8 +154,7 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
     force, far_field = data["excitation"].values, data["far_field"].values.astype(float)
     pool = None
     if "piston" in names:
-        keys = ("pool_centre", "pool_area", "pool_opening", "pool_length")
-        pool = Pool(*(float(data.attrs[key]) for key in keys))
+        pool = Pool(*(float(data.attrs[f"pool_{key}"]) for key in ("centre", "area", "opening")))
     return Hydrodynamics(
         names=names,
         omega=data["omega"].values,

@@ -6,49 +6,29 @@ uniform readings c. The 500 Hz logger of the wave probes is the reference.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 import scipy
+import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
-from seakeep.tank.settings import (
-    ClockSettings,
-    InstrumentPlan,
-    Logger,
-    SlapSettings,
-    TankSettings,
-)
+from seakeep.tank.settings import ClockSettings, Logger, SlapSettings, TankSettings
 
-__all__ = ["Column", "Played", "Record", "clock_instants", "record_run", "slap_pulses", "trigger"]
+__all__ = ["Played", "clock_instants", "record_run", "slap_pulses", "trigger"]
 
+Columns = dict[str, tuple[str, FloatArray]]
+"""Unit and values of each column of a raw file."""
 
 TRIGGER_VOLTS = 5.0
 TRIGGER_NOISE = 0.01  # V
 LAMP_NOISE = 0.02
 FIRST_PULSE = 10.0  # s
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of a raw file: its unit, values, and decimals written."""
-
-    unit: str
-    values: FloatArray
-    decimals: int
-
-
-@dataclass(frozen=True)
-class Record:
-    """What one logger writes: the readings of its clock (s), and its columns."""
-
-    name: str
-    time: FloatArray
-    columns: dict[str, Column]
 
 
 @dataclass(frozen=True)
@@ -146,46 +126,42 @@ def _dropouts(
     return out
 
 
-def _probes(
-    played: Played, time: FloatArray, rate: float, rng: np.random.Generator
-) -> dict[str, Column]:
+def _probes(played: Played, time: FloatArray, rate: float, rng: np.random.Generator) -> Columns:
     instruments = played.settings.instruments
-    at: dict[float, FloatArray] = {}
-    columns = {}
+
+    @functools.cache
+    def wave(position: float) -> FloatArray:
+        linear = played.elevation(position, time)
+        return linear + played.crest(position, time) if instruments.second_order else linear
+
+    columns: Columns = {}
     for name, probe in instruments.probes.items():
-        if probe.position not in at:
-            at[probe.position] = played.elevation(probe.position, time)
-            if instruments.second_order:
-                at[probe.position] = at[probe.position] + played.crest(probe.position, time)
-        values = at[probe.position] + probe.noise * rng.standard_normal(time.size)
-        values = _dropouts(values, rate, probe.dropouts, rng)
-        columns[name] = Column("mm", 1e3 * values, 2)
+        values = wave(probe.position) + probe.noise * rng.standard_normal(time.size)
+        columns[name] = "mm", 1e3 * _dropouts(values, rate, probe.dropouts, rng)
     return columns
 
 
-def _mru(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -> dict[str, Column]:
+def _mru(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -> Columns:
     noise = played.settings.instruments
     q, v, a = played.states(time)
     zero = np.zeros(time.size)
-
-    def column(unit: str, true: FloatArray, sigma: float, decimals: int) -> Column:
-        factor = np.rad2deg(1.0) if unit.startswith("deg") else 1.0
-        noisy = true + sigma * rng.standard_normal(time.size)
-        return Column(unit, factor * noisy, decimals)
-
-    sigma_a, sigma_r, sigma_t = noise.acceleration_noise, noise.rate_noise, noise.angle_noise
-    return {
-        "acceleration_x": column("m/s^2", a[0], sigma_a, 4),
-        "acceleration_y": column("m/s^2", zero, sigma_a, 4),
-        "acceleration_z": column("m/s^2", a[1], sigma_a, 4),
-        "rate_x": column("deg/s", zero, sigma_r, 4),
-        "rate_y": column("deg/s", v[2], sigma_r, 4),
-        "rate_z": column("deg/s", zero, sigma_r, 4),
-        "heave": column("m", q[1], noise.heave_noise, 5),
-        "roll": column("deg", zero, sigma_t, 4),
-        "pitch": column("deg", q[2], sigma_t, 4),
-        "yaw": column("deg", zero, sigma_t, 4),
+    true = {
+        "acceleration_x": ("m/s^2", a[0], noise.acceleration_noise),
+        "acceleration_y": ("m/s^2", zero, noise.acceleration_noise),
+        "acceleration_z": ("m/s^2", a[1], noise.acceleration_noise),
+        "rate_x": ("deg/s", zero, noise.rate_noise),
+        "rate_y": ("deg/s", v[2], noise.rate_noise),
+        "rate_z": ("deg/s", zero, noise.rate_noise),
+        "heave": ("m", q[1], noise.heave_noise),
+        "roll": ("deg", zero, noise.angle_noise),
+        "pitch": ("deg", q[2], noise.angle_noise),
+        "yaw": ("deg", zero, noise.angle_noise),
     }
+    columns: Columns = {}
+    for name, (unit, values, sigma) in true.items():
+        factor = np.rad2deg(1.0) if unit.startswith("deg") else 1.0
+        columns[name] = unit, factor * (values + sigma * rng.standard_normal(time.size))
+    return columns
 
 
 def _immersed(played: Played, time: FloatArray, line: int) -> npt.NDArray[np.bool_]:
@@ -199,33 +175,28 @@ def _immersed(played: Played, time: FloatArray, line: int) -> npt.NDArray[np.boo
     return under
 
 
-def _loads(
-    played: Played, time: FloatArray, _: float, rng: np.random.Generator
-) -> dict[str, Column]:
+def _loads(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -> Columns:
     instruments = played.settings.instruments
-    true = played.loads(time)
     # Whether a line is wet changes slowly: every tenth sample finds the crossings.
     coarse = time[::10]
-    columns = {}
-    for line, name in enumerate(played.rig.line_names):
-        values = true[line] + instruments.load_noise * rng.standard_normal(time.size)
-        slap = instruments.slap.get(name)
-        if slap is not None:
+    columns: Columns = {}
+    for line, (name, true) in enumerate(
+        zip(played.rig.line_names, played.loads(time), strict=True)
+    ):
+        values = true + instruments.load_noise * rng.standard_normal(time.size)
+        if (slap := instruments.slap.get(name)) is not None:
             wet = np.repeat(_immersed(played, coarse, line), 10)[: time.size]
             values = values + slap_pulses(time, wet, slap, rng)
-        columns[f"mooring_{name}"] = Column("N", values, 4)
+        columns[f"mooring_{name}"] = "N", values
     return columns
 
 
-def _video(
-    played: Played, time: FloatArray, _: float, rng: np.random.Generator
-) -> dict[str, Column]:
-    surge = played.states(time)[0][0]
-    noisy = surge + played.settings.instruments.surge_noise * rng.standard_normal(time.size)
-    return {"surge": Column("m", noisy, 5)}
+def _video(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -> Columns:
+    noise = played.settings.instruments.surge_noise * rng.standard_normal(time.size)
+    return {"surge": ("m", played.states(time)[0][0] + noise)}
 
 
-_MAKERS: dict[Logger, Callable[..., dict[str, Column]]] = {
+_LOGGERS: dict[Logger, Callable[..., Columns]] = {
     "wave_probes": _probes,
     "mru": _mru,
     "loads": _loads,
@@ -234,34 +205,46 @@ _MAKERS: dict[Logger, Callable[..., dict[str, Column]]] = {
 """What each logger records of a run at instants, from a run, instants, rate and generator."""
 
 
-def _pulse(
-    settings: InstrumentPlan, name: str, time: FloatArray, rng: np.random.Generator
-) -> dict[str, Column]:
-    pulse = trigger(time, settings.trigger_period, settings.trigger_width)
-    noise = rng.standard_normal(time.size)
-    if name == "video":
-        return {"lamp": Column("-", pulse + LAMP_NOISE * noise, 4)}
-    return {"trigger": Column("V", TRIGGER_VOLTS * pulse + TRIGGER_NOISE * noise, 4)}
+def _record(readings: FloatArray, columns: Columns) -> xr.Dataset:
+    channels = {name: ("time", values, {"units": unit}) for name, (unit, values) in columns.items()}
+    return xr.Dataset(channels, coords={"time": ("time", readings, {"units": "s"})})
 
 
-def record_run(played: Played, rng: np.random.Generator) -> list[Record]:
-    """Record a run with all instruments, each in its own clock and with its own noise."""
-    settings = played.settings.instruments
-    records = []
-    for (name, make), child in zip(_MAKERS.items(), rng.spawn(len(_MAKERS)), strict=True):
-        clock = settings.clocks[name]
+def record_run(
+    played: Played, rng: np.random.Generator, single_rate: float | None = None
+) -> dict[str, xr.Dataset]:
+    """Record a run with all instruments, each with its own noise.
+
+    Parameters
+    ----------
+    played : Played
+        The run.
+    rng : Generator
+        Source of the noise.
+    single_rate : float, optional
+        Rate (Hz) of one logger ``"all"`` for all instruments, on the reference clock and without
+        trigger. By default each logger has its own rate and clock, and records the trigger.
+
+    Returns
+    -------
+    dict of str to Dataset
+        Logger → its columns, with units, over the readings of its clock (s).
+    """
+    instruments = played.settings.instruments
+    records: dict[str, xr.Dataset] = {}
+    together: Columns = {}
+    for (name, make), child in zip(_LOGGERS.items(), rng.spawn(len(_LOGGERS)), strict=True):
+        clock = instruments.clocks[name] if single_rate is None else ClockSettings(rate=single_rate)
         readings, instants = clock_instants(clock, played.length)
-        columns = _pulse(settings, name, instants, child) | make(
-            played, instants, clock.rate, child
-        )
-        records.append(Record(name, readings, columns))
-    return records
-
-
-def record_together(played: Played, rate: float, rng: np.random.Generator) -> Record:
-    """Record a run with all instruments on one logger of the given rate (Hz)."""
-    time, _ = clock_instants(ClockSettings(rate=rate), played.length)
-    columns: dict[str, Column] = {}
-    for make, child in zip(_MAKERS.values(), rng.spawn(len(_MAKERS)), strict=True):
-        columns |= make(played, time, rate, child)
-    return Record("all", time, columns)
+        columns: Columns = {}
+        if single_rate is None:
+            pulse = trigger(instants, instruments.trigger_period, instruments.trigger_width)
+            noise = child.standard_normal(instants.size)
+            if name == "video":
+                columns["lamp"] = "-", pulse + LAMP_NOISE * noise
+            else:
+                columns["trigger"] = "V", TRIGGER_VOLTS * pulse + TRIGGER_NOISE * noise
+        columns |= make(played, instants, clock.rate, child)
+        records[name] = _record(readings, columns)
+        together |= columns
+    return records if single_rate is None else {"all": _record(readings, together)}

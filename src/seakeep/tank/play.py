@@ -27,19 +27,18 @@ from seakeep.tank.delivery import (
 )
 from seakeep.tank.dynamics import Rig, assemble_rig, simulate
 from seakeep.tank.hydrodynamics import excitation_at
-from seakeep.tank.instruments import Played, record_run, record_together
+from seakeep.tank.instruments import Played, record_run
 from seakeep.tank.seas import Sea, sea_of_run
 from seakeep.tank.settings import TankSettings
 from seakeep.tank.video import SIDE_VIEW, render_side_view
 
-__all__ = ["check_settings", "generator", "noisy_truth", "play", "play_run", "truth"]
-
+__all__ = ["check_settings", "generator", "play", "play_run", "truth"]
 
 CAMPAIGN_FILE = "campaign.toml"
 LOGGERS = ("wave_probes", "mru", "loads", "video", "all")
 SINGLE_RATE = 100.0  # Hz, where all instruments share a logger
 MARGIN = 2.0  # s simulated before and after what any logger records
-STREAMS = {"waves": 0, "instruments": 1, "truth": 2, "video": 3}
+STREAMS = {"waves": 0, "instruments": 1, "video": 3}
 
 
 def generator(settings: TankSettings, run: str, stream: str) -> np.random.Generator:
@@ -48,27 +47,18 @@ def generator(settings: TankSettings, run: str, stream: str) -> np.random.Genera
 
 
 def _sea(settings: TankSettings, rig: Rig, name: str) -> Sea:
-    sea = sea_of_run(
-        name, settings.runs[name], settings.facility, generator(settings, name, "waves")
-    )
+    if name not in settings.runs:
+        raise RequestError(
+            f"there is no run {name!r}.{did_you_mean(name, settings.runs)} The runs are "
+            f"{', '.join(settings.runs)}."
+        )
+    rng = generator(settings, name, "waves")
+    sea = sea_of_run(name, settings.runs[name], settings.facility, rng)
     try:
         excitation_at(rig.hydro, sea.omega)
     except RequestError as error:
         raise RequestError(f"runs.{name}: {error}") from error
     return sea
-
-
-def _chosen(settings: TankSettings, names: Iterable[str] | None) -> list[str]:
-    wanted = list(settings.runs) if names is None else list(names)
-    for name in wanted:
-        if name not in settings.runs:
-            raise RequestError(
-                f"there is no run {name!r}.{did_you_mean(name, settings.runs)} The runs are "
-                f"{', '.join(settings.runs)}."
-            )
-    if not wanted:
-        raise RequestError("no run was asked for. Add a table [runs.NAME] to the settings.")
-    return wanted
 
 
 def check_settings(settings: TankSettings, names: Iterable[str] | None = None) -> Rig:
@@ -82,10 +72,10 @@ def check_settings(settings: TankSettings, names: Iterable[str] | None = None) -
     Raises
     ------
     RequestError
-        If hydrodynamics, moorings, step or waves are not possible.
+        If a run does not exist, or hydrodynamics, moorings, step or waves are not possible.
     """
     rig = assemble_rig(settings)
-    for name in _chosen(settings, names):
+    for name in settings.runs if names is None else names:
         _sea(settings, rig, name)
     return rig
 
@@ -96,7 +86,6 @@ def play_run(settings: TankSettings, name: str, rig: Rig | None = None) -> Playe
     A rig from :func:`check_settings` saves its making for each run.
     """
     made = assemble_rig(settings) if rig is None else rig
-    (name,) = _chosen(settings, [name])
     sea = _sea(settings, made, name)
     run = settings.runs[name]
     clocks = settings.instruments.clocks.values()
@@ -106,15 +95,12 @@ def play_run(settings: TankSettings, name: str, rig: Rig | None = None) -> Playe
     return Played(settings, made, sea, motion, run.length)
 
 
-def _labelled(name: str) -> dict[str, str]:
-    channel = canonical_channel(name)
-    extra = {
-        "piston": ("m", "moon-pool piston elevation"),
-        "slosh": ("m", "moon-pool sloshing elevation"),
-        "surge_slow": ("m", "slow part of surge"),
-    }
-    unit, label = extra[name] if channel is None else (channel.units, channel.long_name)
-    return {"units": unit, "long_name": label}
+POOL_AND_DRIFT = {
+    "piston": ("m", "moon-pool piston elevation"),
+    "slosh": ("m", "moon-pool sloshing elevation"),
+    "surge_slow": ("m", "slow part of surge"),
+}
+"""Units and words of the true channels that no campaign has."""
 
 
 def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
@@ -153,22 +139,19 @@ def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
         values[f"eta_{probe}"] = played.elevation(at.position, time)
         if settings.instruments.second_order:
             values[f"eta_{probe}_crest"] = played.crest(at.position, time)
-    data = xr.Dataset(
-        {key: ("time", value, _labelled(key)) for key, value in values.items()},
-        coords={"time": ("time", time, {"units": "s", "long_name": "time, reference clock"})},
-    )
+    data = xr.Dataset(coords={"time": time})
+    data["time"].attrs = {"units": "s", "long_name": "time, reference clock"}
+    for key, value in values.items():
+        channel = canonical_channel(key)
+        known = (channel.units, channel.long_name) if channel else POOL_AND_DRIFT[key]
+        data[key] = "time", value, dict(zip(("units", "long_name"), known, strict=True))
     for probe, at in settings.instruments.probes.items():
         data[f"eta_{probe}"].attrs["x_position"] = at.position
-    return data.assign_attrs(_attributes(played, name))
-
-
-def _attributes(played: Played, name: str) -> dict[str, str | float]:
-    settings, run = played.settings, played.settings.runs[name]
-    attrs: dict[str, str | float] = {
+    data.attrs = {
         MARK: TRUTH,
         "run": name,
         "seed": settings.seed,
-        "startup": run.startup,
+        "startup": settings.runs[name].startup,
         "water_depth": settings.facility.water_depth,
         "x_position": settings.vessel.position,
         "frame": "x downstream, z up, pitch positive bow up; motions of the centre of gravity",
@@ -177,72 +160,27 @@ def _attributes(played: Played, name: str) -> dict[str, str | float]:
         "settings": settings.model_dump_json(exclude={"vessel": {"hydrodynamics"}}),
     }
     for logger, clock in settings.instruments.clocks.items():
-        attrs[f"clock_{logger}_offset"] = clock.offset
-        attrs[f"clock_{logger}_drift_ppm"] = clock.drift
-    return attrs
-
-
-def noisy_truth(
-    settings: TankSettings, name: str, step: float, rig: Rig | None = None
-) -> xr.Dataset:
-    """Channels of a run as ideal instruments would give them: true values plus stated noise.
-
-    No clock is off, nothing slaps, drops out or is derived: what is left between this and the
-    raw files is the measurement chain's work.
-
-    Parameters
-    ----------
-    settings : TankSettings
-        The settings.
-    name : str
-        The run.
-    step : float
-        Time step, s.
-    rig : Rig, optional
-        From :func:`check_settings`.
-
-    Returns
-    -------
-    Dataset
-        The eleven channels of the paper and the wave probes, start-up included.
-    """
-    played = play_run(settings, name, rig)
-    rng = generator(settings, name, "truth")
-    noise = settings.instruments
-    clean = truth(played, name, step)
-    sigma = {
-        "surge": noise.surge_noise, "heave": noise.heave_noise, "pitch": noise.angle_noise,
-        "surge_rate": 0.0, "heave_rate": 0.0, "pitch_rate": noise.rate_noise,
-        "surge_acceleration": noise.acceleration_noise,
-        "heave_acceleration": noise.acceleration_noise,
-        "pitch_acceleration": 0.0,
-    }  # fmt: skip
-    sigma |= {f"mooring_{line}": noise.load_noise for line in settings.moorings}
-    sigma |= {f"eta_{probe}": at.noise for probe, at in noise.probes.items()}
-    data = clean[list(sigma)]
-    for channel, level in sigma.items():
-        data[channel] = data[channel] + level * rng.standard_normal(data.sizes["time"])
-        data[channel].attrs = dict(clean[channel].attrs)
+        data.attrs[f"clock_{logger}_offset"] = clock.offset
+        data.attrs[f"clock_{logger}_drift_ppm"] = clock.drift
     return data
 
 
-def _check_outputs(folder: Path, names: list[str], kind: str, filmed: list[str]) -> None:
+def _check_outputs(folder: Path, names: list[str], kind: str) -> None:
     """Refuse to overwrite a campaign file or a record that the tank has not written."""
-    if is_there(campaign := folder / CAMPAIGN_FILE):
-        check_output(campaign, CAMPAIGN)
+    if is_there(folder / CAMPAIGN_FILE):
+        check_output(folder / CAMPAIGN_FILE, CAMPAIGN)
     for name in names:
         raw, hidden = folder / "raw" / name, folder / "truth" / f"{name}.nc"
+        written = [path for path in raw.glob("*") if path.suffix in (f".{kind}", ".mp4")]
+        if written and not hidden.exists():  # which is written first
+            raise RequestError(
+                f"{written[0]} exists, and no truth of the tank beside it; it may be a "
+                "measurement. Choose another folder."
+            )
         if hidden.exists():
             check_output(hidden, TRUTH)
-        records = [raw / f"{logger}.{kind}" for logger in LOGGERS]
-        films = [raw / f"{SIDE_VIEW}.mp4"] if name in filmed else []
-        for path in filter(Path.exists, [*records, *films]):
-            if not hidden.exists():  # which is written first
-                raise RequestError(
-                    f"{path} exists, and no truth of the tank beside it; it may be a measurement. "
-                    "Choose another folder."
-                )
-            if path in records:
+        for path in written:
+            if path.stem in LOGGERS:
                 check_output(path, RAW, header=FIRST_LINE)
 
 
@@ -291,26 +229,28 @@ def play(
     """
     if kind not in ("csv", "nc"):
         raise RequestError(f"raw files are 'csv' or 'nc'; received {kind!r}. Choose one.")
-    chosen = _chosen(settings, names)
-    filmed = _chosen(settings, videos) if (videos := list(videos)) else []
+    chosen, filmed = list(settings.runs if names is None else names), list(videos)
+    if not chosen:
+        raise RequestError("no run was asked for. Add a table [runs.NAME] to the settings.")
     if filmed:
         opencv("rendering")
+    rig = check_settings(settings, [*chosen, *filmed])
     part = settings.model_copy(update={"runs": {n: settings.runs[n] for n in chosen}})
-    rig = check_settings(part)
     folder = Path(out)
-    _check_outputs(folder, chosen, kind, filmed)
+    _check_outputs(folder, chosen, kind)
     files: dict[str, dict[str, Path]] = {}
     for done, name in enumerate(chosen):
         if progress is not None:
             progress(done, len(chosen), name)
         played = play_run(part, name, rig)
-        rng = generator(part, name, "instruments")
-        records = (
-            [record_together(played, SINGLE_RATE, rng)] if one_logger else record_run(played, rng)
-        )
         raw, hidden = make_folder(folder / "raw" / name), make_folder(folder / "truth")
         write_dataset(truth(played, name), hidden / f"{name}.nc")
-        files[name] = {record.name: write_record(record, raw, kind) for record in records}
+        rng = generator(part, name, "instruments")
+        records = record_run(played, rng, SINGLE_RATE if one_logger else None)
+        files[name] = {
+            logger: write_record(record, raw / f"{logger}.{kind}")
+            for logger, record in records.items()
+        }
         if name in filmed:
             files[name][SIDE_VIEW] = render_side_view(
                 played, raw / f"{SIDE_VIEW}.mp4", generator(part, name, "video")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, Progress
 from seakeep.errors import RequestError
 from seakeep.signals import (
     encounter_period,
@@ -18,13 +21,21 @@ from seakeep.signals import (
 )
 from seakeep.signals.time_axis import over_gaps
 from seakeep.signals.waves import paper_welch
+from seakeep.tank.dynamics import Rig
 from seakeep.tank.instruments import Played, record_run
-from seakeep.tank.play import generator
+from seakeep.tank.play import generator, play_run, truth
 from seakeep.tank.settings import TankSettings
 from seakeep.waves import group_speed, phase_speed, wavelength_to_frequency
 
-__all__ = ["PAPER", "Realised", "Row", "comparison", "matrix_rows", "paper_peak", "realise"]
-
+__all__ = [
+    "PAPER",
+    "Realised",
+    "comparison",
+    "matrix_rows",
+    "paper_peak",
+    "realise",
+    "realise_runs",
+]
 
 PAPER = {
     "significant height": (0.16, 0.01, "m"),
@@ -36,6 +47,7 @@ PAPER = {
 }
 """The paper's realised waves, the tolerance we hold ours to, and the unit."""
 
+MATRIX = ("h [m]", "λ/L", "phase speed [m/s]", "group speed [m/s]", "realised h [m]", "runs")
 HULL_LENGTH = 1.40  # m, by which the paper divides wavelengths
 
 
@@ -44,8 +56,8 @@ class Realised:
     """One run as measured by its forward probe (low-passed elevation), its start-up left out.
 
     The peak period is by the paper's Welch settings; `height` is the mean of the single waves'.
-    `slack` is the part of the time for which each line was slack, `spread` and `mean` the
-    standard deviation and mean of each true motion and load. SI.
+    `motions` has a row for each true motion and load, with its mean, its SD, and the part of the
+    time for which a line was slack. SI.
     """
 
     run: str
@@ -57,25 +69,7 @@ class Realised:
     peak_period: float
     height: float
     height_spread: float
-    slack: dict[str, float]
-    spread: dict[str, float]
-    mean: dict[str, float]
-
-
-@dataclass(frozen=True)
-class Row:
-    """A realised number beside the paper's."""
-
-    name: str
-    unit: str
-    ours: float
-    paper: float
-    tolerance: float
-
-    @property
-    def agrees(self) -> bool:
-        """Whether ours lies within the tolerance."""
-        return abs(self.ours - self.paper) <= self.tolerance
+    motions: pd.DataFrame
 
 
 def paper_peak(elevation: npt.ArrayLike, dt: float) -> tuple[float, FloatArray, FloatArray]:
@@ -84,31 +78,38 @@ def paper_peak(elevation: npt.ArrayLike, dt: float) -> tuple[float, FloatArray, 
     return float(1.0 / frequency[np.argmax(density)]), frequency, density
 
 
-def _forward_probe(settings: TankSettings) -> str:
-    probes = settings.instruments.probes
-    if not probes:
-        raise RequestError("no wave probe is set. Add a table under [instruments.probes].")
-    return min(probes, key=lambda n: (probes[n].position, probes[n].noise))
+def realise_runs(
+    settings: TankSettings, rig: Rig, names: Sequence[str], progress: Progress
+) -> list[Realised]:
+    """Play runs, and measure each as the paper measures it; raises as :func:`realise`."""
+    measured = []
+    for done, name in enumerate(names):
+        progress(done, len(names), name)
+        measured.append(realise(play_run(settings, name, rig), name))
+    progress(len(names), len(names), "done")
+    return measured
 
 
 def realise(played: Played, name: str) -> Realised:
-    """Measure one run as the paper measures it."""
+    """Measure one run as the paper measures it.
+
+    Raises RequestError if the settings have no wave probe.
+    """
     settings, run = played.settings, played.settings.runs[name]
-    probe = _forward_probe(settings)
-    record = record_run(played, generator(settings, name, "instruments"))[0]
+    probes = settings.instruments.probes
+    if not probes:
+        raise RequestError("no wave probe is set. Add a table under [instruments.probes].")
+    forward = min(probes, key=lambda n: (probes[n].position, probes[n].noise))
+    record = record_run(played, generator(settings, name, "instruments"))["wave_probes"]
     dt = 1.0 / settings.instruments.clocks["wave_probes"].rate
-    values = over_gaps(1e-3 * record.columns[probe].values)
     edges = (10.0, 10.75) if dt < 1 / 22 else (0.4 / dt, 0.45 / dt)
-    eta = low_pass(values, dt, *edges)[record.time >= run.startup]
-    time = played.rig.step * np.arange(int(played.length / played.rig.step) + 1, dtype=float)
-    time = time[time >= run.startup]
-    position, _, _ = played.states(time)
-    loads = played.loads(time)
-    channels = dict(zip(played.rig.names, position, strict=True))
-    channels["surge_fast"] = position[0] - np.interp(
-        time, played.motion.time, played.motion.slow_surge
-    )
-    channels |= {f"mooring_{n}": x for n, x in zip(played.rig.line_names, loads, strict=True)}
+    low_passed = low_pass(over_gaps(1e-3 * record[forward].values), dt, *edges)
+    eta = low_passed[record["time"].values >= run.startup]
+    true = truth(played, name)
+    true = true.isel(time=true["time"].values >= run.startup)
+    true["surge_fast"] = true["surge"] - true["surge_slow"]
+    loads = [f"mooring_{line}" for line in played.rig.line_names]
+    motions = true[[*played.rig.names, "surge_fast", *loads]].to_dataframe()
     heights = wave_heights(eta, dt)
     return Realised(
         run=name,
@@ -120,81 +121,58 @@ def realise(played: Played, name: str) -> Realised:
         peak_period=paper_peak(eta, dt)[0],
         height=float(heights.mean()),
         height_spread=float(heights.std(ddof=1)),
-        slack={
-            n: float(np.mean(x <= 0.0)) for n, x in zip(played.rig.line_names, loads, strict=True)
-        },
-        spread={n: float(x.std()) for n, x in channels.items()},
-        mean={n: float(x.mean()) for n, x in channels.items()},
+        motions=pd.DataFrame(
+            {
+                "mean": motions.mean(),
+                "SD": motions.std(ddof=0),
+                "slack": (motions[loads] <= 0.0).mean(),
+            }
+        ).loc[motions.columns],
     )
 
 
-def comparison(settings: TankSettings, realised: list[Realised]) -> list[Row]:
-    """Numbers that the paper states, ours beside them.
+def comparison(settings: TankSettings, realised: list[Realised]) -> pd.DataFrame:
+    """Numbers that the paper states (index), their unit, ours, the paper's and the tolerance.
 
     Means over the irregular runs; the mean height of each regular run whose wavelength is one of
     the paper's.
     """
-    rows = []
-    seas = [r for r in realised if r.irregular]
-    means = {
-        "significant height": [r.significant_height for r in seas],
-        "zero-up-crossing period": [r.zero_up_period for r in seas],
-        "peak period (paper's Welch)": [r.peak_period for r in seas],
-    }
+    seas = [each for each in realised if each.irregular]
+    ours: dict[str, Any] = {}
+    if seas:
+        ours["significant height"] = np.mean([each.significant_height for each in seas])
+        ours["zero-up-crossing period"] = np.mean([each.zero_up_period for each in seas])
+        ours["peak period (paper's Welch)"] = np.mean([each.peak_period for each in seas])
     for each in realised:
-        length = settings.runs[each.run].wavelength
-        if length is not None:
-            means[f"height, wavelength {length:.2f} m"] = [each.height]
-    for name, values in means.items():
-        if values and name in PAPER:
-            paper, tolerance, unit = PAPER[name]
-            rows.append(Row(name, unit, float(np.mean(values)), paper, tolerance))
-    return rows
+        if (length := settings.runs[each.run].wavelength) is not None:
+            ours[f"height, wavelength {length:.2f} m"] = each.height
+    paper = pd.DataFrame.from_dict(PAPER, orient="index", columns=["paper", "tolerance", "unit"])
+    paper.insert(0, "here", pd.Series(ours, dtype=float))
+    return paper.dropna()[["unit", "here", "paper", "tolerance"]]
 
 
 def matrix_rows(settings: TankSettings, realised: list[Realised]) -> list[dict[str, str]]:
     """Test matrix as in the paper's first table, one row per sea, with realised heights."""
     depth = settings.facility.water_depth
-    rows: list[dict[str, str]] = []
-    seas: dict[tuple[str, str], list[Realised]] = {}
+    rows: list[tuple[str, ...]] = []
+    seas: dict[tuple[str, str], list[float]] = {}
     for each in realised:
         run = settings.runs[each.run]
         if run.spectrum is not None:
             high = run.nominal_height or run.spectrum.height
             stated = "" if high is None else f"{high:.2f}"
-            seas.setdefault((stated, run.spectrum.kind.replace("_", "–").title()), []).append(each)
-    for (nominal, kind), runs in seas.items():
-        values = np.array([r.significant_height for r in runs])
-        spread = values.std(ddof=1) if values.size > 1 else 0.0
-        rows.append(
-            _row(nominal, f"{kind} spectrum", "", "", f"{values.mean():.3f} ± {spread:.3f}", runs)
-        )
+            kind = run.spectrum.kind.replace("_", "–").title()
+            seas.setdefault((stated, kind), []).append(each.significant_height)
+    for (nominal, kind), heights in seas.items():
+        spread = np.std(heights, ddof=1) if len(heights) > 1 else 0.0
+        height = f"{np.mean(heights):.3f} ± {spread:.3f}"
+        rows.append((nominal, f"{kind} spectrum", "", "", height, str(len(heights))))
     for each in realised:
         run = settings.runs[each.run]
-        if run.wavelength is None:
-            continue
-        omega = wavelength_to_frequency(run.wavelength, depth)
-        rows.append(
-            _row(
-                f"{run.nominal_height or run.height:.2f}",
-                f"{run.wavelength / HULL_LENGTH:g}",
-                f"{float(phase_speed(omega, depth)):.3f}",
-                f"{float(group_speed(omega, depth)):.3f}",
-                f"{each.height:.3f} ± {each.height_spread:.3f}",
-                [each],
-            )
-        )
-    return rows
-
-
-def _row(
-    nominal: str, ratio: str, phase: str, group: str, height: str, runs: list[Realised]
-) -> dict[str, str]:
-    return {
-        "h [m]": nominal,
-        "λ/L": ratio,
-        "phase speed [m/s]": phase,
-        "group speed [m/s]": group,
-        "realised h [m]": height,
-        "runs": str(len(runs)),
-    }
+        if run.wavelength is not None:
+            omega = wavelength_to_frequency(run.wavelength, depth)
+            high, ratio = run.nominal_height or run.height, run.wavelength / HULL_LENGTH
+            speeds = (f"{float(of(omega, depth)):.3f}" for of in (phase_speed, group_speed))
+            height = f"{each.height:.3f} ± {each.height_spread:.3f}"
+            rows.append((f"{high:.2f}", f"{ratio:g}", *speeds, height, "1"))
+    return [dict(zip(MATRIX, row, strict=True)) for row in rows]

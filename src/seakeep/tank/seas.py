@@ -176,20 +176,18 @@ def sea_of_run(
     Raises RequestError if a frequency or the height is beyond the wave maker.
     """
     low, high = facility.wave_band
+    depth = facility.water_depth
     if run.spectrum is not None:
-        sea = irregular_sea(run.spectrum, facility.water_depth, rng)
+        sea = irregular_sea(run.spectrum, depth, rng)
         asked = run.spectrum.band
         height = 4.0 * float(np.sqrt(0.5 * np.sum(sea.amplitude**2)))
     else:
         length, height = run.wavelength or 0.0, run.height or 0.0
-        sea = regular_sea(length, height, run.unsteadiness, facility.water_depth, rng)
-        centre = float(wavelength_to_frequency(length, facility.water_depth)) / (2 * np.pi)
-        asked = (centre, centre)
+        sea = regular_sea(length, height, run.unsteadiness, depth, rng)
+        asked = (sea.omega[0] / (2 * np.pi),) * 2
     if asked[0] < low or asked[1] > high:
-        shortest, longest = (
-            2 * np.pi / float(wavenumber(2 * np.pi * f, facility.water_depth)) for f in (high, low)
-        )
         wanted = "–".join(dict.fromkeys(f"{f:.3g}" for f in asked))
+        longest, shortest = 2 * np.pi / wavenumber([2 * np.pi * low, 2 * np.pi * high], depth)
         raise RequestError(
             f"runs.{name} asks for waves of {wanted} Hz; the wave maker covers {low:g}–{high:g} Hz "
             f"(wavelengths of {shortest:.2f}–{longest:.1f} m). Change the wave, or "

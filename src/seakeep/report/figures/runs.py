@@ -25,8 +25,8 @@ from seakeep.report.style import (
 from seakeep.signals import wave_spectrum
 from seakeep.signals.time_axis import over_gaps
 from seakeep.study import StudyResult
-from seakeep.tank.dynamics import Rig
-from seakeep.tank.hydrodynamics import excitation_at, kernel_coefficients, response
+from seakeep.tank.dynamics import Rig, linear_response
+from seakeep.tank.hydrodynamics import excitation_at, kernel_coefficients
 from seakeep.tank.realised import Realised, paper_peak
 from seakeep.tank.seas import spectral_density
 from seakeep.tank.settings import TankSettings
@@ -217,7 +217,7 @@ def hydrodynamics_figure(rig: Rig, settings: TankSettings) -> Figure:
     """Added mass, damping, excitation and response amplitude operators over frequency."""
     hydro, omega = rig.hydro, rig.hydro.omega
     fine, waves = np.linspace(max(0.5, omega[0]), omega[-1], 500), np.linspace(1.6, 9.0, 600)
-    motion = np.abs(response(hydro, waves, rig.linear_damping, rig.mooring_stiffness, rig.kernel))
+    motion = np.abs(linear_response(rig, waves))
     slope = wavenumber(waves, hydro.water_depth)
     diagonal = [np.diagonal(each, axis1=1, axis2=2) for each in (hydro.added_mass, hydro.damping)]
     points = [*diagonal, np.abs(hydro.excitation)]
