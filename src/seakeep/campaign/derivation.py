@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -36,7 +37,7 @@ ANGLES = ("roll", "pitch", "yaw")
 AXES = {"surge": 0, "sway": 1, "heave": 2, "x": 0, "y": 1, "z": 2}
 
 
-Channels = Mapping[str, xr.Variable]
+Channels = Mapping[Any, xr.Variable]
 
 
 def derive(

@@ -180,7 +180,7 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
             keys = {"time", "time_unit", "sampling_rate"}
             stated = settings.instruments[key].model_dump(include=keys, exclude_none=True)
             options = options.model_copy(update=stated)
-        columns = reader(path, options.known())
+        columns = reader(path, options)
         if key and time_column(columns, options.time) is not None:
             options = options.model_copy(update={"sampling_rate": None})
         loggers[key] = Logger(key, path, columns, options)
@@ -500,7 +500,6 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
     settings, groups, late = run.settings, dict(run.groups), []
     needed = needed_channels(settings, settings.channel_names if wanted is None else wanted)
     home = {str(name): key for key, data in groups.items() for name in data.data_vars}
-    channels = {key: variables_of(data) for key, data in groups.items()}
     for name in derivation_order(settings.derived, settings.channel_names):
         if name not in needed:
             continue
@@ -510,26 +509,11 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
         if home[name] == COMMON:
             late.append(name)
             continue
-        own = channels[home[name]]
-        step = uniform_step(groups[home[name]]["time"].to_numpy(), f"run '{run.name}'")
-        own |= derive(own, name, settings, step, run.name)
-    for key, data in groups.items():
-        groups[key] = _dataset(data.variables["time"], channels[key], data.attrs)
+        data = groups[home[name]]
+        step = uniform_step(data["time"].to_numpy(), f"run '{run.name}'")
+        made = derive(data.variables, name, settings, step, run.name)
+        groups[home[name]] = data.assign({name: made.pop(name)}).assign_coords(made)
     return replace(run, groups=groups, late=tuple(late))
-
-
-def variables_of(data: xr.Dataset) -> dict[str, xr.Variable]:
-    """Channels of a Dataset and their flags, by name."""
-    return {str(name): each for name, each in data.variables.items() if name != "time"}
-
-
-def _dataset(
-    time: xr.Variable, channels: Mapping[str, xr.Variable], attributes: Mapping[Any, Any]
-) -> xr.Dataset:
-    """Channels as variables, their flags as coordinates."""
-    flags = {name: each for name, each in channels.items() if name.endswith("_flags")}
-    data = {name: each for name, each in channels.items() if name not in flags}
-    return xr.Dataset(data, {"time": time, **flags}, attributes)
 
 
 def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
@@ -544,16 +528,15 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         channels |= _on_axis(group, time, dt, run.settings.preparation, run.name)
     for name in run.late:
         channels |= derive(channels, name, run.settings, dt, run.name)
-    out = {}
-    for name in run.settings.channel_names:
-        if name in channels:
-            out[name] = channels[name]
-            if (flags := channels.get(f"{name}_flags")) is not None:
-                lost = (flags.to_numpy() & MISSING) > 0
-                out[name] = out[name].copy(data=np.where(lost, np.nan, out[name].to_numpy()))
-                out[f"{name}_flags"] = flags
-    attributes = next(iter(run.groups.values()))["time"].attrs
-    return replace(run, data=_dataset(xr.Variable("time", time, attributes), out, {}))
+    axis = xr.Variable("time", time, next(iter(run.groups.values()))["time"].attrs)
+    data, coordinates = {}, {"time": axis}
+    for name in (each for each in run.settings.channel_names if each in channels):
+        data[name] = channels[name]
+        if (flags := channels.get(f"{name}_flags")) is not None:
+            lost = (flags.to_numpy() & MISSING) > 0
+            data[name] = data[name].copy(data=np.where(lost, np.nan, data[name].to_numpy()))
+            coordinates[f"{name}_flags"] = flags
+    return replace(run, data=xr.Dataset(data, coordinates))
 
 
 def _axis(run: Run, dt: float) -> FloatArray:
