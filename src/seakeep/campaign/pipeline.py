@@ -79,7 +79,7 @@ from seakeep.signals import (
     uniform_step,
 )
 from seakeep.signals.synchronisation import ASSUMED
-from seakeep.signals.time_axis import instant_text, stretches
+from seakeep.signals.time_axis import instant_text, span_text, stretches
 from seakeep.sizes import LONG_NUMBERS, check_numbers
 from seakeep.toml import Length, number
 
@@ -543,9 +543,10 @@ def _axis(run: Run, dt: float) -> FloatArray:
     begin = max(float(each["time"][0]) for each in run.groups.values())
     end = min(float(each["time"][-1]) for each in run.groups.values())
     if end <= begin:
+        times = {name: each["time"].to_numpy() for name, each in run.groups.items()}
         spans = ", ".join(
-            f"{name} {_instant(each, 0)} to {_instant(each, -1)} s"
-            for name, each in run.groups.items()
+            f"{name} {span_text(t[0], t[-1], float(np.median(np.diff(t))))}"
+            for name, t in times.items()
         )
         raise DataError(
             f"run '{run.name}': its instruments never recorded together ({spans}, on the "
@@ -573,11 +574,6 @@ def _axis(run: Run, dt: float) -> FloatArray:
     )
     instants: FloatArray = origin + dt * np.arange(first, last + 1)
     return instants
-
-
-def _instant(group: xr.Dataset, at: int) -> str:
-    time = group["time"].to_numpy()
-    return instant_text(float(time[at]), float(np.median(np.diff(time))))
 
 
 def _on_axis(
@@ -738,10 +734,9 @@ def _refuse_outside(
     """Refuse a span that reaches beyond a record by more than its last sample's own step."""
     finite = [edge for edge in span if np.isfinite(edge)]
     if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):
-        begin, end = _texts(record, dt)
         raise RequestError(
-            f"{key}: received [{', '.join(_texts(span, dt))}] s, and the record runs from {begin} "
-            f"to {end} s. Correct the span; 'inf' stands for the end."
+            f"{key}: received {_shown(span, dt)} s, and the record runs from "
+            f"{span_text(*record, dt)}. Correct the span; 'inf' stands for the end."
         )
 
 
@@ -751,23 +746,19 @@ def _refuse_empty(
     """Refuse a span that holds too few of a run's instants, whose record is the reference's."""
     if (count := int(inside(time, span, dt).sum())) > 1:
         return
-    stretch = ", ".join(_texts(span, dt))
-    stated = f"{key}: [{stretch}] s holds {count} sample(s) at a step of {dt:.4g} s"
-    begin, end = _texts((float(time[0]), float(time[-1])), dt)
+    stated = f"{key}: {_shown(span, dt)} s holds {count} sample(s) at a step of {dt:.4g} s"
+    common = span_text(float(time[0]), float(time[-1]), dt)
     if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:
-        first, last = _texts(record, dt)
         raise DataError(
-            f"{stated}, since all loggers recorded together only from {begin} to {end} s; the "
-            f"reference runs from {first} to {last} s. Check whether the files of the other "
-            "loggers are whole, or correct the span."
+            f"{stated}, since all loggers recorded together only from {common}; the reference runs "
+            f"from {span_text(*record, dt)}. Check whether the files of the other loggers are "
+            "whole, or correct the span."
         )
-    raise RequestError(
-        f"{stated}. Lengthen the span, or move it into the run's {begin} to {end} s."
-    )
+    raise RequestError(f"{stated}. Lengthen the span, or move it into the run's {common}.")
 
 
-def _texts(span: tuple[float, float], dt: float) -> tuple[str, str]:
-    return instant_text(span[0], dt), instant_text(span[1], dt)
+def _shown(span: tuple[float, float], dt: float) -> str:
+    return f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}]"
 
 
 def attributes_of(

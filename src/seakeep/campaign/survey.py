@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import xarray as xr
-
 from seakeep.arrays import Progress
 from seakeep.campaign.pipeline import (
     Run,
@@ -194,20 +192,13 @@ def _left_out(run: str, error: SeakeepError, period: bool, drift: bool) -> str:
     )
 
 
-def _waves_of(run: Run, channel: str) -> xr.Dataset:
-    """The wave channel of a run, at its own rate."""
-    run = derived(cleaned(mapped(run, [channel])), [channel])
-    for group in run.groups.values():
-        if channel in group:
-            return group
-    data = resampled(run, uniform_step(run.reference_time)).data
-    assert data is not None
-    return data
-
-
 def _period(run: Run, channel: str) -> tuple[float, float]:
     """Counted period and energy period of the waves of a run, s."""
-    waves = _waves_of(run, channel)
+    run = derived(cleaned(mapped(run, [channel])), [channel])
+    waves = next((group for group in run.groups.values() if channel in group), None)
+    if waves is None:  # it needs several loggers
+        waves = resampled(run, uniform_step(run.reference_time)).data
+        assert waves is not None
     time, series = waves["time"].to_numpy(), waves[channel].to_numpy()
     step = uniform_step(time, f"run '{run.name}'")
     kept = inside(time, used_span(run.own), step)

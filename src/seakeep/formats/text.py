@@ -226,7 +226,7 @@ def _remarks(
 
 def _decimal(path: Path, body: list[str], delimiter: str) -> str:
     """The mark of decimals: a comma if cells are numbers with a comma and none has a point."""
-    if delimiter == "," or not any("," in line for line in body):
+    if delimiter == "," or "," not in "".join(body):
         return "."
     for line in body:
         cells = [cell for cell in _cells(line, delimiter) if _NUMBER.match(cell)]
@@ -297,7 +297,7 @@ def _units(cells: list[str], headers: list[str]) -> list[str] | None:
 def _frame(path: Path, lines: list[str], layout: _Layout) -> pd.DataFrame:
     """Cells of the body, as pandas parses them, with as many in each row as the header has."""
     _check_widths(path, lines, layout)
-    body = "\n".join(line for _, line in layout.rows)
+    body = "\n".join([line for _, line in layout.rows])
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # columns of several kinds: each cell is looked at here
