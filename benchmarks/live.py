@@ -186,7 +186,7 @@ def chain(model, campaign, name, until=120.0):
     """Difference of live and offline samples, and of forecasts that start from them."""
     fitted, read = seakeep.load_model(model), seakeep.read_campaign(campaign)
     offline = read.prepare([name])[name]
-    options = read.settings.files.known()
+    options = read.settings.files
     files = {key: read_columns(path, options).values for key, path in read.files_of(name).items()}
     for delay in DELAYS:
         live, given, at, spent = read.live_chain(name, delay=delay), [], dict.fromkeys(files, 0), []

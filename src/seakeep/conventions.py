@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MOTIONS",
+    "TURNS",
     "Channel",
     "base_powers",
     "canonical_channel",
@@ -55,6 +56,8 @@ class Channel:
 
 MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """Motions of a rigid body, in the order of its six degrees of freedom."""
+TURNS = MOTIONS[3:]
+"""Those that are angles, about x, y and z."""
 _QUANTITIES = {
     "surge": ("m", "surge", "x"),
     "sway": ("m", "sway", "y"),
@@ -75,6 +78,7 @@ _NAME = re.compile(
 )
 
 
+@lru_cache(maxsize=1024)
 def canonical_channel(name: str) -> Channel | None:
     r"""Look a canonical channel up.
 

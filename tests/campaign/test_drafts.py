@@ -2,7 +2,6 @@
 
 import re
 
-import h5py
 import numpy as np
 import pytest
 from scipy import io
@@ -517,32 +516,6 @@ def test_noise_that_leads_the_count_of_waves(tmp_path):
     assert campaign.encounter_period() == pytest.approx(sound, rel=0.05)  # some waves are lower
 
 
-def test_init_overwrites_nothing_that_was_not_asked_for(tmp_path, capsys):
-    path, out = write_csv(tmp_path / "run.csv", tank_columns()), tmp_path / "campaign.toml"
-    assert cli.main(["init", str(path), "-o", str(out)]) == 0
-    assert cli.main(["init", str(path), "-o", str(out)]) == 2
-    assert cli.main(["init", str(path), "-o", str(out), "--force"]) == 0
-    kept = path.read_bytes()
-    capsys.readouterr()
-    assert cli.main(["init", str(path), "-o", str(path), "--force"]) == 2
-    assert "is read by this command and would be overwritten" in capsys.readouterr().err
-    other = tmp_path / "other.csv"
-    other.write_bytes(kept)
-    assert cli.main(["init", str(path), "-o", str(other), "--force"]) == 2
-    assert path.read_bytes() == other.read_bytes() == kept
-
-
-def test_init_takes_a_group(tmp_path):
-    with h5py.File(tmp_path / "run.h5", "w") as file:
-        for group in ("a", "b"):
-            for name, each in tank_columns().items():
-                file[f"{group}/{name.split()[0]}"] = each
-    out = tmp_path / "campaign.toml"
-    assert cli.main(["init", str(tmp_path / "run.h5"), "-o", str(out)]) == 1
-    assert cli.main(["init", str(tmp_path / "run.h5"), "--group", "b", "-o", str(out)]) == 0
-    assert read_campaign(out).settings.files.group == "b"
-
-
 def test_init_takes_what_the_message_asks_for(tmp_path, capsys):
     """A title with blanks, a blank line, tabs, decimal commas, a row of units."""
     path = tmp_path / "de.txt"
@@ -554,6 +527,8 @@ def test_init_takes_what_the_message_asks_for(tmp_path, capsys):
     out = tmp_path / "campaign.toml"
     options = ["--skip-rows", "2", "--delimiter", "tab", "--decimal", ","]
     assert cli.main(["init", str(path), *options, "-o", str(out)]) == 0
+    assert cli.main(["init", str(path), *options, "-o", str(out)]) == 2  # it is there
+    assert cli.main(["init", str(path), *options, "-o", str(out), "--force"]) == 0
     files = read_campaign(out).settings.files
     assert (files.skip_rows, files.delimiter, files.decimal) == (2, "\t", ",")
     run = read_campaign(out).read_run("de")

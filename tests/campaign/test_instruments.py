@@ -4,9 +4,8 @@ import shutil
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from seakeep.campaign import draft_campaign, load_prepared, read_campaign, write_prepared
+from seakeep.campaign import draft_campaign, read_campaign, write_prepared
 from seakeep.errors import DataError, RequestError
 
 pytest.importorskip("numba", reason="needs the extra tank")
@@ -55,14 +54,6 @@ def test_drop_outs_are_masked_and_flagged(prepared):
     assert run["eta_us_fwd_flags"].attrs["flag_meanings"].split()[0] == "missing"
     for name in (*MOTIONS, "eta_fwd", "mooring_bow"):
         assert np.isfinite(run[name].values).all()
-
-
-def test_prepared_files_come_back_as_they_were(copied):
-    campaign = read_campaign(copied())
-    write_prepared(campaign, names=["regular_2"])
-    expected = campaign.prepare(["regular_2"])["regular_2"]
-    loaded = load_prepared(campaign, names=["regular_2"])["regular_2"]
-    xr.testing.assert_identical(loaded, expected)
 
 
 def test_interrupted_half_way_a_second_call_continues(copied):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seakeep.campaign import read_campaign, read_table
+from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.errors import SeakeepWarning
 
@@ -55,15 +55,6 @@ def test_draft(tmp_path, name):
     assert "eta_1" in campaign.model().inputs
     for run in runs.values():
         assert all(np.isfinite(each).all() for each in run.values())
-
-
-def test_units_and_sizes_of_the_flume():
-    run = read_table(files_of(FLUME)[0])
-    assert run["Roll"].attrs["units"] == "rad"
-    assert run["ACC_SWAY"].attrs["units"] == "m/s2"
-    assert "units" not in run["WM_Position"].attrs
-    assert len(run.data_vars) == 15
-    assert 50 < float(run["time"][-1]) < 66
 
 
 HEAVE = """

@@ -255,10 +255,6 @@ class TestPeriod:
 
 
 class TestValues:
-    def test_degrees_taken_for_radians(self, edited):
-        path = edited(('column = "Pitch"', 'column = "Pitch (deg)"\nunit = "deg"'))
-        assert "impossible" not in kinds(read_campaign(path).prepare()["first"])
-
     @pytest.mark.parametrize(
         ("stem", "header", "message"),
         [("Pitch (deg)", "Pitch (rad)", r"pitch reaches \d.* deg, more than 90 deg"),

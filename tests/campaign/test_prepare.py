@@ -440,6 +440,19 @@ class TestFiles:
             monkeypatch.setattr("seakeep.campaign.store.version", lambda: "99.0")
         assert float(load_prepared(campaign)["second"]["heave"].std()) > 0.0
 
+    def test_a_measurement_is_never_overwritten(self, tank, edited):
+        """`prepare -o .` replaced the raw run1.nc by the prepared run of that name."""
+        campaign = read_campaign(edited(('file = "first.csv"', 'file = "first.nc"')))
+        (tank / "other").mkdir()
+        for folder, message in (
+            (tank, r"first\.nc is read by this command and would be"),
+            (tank / "other", r"first\.nc exists and is not a prepared run that"),
+        ):
+            (folder / "first.nc").write_bytes(b"CDF")
+            with pytest.raises(RequestError, match=message):
+                write_prepared(campaign, folder, ["first"])
+            assert (folder / "first.nc").read_bytes() == b"CDF"
+
     def test_a_byte_that_was_altered_is_noticed(self, campaign):
         """84 of 100 such files were used, with other numbers."""
         path = write_prepared(campaign, names=["second"])["second"]
@@ -450,32 +463,6 @@ class TestFiles:
             with pytest.warns(SeakeepWarning, match=r"second\.nc was cut off, altered"):
                 run = load_prepared(campaign, names=["second"])["second"]
             xr.testing.assert_identical(run, expected)
-
-    def test_a_measurement_is_never_overwritten(self, tank, edited):
-        """`prepare -o .` replaced the raw run1.nc by the prepared run of that name."""
-        columns = tank_columns(0)
-        names = {"WP fwd [mm]": "fwd", "Heave [mm]": "z", "Pitch (deg)": "p", "acc [g]": "a"}
-        raw = xr.Dataset({new: ("t", columns[old]) for old, new in names.items()})
-        raw = raw.assign_coords(t=("t", columns["Time [s]"], {"units": "s"}))
-        raw.to_netcdf(tank / "first.nc", engine="h5netcdf")
-        before = (tank / "first.nc").read_bytes()
-        campaign = read_campaign(
-            edited(
-                ('file = "first.csv"', 'file = "first.nc"'),
-                ('column = "WP fwd"', 'column = "fwd"\nunit = "mm"'),
-                ('column = "Heave"', 'column = "z"\nunit = "mm"'),
-                ('column = "Pitch"', 'column = "p"\nunit = "deg"'),
-                ('column = "acc [g]"', 'column = "a"\nunit = "g"'),
-            )
-        )
-        with pytest.raises(RequestError, match=r"first\.nc is read by this command and would be"):
-            write_prepared(campaign, tank, ["first"])
-        (tank / "other").mkdir()
-        (tank / "other" / "first.nc").write_bytes(before)
-        with pytest.raises(RequestError, match=r"first\.nc exists and is not a prepared run that"):
-            write_prepared(campaign, tank / "other", ["first"])
-        assert (tank / "first.nc").read_bytes() == before
-        assert (tank / "other" / "first.nc").read_bytes() == before
 
 
 def test_a_span_to_the_end_of_the_record(tank, edited):

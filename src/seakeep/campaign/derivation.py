@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -10,7 +11,7 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.campaign.settings import CampaignSettings, DerivedSettings, long_name_of
 from seakeep.campaign.validation import sources_of
-from seakeep.conventions import canonical_channel, conversion, si_unit
+from seakeep.conventions import TURNS, canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError
 from seakeep.quality.faults import BRIDGED, MISSING, flag_attributes
 from seakeep.signals import (
@@ -32,11 +33,10 @@ from seakeep.waves import GRAVITY
 __all__ = ["derive"]
 
 
-ANGLES = ("roll", "pitch", "yaw")
 AXES = {"surge": 0, "sway": 1, "heave": 2, "x": 0, "y": 1, "z": 2}
 
 
-Channels = Mapping[str, xr.Variable]
+Channels = Mapping[Any, xr.Variable]
 
 
 def derive(
@@ -126,9 +126,10 @@ def _body_step(
             described,
         )
     axis = _axis(name, settings)
-    angles = _three(dataset, ANGLES)
+    angles = _three(dataset)
     if settings.step == "remove_gravity":
-        described = f"{settings.source}, gravity removed by {', '.join(_present(dataset, ANGLES))}"
+        measured = [name for name in TURNS if name in dataset]
+        described = f"{settings.source}, gravity removed by {', '.join(measured)}"
         if settings.components is not None:
             force = np.column_stack([dataset[each].to_numpy() for each in settings.components])
             moved = remove_gravity(force, angles, zeroed=bool(settings.zeroed))
@@ -143,7 +144,7 @@ def _body_step(
     vector[:, axis] = series
     if unit == "m":
         return transfer_position(vector, angles, offset)[:, axis], unit, described
-    rates = _three(dataset, [f"{each}_rate" for each in ANGLES])
+    rates = _three(dataset, "_rate")
     if unit == "m/s":
         return transfer_velocity(vector, angles, rates, offset)[:, axis], unit, described
     if unit != "m/s^2":
@@ -151,7 +152,7 @@ def _body_step(
             f"'{settings.source}' is measured in '{unit}'; positions (m), velocities (m/s) and "
             "accelerations (m/s^2) are transferred. Choose another channel."
         )
-    turning = _three(dataset, [f"{each}_acceleration" for each in ANGLES])
+    turning = _three(dataset, "_acceleration")
     moved = transfer_acceleration(vector, angles, rates, turning, offset)
     return moved[:, axis], unit, described
 
@@ -179,13 +180,10 @@ def _axis(name: str, settings: DerivedSettings) -> int:
     )
 
 
-def _present(dataset: Channels, names: tuple[str, ...] | list[str]) -> list[str]:
-    return [name for name in names if name in dataset]
-
-
-def _three(dataset: Channels, names: tuple[str, ...] | list[str]) -> FloatArray:
-    """Three channels side by side, zeros where one is not measured; one at least must be."""
-    if not _present(dataset, names):
+def _three(dataset: Channels, kind: str = "") -> FloatArray:
+    """Angles, or their rates, side by side; zeros where one is not measured, but one must be."""
+    names = [each + kind for each in TURNS]
+    if not any(name in dataset for name in names):
         raise RequestError(
             f"none of the channels {', '.join(names)} is measured. Map or derive those in which "
             "the body turns."

@@ -77,7 +77,7 @@ def draft_campaign(
     paths = [Path(file) for file in files]
     known = {key: value for key, value in (options or {}).items() if value is not None}
     settings = validated(FileSettings, known, "options", "draft")
-    read = arranged(paths, [read_columns(path, settings.known()) for path in paths])
+    read = arranged(paths, [read_columns(path, settings) for path in paths])
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
         _refuse(read)

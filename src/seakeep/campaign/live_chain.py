@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,47 +17,16 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, as_real, as_table
-from seakeep.campaign.pipeline import cleaned, derived, mapped, read, resampled, sync
+from seakeep.campaign.pipeline import Logger, Run, cleaned, derived, mapped, resampled
 from seakeep.campaign.readers import find_column, time_column, time_unit_of
-from seakeep.campaign.settings import CampaignSettings
 from seakeep.conventions import conversion
 from seakeep.errors import RequestError, SeakeepError, did_you_mean
 from seakeep.files import load_sealed, write_sealed_array
-from seakeep.formats import Columns, Options
-from seakeep.signals import Clock
 
-__all__ = ["LiveChain", "Template"]
+__all__ = ["LiveChain"]
 
 STATE = "state of a live chain"
 """Kind of the files of :meth:`LiveChain.save`."""
-
-
-@dataclass(frozen=True)
-class Template:
-    """A run whose files say what loggers send.
-
-    Parameters
-    ----------
-    name : str
-        The run.
-    settings : CampaignSettings
-        The campaign, lengths in seconds.
-    paths : mapping of str to Path
-        Its file by logger.
-    columns : mapping of str to Columns
-        Their columns, which give names and units.
-    clocks : mapping of str to Clock
-        Clock of each logger against the reference's.
-    dt : float
-        Time step of the model, s.
-    """
-
-    name: str
-    settings: CampaignSettings
-    paths: Mapping[str, Path]
-    columns: Mapping[str, Columns]
-    clocks: Mapping[str, Clock]
-    dt: float
 
 
 class LiveChain:
@@ -65,8 +34,10 @@ class LiveChain:
 
     Parameters
     ----------
-    template : Template
-        A run whose files have the columns that the loggers send.
+    run : Run
+        A run whose files have the columns that the loggers send, clocks known and not yet mapped.
+    dt : float
+        Time step of the model samples, s.
     delay : float
         Time that must have passed after a model sample before it is handed out, s.
     window : float
@@ -75,33 +46,16 @@ class LiveChain:
         Model samples that are handed out together, at least; the chain runs once for them.
     """
 
-    def __init__(self, template: Template, delay: float, window: float, every: int) -> None:
-        self._template = template
+    def __init__(self, run: Run, dt: float, delay: float, window: float, every: int) -> None:
+        self._run, self.dt = run, dt
         self.delay, self.window, self.every = delay, window, every
-        self._time = {key: self._time_column(key) for key in template.columns}
+        self._time = {key: _time_column(logger) for key, logger in run.loggers.items()}
         self._rows: dict[str, dict[str, FloatArray]] = {
-            key: {name: np.empty(0) for name in columns.values}
-            for key, columns in template.columns.items()
+            key: {name: np.empty(0) for name in logger.columns.values}
+            for key, logger in run.loggers.items()
         }
         self._origin: float | None = None
         self._given = 0
-
-    @property
-    def dt(self) -> float:
-        """Time step of the model samples, s."""
-        return self._template.dt
-
-    def _time_column(self, key: str) -> tuple[str, float]:
-        """Name of a logger's time column, and its unit in seconds."""
-        template, columns = self._template, self._template.columns[key]
-        own = template.settings.instruments[key] if key else template.settings.files
-        name = time_column(columns, own.time)
-        if name is None:
-            raise RequestError(
-                f"{template.paths[key]} has no time column, and in service samples need their "
-                "instants. Have the logger send them."
-            )
-        return name, conversion(time_unit_of(columns, name, own.time_unit), "s")
 
     def push(self, samples: Mapping[str, Mapping[str, npt.ArrayLike]]) -> xr.Dataset:
         """Take raw samples, and give the model samples that are ready.
@@ -211,7 +165,7 @@ class LiveChain:
             newest = min(float(self._instants(key)[-1]) for key in self._rows)
             ready = int(np.floor((newest - self.delay - self._origin) / self.dt + 1e-9)) + 1
         if ready - self._given < self.every:
-            empty = dict.fromkeys(self._template.settings.channel_names, ("time", np.empty(0)))
+            empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
             return xr.Dataset(empty, coords={"time": np.empty(0)})
         found = self._made(self._given, ready)
         self._given = ready
@@ -224,9 +178,9 @@ class LiveChain:
                 f"there is no logger '{key}'.{did_you_mean(key, self._rows)} Loggers: "
                 f"{', '.join(self._rows)}."
             )
-        columns, path = self._template.columns[key], self._template.paths[key]
+        logger = self._run.loggers[key]
         arrays = {
-            find_column(path, columns, name): as_real(values, name)
+            find_column(logger.path, logger.columns, name): as_real(values, name)
             for name, values in as_table(table, f"samples of '{key}'").items()
         }
         missing = [name for name in self._rows[key] if name not in arrays]
@@ -251,9 +205,7 @@ class LiveChain:
     def _instants(self, key: str) -> FloatArray:
         """Instants of a logger's rows on the reference's clock."""
         name, factor = self._time[key]
-        clock = self._template.clocks[key]
-        found: FloatArray = clock.reference(self._rows[key][name] * factor)
-        return found
+        return self._run.clocks[key].reference(self._rows[key][name] * factor)
 
     def _check_all_send(self) -> None:
         """Refuse a silent logger: nothing can be made without it, and the others' rows pile up."""
@@ -270,25 +222,20 @@ class LiveChain:
 
     def _made(self, first: int, stop: int) -> xr.Dataset:
         """Model samples of these numbers, by the chain over the whole window."""
-        template, dt, origin = self._template, self.dt, self._origin
+        dt, origin = self.dt, self._origin
         assert origin is not None
-        columns = {
-            path: replace(template.columns[key], values=self._rows[key])
-            for key, path in template.paths.items()
+        loggers = {
+            key: replace(logger, columns=replace(logger.columns, values=self._rows[key]))
+            for key, logger in self._run.loggers.items()
         }
-
-        def reader(path: Path, options: Options) -> Columns:
-            return columns[path]
-
-        run = sync(read(template.name, template.settings, template.paths, reader), template.clocks)
-        run = derived(cleaned(mapped(run)))
+        run = derived(cleaned(mapped(replace(self._run, loggers=loggers))))
         ends = [each["time"].to_numpy()[[0, -1]] for each in run.groups.values()]
         low = int(np.ceil((max(each[0] for each in ends) - origin) / dt - 1e-9))
         high = int(np.floor((min(each[1] for each in ends) - origin) / dt + 1e-9))
         axis: FloatArray = origin + dt * np.arange(low, high + 1, dtype=float)
         data = resampled(run, dt, axis).data
         assert data is not None
-        names = list(self._template.settings.channel_names)
+        names = list(run.settings.channel_names)
         return data[names].reset_coords(drop=True).isel(time=slice(max(first - low, 0), stop - low))
 
     def _trim(self) -> None:
@@ -298,3 +245,15 @@ class LiveChain:
         for key, table in self._rows.items():
             first = int(np.searchsorted(self._instants(key), oldest))
             self._rows[key] = {name: values[first:] for name, values in table.items()}
+
+
+def _time_column(logger: Logger) -> tuple[str, float]:
+    """Name of a logger's time column, and its unit in seconds."""
+    columns, stated = logger.columns, logger.options
+    name = time_column(columns, stated.time)
+    if name is None:
+        raise RequestError(
+            f"{logger.path} has no time column, and in service samples need their instants. Have "
+            "the logger send them."
+        )
+    return name, conversion(time_unit_of(columns, name, stated.time_unit), "s")

@@ -79,7 +79,7 @@ from seakeep.signals import (
     uniform_step,
 )
 from seakeep.signals.synchronisation import ASSUMED
-from seakeep.signals.time_axis import instant_text, stretches
+from seakeep.signals.time_axis import instant_text, span_text, stretches
 from seakeep.sizes import LONG_NUMBERS, check_numbers
 from seakeep.toml import Length, number
 
@@ -180,7 +180,7 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
             keys = {"time", "time_unit", "sampling_rate"}
             stated = settings.instruments[key].model_dump(include=keys, exclude_none=True)
             options = options.model_copy(update=stated)
-        columns = reader(path, options.known())
+        columns = reader(path, options)
         if key and time_column(columns, options.time) is not None:
             options = options.model_copy(update={"sampling_rate": None})
         loggers[key] = Logger(key, path, columns, options)
@@ -500,7 +500,6 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
     settings, groups, late = run.settings, dict(run.groups), []
     needed = needed_channels(settings, settings.channel_names if wanted is None else wanted)
     home = {str(name): key for key, data in groups.items() for name in data.data_vars}
-    channels = {key: variables_of(data) for key, data in groups.items()}
     for name in derivation_order(settings.derived, settings.channel_names):
         if name not in needed:
             continue
@@ -510,26 +509,11 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
         if home[name] == COMMON:
             late.append(name)
             continue
-        own = channels[home[name]]
-        step = uniform_step(groups[home[name]]["time"].to_numpy(), f"run '{run.name}'")
-        own |= derive(own, name, settings, step, run.name)
-    for key, data in groups.items():
-        groups[key] = _dataset(data.variables["time"], channels[key], data.attrs)
+        data = groups[home[name]]
+        step = uniform_step(data["time"].to_numpy(), f"run '{run.name}'")
+        made = derive(data.variables, name, settings, step, run.name)
+        groups[home[name]] = data.assign({name: made.pop(name)}).assign_coords(made)
     return replace(run, groups=groups, late=tuple(late))
-
-
-def variables_of(data: xr.Dataset) -> dict[str, xr.Variable]:
-    """Channels of a Dataset and their flags, by name."""
-    return {str(name): each for name, each in data.variables.items() if name != "time"}
-
-
-def _dataset(
-    time: xr.Variable, channels: Mapping[str, xr.Variable], attributes: Mapping[Any, Any]
-) -> xr.Dataset:
-    """Channels as variables, their flags as coordinates."""
-    flags = {name: each for name, each in channels.items() if name.endswith("_flags")}
-    data = {name: each for name, each in channels.items() if name not in flags}
-    return xr.Dataset(data, {"time": time, **flags}, attributes)
 
 
 def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
@@ -544,25 +528,25 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         channels |= _on_axis(group, time, dt, run.settings.preparation, run.name)
     for name in run.late:
         channels |= derive(channels, name, run.settings, dt, run.name)
-    out = {}
-    for name in run.settings.channel_names:
-        if name in channels:
-            out[name] = channels[name]
-            if (flags := channels.get(f"{name}_flags")) is not None:
-                lost = (flags.to_numpy() & MISSING) > 0
-                out[name] = out[name].copy(data=np.where(lost, np.nan, out[name].to_numpy()))
-                out[f"{name}_flags"] = flags
-    attributes = next(iter(run.groups.values()))["time"].attrs
-    return replace(run, data=_dataset(xr.Variable("time", time, attributes), out, {}))
+    axis = xr.Variable("time", time, next(iter(run.groups.values()))["time"].attrs)
+    data, coordinates = {}, {"time": axis}
+    for name in (each for each in run.settings.channel_names if each in channels):
+        data[name] = channels[name]
+        if (flags := channels.get(f"{name}_flags")) is not None:
+            lost = (flags.to_numpy() & MISSING) > 0
+            data[name] = data[name].copy(data=np.where(lost, np.nan, data[name].to_numpy()))
+            coordinates[f"{name}_flags"] = flags
+    return replace(run, data=xr.Dataset(data, coordinates))
 
 
 def _axis(run: Run, dt: float) -> FloatArray:
     begin = max(float(each["time"][0]) for each in run.groups.values())
     end = min(float(each["time"][-1]) for each in run.groups.values())
     if end <= begin:
+        times = {name: each["time"].to_numpy() for name, each in run.groups.items()}
         spans = ", ".join(
-            f"{name} {_instant(each, 0)} to {_instant(each, -1)} s"
-            for name, each in run.groups.items()
+            f"{name} {span_text(t[0], t[-1], float(np.median(np.diff(t))))}"
+            for name, t in times.items()
         )
         raise DataError(
             f"run '{run.name}': its instruments never recorded together ({spans}, on the "
@@ -590,11 +574,6 @@ def _axis(run: Run, dt: float) -> FloatArray:
     )
     instants: FloatArray = origin + dt * np.arange(first, last + 1)
     return instants
-
-
-def _instant(group: xr.Dataset, at: int) -> str:
-    time = group["time"].to_numpy()
-    return instant_text(float(time[at]), float(np.median(np.diff(time))))
 
 
 def _on_axis(
@@ -755,10 +734,9 @@ def _refuse_outside(
     """Refuse a span that reaches beyond a record by more than its last sample's own step."""
     finite = [edge for edge in span if np.isfinite(edge)]
     if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):
-        begin, end = _texts(record, dt)
         raise RequestError(
-            f"{key}: received [{', '.join(_texts(span, dt))}] s, and the record runs from {begin} "
-            f"to {end} s. Correct the span; 'inf' stands for the end."
+            f"{key}: received {_shown(span, dt)} s, and the record runs from "
+            f"{span_text(*record, dt)}. Correct the span; 'inf' stands for the end."
         )
 
 
@@ -768,23 +746,19 @@ def _refuse_empty(
     """Refuse a span that holds too few of a run's instants, whose record is the reference's."""
     if (count := int(inside(time, span, dt).sum())) > 1:
         return
-    stretch = ", ".join(_texts(span, dt))
-    stated = f"{key}: [{stretch}] s holds {count} sample(s) at a step of {dt:.4g} s"
-    begin, end = _texts((float(time[0]), float(time[-1])), dt)
+    stated = f"{key}: {_shown(span, dt)} s holds {count} sample(s) at a step of {dt:.4g} s"
+    common = span_text(float(time[0]), float(time[-1]), dt)
     if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:
-        first, last = _texts(record, dt)
         raise DataError(
-            f"{stated}, since all loggers recorded together only from {begin} to {end} s; the "
-            f"reference runs from {first} to {last} s. Check whether the files of the other "
-            "loggers are whole, or correct the span."
+            f"{stated}, since all loggers recorded together only from {common}; the reference runs "
+            f"from {span_text(*record, dt)}. Check whether the files of the other loggers are "
+            "whole, or correct the span."
         )
-    raise RequestError(
-        f"{stated}. Lengthen the span, or move it into the run's {begin} to {end} s."
-    )
+    raise RequestError(f"{stated}. Lengthen the span, or move it into the run's {common}.")
 
 
-def _texts(span: tuple[float, float], dt: float) -> tuple[str, str]:
-    return instant_text(span[0], dt), instant_text(span[1], dt)
+def _shown(span: tuple[float, float], dt: float) -> str:
+    return f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}]"
 
 
 def attributes_of(

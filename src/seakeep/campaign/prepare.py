@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Progress, number, whole_number
-from seakeep.campaign.live_chain import LiveChain, Template
+from seakeep.campaign.live_chain import LiveChain
 from seakeep.campaign.pipeline import (
     Run,
     attributes_of,
@@ -30,11 +30,10 @@ from seakeep.campaign.pipeline import (
 )
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
-from seakeep.campaign.survey import Failures, Survey, spare, survey
+from seakeep.campaign.survey import Failures, ReadOnce, Survey, spare, survey
 from seakeep.campaign.validation import read_settings
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import expanded
-from seakeep.formats import Columns, Options, read_columns
 from seakeep.quality import as_json, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.signals.waves import noise_floor
@@ -44,10 +43,6 @@ __all__ = ["Campaign", "Progress", "read_campaign"]
 
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
-
-KEPT = 2**30
-"""Bytes of columns that are kept from the survey of all runs until each is prepared: campaigns of
-model tests fit; what is beyond is read again."""
 
 FORMAT = 10
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
@@ -87,7 +82,7 @@ class Campaign:
     @property
     def runs(self) -> list[str]:
         """Names of the runs that are used, in the file's order."""
-        return [name for name, run in self.settings.runs.items() if run.role != "unused"]
+        return self.settings.used_runs
 
     @property
     def training_runs(self) -> list[str]:
@@ -242,8 +237,7 @@ class Campaign:
         DataError
             If the file is damaged, has gaps, or its times are not uniform.
         """
-        self._run(name)
-        reader = _ReadOnce()
+        reader = ReadOnce()
         found, settings, _, _ = self._whole([name], None, reader, steps=False)
         run = self._channels(name, found, settings, reader)
         dt = uniform_step(run.reference_time, f"run '{name}'")
@@ -252,7 +246,7 @@ class Campaign:
         return data.assign_attrs(self._attributes(name, data, dt, found, settings))
 
     def _channels(
-        self, name: str, found: Survey, settings: CampaignSettings, reader: _ReadOnce
+        self, name: str, found: Survey, settings: CampaignSettings, reader: ReadOnce
     ) -> Run:
         """Steps 1 to 5: the channels of a run by logger, at their own rates."""
         run = sync(read(name, settings, self.files_of(name), reader), found.clocks[name])
@@ -279,32 +273,24 @@ class Campaign:
             read are left out of the pooled drifts, with a warning.
         """
         wanted = list(self.runs if names is None else names)
-        found = self._survey(wanted, False, _ReadOnce())
+        found = self._survey(wanted, False)
         return {name: dict(found.clocks[name]) for name in wanted}
 
     def _survey(
         self,
         wanted: list[str],
         periods: bool,
-        reader: _ReadOnce,
+        reader: ReadOnce | None = None,
         progress: Progress | None = None,
         failures: Failures | None = None,
     ) -> Survey:
         """Clocks of the wanted runs and, if asked for, periods of the irregular ones."""
-        several = [n for n in dict.fromkeys([*wanted, *self.runs]) if self._run(n).files]
-        pooled = self.settings.instruments.pool_drift and set(wanted) & set(several)
-        timed = several if pooled else [n for n in wanted if n in several]
-        waves = self.settings.period_runs if periods else ()
-        channel = self.period_channel() if periods else ""
+        for name in wanted:
+            self._run(name)
         settings = self._in_seconds(self.settings.campaign.encounter_period)
-        again = [name for name in wanted if name in (*timed, *waves)]
-        reader.again = {path for name in again for path in self.files_of(name).values()}
-        found = survey(
-            settings, self.files_of, timed, waves, channel, reader, progress, wanted, failures
-        )
-        reader.again = set()
-        one = {n: {"": Clock()} for n in wanted if n not in several}
-        return replace(found, clocks={**one, **found.clocks})
+        channel = self.period_channel() if periods else None
+        reader = reader or ReadOnce()
+        return survey(settings, self.files_of, wanted, channel, reader, progress, failures)
 
     def period_channel(self) -> str:
         """Name of the wave channel that defines the encounter period.
@@ -349,7 +335,7 @@ class Campaign:
         stated = self.settings.campaign.encounter_period
         if stated is not None:
             return stated
-        return self._mean_period(self._survey([], True, _ReadOnce()))
+        return self._mean_period(self._survey([], True))
 
     def seconds(self, stated: float | str) -> float:
         """Seconds of a length or an instant that may be stated in encounter periods.
@@ -439,9 +425,7 @@ class Campaign:
             As :meth:`prepare`.
         """
         wanted = list(self.runs if names is None else names)
-        for name in wanted:
-            self._run(name)
-        reader = _ReadOnce()
+        reader = ReadOnce()
         found, settings, period, dt = self._whole(wanted, progress, reader, failures=failures)
         stated, first = dt is not None, ""
         told = {(str(settings.wave_channel), "PERIOD")}  # the survey has warned of it
@@ -512,11 +496,8 @@ class Campaign:
         DataError
             If a file of the run cannot be read.
         """
-        self._run(run)
-        reader = _ReadOnce()
+        reader = ReadOnce()
         found, settings, _, dt = self._whole([run], None, reader)
-        paths = self.files_of(run)
-        source = read(run, settings, paths, reader)
         if dt is None:
             dt = uniform_step(self._channels(run, found, settings, reader).reference_time, run)
         late, length = self.seconds(delay), self.seconds(window)
@@ -525,21 +506,20 @@ class Campaign:
                 f"delay is {late:g} s and window {length:g} s; the window must be at least four "
                 "times as long as the delay. Raise window."
             )
-        columns = {name: each.columns for name, each in source.loggers.items()}
         whole = settings.runs[run].model_copy(update={"record": None})
         changed: dict[str, Any] = {"runs": {**settings.runs, run: whole}}
         if settings.preparation.gaps == "refuse":  # rows get lost in service
             masked = settings.preparation.model_copy(update={"gaps": "mask"})
             changed["preparation"] = masked
         settings = settings.model_copy(update=changed)
-        template = Template(run, settings, paths, columns, found.clocks[run], dt)
-        return LiveChain(template, late, length, whole_number(every, "every"))
+        source = sync(read(run, settings, self.files_of(run), reader), found.clocks[run])
+        return LiveChain(source, dt, late, length, whole_number(every, "every"))
 
     def _whole(
         self,
         wanted: list[str],
         progress: Progress | None,
-        reader: _ReadOnce,
+        reader: ReadOnce,
         steps: bool = True,
         failures: Failures | None = None,
     ) -> tuple[Survey, CampaignSettings, float | None, float | None]:
@@ -567,30 +547,6 @@ class Campaign:
             "basis_sha256": self.basis_of(name),
         }
         return {**own, **attributes_of(name, run, dt, found.clocks[name], settings)}
-
-
-@dataclass
-class _ReadOnce:
-    """Reads files, and keeps those that are wanted again as long as they fit.
-
-    Parameters
-    ----------
-    again : set of Path
-        Files that are read a second time, after the survey of all runs.
-    """
-
-    again: set[Path] = field(default_factory=set)
-    kept: dict[tuple[Path, Options], Columns] = field(default_factory=dict)
-
-    def __call__(self, path: Path, options: Options) -> Columns:
-        """Columns of a file."""
-        if (known := self.kept.pop((path, options), None)) is not None:
-            return known
-        columns = read_columns(path, options)
-        held = sum(x.nbytes for each in self.kept.values() for x in each.values.values())
-        if path in self.again and held < KEPT:
-            self.kept[path, options] = columns
-        return columns
 
 
 def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:

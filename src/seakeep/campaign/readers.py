@@ -103,7 +103,7 @@ def read_table(
         If the file is damaged, a cell is not a number, or times are missing, repeated or unsorted.
     """
     path, options = Path(path), options or FileSettings()
-    table = read_columns(path, options.known())
+    table = read_columns(path, options)
     time_name, time = times_of(path, table, options)
     # A run has one `time`: a column of that name beside the stated one is left out.
     others = [name for name in table.names if name not in (time_name, "time")]

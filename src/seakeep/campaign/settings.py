@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import fields
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -98,31 +97,8 @@ class TimesSettings(Table):
     )
 
 
-class FileSettings(TimesSettings):
+class FileSettings(Options, TimesSettings):
     """``[files]``: how the files of the runs are to be read; all of it is optional."""
-
-    delimiter: Literal[",", ";", "\t", " "] | None = optional(
-        "',' or ';' or '\\t', or ' ' for any number of blanks"
-    )
-    decimal: Literal[".", ","] | None = optional("'.' or ','")
-    comment: Annotated[str, Field(min_length=1)] | None = optional(
-        "the mark that starts a comment line; '#' and '%' are known"
-    )
-    skip_rows: Annotated[int, Field(ge=0)] = optional(
-        "lines to leave out at the head of the file", 0
-    )
-    encoding: str | None = optional(
-        "of a text file, such as 'utf-8', 'cp1252' or 'utf-16-le'; left out, UTF-8, "
-        "UTF-16 with its mark, or Windows-1252 (Latin-1)"
-    )
-    group: str | None = optional(
-        "the part of a file that is read, where it holds several: the group of a TDMS, "
-        "HDF5 or NetCDF file, the topic of a ROS 2 bag or MCAP file"
-    )
-
-    def known(self) -> Options:
-        """What a reader needs to know of these."""
-        return Options(**{each.name: getattr(self, each.name) for each in fields(Options)})
 
 
 class ChannelSettings(Table):
@@ -247,26 +223,25 @@ class InstrumentsSettings(Table):
         return self.loggers.get(name, InstrumentSettings())
 
 
-_STEP_KEYS: dict[str, set[str]] = {
-    "band_pass": {"band"},
-    "integrate": {"times", "band"},
-    "differentiate": set(),
-    "low_pass": {"passband", "stopband"},
-    "envelope_squared": set(),
-    "complementary_filter": {"times", "position", "crossover"},
-    "transfer": {"offset", "axis"},
-    "remove_gravity": {"axis", "components", "zeroed"},
-}
-_NEEDED = {
-    "integrate": ("band", "(Hz), such as band = [0.3, 5.0]"),
-    "band_pass": ("band", "(Hz), such as band = [0.3, 5.0]"),
-    "low_pass": ("passband", "(Hz)"),
+_STEPS: dict[str, tuple[str, set[str], str]] = {
+    "band_pass": ("band", set(), "'band' (Hz), such as band = [0.3, 5.0]"),
+    "integrate": ("band", {"times"}, "'band' (Hz), such as band = [0.3, 5.0]"),
+    "differentiate": ("", set(), ""),
+    "low_pass": ("passband", {"stopband"}, "'passband' (Hz)"),
+    "envelope_squared": ("", set(), ""),
     "complementary_filter": (
-        "position",
-        "and 'crossover' (Hz), such as position = 'surge', crossover = 0.15",
+        "crossover",
+        {"times", "position"},
+        "'position' and 'crossover' (Hz), such as position = 'surge', crossover = 0.15",
     ),
-    "transfer": ("offset", "[x, y, z] (m) from the measured point to the wanted one"),
+    "transfer": (
+        "offset",
+        {"axis"},
+        "'offset' [x, y, z] (m) from the measured point to the wanted one",
+    ),
+    "remove_gravity": ("", {"axis", "components", "zeroed"}, ""),
 }
+"""Steps by name: a key that each needs, others that it knows, and what a message asks for."""
 Step = Literal[
     "integrate", "differentiate", "band_pass", "low_pass", "envelope_squared",
     "complementary_filter", "transfer", "remove_gravity",
@@ -315,7 +290,8 @@ class DerivedSettings(Table):
     def _one_way(self) -> DerivedSettings:
         if (self.expression is None) == (self.step is None):
             raise ValueError("a derived channel needs either 'expression', or 'from' and 'step'")
-        keys = set().union(*_STEP_KEYS.values())
+        keys = {"times", "band", "passband", "stopband", "position", "crossover", "offset", "axis",
+                "components", "zeroed"}  # fmt: skip
         given = {key for key in keys if getattr(self, key) is not None}
         if self.step is None:
             if self.source is not None or given:
@@ -323,11 +299,12 @@ class DerivedSettings(Table):
             return self
         if self.source is None:
             raise ValueError(f"step '{self.step}' needs 'from', the channel it works on")
-        if extra := given - _STEP_KEYS[self.step]:
+        needed, others, words = _STEPS[self.step]
+        if extra := given - others - {needed}:
             raise ValueError(f"step '{self.step}' has no key {sorted(extra)[0]!r}; remove it")
-        needed, words = _NEEDED.get(self.step, ("", ""))
-        if needed and (needed not in given or (needed == "position" and not self.crossover)):
-            raise ValueError(f"step '{self.step}' needs '{needed}' {words}")
+        lacks_position = self.step == "complementary_filter" and self.position is None
+        if (needed and needed not in given) or lacks_position:
+            raise ValueError(f"step '{self.step}' needs {words}")
         return self
 
 
@@ -552,11 +529,15 @@ class CampaignSettings(Table):
         return next(iter((*waves, *inputs)), None)
 
     @property
+    def used_runs(self) -> list[str]:
+        """Names of the runs that are used, in the file's order."""
+        return [name for name, run in self.runs.items() if run.role != "unused"]
+
+    @property
     def period_runs(self) -> tuple[str, ...]:
         """Runs over which the period is measured: irregular ones, or all if none is marked."""
-        used = [name for name, run in self.runs.items() if run.role != "unused"]
-        irregular = [name for name in used if self.runs[name].waves == "irregular"]
-        return tuple(irregular or used)
+        irregular = [name for name in self.used_runs if self.runs[name].waves == "irregular"]
+        return tuple(irregular or self.used_runs)
 
     @property
     def preset(self) -> str | None:

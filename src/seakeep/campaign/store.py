@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -66,10 +66,9 @@ def write_prepared(
     inputs = [path for name in campaign.runs for path in campaign.files_of(name).values()]
     for file in files.values():
         check_output(file, PREPARED, [campaign.path, *inputs])
-    fresh = {name: _fresh_step(campaign, name, files[name]) for name in wanted}
-    missing = [name for name in wanted if fresh[name] is None or anew]
-    steps = {step for name, step in fresh.items() if step is not None and name not in missing}
-    done = len(wanted) - len(missing)
+    steps = {} if anew else {name: run.attrs["dt"] for name, run in _fresh(campaign, files)}
+    missing = [name for name in wanted if name not in steps]
+    done = len(steps)
 
     def told(count: int, _: int, name: str) -> None:
         if progress is not None:
@@ -77,18 +76,13 @@ def write_prepared(
 
     for name, run in campaign.each_prepared(missing, told, failed):
         write_sealed(run, files[name], PREPARED)
-        steps.add(float(run.attrs["dt"]))
-    if len(steps) > 1:  # fresh runs had another step, which only the whole campaign shows
+        steps[name] = run.attrs["dt"]
+    if len(set(steps.values())) > 1:  # that of fresh runs was another, which only all runs show
         for name, run in campaign.each_prepared(wanted, progress, failed):
             write_sealed(run, files[name], PREPARED)
     if failed and failures is None:
         raise as_one(failed)
     return {name: file for name, file in files.items() if name not in failed}
-
-
-def _fresh_step(campaign: Campaign, name: str, file: Path) -> float | None:
-    run = _fresh(campaign, name, file)
-    return None if run is None else float(run.attrs["dt"])
 
 
 def load_prepared(
@@ -123,14 +117,12 @@ def load_prepared(
     """
     folder = prepared_folder(campaign, out_dir)
     wanted = list(campaign.runs if names is None else names)
-    fresh = {name: _fresh(campaign, name, folder / f"{name}.nc") for name in wanted}
-    missing = [name for name, run in fresh.items() if run is None]
-    made = campaign.prepare(missing, progress) if missing else {}
-    steps = {run.attrs["dt"] for run in (*made.values(), *fresh.values()) if run is not None}
-    if len(steps) > 1:  # files of one rate beside runs of another
-        made = campaign.prepare(wanted, progress)
-    found = {name: run for name, run in fresh.items() if run is not None}
-    return {name: made[name] if name in made else found[name] for name in wanted}
+    runs = dict(_fresh(campaign, {name: folder / f"{name}.nc" for name in wanted}))
+    if missing := [name for name in wanted if name not in runs]:
+        runs |= campaign.prepare(missing, progress)
+    if len({run.attrs["dt"] for run in runs.values()}) > 1:  # files of one rate beside others
+        runs = campaign.prepare(wanted, progress)
+    return {name: runs[name] for name in wanted}
 
 
 def prepared_folder(campaign: Campaign, out_dir: Path | str | None = None) -> Path:
@@ -138,28 +130,28 @@ def prepared_folder(campaign: Campaign, out_dir: Path | str | None = None) -> Pa
     return campaign.path.parent / "prepared" if out_dir is None else Path(out_dir)
 
 
-def _fresh(campaign: Campaign, name: str, file: Path) -> xr.Dataset | None:
-    if not file.exists():
-        return None
-    try:
-        run = load_sealed(file, PREPARED)
-    except SeakeepError as error:
-        warn(f"{error} The run is prepared anew.")
-        return None
-    expected: Mapping[str, object] = {
-        "campaign_digest": campaign.digest,
-        "basis_sha256": campaign.basis_of(name),
-        "seakeep_version": version(),
-        "campaign": campaign.name,
-    }
-    if any(run.attrs.get(key) != value for key, value in expected.items()):
-        return None
-    run.attrs = {key: _plain(value) for key, value in run.attrs.items()}
-    for each in run.variables.values():
-        each.attrs = {k: _plain(v) for k, v in each.attrs.items() if k != "_FillValue"}
-        each.encoding = {}
-    run.encoding = {}
-    return run
+def _fresh(campaign: Campaign, files: Mapping[str, Path]) -> Iterator[tuple[str, xr.Dataset]]:
+    """Runs whose files are fresh, as they were written."""
+    for name, file in files.items():
+        if not file.exists():
+            continue
+        try:
+            run = load_sealed(file, PREPARED)
+        except SeakeepError as error:
+            warn(f"{error} The run is prepared anew.")
+            continue
+        expected = {
+            "campaign_digest": campaign.digest,
+            "basis_sha256": campaign.basis_of(name),
+            "seakeep_version": version(),
+            "campaign": campaign.name,
+        }
+        if all(run.attrs.get(key) == value for key, value in expected.items()):
+            parts: list[Any] = [run, *run.variables.values()]
+            for each in parts:
+                each.attrs = {k: _plain(v) for k, v in each.attrs.items() if k != "_FillValue"}
+                each.encoding = {}
+            yield name, run
 
 
 def _plain(value: Any) -> Any:

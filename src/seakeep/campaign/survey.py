@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import xarray as xr
-
 from seakeep.arrays import Progress
 from seakeep.campaign.pipeline import (
-    Reader,
     Run,
     cleaned,
     derived,
@@ -23,13 +20,14 @@ from seakeep.campaign.pipeline import (
 )
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.errors import DataError, MissingFileError, SeakeepError, warn
+from seakeep.formats import Columns, Options, read_columns
 from seakeep.quality import Finding, warn_of
 from seakeep.quality.clocks import ClocksKind
 from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, waves_part
 from seakeep.signals.synchronisation import without_doubtful_drift
 from seakeep.signals.waves import energy_period
 
-__all__ = ["Failures", "Survey", "as_one", "spare", "survey"]
+__all__ = ["Failures", "ReadOnce", "Survey", "as_one", "spare", "survey"]
 
 Failures = dict[str, SeakeepError]
 """Errors by run: a run that cannot be read must not stop the others."""
@@ -40,6 +38,10 @@ LED = 2.0
 The energy period is 1.20 times the crossing period in a Pierson-Moskowitz spectrum, and less in
 narrower ones; two seas of one height that are two octaves apart make 1.82. White noise of a third
 of the waves' height takes a tenth off the energy period, and makes the count a fraction."""
+
+KEPT = 2**30
+"""Bytes of columns that are kept from the survey of all runs until each is prepared: campaigns of
+model tests fit; what is beyond is read again."""
 
 LISTED = 6
 """Errors of runs that one message holds at most."""
@@ -84,23 +86,46 @@ def as_one(errors: Mapping[str, SeakeepError]) -> SeakeepError:
     return DataError(f"{len(errors)} runs cannot be read:\n" + "\n".join(lines))
 
 
+@dataclass
+class ReadOnce:
+    """Reads files, and keeps those that are wanted again as long as they fit.
+
+    Parameters
+    ----------
+    keep : bool
+        Whether what is read now is read a second time, after the survey of all runs.
+    """
+
+    keep: bool = False
+    kept: dict[tuple[Path, Options], Columns] = field(default_factory=dict)
+
+    def __call__(self, path: Path, options: Options) -> Columns:
+        """Columns of a file."""
+        if (known := self.kept.pop((path, options), None)) is not None:
+            return known
+        columns = read_columns(path, options)
+        held = sum(x.nbytes for each in self.kept.values() for x in each.values.values())
+        if self.keep and held < KEPT:
+            self.kept[path, options] = columns
+        return columns
+
+
 def survey(
     settings: CampaignSettings,
     files_of: Callable[[str], Mapping[str, Path]],
-    clock_runs: Sequence[str],
-    period_runs: Sequence[str],
-    channel: str,
-    reader: Reader,
+    asked: Sequence[str],
+    channel: str | None,
+    reader: ReadOnce,
     progress: Progress | None = None,
-    asked: Collection[str] = (),
     failures: Failures | None = None,
 ) -> Survey:
-    """Read each run once for its clocks and its period.
+    """Read each run once for its clocks and, where a `channel` of waves is given, its period.
 
     Of runs that are not `asked` for, those that cannot be read are left out of what is pooled, with
     a warning; of the others, `failures` takes the errors, or they are raised. Drifts are pooled
     where the campaign does not say otherwise, and one that is not certain is left out.
     """
+    clock_runs, period_runs = _surveyed(settings, asked, channel)
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks: dict[str, dict[str, Clock]] = {}
     found: dict[str, tuple[float, float]] = {}
@@ -108,15 +133,17 @@ def survey(
     for count, name in enumerate(runs, 1):
         if progress is not None:
             progress(0, len(runs), f"clocks and waves of {name} ({count} of {len(runs)})")
+        reader.keep = name in asked
         try:
             run = sync(read(name, settings, files_of(name), reader))
             clocks[name] = dict(run.clocks)
-            if name in period_runs:
+            if channel is not None and name in period_runs:
                 found[name] = _period(run, channel)
         except SeakeepError as error:
             if name in asked:
                 spare(failures, name, error)
             bad[name] = error
+    reader.keep = False
     periods = {name: counted for name, (counted, _) in found.items()}
     doubts = {name: pair for name, pair in found.items() if not 1 / LED <= pair[1] / pair[0] <= LED}
     if bad and (not clocks or (period_runs and not periods)):
@@ -128,12 +155,24 @@ def survey(
     for words in (words for name, words in left_out.items() if name not in asked):
         warn(words)
     kind = ClocksKind.PERIOD
-    warn_of([Finding(kind, run, channel, *two, "s") for run, two in doubts.items()], set())
+    warn_of([Finding(kind, run, str(channel), *two, "s") for run, two in doubts.items()], set())
     if settings.instruments.pool_drift:
         _pool(clocks)
     for each in clocks.values():
         each.update({logger: without_doubtful_drift(clock) for logger, clock in each.items()})
-    return Survey(clocks, periods, left_out, doubts)
+    alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}
+    return Survey(alone | clocks, periods, left_out, doubts)
+
+
+def _surveyed(
+    settings: CampaignSettings, asked: Sequence[str], channel: str | None
+) -> tuple[Sequence[str], Sequence[str]]:
+    """Runs of which clocks are needed, and those of which periods are."""
+    runs = dict.fromkeys([*asked, *settings.used_runs])
+    timed = several = [name for name in runs if settings.runs[name].files]
+    if not (settings.instruments.pool_drift and set(asked) & set(several)):
+        timed = [name for name in several if name in asked]
+    return timed, () if channel is None else settings.period_runs
 
 
 def _pool(clocks: Mapping[str, dict[str, Clock]]) -> None:
@@ -153,20 +192,13 @@ def _left_out(run: str, error: SeakeepError, period: bool, drift: bool) -> str:
     )
 
 
-def _waves_of(run: Run, channel: str) -> xr.Dataset:
-    """The wave channel of a run, at its own rate."""
-    run = derived(cleaned(mapped(run, [channel])), [channel])
-    for group in run.groups.values():
-        if channel in group:
-            return group
-    data = resampled(run, uniform_step(run.reference_time)).data
-    assert data is not None
-    return data
-
-
 def _period(run: Run, channel: str) -> tuple[float, float]:
     """Counted period and energy period of the waves of a run, s."""
-    waves = _waves_of(run, channel)
+    run = derived(cleaned(mapped(run, [channel])), [channel])
+    waves = next((group for group in run.groups.values() if channel in group), None)
+    if waves is None:  # it needs several loggers
+        waves = resampled(run, uniform_step(run.reference_time)).data
+        assert waves is not None
     time, series = waves["time"].to_numpy(), waves[channel].to_numpy()
     step = uniform_step(time, f"run '{run.name}'")
     kept = inside(time, used_span(run.own), step)

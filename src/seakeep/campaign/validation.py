@@ -7,7 +7,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings
-from seakeep.conventions import canonical_channel, conversion, si_unit
+from seakeep.conventions import TURNS, canonical_channel, conversion, si_unit
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.signals.expressions import parse
 from seakeep.toml import Mistake, lengths, read_toml, validated
@@ -44,9 +44,6 @@ def derivation_order(
         ) from None
 
 
-_TURNS = ("roll", "pitch", "yaw")
-
-
 def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) -> tuple[str, ...]:
     """Channels that a derived channel needs."""
     if settings.expression is not None:
@@ -61,7 +58,7 @@ def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) 
             turning = [""]
         elif (known := canonical_channel(sources[0]) or canonical_channel(name)) is not None:
             turning = turning[: {"m": 1, "m/s": 2}.get(known.units, 3)]
-        sources += [turn + kind for kind in turning for turn in _TURNS if turn + kind in channels]
+        sources += [turn + kind for kind in turning for turn in TURNS if turn + kind in channels]
     return tuple(dict.fromkeys(each for each in sources if each != name))
 
 

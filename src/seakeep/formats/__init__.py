@@ -11,7 +11,6 @@ from pathlib import Path
 from seakeep.errors import DataError
 from seakeep.files import reading
 from seakeep.formats.columns import Columns
-from seakeep.formats.foreign import refuse_foreign, refuse_text
 from seakeep.formats.matlab import read_matlab
 from seakeep.formats.netcdf import read_netcdf
 from seakeep.formats.reader import Options, Reader
@@ -33,6 +32,21 @@ READERS = [
 
 TEXT = Reader("text", read_text)
 """Reader of what no other one knows."""
+
+_DATA = "Name the file that holds the run's samples."
+_SHEET = "Save its sheet as CSV and name that file."
+_TRACK = "Track the panel first, with `seakeep track`, and name the table that it writes."
+_FOREIGN = (
+    (b"\x89PNG\r\n", "a PNG picture", _DATA),
+    (b"\xff\xd8\xff", "a JPEG picture", _DATA),
+    (b"GIF8", "a GIF picture", _DATA),
+    (b"%PDF-", "a PDF document", _DATA),
+    (b"\xd0\xcf\x11\xe0", "an Excel workbook of the old kind (or another Office file)", _SHEET),
+    (b"PK\x03\x04", "an Excel workbook (or another ZIP archive)", _SHEET),
+    (b"RIFF", "a recording in AVI or WAV", _TRACK),
+    (b"\x1aE\xdf\xa3", "a video in Matroska", _TRACK),
+)
+"""Files that are not tables: what they start with, what they are, and what to do about them."""
 
 HEAD = 600
 """Bytes from which a kind is recognised."""
@@ -88,9 +102,17 @@ def _reader_of(path: Path, head: bytes) -> Reader:
     for reader in READERS:
         if head.startswith(reader.signatures):
             return reader
-    refuse_foreign(path, head)
-    for reader in READERS:
-        if path.suffix.lower() in reader.suffixes:
-            refuse_text(path, head, reader.kind)
-            return reader
-    return TEXT
+    for start, what, mend in _FOREIGN:
+        if head.startswith(start):
+            raise DataError(f"{path} is {what}, not a table. {mend}")
+    if head[4:8] == b"ftyp":
+        raise DataError(f"{path} is an MP4 video, not a table. {_TRACK}")
+    reader = next((each for each in READERS if path.suffix.lower() in each.suffixes), TEXT)
+    printable = all(byte >= 0x20 or byte in b"\t\n\r\f" for byte in head) and b"\x7f" not in head
+    if reader is not TEXT and printable and len(head) >= 8:
+        shown = head[:24].decode("latin-1").splitlines()[0] if head.strip() else ""
+        raise DataError(
+            f"{path} is not a valid {reader.kind} file: it holds text and starts with {shown!r}. "
+            "If it is a table, name it .csv or .txt; else copy or export it again."
+        )
+    return reader

@@ -5,16 +5,17 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
-from pymatreader import read_mat
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError
 from seakeep.formats.columns import Columns, check_lengths, unique_names
 from seakeep.formats.reader import Options, decoding
+
+if TYPE_CHECKING:
+    import h5py
 
 __all__ = ["read_matlab"]
 
@@ -50,6 +51,8 @@ def read_matlab(path: Path, options: Options) -> Columns:
 
 def _loaded(path: Path) -> dict[str, Any]:
     """Variables of a file; those that MATLAB alone can read are left out."""
+    from pymatreader import read_mat  # here, since it takes half a second that few need
+
     with path.open("rb") as file:
         hdf5 = file.read(len(_VERSION_73)) == _VERSION_73
     version = "version 7.3" if hdf5 else "version 5"
@@ -83,6 +86,8 @@ def _tidy(value: Any, in_order: bool) -> Any:
 
 def _opaque(path: Path) -> dict[str, str]:
     """Variables and fields that only MATLAB can read (table, string, sparse …), with their kind."""
+    import h5py
+
     found: dict[str, str] = {}
 
     def look(name: str, item: h5py.Dataset | h5py.Group) -> None:

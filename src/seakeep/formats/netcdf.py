@@ -6,14 +6,16 @@ import io
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import xarray as xr
 
 from seakeep.errors import DataError, did_you_mean
 from seakeep.formats.columns import Columns
 from seakeep.formats.reader import Options, decoding
+
+if TYPE_CHECKING:
+    import h5py
 
 __all__ = ["opened_netcdf", "read_netcdf"]
 
@@ -89,6 +91,8 @@ def opened_netcdf(path: Path, group: str | None = None) -> xr.Dataset:
 
 def _group(path: Path, wanted: str | None) -> str | None:
     """Group of an HDF5 file that is read: the one stated, the root, or the only one with sets."""
+    import h5py  # here, so that files of other kinds are read without HDF5
+
     holding: dict[str, int] = {}
 
     def look(name: str, item: h5py.Dataset | h5py.Group) -> None:

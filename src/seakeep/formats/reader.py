@@ -6,42 +6,39 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from seakeep.errors import DataError, SeakeepError
 from seakeep.formats.columns import Columns
+from seakeep.toml import Table, optional
 
 __all__ = ["Options", "Reader", "decoding"]
 
 
-@dataclass(frozen=True)
-class Options:
-    r"""What is known about a file; what is left out is recognised.
+class Options(Table):
+    """What is known about a file; what is left out is recognised."""
 
-    Parameters
-    ----------
-    time : str, optional
-        Name of the time column.
-    delimiter, decimal : str, optional
-        Of a text file: ``","``, ``";"``, ``"\\t"`` or ``" "`` for any number of blanks; ``"."`` or
-        ``","``.
-    comment : str, optional
-        Mark of comment lines; ``#`` and ``%`` are known.
-    skip_rows : int
-        Lines to leave out at the head of a text file.
-    encoding : str, optional
-        Encoding of a text file.
-    group : str, optional
-        The part that is read where a file holds several: a group of TDMS or HDF5, a topic of ROS.
-    """
-
-    time: str | None = None
-    delimiter: Literal[",", ";", "\t", " "] | None = None
-    decimal: Literal[".", ","] | None = None
-    comment: str | None = None
-    skip_rows: int = 0
-    encoding: str | None = None
-    group: str | None = None
+    time: str | None = optional("the name of the time column")
+    delimiter: Literal[",", ";", "\t", " "] | None = optional(
+        "',' or ';' or '\\t', or ' ' for any number of blanks"
+    )
+    decimal: Literal[".", ","] | None = optional("'.' or ','")
+    comment: Annotated[str, Field(min_length=1)] | None = optional(
+        "the mark that starts a comment line; '#' and '%' are known"
+    )
+    skip_rows: Annotated[int, Field(ge=0)] = optional(
+        "lines to leave out at the head of the file", 0
+    )
+    encoding: str | None = optional(
+        "of a text file, such as 'utf-8', 'cp1252' or 'utf-16-le'; left out, UTF-8, "
+        "UTF-16 with its mark, or Windows-1252 (Latin-1)"
+    )
+    group: str | None = optional(
+        "the part of a file that is read, where it holds several: the group of a TDMS, "
+        "HDF5 or NetCDF file, the topic of a ROS 2 bag or MCAP file"
+    )
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,10 @@ import re
 import warnings
 import zlib
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from seakeep.arrays import FloatArray
@@ -29,12 +26,12 @@ __all__ = ["read_text"]
 HEAD = 40
 """Lines that may stand above a header, and from which the layout is recognised."""
 
-SHORT_END = 8192
-"""Bytes at the end of a text that are searched for a last line that was cut off."""
+SHORT_END = 100
+"""Rows at the end of a text whose last cells are compared with that of a line that has no end."""
 
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\Z", re.ASCII)
 _MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf"}
-_NO_THOUSANDS = re.compile(rb"(?<!\d)0\d*,|(?<!\d),|\d{4},|,(?!\d{3}(?!\d))")
+_NO_THOUSANDS = re.compile(r"(?<!\d)0\d*,|(?<!\d),|\d{4},|,(?!\d{3}(?!\d))", re.ASCII)
 """A comma that divides no thousands: behind a zero or four digits, or not before three digits."""
 _RULE = re.compile(
     r"(?=.*[-=_*~]{2})[-=_*~+.:|\s,;]+\Z|(\s*[+-]?[\d.]+\s+:\s+[+-]?[\d.]+\s*[,;]?)+\Z", re.ASCII
@@ -44,14 +41,13 @@ _RULE = re.compile(
 
 @dataclass(frozen=True)
 class _Layout:
-    """How a text is divided: `start` is the offset of the first row of numbers."""
+    """How a text is divided, and its rows of numbers: the number of a line, and what it holds."""
 
     delimiter: str
     decimal: str
     headers: list[str]
     units: list[str] | None
-    start: int
-    marks: tuple[str, ...]
+    rows: list[tuple[int, str]]
 
 
 def read_text(path: Path, options: Options) -> Columns:
@@ -59,17 +55,17 @@ def read_text(path: Path, options: Options) -> Columns:
 
     Empty cells and ``nan`` are NaN. The body is parsed once, by pandas.
     """
-    raw = _utf8(path, _unpacked(path), options.encoding)
+    lines = _decoded(path, _unpacked(path), options.encoding).split("\n")
     try:
-        layout = _layout(path, raw, options)
+        layout = _layout(path, lines, options)
     except csv.Error as error:
         raise DataError(
             f"{path}: its head cannot be divided into cells ({error}). If it is a table, state "
             "delimiter or skip_rows in [files]; else export the run as CSV."
         ) from None
-    frame = _frame(path, raw, layout)
-    if not raw.endswith(b"\n"):
-        _warn_of_a_short_end(path, raw, layout)
+    frame = _frame(path, lines, layout)
+    if lines[-1]:
+        _warn_of_a_short_end(path, lines, layout)
     names, units = unique_names(layout.headers)
     if layout.units is not None:
         for name, row, unit in zip(names, layout.units, units, strict=True):
@@ -80,8 +76,8 @@ def read_text(path: Path, options: Options) -> Columns:
                 )
         units = [row or unit for row, unit in zip(layout.units, units, strict=True)]
     count = Counter(names)
-    keep = [i for i, name in enumerate(names) if name and count[name] == 1]
-    numbers, faults = _numbers(path, raw, frame, layout, {i: names[i] for i in keep})
+    keep = {i: name for i, name in enumerate(names) if name and count[name] == 1}
+    numbers, faults = _numbers(path, frame, layout, keep)
     faults |= {
         name: f"{path}: {count[name]} columns have the name '{name}'. Rename them in the file's "
         "header, so that it is plain which one is meant."
@@ -90,20 +86,18 @@ def read_text(path: Path, options: Options) -> Columns:
     }
     return Columns(
         values=numbers,
-        units={names[i]: str(units[i]) for i in keep if units[i] is not None},
+        units={name: unit for i, name in keep.items() if (unit := units[i]) is not None},
         faults=faults,
         headers={name: full for name, full in zip(names, layout.headers, strict=True) if name},
     )
 
 
-def _warn_of_a_short_end(path: Path, raw: bytes, layout: _Layout) -> None:
+def _warn_of_a_short_end(path: Path, lines: list[str], layout: _Layout) -> None:
     """Warn where the last line has no end and its last cell is shorter than those above."""
-    start = max(layout.start, raw.rfind(b"\n", 0, max(0, len(raw) - SHORT_END)) + 1)
-    cells = [_cells(row, layout.delimiter)[-1] for _, row in _rows(raw, start, layout.marks)]
-    if len(cells) > 2 and len(cells[-1]) < min(map(len, cells[:-1])):
-        line = raw.count(b"\n") + 1
+    *above, last = (_cells(row, layout.delimiter)[-1] for _, row in layout.rows[-SHORT_END:])
+    if len(above) > 1 and len(last) < min(map(len, above)):
         warn(
-            f"{path} ends within line {line}, at {cells[-1]!r}: it seems to be cut "
+            f"{path} ends within line {len(lines)}, at {last!r}: it seems to be cut "
             "off. Export it again, or end the last line if it is whole."
         )
 
@@ -120,8 +114,8 @@ def _unpacked(path: Path) -> bytes:
         ) from None
 
 
-def _utf8(path: Path, raw: bytes, encoding: str | None) -> bytes:
-    """Text in UTF-8 with plain ends of lines, from any encoding."""
+def _decoded(path: Path, raw: bytes, encoding: str | None) -> str:
+    """Text with plain ends of lines, from any encoding."""
     if not raw or raw.isspace():
         raise DataError(f"{path} is empty. Export the run again.")
     if encoding is None and raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -129,9 +123,7 @@ def _utf8(path: Path, raw: bytes, encoding: str | None) -> bytes:
     if encoding is None and b"\x00" in raw[:4096]:
         raise _binary(path, raw)
     try:
-        if encoding is not None or not raw.isascii():
-            text = raw.decode(encoding or "utf-8")
-            raw = text.encode() if encoding is not None else raw
+        text = raw.decode(encoding or "utf-8")
     except UnicodeError as error:
         if encoding is not None:
             where = f"byte {error.start}" if isinstance(error, UnicodeDecodeError) else str(error)
@@ -139,13 +131,12 @@ def _utf8(path: Path, raw: bytes, encoding: str | None) -> bytes:
                 f"{path} is not {encoding}: {where} does not fit. Correct 'encoding' in [files], "
                 "or leave it out."
             ) from None
-        raw = _western(path, raw).encode()
+        text = _western(path, raw)
     except (LookupError, ValueError):
         raise DataError(
             f"{path}: the encoding {encoding!r} is not known. Write 'utf-8', 'latin-1' or 'cp1252'."
         ) from None
-    raw = raw.removeprefix(codecs.BOM_UTF8)
-    return raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in raw else raw
+    return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _binary(path: Path, raw: bytes) -> DataError:
@@ -179,42 +170,25 @@ def _western(path: Path, raw: bytes) -> str:
     return raw.decode("latin-1" if _UNUSED & letters else "cp1252")
 
 
-def _rows(raw: bytes, at: int, marks: tuple[str, ...]) -> Iterator[tuple[int, str]]:
-    """Offset and content of each line that is neither a comment nor blank."""
-    # Not splitlines: it would break lines at form feeds and other marks inside a cell.
-    while at < len(raw):
-        end = raw.find(b"\n", at)
-        end = len(raw) if end < 0 else end
-        line = raw[at:end].decode("utf-8", "replace")
-        if line.strip(" \t,;") and not line.lstrip().startswith(marks):
-            yield at, line
-        at = end + 1
-
-
-def _line_number(raw: bytes, layout: _Layout, row: int) -> int:
-    """Number of the line, from one, that holds a row of the body."""
-    offset, _ = next(islice(_rows(raw, layout.start, layout.marks), row, None))
-    return raw.count(b"\n", 0, offset) + 1
-
-
-def _layout(path: Path, raw: bytes, options: Options) -> _Layout:
+def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
     marks = (options.comment,) if options.comment else ("#", "%")
-    begin, skip = 0, options.skip_rows
-    while skip and begin < len(raw):
-        begin, skip = raw.find(b"\n", begin) + 1 or len(raw), skip - 1
-    rows = list(islice(_rows(raw, begin, marks), HEAD))
-    text = [line for _, line in rows if not _RULE.match(line)]
-    if not text:
+    rows = [
+        (number, line)
+        for number, line in enumerate(lines[options.skip_rows :], options.skip_rows + 1)
+        if line.strip(" \t,;") and not line.lstrip().startswith(marks)
+    ]
+    text = next((line for _, line in rows[:HEAD] if not _RULE.match(line)), None)
+    if text is None:
         raise DataError(
             f"{path} holds no rows, only comments and blank lines. Export the run again."
         )
-    delimiter = options.delimiter or _delimiter(text[0])
-    numeric = (i for i, (_, line) in enumerate(rows) if _numeric(_cells(line, delimiter)))
+    delimiter = options.delimiter or _delimiter(text)
+    numeric = (i for i, (_, line) in enumerate(rows[:HEAD]) if _numeric(_cells(line, delimiter)))
     first = next(numeric, HEAD)
-    rows = [row for i, row in enumerate(rows) if i > first or not _RULE.match(row[1])]
-    cells = [_cells(line, delimiter) for _, line in rows[:2]]
-    said = _remarks(raw[begin : rows[0][0]], marks, delimiter, len(cells[0]))
-    headers, units, at = cells[0], None, 1
+    rows = [row for row in rows[:first] if not _RULE.match(row[1])] + rows[first:]
+    headers, *below = (_cells(line, delimiter) for _, line in rows[:2])
+    above = lines[options.skip_rows : rows[0][0] - 1]
+    said, units, at = _remarks(above, marks, delimiter, len(headers)), None, 1
     if _numeric(headers):
         if not said and len(rows) < min(len(headers), HEAD):
             words = "no header and more columns than rows, which looks"
@@ -228,20 +202,21 @@ def _layout(path: Path, raw: bytes, options: Options) -> _Layout:
     else:
         if len(headers) > 2 and not _NUMBER.match(headers[0]) and _numeric(headers[1:]):
             words = f"the first line is '{headers[0]}' and {len(headers) - 1} numbers, which looks"
-            raise _transposed(path, words, len(list(_rows(raw, begin, marks))), len(headers))
-        units = _units(cells[1], headers) if len(cells) > 1 else None
+            raise _transposed(path, words, len(rows), len(headers))
+        units = _units(below[0], headers) if below else None
         at += units is not None
     if at >= len(rows):
         raise DataError(f"{path} has a header and no rows of numbers. Export the run again.")
-    start = rows[at][0]
-    decimal = options.decimal or _decimal(path, raw, start, marks, delimiter)
-    return _Layout(delimiter, decimal, headers, units, start, marks)
+    decimal = options.decimal or _decimal(path, [line for _, line in rows[at:]], delimiter)
+    return _Layout(delimiter, decimal, headers, units, rows[at:])
 
 
-def _remarks(above: bytes, marks: tuple[str, ...], delimiter: str, width: int) -> list[list[str]]:
+def _remarks(
+    above: list[str], marks: tuple[str, ...], delimiter: str, width: int
+) -> list[list[str]]:
     """Comment lines above the first row that may be a header: as many words as it has cells."""
-    lines = [line.lstrip() for line in above.decode("utf-8", "replace").split("\n")]
-    bare = [line.lstrip("".join(marks)).strip() for line in lines if line.startswith(marks)]
+    comments = [line.lstrip() for line in above if line.lstrip().startswith(marks)]
+    bare = [line.lstrip("".join(marks)).strip() for line in comments]
     for mark in dict.fromkeys((delimiter, "\t", ";", ",")):
         cells = [_cells(line, mark) for line in bare if not _RULE.match(line)]
         if found := [each for each in cells if len(each) == width and not _numeric(each)]:
@@ -249,16 +224,16 @@ def _remarks(above: bytes, marks: tuple[str, ...], delimiter: str, width: int) -
     return []
 
 
-def _decimal(path: Path, raw: bytes, start: int, marks: tuple[str, ...], delimiter: str) -> str:
+def _decimal(path: Path, body: list[str], delimiter: str) -> str:
     """The mark of decimals: a comma if cells are numbers with a comma and none has a point."""
-    if delimiter == "," or raw.find(b",", start) < 0:
+    if delimiter == "," or "," not in "".join(body):
         return "."
-    for _, line in _rows(raw, start, marks):
+    for line in body:
         cells = [cell for cell in _cells(line, delimiter) if _NUMBER.match(cell)]
         if any("." in cell for cell in cells):
             return "."
         if commas := [cell for cell in cells if "," in cell]:
-            if _NO_THOUSANDS.search(raw, start) is None:
+            if not any(map(_NO_THOUSANDS.search, body)):
                 raise DataError(
                     f"{path}: the comma of {commas[0]!r} may divide thousands or decimals, and so "
                     "may all others of the file. Export it without marks of thousands; or, if the "
@@ -319,28 +294,28 @@ def _units(cells: list[str], headers: list[str]) -> list[str] | None:
     return stripped
 
 
-def _frame(path: Path, raw: bytes, layout: _Layout) -> pd.DataFrame:
+def _frame(path: Path, lines: list[str], layout: _Layout) -> pd.DataFrame:
     """Cells of the body, as pandas parses them, with as many in each row as the header has."""
-    body = _plain(raw, layout)
-    _check_widths(path, raw, body, layout)
+    _check_widths(path, lines, layout)
+    body = "\n".join([line for _, line in layout.rows])
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # columns of several kinds: each cell is looked at here
             frame: pd.DataFrame = pd.read_csv(  # type: ignore[call-overload]
-                io.BytesIO(body),
+                io.StringIO(body),
                 sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
                 decimal=layout.decimal,
                 header=None,
                 names=list(range(len(layout.headers))),
                 index_col=False,
                 skip_blank_lines=False,
-                skipinitialspace=b" " in body,
+                skipinitialspace=" " in body,
                 **_EXACT,
             )
             said = "fewer rows than lines"
     except ValueError as error:
         frame, said = pd.DataFrame(), str(error).strip()
-    if len(frame) != body.count(b"\n") + 1:
+    if len(frame) != len(layout.rows):
         raise DataError(
             f"{path} cannot be divided into cells ({said}). Look for a quotation mark that is not "
             "closed."
@@ -348,55 +323,38 @@ def _frame(path: Path, raw: bytes, layout: _Layout) -> pd.DataFrame:
     return frame
 
 
-def _plain(raw: bytes, layout: _Layout) -> bytes:
-    """Body without comments and blank lines."""
-    body = raw[layout.start :].rstrip(b"\n")
-    marks = "|".join(map(re.escape, layout.marks)).encode()
-    if re.search(rb"\n[ \t,;]*(?:\n|\Z|" + marks + rb")", body) is None:
-        return body
-    return b"\n".join(line.encode() for _, line in _rows(raw, layout.start, layout.marks))
-
-
-def _check_widths(path: Path, raw: bytes, body: bytes, layout: _Layout) -> None:
+def _check_widths(path: Path, lines: list[str], layout: _Layout) -> None:
     """Refuse rows with more or fewer cells than the header, which pandas would fill or cut."""
     wanted, mark = len(layout.headers), layout.delimiter
-    letters = np.frombuffer(body, np.uint8)
-    ends = letters == ord("\n")
-    if mark == " ":
-        blank = (letters == ord(" ")) | (letters == ord("\t")) | ends
-        firsts = ~blank & np.append(True, blank[:-1])
-    else:
-        firsts = letters == ord(mark)
-    starts = np.append(0, np.flatnonzero(ends[:-1]) + 1)
-    counts = np.add.reduceat(firsts, starts, dtype=np.intp) + (mark != " ")
-    if b'"' in body:
-        for i, line in enumerate(body.decode().split("\n")):
-            counts[i] = len(_cells(line, mark)) if '"' in line else counts[i]
-    wrong = np.flatnonzero(counts != wanted)
-    if not wrong.size:
+    counts = [
+        len(_cells(row, mark))
+        if '"' in row
+        else len(re.findall("[^ \t]+", row))
+        if mark == " "
+        else row.count(mark) + 1
+        for _, row in layout.rows
+    ]
+    wrong = [i for i, count in enumerate(counts) if count != wanted]
+    if not wrong:
         return
-    first = int(wrong[0])
+    first = wrong[0]
     shown = {" ": "blanks", "\t": "tabs"}.get(mark, f"'{mark}'")
-    last = wrong.size == 1 and first == counts.size - 1
+    mend = "It is the last line: the file was cut off. Export it again, or remove the line."
+    if first < len(counts) - 1:
+        mend = _widths_mend(wanted, counts, mark, lines)
     raise DataError(
-        f"{path}, line {_line_number(raw, layout, first)}: {counts[first]} cells where the header "
-        f"has {wanted} ({wrong.size} such line(s), columns divided by {shown}). "
-        + (
-            "It is the last line: the file was cut off. Export it again, or remove the line."
-            if last
-            else _widths_mend(wanted, counts, mark, raw)
-        )
+        f"{path}, line {layout.rows[first][0]}: {counts[first]} cells where the header "
+        f"has {wanted} ({len(wrong)} such line(s), columns divided by {shown}). {mend}"
     )
 
 
-def _widths_mend(wanted: int, counts: npt.NDArray[np.intp], mark: str, raw: bytes) -> str:
+def _widths_mend(wanted: int, counts: list[int], mark: str, lines: list[str]) -> str:
     """What to do about lines of another width, as far as the file itself shows."""
-    if mark == "," and np.isin(counts, (2 * wanted, 2 * wanted - 1)).all():
+    if mark == "," and set(counts) <= {2 * wanted, 2 * wanted - 1}:
         return (
             "This looks like decimal commas in a file divided by commas; they cannot be "
             "distinguished: export it with decimal points, or divided by semicolons or tabs."
         )
-    lines = raw.decode("utf-8", "replace").split("\n")
     rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
     for name, each in (("tabs", "\t"), ("semicolons", ";"), ("commas", ",")):
         widths = [line.count(each) + 1 for _, line in rows]
@@ -420,7 +378,7 @@ _EXACT = {"float_precision": "round_trip"} if _RELEASE < (3, 1) else {}
 
 
 def _numbers(
-    path: Path, raw: bytes, frame: pd.DataFrame, layout: _Layout, names: dict[int, str]
+    path: Path, frame: pd.DataFrame, layout: _Layout, names: dict[int, str]
 ) -> tuple[dict[str, FloatArray], dict[str, str]]:
     """Columns by name, and those that are not all numbers, with the first cell at fault."""
     values, faults = {}, {}
@@ -434,7 +392,7 @@ def _numbers(
             number = np.nan if pd.isna(cell) else _number(str(cell).strip(), layout.decimal)
             if number is None:
                 faults[name] = (
-                    f"{path}, line {_line_number(raw, layout, row)}, column '{name}': {cell!r} is "
+                    f"{path}, line {layout.rows[row][0]}, column '{name}': {cell!r} is "
                     f"not a number. {_mend(str(cell))}"
                 )
                 break
