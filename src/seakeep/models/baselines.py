@@ -18,9 +18,9 @@ from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
 from seakeep.models import store
+from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.engine import Windows, cut_lost
 from seakeep.models.forecasts import SingleModel, counted
-from seakeep.models.inputs import ProbeAlignment
 from seakeep.models.interface import Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel

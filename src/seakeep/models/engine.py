@@ -27,9 +27,10 @@ from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
 from seakeep.models.executor import Progress, in_order
-from seakeep.models.following import Followed
-from seakeep.models.inputs import Measured
-from seakeep.models.interface import Drive, Follows, Scale, Signature, Span
+from seakeep.models.following import Following
+from seakeep.models.inputs import Drive
+from seakeep.models.interface import Scale, Signature
+from seakeep.models.labelled import Span
 from seakeep.models.readouts import FittedReadOut, read_out
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import instant_text
@@ -126,8 +127,8 @@ class Dynamics:
         s and z.
     state_scale, input_scale, direct_scale : Scale
         Moments of the states and of both kinds of regressors.
-    follows : Follows or None
-        Place of the vessel where the model follows its own surge.
+    follows : Following or None
+        Carriers and place of the vessel where the model follows its own surge.
     """
 
     coefficients: FloatArray
@@ -136,7 +137,7 @@ class Dynamics:
     state_scale: Scale
     input_scale: Scale
     direct_scale: Scale
-    follows: Follows | None = None
+    follows: Following | None = None
 
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray]:
@@ -255,11 +256,10 @@ def driven(
             delayed=np.stack([each.delayed for each in rows]),
             direct=np.stack([each.direct[z:] for each in rows]),
         )
-    found = [drive for drive in drives if isinstance(drive, Followed)]
-    pairs = list(zip(found, spans, strict=True))
+    pairs = list(zip(drives, spans, strict=True))
     place = signature.input_map.follows.place
     tables, starts, first = [], {}, 0
-    for drive in dict.fromkeys(found):
+    for drive in dict.fromkeys(drives):
         mine = [span for each, span in pairs if each is drive]
         begin, end = min(span.known for span in mine), max(span.stop for span in mine)
         starts[drive] = first - begin
@@ -387,7 +387,7 @@ class _Opened:
             surge = labelled.channel_matrix(self.run, [channel], self.name, slice(first, last))[
                 :, 0
             ]
-        return signature.input_map.wrap(Measured(values, first, surge), self.run, spans)
+        return signature.input_map.drive(values, spans, run=self.run, first=first, surge=surge)
 
     def history(self, signature: Signature, span: Span) -> FloatArray:
         """States up to the start."""
@@ -454,8 +454,7 @@ def array_windows(
         if follows is not None:
             known = states[-history:, follows.column]
             surge = np.concatenate([np.full(history - len(known), np.nan), known])
-        measured = Measured(values, 0, surge)
-        drives.append(signature.input_map.wrap(measured, rig, [span]))
+        drives.append(signature.input_map.drive(values, [span], run=rig, surge=surge))
     time = xr.Variable(("time",), signature.dt * np.arange(1, steps + 1))
     windows = Windows(
         places=(("these arrays", 0.0),) * len(histories),

@@ -16,11 +16,12 @@ from seakeep.arrays import ComplexArray, FloatArray, as_real
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import export, labelled, store
+from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
 from seakeep.models.forecasts import SingleModel, check_arrays, counted, one_run
 from seakeep.models.growth import LeadErrors, training_errors
-from seakeep.models.inputs import Chain, FittedAlignment, Measured
-from seakeep.models.interface import Scale, Signature, Span
+from seakeep.models.interface import Scale, Signature
+from seakeep.models.labelled import Span
 from seakeep.models.live import Live
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.settings import HankelSettings
@@ -123,7 +124,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
     @property
     def alignment(self) -> FittedAlignment | None:
         """How the wave input is aligned to the vessel, as completed from the training runs."""
-        return Chain.of(self.signature.input_map).alignment
+        return self.signature.input_map.alignment
 
     @property
     def state_scale(self) -> Scale:
@@ -268,7 +269,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
             time = np.asarray(run["time"].values, dtype=float)
             labelled.check_finite(values, self.inputs, name, 0, time)
             span = Span(0, len(values) - 1, len(values))
-            values = alignment.wrap(Measured(values), run, [span]).rows(0, len(values)).delayed
+            values = alignment.carry(run, [span])
         variables = {
             channel: ("time", values[:, column], run[channel].attrs)
             for column, channel in enumerate(self.inputs)

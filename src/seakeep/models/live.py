@@ -34,13 +34,14 @@ from seakeep.core.recursion import read_table
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import load_sealed, write_sealed_array
 from seakeep.models import engine, store
+from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows
 from seakeep.models.executor import one_blas_thread
-from seakeep.models.following import Followed, Following
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors
-from seakeep.models.inputs import Chain, FittedAlignment, Measured
-from seakeep.models.interface import Regressors, Signature, Span
+from seakeep.models.inputs import Drive
+from seakeep.models.interface import Signature
+from seakeep.models.labelled import Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
@@ -130,17 +131,16 @@ class Live:
         signature = self.signature
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
-        chain = Chain.of(signature.input_map)
         self._follows = signature.input_map.follows
         rig = _dataset(signature, self._rig)
-        aligned = chain.alignment
+        aligned = signature.input_map.alignment
         if aligned is not None and self._follows is None and aligned.carries_in(rig):
             raise RequestError(
                 "the model is driven by waves that are carried over whole records, which are not "
                 "there in service. Fit it with alignment mode = 'dispersion', surge = 'predicted', "
                 "which carries them in each step, or without alignment."
             )
-        self._places, self._depth = _places(signature, chain.alignment, self._rig)
+        self._places, self._depth = _places(signature, aligned, self._rig)
         self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
         count, s = len(signature.states), signature.state_delays
         size, variances = count * (s + 1), self._noise**2
@@ -153,11 +153,10 @@ class Live:
         self._ahead = signature.lead_samples
         # Of a model that follows its own surge: the map with its carriers in this rig, and filters
         # that predict the probes from one another; rows at all places of the samples to come.
-        self._following = next((each for each in chain.maps if isinstance(each, Following)), None)
         self._table = (0, np.empty(0))
-        if self._following is not None:
-            self._banks = self._following.banks(rig)
-            self._foresight = self._following.foresight(rig, max(self._ahead, 1))
+        if self._follows is not None:
+            self._banks = self._follows.banks(rig)
+            self._foresight = self._follows.foresight(rig, max(self._ahead, 1))
         longest = max(s, signature.input_delays) + 1
         needed = 2 * (signature.history_samples + self._ahead + 1)
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
@@ -359,7 +358,7 @@ class Live:
     def _foreseen(self) -> FloatArray:
         """Inputs of a sample that was lost: from each record, and from the probe up-wave."""
         known, placed = self._known_inputs(), np.count_nonzero(np.isfinite(self._places))
-        if self._following is not None and self.ready:
+        if self._follows is not None and self.ready:
             first: FloatArray = self._expected(known, 1)[0]
             return first
         expected: FloatArray
@@ -373,7 +372,7 @@ class Live:
 
     def _expected(self, known: FloatArray, count: int) -> FloatArray:
         """Inputs of the next samples: in waves as those of training, or from each record."""
-        if self._following is None or not self.ready:
+        if self._follows is None or not self.ready:
             return predict_waves(known, count)
         taps, placed = self._foresight
         means = self.signature.input_scale.mean[: known.shape[1]]
@@ -483,7 +482,7 @@ class Live:
         """One-step prediction from the sample `at`."""
         z, kept = self.signature.input_delays, self._kept
         if self._follows is not None:
-            place, column, _ = self._follows
+            place, column = self._follows.place, self._follows.column
             first, table = self._table
             here = place.of(self._x[at + 1 - place.taps.size : at + 1, column])
             kept["delayed"][at] = read_table(place, table, np.array([at - first]), here)[0]
@@ -528,9 +527,9 @@ class Live:
         if stop <= first:
             return
         begin = self._at["filled"] - min(self._at["filled"], self._record)
-        if self._following is not None and self._follows is not None:
+        if self._follows is not None:
             surge = self._x[begin : self._at["filled"], self._follows.column]
-            drive = Followed(self._following, Measured(known, begin, surge), self._banks)
+            drive = Drive(signature.input_map, known, begin, surge, self._banks)
             places = drive.places(first, stop)
             self._table = (first, drive.table(first, stop))
             self._kept["delayed"][first:stop] = read_table(
@@ -540,8 +539,7 @@ class Live:
             return
         # Direct regressors are wanted from the first prediction on.
         span = Span(first, max(first, self._at["begins"] - 1), stop)
-        wrapped = signature.input_map.wrap(Measured(known, begin), None, [span])
-        found: Regressors = wrapped.rows(first, stop)
+        found = signature.input_map.drive(known, [span], first=begin).rows(first, stop)
         self._kept["delayed"][first:stop] = found.delayed
         self._kept["direct"][first:stop] = found.direct
 
@@ -719,7 +717,7 @@ class Live:
         """Views of what samples and forecasts to come read, but for the covariance."""
         place, signature = self._at, self.signature
         filled, slots = place["filled"], len(self._plain)
-        taps = 0 if self._follows is None else self._follows[0].taps.size
+        taps = 0 if self._follows is None else self._follows.place.taps.size
         longest = max(signature.state_delays, signature.input_delays, taps)
         record, tail = (max(filled - each, 0) for each in (self._record, slots + longest + 2))
         kept = [each[record if name == "u" else tail : filled] for name, each in self._kept.items()]

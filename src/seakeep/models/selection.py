@@ -13,7 +13,7 @@ import json
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import astuple, dataclass, field, replace
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -24,10 +24,11 @@ from seakeep.core import metrics
 from seakeep.core.path import Moments, lagged, ridge_path, truncated_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
+from seakeep.models.alignment import Mode, ProbeAlignment, Surge
 from seakeep.models.engine import Dynamics, Windows, model_runs
 from seakeep.models.executor import Progress, in_order
-from seakeep.models.following import LEAD, Followed
-from seakeep.models.inputs import FittedAlignment, Measured, Mode, ProbeAlignment, Surge
+from seakeep.models.following import LEAD
+from seakeep.models.inputs import Drive
 from seakeep.models.interface import Scale
 from seakeep.models.labelled import mean_period
 from seakeep.models.observables import Observable, Powers, SlowSquares, named
@@ -176,7 +177,7 @@ class Problem:
     """
 
     data: TrainingData
-    drives: tuple[Followed, ...]
+    drives: tuple[Drive, ...]
     offsets: tuple[int, ...]
     widest: Candidate
     owners: tuple[int, ...]
@@ -992,7 +993,7 @@ def _alignments(
             fitted = made.fit(runs, states, inputs, None)
         except (RequestError, DataError):
             continue  # no depth, no positions, or no surge among the states
-        assert isinstance(fitted, FittedAlignment)
+        assert fitted is not None
         if surge == "predicted" or any(np.any(fitted.offsets(run)) for run in runs.values()):
             found.append(made)
     found.append(None)
@@ -1082,7 +1083,7 @@ def _problem(
         offsets.append(size - max(chain.lead_samples - 1, 0) - len(x))
         if chain.follows is not None:
             values = labelled.channel_matrix(run, list(inputs), name)
-            drives.append(cast("Followed", chain.wrap(Measured(values), run, [])))
+            drives.append(chain.drive(values, [], run=run))
     owners: list[int] = [-1] * len(inputs)
     direct: list[int] = []
     for number, bound in enumerate(() if chain.observed is None else chain.observed.bound):

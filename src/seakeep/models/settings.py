@@ -15,12 +15,13 @@ import xarray as xr
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_integer, check_keys, settings_of
+from seakeep.models.alignment import ProbeAlignment
+from seakeep.models.checks import Json, check_choice, check_integer, check_keys, plain, settings_of
 from seakeep.models.following import Following
 from seakeep.models.html import settings_html
-from seakeep.models.inputs import Chain, FittedAlignment, Lead, ProbeAlignment
-from seakeep.models.interface import Json, Needs, plain
-from seakeep.models.observables import Observable, Observing, observables_of
+from seakeep.models.inputs import InputMap
+from seakeep.models.interface import Needs
+from seakeep.models.observables import Observable, Observed, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
@@ -371,22 +372,20 @@ class HankelSettings:
         states: Sequence[str],
         inputs: Sequence[str],
         window: int | None,
-    ) -> Chain:
+    ) -> InputMap:
         """Fit the input map to training runs that end where training ends.
 
-        Where the model follows its own surge, that is one map; else the alignment, the look-ahead,
-        and the observables on both.
+        Observables of a model that follows its own surge are made of waves without look-ahead.
         """
-        arguments, lead = (runs, states, inputs, window), self.lead
-        aligned = None if self.alignment is None else self.alignment.fit(*arguments)
-        follows = isinstance(aligned, FittedAlignment) and aligned.settings.surge == "predicted"
-        observed = None
+        aligned = observed = None
+        if self.alignment is not None:
+            aligned = self.alignment.fit(runs, states, inputs, window)
         if self.observables:
-            observed = Observing(self.observables, 0 if follows else lead).fit(*arguments)
-        if isinstance(aligned, FittedAlignment) and follows:
-            return Chain((Following.fit(aligned, runs, window, lead, observed),))
-        found = (aligned, Lead(lead) if lead else None, observed)
-        return Chain(tuple(each for each in found if each is not None))
+            observed = Observed.fit(self.observables, runs, inputs, window)
+        if aligned is None or aligned.settings.surge != "predicted":
+            return InputMap(aligned, self.lead, observed)
+        follows = Following.fit(aligned, runs, states, window, self.lead)
+        return InputMap(aligned, observed=observed, follows=follows)
 
     def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
         """Samples of input before and after the start that the rows of a forecast read.
@@ -420,7 +419,7 @@ class HankelSettings:
         content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
         select = content.get("select")
         maps = {
-            "alignment": None if self.alignment is None else self.alignment.to_json(),
+            "alignment": None if self.alignment is None else asdict(self.alignment),
             "observables": [observable_json(each) for each in self.observables],
             "readouts": readouts_json(self.readouts),
             "select": None if select is None else asdict(select),

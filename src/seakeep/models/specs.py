@@ -12,13 +12,14 @@ import xarray as xr
 
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled, store
-from seakeep.models.checks import check_choice
+from seakeep.models.alignment import ProbeAlignment
+from seakeep.models.checks import Json, check_choice
 from seakeep.models.draws import PRIORS, Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.executor import Progress
-from seakeep.models.inputs import Chain, ProbeAlignment
-from seakeep.models.interface import Json, Needs, Role, Signature, Span, Spec
-from seakeep.models.labelled import Runs, Stop, as_runs
+from seakeep.models.inputs import InputMap
+from seakeep.models.interface import Needs, Role, Signature, Spec
+from seakeep.models.labelled import Runs, Span, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.members import TrainingArrays, reach, spectral_radius
 from seakeep.models.observables import Observable
@@ -815,7 +816,7 @@ def _training_arrays(
     inputs: Sequence[str],
     samples: Sequence[int],
     earliest: Sequence[int],
-    input_map: Chain,
+    input_map: InputMap,
 ) -> tuple[TrainingArrays, list[np.ndarray[Any, np.dtype[np.float64]]]]:
     """States and regressors that members learn from, and the measured inputs, physical units."""
     read, trained = [], []
@@ -847,7 +848,7 @@ def _training_arrays(
 
 
 def _regressor_names(
-    input_map: Chain, runs: dict[str, xr.Dataset], inputs: Sequence[str]
+    input_map: InputMap, runs: dict[str, xr.Dataset], inputs: Sequence[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     made = input_map.regressors(labelled.channel_labels(next(iter(runs.values())), inputs))
     delayed, direct = (tuple(label.name for label in group) for group in made)

@@ -13,8 +13,9 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.errors import MissingFileError, RequestError
 from seakeep.files import load_sealed, write_sealed
-from seakeep.models.inputs import Chain
-from seakeep.models.interface import Json, Scale, Signature
+from seakeep.models.checks import Json
+from seakeep.models.inputs import InputMap
+from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.readouts import FittedReadOut
 
@@ -103,7 +104,7 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
         input_labels=labels["inputs"],
         state_delays=kept["state_delays"],
         input_delays=kept["input_delays"],
-        input_map=Chain.from_json(kept["input_map"]),
+        input_map=InputMap.from_json(kept["input_map"]),
         state_scale=state_scale,
         input_scale=input_scale,
         direct_scale=direct_scale,

@@ -12,7 +12,7 @@ import ast
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +21,6 @@ from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import DataError, RequestError, did_you_mean
 
 __all__ = ["Expression", "parse"]
-
-Value = TypeVar("Value")
 
 GREATEST_EXPONENT = 16.0
 """A physical law has no higher power; 9**9**9 has."""
@@ -98,7 +96,7 @@ class Expression:
                 f"{', '.join(f'{name}: {array.shape}' for name, array in arrays.items())}."
             )
         with np.errstate(all="ignore"):
-            out = self.fold(np.asarray, arrays.__getitem__, _apply)
+            out = self.of(arrays.__getitem__)
         result: FloatArray = np.array(np.broadcast_to(out, shapes.pop()))
         if not np.all(np.isfinite(result)):
             bad = np.flatnonzero(~np.isfinite(result))
@@ -109,21 +107,13 @@ class Expression:
             )
         return result
 
-    def fold(
-        self,
-        number: Callable[[float], Value],
-        channel: Callable[[str], Value],
-        apply: Callable[[str, list[Value]], Value],
-    ) -> Value:
-        """Build a value from the leaves up: numbers, text in another language, nodes of a graph.
+    def of(self, channel: Callable[[str], Any]) -> Any:
+        """Value of the expression of anything that knows the arithmetic of numpy.
 
         Parameters
         ----------
-        number, channel : callable
-            Value of a number, and of a channel by its name.
-        apply : callable
-            Value of an operation on values: ``add``, ``subtract``, ``multiply``, ``divide``,
-            ``power``, ``negative`` and the functions by their names.
+        channel : callable
+            Value of a channel by its name: an array, text in another language, nodes of a graph.
 
         Returns
         -------
@@ -131,34 +121,30 @@ class Expression:
             Value of the whole.
         """
 
-        def value(node: ast.expr) -> Value:
+        def value(node: ast.expr) -> Any:
             if isinstance(node, ast.Constant):
-                return number(float(node.value))  # type: ignore[arg-type]
+                return float(node.value)  # type: ignore[arg-type]
             if isinstance(node, ast.Name):
                 return channel(self._quoted.get(node.id, node.id))
             if isinstance(node, ast.BinOp):
-                return apply(_OPERATORS[type(node.op)], [value(node.left), value(node.right)])
+                return _apply(_OPERATORS[type(node.op)], [value(node.left), value(node.right)])
             if isinstance(node, ast.UnaryOp):
                 operand = value(node.operand)
-                return apply("negative", [operand]) if isinstance(node.op, ast.USub) else operand
+                return _apply("negative", [operand]) if isinstance(node.op, ast.USub) else operand
             assert isinstance(node, ast.Call)
             assert isinstance(node.func, ast.Name)
-            return apply(node.func.id, [value(argument) for argument in node.args])
+            return _apply(node.func.id, [value(argument) for argument in node.args])
 
         return value(self._tree)
 
 
-def _apply(name: str, values: list[FloatArray]) -> FloatArray:
-    """Value of an operation on arrays."""
-    if name == "mean":
-        return np.asarray(np.mean(values[0]))
-    if name == "average":
-        total = values[0]
-        for each in values[1:]:
-            total = total + each
-        return total / len(values)
-    result: FloatArray = getattr(np, name)(*values)
-    return result
+def _apply(name: str, values: list[Any]) -> Any:
+    """Value of an operation."""
+    return (
+        sum(values[1:], values[0]) / len(values)
+        if name == "average"
+        else getattr(np, name)(*values)
+    )
 
 
 def parse(text: str) -> Expression:

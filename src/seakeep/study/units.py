@@ -23,8 +23,8 @@ from seakeep.core.bands import band_error_over_time
 from seakeep.errors import DataError, SeakeepError
 from seakeep.formats.netcdf import opened_netcdf
 from seakeep.models.calibration import Judged, envelope_of, found_margin, held_out
+from seakeep.models.checks import Json
 from seakeep.models.engine import group_series, read_groups
-from seakeep.models.interface import Json
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.registry import is_ensemble
 from seakeep.models.selection import Selected
