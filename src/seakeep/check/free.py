@@ -44,7 +44,7 @@ def modes(model: Model) -> xr.Dataset:
 
     Parameters
     ----------
-    model : HankelDMDcModel or LinearModel
+    model : HankelDMDcModel
         The model.
 
     Returns
@@ -80,7 +80,7 @@ def decay(model: Model) -> xr.Dataset:
 
     Parameters
     ----------
-    model : HankelDMDcModel or LinearModel
+    model : HankelDMDcModel
         The model.
 
     Returns

@@ -56,7 +56,7 @@ def response(
 
     Parameters
     ----------
-    model : HankelDMDcModel, LinearModel or HankelEnsemble
+    model : HankelDMDcModel or HankelEnsemble
         The model.
     frequencies : array_like, shape (frequency,), optional
         Hz; by default 120 around those that were trained.

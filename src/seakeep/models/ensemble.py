@@ -46,7 +46,7 @@ from seakeep.models.growth import LeadErrors, Stretch, lead_errors
 from seakeep.models.html import text_html
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import Runs
-from seakeep.models.linear import HankelDMDcModel, Kept
+from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live
 from seakeep.models.members import (
     TrainingArrays,
@@ -490,7 +490,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
                 rank=found.solution.rank,
                 clipped=found.solution.clipped,
             ),
-            learnt=Kept(self.coverage),
+            coverage=self.coverage,
         )
 
     def spectral_radii(

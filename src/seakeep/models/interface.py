@@ -156,7 +156,10 @@ class Needs:
 class Model(Protocol):
     """A fitted model, as compare, study and report use it."""
 
-    kind: ClassVar[str]
+    @property
+    def kind(self) -> str:
+        """Word of its spec in TOML files and in :data:`seakeep.models.registry.KINDS`."""
+        ...
 
     @property
     def signature(self) -> Signature:

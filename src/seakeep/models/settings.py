@@ -239,6 +239,8 @@ class HankelSettings:
         If a setting is out of range.
     """
 
+    kind: ClassVar[str]
+    title: ClassVar[str] = ""
     may_choose: ClassVar[bool] = False
     lengths: ClassVar[Mapping[str, int]] = {
         "window": 2,

@@ -148,8 +148,9 @@ class HankelDMDc(HankelSettings):
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
         """Rebuild the model that a file holds."""
-        settings = cls.from_json(store.content(dataset, "settings"))
-        return HankelDMDcModel.from_dataset(dataset, settings)
+        return HankelDMDcModel.from_dataset(
+            dataset, cls.from_json(store.content(dataset, "settings"))
+        )
 
     @classmethod
     def paper(cls, encounter_period: float, dt: float) -> Self:
@@ -337,7 +338,8 @@ class HankelDMDc(HankelSettings):
         """The model of settings that leave nothing to be chosen."""
         data = gather(named, states, inputs, stop, self)
         solution = data.regress(self, self.state_delays, all_rows=self.delay_rows == "ridge")
-        return HankelDMDcModel.fitted(self, data, solution, named, readouts)
+        signature = replace(data.signature(self), readouts=readouts)
+        return HankelDMDcModel.fitted(self, data, signature, solution, named)
 
 
 def _check_growth(model: HankelDMDcModel) -> None:
@@ -475,18 +477,17 @@ class BayesianHankelDMDc(HankelSettings):
         unit: Any = getattr(getattr(self, name), "unit", "")
         return in_samples(Length(value, unit) if unit else value, dt, self.encounter_period)
 
-    def shared(self, dt: float) -> HankelSettings:
+    def shared(self, dt: float) -> HankelDMDc:
         """What all members share; its delays, window and λ are not used."""
         own = {each.name: getattr(self, each.name) for each in fields(HankelSettings)}
         unused = {"state_delays": 0, "input_delays": 0, "ridge": 0.0, "window": None}
-        return HankelSettings(**own | unused).resolved(dt, self.encounter_period)
+        return HankelDMDc(**own | unused).resolved(dt, self.encounter_period)
 
     def central(self, dt: float) -> HankelDMDc:
         """The single model at the medians of the priors."""
-        shared = self.shared(dt)
-        values = {each.name: getattr(shared, each.name) for each in fields(shared)}
-        ridge = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
-        return HankelDMDc(**values | self._lengths(0.5, dt) | {"ridge": ridge}, select=self.select)
+        ridge: Any = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
+        lengths: dict[str, Any] = self._lengths(0.5, dt)
+        return replace(self.shared(dt), **lengths, ridge=ridge, select=self.select)
 
     def _lengths(self, q: float, dt: float) -> dict[str, int | None]:
         """Window and delays at a quantile, samples."""

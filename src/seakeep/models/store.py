@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -39,8 +39,6 @@ MOMENTS = ("mean", "std", "spread", "centre", "reach")
 class Saved:
     """A model that a NetCDF file can hold; it has a ``kind`` and ``to_dataset``."""
 
-    kind: ClassVar[str]
-
     def to_dataset(self) -> xr.Dataset:
         """All that :meth:`save` writes."""
         raise NotImplementedError
@@ -63,7 +61,7 @@ class Saved:
         RequestError
             If the file cannot be written, or another one than a model is there.
         """
-        dataset = self.to_dataset().assign_attrs(seakeep_kind=self.kind)
+        dataset = self.to_dataset().assign_attrs(seakeep_kind=self.kind)  # type: ignore[attr-defined]
         return write_sealed(dataset, path, MODEL)
 
 
