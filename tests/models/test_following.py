@@ -76,6 +76,11 @@ def test_nothing_is_read_beyond_the_look_ahead_and_no_state_after_the_start(mode
     assert expected.attrs["reads_input_until"] == pytest.approx((model.lead_samples - 1) * DT)
 
 
+def test_settings_know_the_history_that_carriers_read(models):
+    model, period = models["now"], drifting_run(7).attrs["encounter_period"]
+    assert model.history_samples == model.settings.needs(DT, period).history + 1
+
+
 @pytest.mark.parametrize("name", ["ahead", "now"])
 def test_runs_arrays_members_and_service_are_one_recursion(models, name):
     model, run, steps, start = models[name], drifting_run(7), 60, 600

@@ -63,7 +63,7 @@ class Constant:
         """Settings whose window counts in samples."""
         return replace(self, window=self._settings.resolved(dt, encounter_period).window)
 
-    def needs(self, dt: float) -> Needs:
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that it asks of its runs."""
         return self._settings.needs(dt)
 

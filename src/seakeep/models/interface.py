@@ -247,8 +247,8 @@ class Spec(Protocol):
         """Settings whose lengths are samples."""
         ...
 
-    def needs(self, dt: float) -> Needs:
-        """Samples that it asks of its runs at a time step."""
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
+        """Samples that it asks of its runs at a time step and an encounter period, s."""
         ...
 
     def fit(

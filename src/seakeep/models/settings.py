@@ -17,7 +17,7 @@ from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
 from seakeep.models import labelled
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.checks import Json, check_choice, check_integer, check_keys, plain, settings_of
-from seakeep.models.following import Following
+from seakeep.models.following import BACK, Following
 from seakeep.models.html import settings_html
 from seakeep.models.inputs import InputMap
 from seakeep.models.interface import Needs
@@ -389,27 +389,35 @@ class HankelSettings:
         follows = Following.fit(aligned, runs, states, window, self.lead)
         return InputMap(aligned, observed=observed, follows=follows)
 
-    def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
-        """Samples of input before and after the start that the rows of a forecast read.
+    @property
+    def may_observe(self) -> tuple[Observable, ...]:
+        """Observables that a model of these settings may have."""
+        return self.observables
+
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
+        """Samples that it asks of its runs.
+
+        Parameters
+        ----------
+        dt : float
+            Time step, s.
+        encounter_period : float, optional
+            Encounter period, s, in which carriers of a model that follows its surge count.
 
         Raises
         ------
         RequestError
             If an observable counts in encounter periods and does not state its own.
         """
-        delays = self.input_delays if input_delays is None else input_delays
-        reach = [each.reach(dt) for each in self.observables]
-        before = max([delays, *(before for before, _ in reach)])
-        return before, max([self.lead, *(ahead for _, ahead in reach)])
-
-    def needs(self, dt: float) -> Needs:
-        """Samples that it asks of its runs."""
-        before, after = self.around(dt)
+        before, after = zip((0, self.lead), *(o.reach(dt) for o in self.may_observe), strict=True)
+        delayed = self.input_delays
+        if encounter_period and self.alignment and self.alignment.surge == "predicted":
+            delayed += round(BACK * encounter_period / dt)
         return Needs(
             self.window or 1,
-            max(self.state_delays, before),
+            max(self.state_delays, delayed, *before),
             self.history == "inside",
-            after,
+            max(after),
         )
 
     def _repr_html_(self) -> str:

@@ -141,9 +141,18 @@ class HankelDMDc(HankelSettings):
         super().__post_init__()
         object.__setattr__(self, "select", Select.of(self.select))
 
-    def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
-        """Samples around the start that a forecast reads, whichever observables are chosen."""
-        return _around_any(super().around(dt, input_delays), self.select, self.observables, dt)
+    @property
+    def may_observe(self) -> tuple[Observable, ...]:
+        """Observables that are stated, or those among which `fit` chooses."""
+        select = self.select
+        if self.observables or select is None or not select.observables:
+            return self.observables
+        return default_observables(("eta",), select.period)
+
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
+        """Samples that it asks of its runs, whichever observables are chosen."""
+        stated = None if self.select is None else self.select.period
+        return super().needs(dt, encounter_period or stated)
 
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
@@ -354,17 +363,6 @@ def _check_growth(model: HankelDMDcModel) -> None:
         )
 
 
-def _around_any(
-    around: tuple[int, int], select: Select | None, observables: tuple[Observable, ...], dt: float
-) -> tuple[int, int]:
-    """Samples around the start, with those of observables that may be chosen."""
-    if select is None or not select.observables or observables:
-        return around
-    reach = [each.reach(dt) for each in default_observables(("eta",), select.period)]
-    before, after = zip(around, *reach, strict=True)
-    return max(before), max(after)
-
-
 WINDOW = Uniform("60 T", "120 T")
 """What a member learns from where runs are long.
 
@@ -485,31 +483,22 @@ class BayesianHankelDMDc(HankelSettings):
 
     def central(self, dt: float) -> HankelDMDc:
         """The single model at the medians of the priors."""
-        ridge: Any = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
-        lengths: dict[str, Any] = self._lengths(0.5, dt)
-        return replace(self.shared(dt), **lengths, ridge=ridge, select=self.select)
+        return self._single(0.5, dt)
 
-    def _lengths(self, q: float, dt: float) -> dict[str, int | None]:
-        """Window and delays at a quantile, samples."""
-        found: dict[str, int | None] = {}
+    def _single(self, q: float, dt: float) -> HankelDMDc:
+        """The single model at a quantile of the window and delays, with the median of λ."""
+        made: dict[str, Any] = {}
         for name in PRIORS[:3]:
             value = self.at(name, q)
             if value is not None and not np.isfinite(value):
                 value = self.at(name, 1.0 - 1e-6)  # of a prior without an upper end
-            found[name] = None if value is None else self.samples(name, value, dt)
-        return found
+            made[name] = None if value is None else self.samples(name, value, dt)
+        made["ridge"] = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
+        return replace(self.shared(dt), **made, select=self.select)
 
-    def needs(self, dt: float) -> Needs:
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that its largest draw asks of its runs: the upper ends of the priors count."""
-        most = self._lengths(1.0, dt)
-        around = self.shared(dt).around(dt, most["input_delays"])
-        before, after = _around_any(around, self.select, self.observables, dt)
-        return Needs(
-            most["window"] or 1,
-            max(most["state_delays"] or 0, before),
-            self.history == "inside",
-            after,
-        )
+        return self._single(1.0, dt).needs(dt, self.encounter_period or encounter_period)
 
     def to_json(self) -> Json:
         """Settings as JSON values; the seed as entropy, and the spawn key behind strokes."""

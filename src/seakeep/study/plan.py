@@ -287,9 +287,9 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
     return float(np.mean(shares)) if shares else 0.0
 
 
-def needs_of(specs: Sequence[Spec], dt: float) -> Needs:
+def needs_of(specs: Sequence[Spec], dt: float, encounter_period: float) -> Needs:
     """Samples that the most demanding of several models needs: the same windows serve all."""
-    each = [spec.needs(dt) for spec in specs]
+    each = [spec.needs(dt, encounter_period) for spec in specs]
     return Needs(
         max(needs.snapshots for needs in each),
         max(needs.history for needs in each),
@@ -402,7 +402,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
         for name, each in settings.models.items()
     }
     specs = [each.spec for each in models.values()]
-    needs = needs_of(specs, dt)
+    needs = needs_of(specs, dt, period)
     training = choose_training(settings, runs, training_names, needs, study.inputs)
     default = "whole" if left_out else "test"
     tests = {
@@ -496,7 +496,7 @@ def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:
     """Warn once for a study, of the model and training set that hold the fewest slow periods."""
     least = None
     for model, spec in plan.specs.items():
-        snapshots = needs_of([spec], plan.dt).snapshots
+        snapshots = needs_of([spec], plan.dt, plan.encounter_period).snapshots
         longest = (snapshots - 1) * plan.dt if snapshots > 1 else float("inf")
         for training in plan.training if getattr(spec, "standardize", False) else ():
             trained = sum(min(stop - begin, longest) for _, begin, stop in training.spans)
