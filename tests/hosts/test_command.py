@@ -64,7 +64,7 @@ def test_an_fmu_without_a_compiler_is_announced(run, monkeypatch, tmp_path):
         ),
         (("--fmu", "rom.zip"), "rom.zip ends in '.zip'"),
         (("--c", "library", "--member", "0"), "--member is for ensembles"),
-        (("--mat", "rom.mat"), "the model is driven by observables too"),
+        (("--mat", "rom.zip"), "rom.zip ends in '.zip'"),
     ],
 )
 def test_wrong_requests_are_refused_and_write_nothing(words, message, run, tmp_path):

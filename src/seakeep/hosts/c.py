@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache, partialmethod
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
 from seakeep.models.observables import SlowSquare, Term
+from seakeep.signals.expressions import Text
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -88,8 +88,9 @@ def content_of(model: HankelDMDcModel, name: str) -> dict[str, Any]:
     follows, observed = input_map.follows, input_map.observed
     back = 0 if follows is None else follows.back
     kernels: list[FloatArray] = []
-    u = np.array([[_C(f"u[{place}]") for place in range(len(signature.inputs))]], dtype=object)
-    delayed, direct = [str(each) for each in u[0]], list[str]()
+    every = [Text(f"u[{place}]", _number) for place in range(len(signature.inputs))]
+    u = np.array([every], dtype=object)
+    delayed, direct = list(map(str, every)), list[str]()
     if observed is not None:
         for each in observed.bound:
             back = max(back, each.before - input_map.lead * each.delayed)
@@ -172,41 +173,6 @@ def _text(value: str) -> str:
     """Literal of C for any text."""
     escaped = re.sub(rb"[^\w /^.-]", lambda found: b"\\%03o" % ord(found[0]), value.encode())
     return f'"{escaped.decode()}"'
-
-
-@dataclass(frozen=True)
-class _C:
-    """An expression of C, which the arithmetic of numpy on arrays of objects continues."""
-
-    text: str
-
-    def __str__(self) -> str:
-        return self.text
-
-    def _with(self, sign: str, other: Any, *, turned: bool = False) -> _C:
-        texts = (self.text, other.text if isinstance(other, _C) else _number(other))
-        return _C(f"({f' {sign} '.join(texts[::-1] if turned else texts)})")
-
-    __add__ = partialmethod(_with, "+")
-    __sub__ = partialmethod(_with, "-")
-    __mul__ = partialmethod(_with, "*")
-    __truediv__ = partialmethod(_with, "/")
-    __radd__ = partialmethod(_with, "+", turned=True)
-    __rsub__ = partialmethod(_with, "-", turned=True)
-    __rmul__ = partialmethod(_with, "*", turned=True)
-    __rtruediv__ = partialmethod(_with, "/", turned=True)
-
-    def _of(self, function: str, more: str = "") -> _C:
-        return _C(f"{function}({self.text}{more})")
-
-    def __pow__(self, exponent: float) -> _C:
-        return self._of("pow", f", {_number(exponent)}")
-
-    __neg__ = partialmethod(_of, "-")
-    __abs__ = partialmethod(_of, "fabs")
-    sqrt = partialmethod(_of, "sqrt")
-    sin = partialmethod(_of, "sin")
-    cos = partialmethod(_of, "cos")
 
 
 def _columns(

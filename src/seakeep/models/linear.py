@@ -350,6 +350,10 @@ class HankelDMDcModel(SingleModel, store.Saved):
     def to_mat(self, path: str | Path) -> Path:
         """Write A, B, C, D, Ts, offsets, names (of the state's entries too) and units for MATLAB.
 
+        With observables the inputs of the system are the regressors; the file holds filters, as
+        state-space systems too, and a function that make them of measured inputs. Its entry
+        ``Regressors`` says how.
+
         Parameters
         ----------
         path : str or Path
@@ -361,7 +365,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
             The file. In MATLAB: ``m = load('rom.mat'); sys = idss(m.A, m.B, m.C, m.D, 'Ts',
             m.Ts, 'InputName', m.InputName, 'OutputName', m.OutputName);``
         """
-        return export.to_mat(self._system(), self.signature, path)
+        return export.to_mat(self._system(is_file=True), self.signature, path)
 
     def initial_state(self, run: xr.Dataset, start: float) -> FloatArray:
         """State of the exported system that continues a measured run.
@@ -414,13 +418,16 @@ class HankelDMDcModel(SingleModel, store.Saved):
         windows = check_arrays(self.signature, x_history, u_history, lead, 1)
         return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
 
-    def _system(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _system(self, *, is_file: bool = False) -> export.System:
         export.check_linear(self.signature)
-        if more := self.regressors[len(self.inputs) :]:
+        observed = self.signature.input_map.observed
+        if is_file and observed is not None and not all(each.terms for each in observed.bound):
+            is_file = False  # Python code from outside
+        if not is_file and (more := self.regressors[len(self.inputs) :]):
             raise RequestError(
                 f"the model is driven by observables too ({', '.join(more)}), which a state-space "
-                "system in its inputs cannot represent. Use forecast_arrays, or fit a model with "
-                "observables=[]."
+                "system in its inputs cannot represent. Use forecast_arrays, export C, an FMU, an "
+                "ONNX graph or a MATLAB file, or fit a model with observables=[]."
             )
         if read := [each.channel for each in self.signature.readouts if each.function]:
             raise RequestError(

@@ -11,7 +11,8 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partialmethod
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ import numpy.typing as npt
 from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import DataError, RequestError, did_you_mean
 
-__all__ = ["Expression", "parse"]
+__all__ = ["Expression", "Text", "parse"]
 
 GREATEST_EXPONENT = 16.0
 """A physical law has no higher power; 9**9**9 has."""
@@ -136,6 +137,58 @@ class Expression:
             return _apply(node.func.id, [value(argument) for argument in node.args])
 
         return value(self._tree)
+
+
+@dataclass(frozen=True)
+class Text:
+    """An expression of another language, which the arithmetic of numpy on objects continues.
+
+    Parameters
+    ----------
+    text : str
+        The expression.
+    number : callable, optional
+        Text of a number.
+    power : str, optional
+        Power of ``{0}`` to ``{1}``, as C has it.
+    absolute : str, optional
+        Name of the function of the absolute value.
+    """
+
+    text: str
+    number: Callable[[float], str] = field(default=repr, repr=False)
+    power: str = "pow({0}, {1})"
+    absolute: str = "fabs"
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _with(self, pattern: str, other: Any, *, turned: bool = False) -> Text:
+        texts = (self.text, other.text if isinstance(other, Text) else self.number(float(other)))
+        return replace(self, text=pattern.format(*(texts[::-1] if turned else texts)))
+
+    __add__ = partialmethod(_with, "({0} + {1})")
+    __sub__ = partialmethod(_with, "({0} - {1})")
+    __mul__ = partialmethod(_with, "({0} * {1})")
+    __truediv__ = partialmethod(_with, "({0} / {1})")
+    __radd__ = partialmethod(_with, "({0} + {1})", turned=True)
+    __rsub__ = partialmethod(_with, "({0} - {1})", turned=True)
+    __rmul__ = partialmethod(_with, "({0} * {1})", turned=True)
+    __rtruediv__ = partialmethod(_with, "({0} / {1})", turned=True)
+
+    def __pow__(self, exponent: float) -> Text:
+        return self._with(self.power, exponent)
+
+    def __abs__(self) -> Text:
+        return self._of(self.absolute)
+
+    def _of(self, function: str) -> Text:
+        return replace(self, text=f"{function}({self.text})")
+
+    __neg__ = partialmethod(_of, "-")
+    sqrt = partialmethod(_of, "sqrt")
+    sin = partialmethod(_of, "sin")
+    cos = partialmethod(_of, "cos")
 
 
 def _apply(name: str, values: list[Any]) -> Any:
