@@ -22,7 +22,14 @@ from seakeep.arrays import FloatArray
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_flag, check_number, names_of, settings_of
+from seakeep.models.checks import (
+    TINY,
+    check_choice,
+    check_flag,
+    check_number,
+    names_of,
+    settings_of,
+)
 from seakeep.models.labelled import Span
 from seakeep.signals.propagation import (
     CarriedElevation,
@@ -37,7 +44,6 @@ __all__ = ["FittedAlignment", "ProbeAlignment", "depth_of"]
 
 Mode = Literal["effective", "dispersion"]
 Surge = Literal["measured", "predicted", "none"]
-TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)

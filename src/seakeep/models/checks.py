@@ -14,6 +14,7 @@ from pydantic import TypeAdapter
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 
 __all__ = [
+    "TINY",
     "Json",
     "check_choice",
     "check_flag",
@@ -28,6 +29,8 @@ __all__ = [
 
 Json = dict[str, Any]
 """Settings as JSON values."""
+TINY = float(np.finfo(float).tiny)
+"""Least number above zero."""
 Settings = TypeVar("Settings")
 Made = TypeVar("Made")
 
@@ -68,11 +71,13 @@ def check_integer(name: str, value: object, least: int, optional: bool = False) 
         )
 
 
-def check_number(name: str, value: Any, meant: str, low: float, high: float = np.inf) -> None:
+def check_number(
+    name: str, value: Any, meant: str, low: float, high: float = np.inf, hint: str = ""
+) -> None:
     """Refuse a setting that is not a finite number from `low` on and below `high`."""
     real = isinstance(value, numbers.Real) and not isinstance(value, bool)
     if not real or not np.isfinite(value) or not low <= value < high:
-        raise RequestError(f"{name} must be {meant}; received {value!r:.{SHOWN}}.")
+        raise RequestError(f"{name} must be {meant}; received {value!r:.{SHOWN}}.{hint}")
 
 
 def check_flag(name: str, value: object) -> None:

@@ -256,7 +256,8 @@ def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple
     labels = channel_labels(next(iter(runs.values())), names)
     if len(runs) == 1:
         return labels
-    for number, label in enumerate(labels):
+    out = []
+    for label in labels:
         stated = {
             name: str(units)
             for name, run in runs.items()
@@ -276,13 +277,8 @@ def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple
                 f"'{next(iter(stated.values()))}', as in {next(iter(stated))}. Set its units "
                 "attribute."
             )
-        if stated:
-            labels = (
-                *labels[:number],
-                replace(label, units=next(iter(stated.values()))),
-                *labels[number + 1 :],
-            )
-    return labels
+        out.append(replace(label, units=next(iter(stated.values()), label.units)))
+    return tuple(out)
 
 
 def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> None:

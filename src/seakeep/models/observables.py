@@ -20,7 +20,7 @@ from seakeep.arrays import FloatArray
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_flag, check_keys, check_number, names_of
+from seakeep.models.checks import TINY, check_choice, check_flag, check_keys, check_number, names_of
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals import expressions
 
@@ -48,7 +48,6 @@ BOUND = 36.0
 """Squared standard deviations of an input at which its powers begin to grow like the input."""
 STIFF = 100.0
 """How much more λ weighs on powers: an error of a high wave is an error of its cube."""
-TINY = float(np.finfo(float).tiny)
 SLOPE = 0.7
 """Slope of slow squares above the largest of training: a force does not grow for ever."""
 

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import math
-import numbers
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar, Literal, Self, get_args
 
-import numpy as np
 import xarray as xr
 
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
 from seakeep.models import labelled
 from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.checks import Json, check_choice, check_integer, check_keys, plain, settings_of
+from seakeep.models.checks import (
+    TINY,
+    Json,
+    check_choice,
+    check_flag,
+    check_integer,
+    check_keys,
+    check_number,
+    plain,
+    settings_of,
+)
 from seakeep.models.following import BACK, Following
 from seakeep.models.html import settings_html
 from seakeep.models.inputs import InputMap
@@ -136,24 +144,16 @@ def as_length(name: str, value: Any, least: int = 0, optional: bool = False) -> 
 
 def check_seconds(name: str, value: object) -> None:
     """Refuse a period or a step that is not a positive number."""
-    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-    if not (real and math.isfinite(value) and value > 0):  # type: ignore[arg-type,operator]
-        raise RequestError(
-            f"{name} must be a positive number of seconds; received {value!r:.{SHOWN}}."
-        )
+    check_number(name, value, "a positive number of seconds", TINY)
 
 
 def check_ridge(value: object, may_choose: bool = False) -> None:
     """Refuse a λ that is not a number, zero or positive, nor "rollout" where λ can be chosen."""
     if may_choose and isinstance(value, str) and value == "rollout":
         return
-    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-    if not real or not math.isfinite(value) or value < 0:  # type: ignore[arg-type,operator]
-        raise RequestError(
-            f"ridge must be a number, zero or positive{', or the word rollout' * may_choose}; "
-            f"received {value!r:.{SHOWN}}. The paper uses 100; 0 asks for the solution of least "
-            "norm."
-        )
+    word = ", or the word rollout" * may_choose
+    hint = " The paper uses 100; 0 asks for the solution of least norm."
+    check_number("ridge", value, f"a number, zero or positive{word}", 0, hint=hint)
 
 
 STABLE_RADIUS = 0.999
@@ -163,12 +163,9 @@ encounter periods."""
 
 def check_stable(value: object) -> None:
     """Refuse what is neither true nor false nor a radius."""
-    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-    if not isinstance(value, bool) and not (real and 0 < value < 1):  # type: ignore[operator]
-        raise RequestError(
-            "stable must be True, False or a radius above 0 and below 1, to which eigenvalues are "
-            f"clipped; received {value!r:.{SHOWN}}. True is {STABLE_RADIUS:g}."
-        )
+    if not isinstance(value, bool):
+        meant = "True, False or a radius above 0 and below 1, to which eigenvalues are clipped"
+        check_number("stable", value, meant, TINY, 1.0, f" True is {STABLE_RADIUS:g}.")
 
 
 Folds = Literal["auto", "run", "sea_state"]
@@ -206,19 +203,11 @@ class Select:
 
     def __post_init__(self) -> None:
         check_choice("select: folds", self.folds, FOLDS)
-        if not isinstance(self.observables, bool):
-            raise RequestError(
-                "select: observables must be True or False; received "
-                f"{self.observables!r:.{SHOWN}}."
-            )
+        check_flag("select: observables", self.observables)
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
-            real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-            if not real or not LEAST_PERIODS < value < MOST_PERIODS:
-                raise RequestError(
-                    "select: horizon (encounter periods) and period (s) must lie between 1e-6 and "
-                    f"1e6; received {value!r:.{SHOWN}}."
-                )
+            what = "select: horizon (encounter periods) and period (s)"
+            check_number(what, value, "between 1e-6 and 1e6", LEAST_PERIODS, MOST_PERIODS)
         if not given:
             raise RequestError("select: horizon is empty. Write horizon=(15, 45).")
         object.__setattr__(self, "horizon", tuple(float(each) for each in given))
@@ -271,10 +260,7 @@ class HankelSettings:
         check_choice("history", self.history, ("before", "inside"))
         check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
-        if not isinstance(self.standardize, bool | np.bool_):
-            raise RequestError(
-                f"standardize must be True or False; received {self.standardize!r:.{SHOWN}}."
-            )
+        check_flag("standardize", self.standardize)
         check_stable(self.stable)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
         object.__setattr__(self, "observables", observables_of(self.observables))

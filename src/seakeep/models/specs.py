@@ -825,6 +825,8 @@ def _training_arrays(
         for run, first in zip(runs.values(), earliest, strict=True)
     ]
     groups = [tuple(each) for each in zip(*read, strict=True)]
+    labels = labelled.channel_labels(next(iter(runs.values())), inputs)
+    delayed, direct = (tuple(each.name for each in made) for made in input_map.regressors(labels))
     arrays = TrainingArrays(
         names=tuple(runs),
         states=groups[0],
@@ -832,14 +834,6 @@ def _training_arrays(
         direct=groups[2],
         offsets=tuple(earliest),
         begins=tuple(begins),
-        channels=(tuple(states), *_regressor_names(input_map, runs, inputs)),
+        channels=(tuple(states), delayed, direct),
     )
     return arrays, [each for each in trained if len(each)]
-
-
-def _regressor_names(
-    input_map: InputMap, runs: dict[str, xr.Dataset], inputs: Sequence[str]
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    made = input_map.regressors(labelled.channel_labels(next(iter(runs.values())), inputs))
-    delayed, direct = (tuple(label.name for label in group) for group in made)
-    return delayed, direct

@@ -117,7 +117,7 @@ def _chosen(plan: Plan, choice: Arrays) -> Selected[HankelDMDc]:
         HankelDMDc.from_json(content["settings"]),
         tuple(content["rows"]),
         content["note"],
-        tuple(FittedReadOut.from_json(each, plan.states) for each in content["readouts"]),
+        tuple(FittedReadOut.from_json(each) for each in content["readouts"]),
     )
 
 
