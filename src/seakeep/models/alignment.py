@@ -307,8 +307,8 @@ class FittedAlignment:
         }
         if settings.surge == "measured":
             out["conditional_on"] = settings.surge_channel
-        if (celerity := self.celerity_of(run)) is not None:
-            out["alignment_celerity"] = celerity
+        if settings.mode == "effective":
+            out["alignment_celerity"] = self._speed(run)
         for key in ("probe_offset", "probe_offset_spread"):
             if key in run.attrs:
                 out[key] = float(run.attrs[key])

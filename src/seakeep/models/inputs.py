@@ -259,8 +259,8 @@ class Drive:
         place, here = made.follows.place, self.places(first, stop)
         table = self.table(first, stop)
         delayed = read_table(place, table, np.arange(stop - first), here)
-        squared = place.squared(here)[:, None]
-        return Regressors(delayed, np.concatenate([direct, squared], axis=1))
+        squared = (here - place.centre) ** 2
+        return Regressors(delayed, np.concatenate([direct, squared[:, None]], axis=1))
 
     def direct(self, first: int, stop: int) -> FloatArray:
         """Columns without delays that no state drives."""

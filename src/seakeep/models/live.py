@@ -486,7 +486,7 @@ class Live:
             first, table = self._table
             here = place.of(self._x[at + 1 - place.taps.size : at + 1, column])
             kept["delayed"][at] = read_table(place, table, np.array([at - first]), here)[0]
-            kept["direct"][at, -1] = place.squared(here)[0]
+            kept["direct"][at, -1] = (here[0] - place.centre) ** 2
         out = self._a @ history.ravel()
         out += self._offset
         out += self._b @ kept["delayed"][at - z : at + 1].ravel()
