@@ -141,8 +141,6 @@ class HoldLast(Constant):
 class LinearSpec(HankelSettings):
     """A linear model of delayed states and inputs: it finds coefficients, the rest is common."""
 
-    role: ClassVar[Role] = "reference"
-    is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
     delay_rows: DelayRows = field(default="exact", init=False, repr=False)
     rank: int | None = field(default=None, init=False, repr=False)
@@ -270,8 +268,6 @@ class Subspace(HankelSettings):
     """
 
     kind: ClassVar[str] = "subspace"
-    role: ClassVar[Role] = "reference"
-    is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
     ridge: float = 1e-3
     delay_rows: DelayRows = field(default="exact", init=False, repr=False)

@@ -28,7 +28,7 @@ from seakeep.models.checks import (
 from seakeep.models.following import BACK, Following
 from seakeep.models.html import settings_html
 from seakeep.models.inputs import InputMap
-from seakeep.models.interface import Needs
+from seakeep.models.interface import Needs, Role
 from seakeep.models.observables import Observable, Observed, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
@@ -230,6 +230,8 @@ class HankelSettings:
 
     kind: ClassVar[str]
     title: ClassVar[str] = ""
+    role: ClassVar[Role] = "reference"
+    is_ensemble: ClassVar[bool] = False
     may_choose: ClassVar[bool] = False
     lengths: ClassVar[Mapping[str, int]] = {
         "window": 2,

@@ -132,7 +132,6 @@ class HankelDMDc(HankelSettings):
 
     kind: ClassVar[str] = "hankel_dmdc"
     role: ClassVar[Role] = "model"
-    is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
     may_choose: ClassVar[bool] = True
     select: Select | None = None
