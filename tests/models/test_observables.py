@@ -11,7 +11,7 @@ from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc
 from seakeep.models.inputs import InputMap, Regressors
 from seakeep.models.labelled import Span, channel_labels
-from seakeep.models.observables import OBSERVABLES, Expression, Powers, SlowSquares, from_json
+from seakeep.models.observables import Expression, Powers, SlowSquares, from_json
 
 DT, PERIOD = 0.1, 16  # s, samples
 
@@ -187,11 +187,3 @@ def test_two_columns_of_one_name_are_refused():
     chosen = [Expression("eta_fwd", "eta_cog**2")]
     with pytest.raises(RequestError, match="two inputs or observables make a column 'eta_fwd'"):
         fitted(irregular(), chosen=chosen)
-
-
-def test_every_kind_of_observable_is_registered_under_its_word():
-    assert {kind: made.kind for kind, made in OBSERVABLES.items()} == {
-        "slow_squares": "slow_squares",
-        "powers": "powers",
-        "expression": "expression",
-    }
