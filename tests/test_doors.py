@@ -62,7 +62,7 @@ def test_each_door_is_tried_here():
         "a quality check",
         "a metric",
         "a model or a baseline",
-        "an input map",
+        "an observable",
         "a figure",
         "a section of the report",
     ]
@@ -109,8 +109,8 @@ def test_a_metric(add, run):
     assert mae(predicted=arrays + 0.1, measured=arrays) == pytest.approx(expected)
 
 
-def test_an_input_map(add, tmp_path):
-    slope = add("an input map", models.OBSERVABLES)["Slope"]
+def test_an_observable(add, tmp_path):
+    slope = add("an observable", models.OBSERVABLES)["Slope"]
     time, eta = 0.1 * np.arange(600), np.random.default_rng(0).standard_normal(600)
     heave = np.r_[0.0, 0.0, np.abs(np.diff(eta))[:-1]]  # answers the rectified slope at once
     variables = {"heave": heave, "eta": eta}

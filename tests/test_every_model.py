@@ -1,8 +1,11 @@
 """Every kind of model, by every preset, on every set of data, is the same after its file."""
 
+import importlib.util
 import os
+import re
 import shutil
 import tomllib
+import zipfile
 from functools import cache
 from pathlib import Path
 
@@ -16,7 +19,7 @@ import xarray as xr
 from seakeep import SeakeepError, load_model, read_campaign
 from seakeep.campaign import load_prepared, write_prepared
 from seakeep.check import check_model
-from seakeep.hosts import write_c
+from seakeep.hosts import write_c, write_fmu, write_onnx
 from seakeep.models import KINDS, load_live
 from seakeep.study import compare, comparison_table, fit_campaign
 
@@ -31,9 +34,11 @@ FEWER = {"bayesian_hankel_dmdc": {"n_members": 3}, "subspace": {"order": 8}}
 MEASURED = pytest.mark.skipif(
     not os.environ.get("SEAKEEP_DATA_DIR"), reason="SEAKEEP_DATA_DIR is not set"
 )
+TANK = pytest.mark.skipif(not importlib.util.find_spec("numba"), reason="needs the extra tank")
 SETS = [
     "tutorial",
     "small tank",
+    pytest.param("virtual tank", marks=TANK),
     "two loggers",
     *(
         pytest.param(name, marks=[pytest.mark.data, MEASURED])
@@ -52,6 +57,15 @@ def written(name: str, folder: Path) -> str:
             columns = small_tank.tank_columns(seed, seconds=60.0)
             small_tank.write_csv(folder / f"{run}.csv", columns)
         return small_tank.CAMPAIGN.replace("[0, 10]", "[0, 40]").replace("[10, inf]", "[40, inf]")
+    if name == "virtual tank":
+        from seakeep.tank.play import play
+        from seakeep.tank.settings import default_settings
+
+        settings = default_settings()
+        run = settings.runs["irregular_1"].model_copy(update={"startup": 5.0, "duration": 90.0})
+        play(settings.model_copy(update={"runs": {"irregular_1": run}}), folder, kind="nc")
+        text = (folder / "campaign.toml").read_text(encoding="utf-8")
+        return re.sub("states = .*", 'states = ["surge", "heave", "pitch", "mooring_stern"]', text)
     if name == "two loggers":
         shutil.copytree(ground.write(folder), folder, dirs_exist_ok=True)
         return ground.CAMPAIGN
@@ -103,11 +117,19 @@ def answers(model, campaign, runs, folder):
         "refused": checked.refused,
         **checked.found,
         "C": answer(lambda: [each.read_text() for each in write_c(model, folder / "c")]),
+        "FMU": answer(lambda: unpacked(write_fmu(model, folder / "model.fmu"))),
+        "ONNX": answer(lambda: write_onnx(model, folder / "model.onnx").read_bytes()),
     }
     served = model.hold() if hasattr(model, "hold") else model
     if hasattr(served, "live"):
         out["live"] = answer(lambda: follow(served, runs[test], folder / "live.nc"))
     return out
+
+
+def unpacked(path):
+    """Files of an archive by their names."""
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
 
 
 def follow(model, run, path):
@@ -126,8 +148,10 @@ def follow(model, run, path):
 @pytest.mark.filterwarnings("ignore::seakeep.errors.SeakeepWarning")
 @pytest.mark.parametrize(("kind", "preset"), MADE)
 @pytest.mark.parametrize("name", SETS)
-def test_a_model_is_the_same_after_its_file(campaign_of, tmp_path, name, kind, preset):
+def test_a_model_is_the_same_after_its_file(campaign_of, tmp_path, monkeypatch, name, kind, preset):
     campaign = campaign_of(name)
+    monkeypatch.setenv("PATH", "")  # FMUs hold sources alone: no compiler is found
+    monkeypatch.delenv("CC", raising=False)
     runs = load_prepared(campaign)
     model = fit_campaign(campaign, f"{kind}{preset}")
     if KINDS[model.kind].is_ensemble:

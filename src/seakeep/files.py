@@ -45,7 +45,7 @@ __all__ = [
     "write_sealed_array",
 ]
 
-FORMAT = 4
+FORMAT = 5
 """Format of sealed files; one of another format is refused, and made again."""
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""

@@ -4,7 +4,7 @@ import pytest
 from drifting import INPUTS, STATES, drifting_run
 
 from seakeep import HankelDMDc, ProbeAlignment, RequestError, cli
-from seakeep.hosts.program import program_of
+from seakeep.hosts.program import exportable, timing
 
 
 @pytest.fixture
@@ -31,15 +31,15 @@ def test_waves_that_no_host_can_carry_are_refused_with_the_way_out(make_run, cha
     alignment = ProbeAlignment(surge="none", celerity=2.0, offset=0.5)
     model = HankelDMDc(2, 2, 1.0, alignment=alignment).fit(make_run(), **channels)
     with pytest.raises(RequestError, match=r"carried over whole records, .* surge = 'predicted'"):
-        program_of(model)
+        exportable(model)
     measured = ProbeAlignment(mode="dispersion", surge="measured")
     model = HankelDMDc(2, 2, 1.0, alignment=measured).fit(drifting_run(), STATES, INPUTS)
     with pytest.raises(RequestError, match="to the measured surge, which no step can make"):
-        program_of(model)
+        exportable(model)
     followed = ProbeAlignment(mode="dispersion", surge="predicted")
     spec = HankelDMDc(2, 2, 1.0, delay_rows="exact", alignment=followed)
     model = spec.fit(drifting_run(), STATES, INPUTS)
-    assert "the probes as measured, where they stood in training" in program_of(model).timing
+    assert "the probes as measured, where they stood in training" in timing(exportable(model))
     with pytest.raises(RequestError, match="its own surge takes it, which no linear system"):
         model.to_state_space()
 
@@ -64,7 +64,7 @@ def test_an_fmu_without_a_compiler_is_announced(run, monkeypatch, tmp_path):
         ),
         (("--fmu", "rom.zip"), "rom.zip ends in '.zip'"),
         (("--c", "library", "--member", "0"), "--member is for ensembles"),
-        (("--mat", "rom.mat"), "the model is driven by observables too"),
+        (("--mat", "rom.zip"), "rom.zip ends in '.zip'"),
     ],
 )
 def test_wrong_requests_are_refused_and_write_nothing(words, message, run, tmp_path):

@@ -311,7 +311,7 @@ def test_an_aligned_ensemble_says_on_what_it_depends_and_comes_back(runs, surge,
         ({"offset": "3 m"}, "offset must be a number .*; received '3 m'"),
         ({"mode": "dispersion", "celerity": 2.0}, "celerity = 2.0 belongs to mode = 'effective'"),
         ({"highest_frequency": 2.0}, "highest_frequency = 2.0 belongs to mode = 'dispersion'"),
-        ({"channels": "eta"}, r"must be a list of names; .* Write channels=\['eta'\]"),
+        ({"channels": "eta"}, r"a list of one or more names; .* Write channels = \['eta'\]"),
     ],
 )
 def test_settings_out_of_range(settings, message):

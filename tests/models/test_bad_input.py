@@ -407,8 +407,3 @@ def test_a_period_and_a_step_that_were_swapped_are_told():
             RequestError, match=r"dt = 9 s is no shorter than .* 0\.1 s\. Are the tw"
         ):
             make(0.1, 9.0)
-
-
-def test_no_setting_hides_in_the_constructor():
-    with pytest.raises(TypeError, match="missing 3 required positional arguments"):
-        HankelDMDc()

@@ -17,7 +17,7 @@ from seakeep.models import (
     KINDS,
     HankelDMDcModel,
     HankelEnsemble,
-    inputs,
+    alignment,
     load_model,
     outside_training,
 )
@@ -207,16 +207,16 @@ class TestOneEngine:
 
     def test_each_probe_is_carried_once_per_run(self, drifting, monkeypatch):
         runs, test = drifting
-        alignment = replace(PREDICTED, surge="measured")
-        fitted = ensemble(alignment=alignment).fit(runs, STATES, INPUTS)
+        measured = replace(PREDICTED, surge="measured")
+        fitted = ensemble(alignment=measured).fit(runs, STATES, INPUTS)
         carries = []
-        real = inputs.carry_by_dispersion
+        real = alignment.carry_by_dispersion
 
         def counting(*arguments):
             carries.append(1)
             return real(*arguments)
 
-        monkeypatch.setattr(inputs, "carry_by_dispersion", counting)
+        monkeypatch.setattr(alignment, "carry_by_dispersion", counting)
         fitted.forecast_windows(test, [20.0, 25.0, 30.0], steps=20)
         assert len(carries) == len(INPUTS)
         carries.clear()
@@ -229,8 +229,8 @@ class TestOneEngine:
 
     def test_windows_of_several_runs_are_single_forecasts(self, drifting):
         runs, test = drifting
-        for alignment in (None, PREDICTED):
-            model = HankelDMDc(4, 12, 1.0, delay_rows="exact", alignment=alignment)
+        for each in (None, PREDICTED):
+            model = HankelDMDc(4, 12, 1.0, delay_rows="exact", alignment=each)
             model = model.fit(runs, STATES, INPUTS)
             places = [("a", 20.0), ("b", 21.0), ("a", 30.0)]
             each = {"a": test, "b": runs[1]}

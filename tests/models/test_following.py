@@ -18,8 +18,7 @@ from seakeep import (
 )
 from seakeep.core.recursion import Place, Recursion, recursion
 from seakeep.models.calibration import envelope_of
-from seakeep.models.inputs import Chain, Measured
-from seakeep.models.interface import Span
+from seakeep.models.labelled import Span
 
 FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
 OBSERVABLES = (
@@ -77,6 +76,11 @@ def test_nothing_is_read_beyond_the_look_ahead_and_no_state_after_the_start(mode
     assert expected.attrs["reads_input_until"] == pytest.approx((model.lead_samples - 1) * DT)
 
 
+def test_settings_know_the_history_that_carriers_read(models):
+    model, period = models["now"], drifting_run(7).attrs["encounter_period"]
+    assert model.history_samples == model.settings.needs(DT, period).history + 1
+
+
 @pytest.mark.parametrize("name", ["ahead", "now"])
 def test_runs_arrays_members_and_service_are_one_recursion(models, name):
     model, run, steps, start = models[name], drifting_run(7), 60, 600
@@ -100,8 +104,7 @@ def test_a_step_is_the_equation(models):
     """x' = A x̂ + B û + D v with each part computed by itself, as a host does."""
     model, run, start = models["ahead"], drifting_run(7), 600
     signature, x, u = model.signature, table_of(run, STATES), table_of(run, INPUTS)
-    follows = signature.input_map.follows
-    made = Chain.of(signature.input_map).maps[0]
+    follows, observed = signature.input_map.follows, signature.input_map.observed
     z, taps = signature.input_delays, follows.place.taps
     rows = []
     for at in range(start - z, start + 1):
@@ -112,13 +115,15 @@ def test_a_step_is_the_equation(models):
         sides = []
         for side in (below, below + 1):
             wave = [
-                np.sum(bank.taps[side] * u[at - made.back : at + made.ahead + 1, bank.columns].T)
-                for bank in made.banks(None)
+                np.sum(
+                    bank.taps[side] * u[at - follows.back : at + follows.ahead + 1, bank.columns].T
+                )
+                for bank in follows.banks(None)
             ]
-            sides.append(made.observed.with_delayed(np.array([wave]))[0])
+            sides.append(observed.with_delayed(np.array([wave]))[0])
         part = on_grid - below
         rows.append((1 - part) * sides[0] + part * sides[1])
-    direct = made.observed.direct(u)[start]
+    direct = observed.direct(u)[start]
     direct = np.append(direct, (place - follows.place.centre) ** 2)
     regressors = np.concatenate(
         [
@@ -154,15 +159,14 @@ def test_a_ridge_weighs_a_hundred_times_on_powers(models):
 def test_training_is_the_recursion_on_the_measured_surge(models):
     model, run = models["ahead"], drifting_run(1)
     surge = run["surge"].values
-    drive = model.signature.input_map.wrap(
-        Measured(table_of(run, INPUTS), 0, surge), run, [Span(500, 500, 600)]
-    )
-    found = drive.rows(500, 600)
     later = surge.copy()
     later[560:] = 9.0
-    other = model.signature.input_map.wrap(
-        Measured(table_of(run, INPUTS), 0, later), run, [Span(500, 500, 600)]
-    ).rows(500, 600)
+    found, other = (
+        model.signature.input_map.drive(
+            table_of(run, INPUTS), [Span(500, 500, 600)], run=run, surge=each
+        ).rows(500, 600)
+        for each in (surge, later)
+    )
     np.testing.assert_array_equal(other.delayed[:60], found.delayed[:60])
     assert not np.allclose(other.delayed[60:], found.delayed[60:])
 

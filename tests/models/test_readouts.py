@@ -279,9 +279,12 @@ class TestRefused:
             ([{"channel": "a", "of": ["b"], "kind": "stack"}], r"a: kind must be 'hinge', 'st"),
             (
                 [{"channel": "a", "of": "surge"}],
-                r"a: of must be a list of states; received 'surge'",
+                r"a: of must be a list of one or more names; received 'surge'",
             ),
-            ([{"channel": "a", "of": []}], r"a: of must name at least one state; received \[\]"),
+            (
+                [{"channel": "a", "of": []}],
+                r"a: of must be a list of one or more names; received \[\]",
+            ),
             ([{"channel": "a", "of": ["b", "a"]}], r"a cannot be read off itself"),
             ([{"channel": 3, "of": ["b"]}], r"channel must be a name; received 3"),
         ],

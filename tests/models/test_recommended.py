@@ -20,7 +20,7 @@ from seakeep import (
     Uniform,
     load_model,
 )
-from seakeep.models.inputs import FittedAlignment
+from seakeep.models.alignment import FittedAlignment
 
 sys.path.insert(0, str(Path(__file__).parent))
 

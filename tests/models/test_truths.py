@@ -30,7 +30,7 @@ def drifting(seed: int, samples: int = 1500) -> tuple[xr.Dataset, np.ndarray]:
     t = np.arange(samples) * DT
     angles = 2 * np.pi * np.outer(t, rng.uniform(0.7, 1.3, 12)) + rng.uniform(0, 2 * np.pi, 12)
     eta = 0.2 * np.cos(angles).sum(axis=1)
-    square = slow_squares(eta, (0,), KERNEL, 2 * PERIOD - 15, (0,), DT)[:, 0]
+    square = slow_squares(eta, 0, KERNEL, (2 * PERIOD - 15,), DT)[:, 0]
     known = np.isfinite(square)
     surge = np.zeros(samples)
     for k in range(samples - 1):

@@ -90,7 +90,7 @@ def test_recommended_is_at_least_as_good_as_paper_though_it_reads_no_surge(prepa
     starts = unseen.attrs["test_span"][0] + PERIODS * period * np.arange(3)
     found = []
     for spec, alignment in ((ours, ours.alignment), (theirs, ProbeAlignment())):
-        spec = type(spec).from_json({**spec.to_json(), "alignment": alignment.to_json()})
+        spec = type(spec).from_json({**spec.to_json(), "alignment": alignment})
         model = spec.fit([of_training(run) for run in train], STATES, INPUTS)
         errors = []
         for start in starts:

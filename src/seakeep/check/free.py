@@ -41,7 +41,7 @@ def modes(model: Model) -> xr.Dataset:
 
     Parameters
     ----------
-    model : HankelDMDcModel or LinearModel
+    model : HankelDMDcModel
         The model.
 
     Returns
@@ -77,7 +77,7 @@ def decay(model: Model) -> xr.Dataset:
 
     Parameters
     ----------
-    model : HankelDMDcModel or LinearModel
+    model : HankelDMDcModel
         The model.
 
     Returns

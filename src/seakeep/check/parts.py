@@ -14,11 +14,8 @@ from seakeep.arrays import BoolArray, FloatArray
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, SlowSquares, is_ensemble
-from seakeep.models.following import Following
-from seakeep.models.inputs import Chain, Lead, Measured
-from seakeep.models.interface import Span
-from seakeep.models.labelled import channel_matrix, check_step
-from seakeep.models.observables import HALF_WIDTH, Observed
+from seakeep.models.labelled import Span, channel_matrix, check_step
+from seakeep.models.observables import HALF_WIDTH
 from seakeep.signals.time_axis import stretches
 from seakeep.waves import wavenumber
 
@@ -198,15 +195,15 @@ def read_off(model: Model) -> list[int]:
 
 
 def driven(
-    chain: Chain,
+    input_map: InputMap,
     inputs: FloatArray,
     run: xr.Dataset | None,
     first: int,
     stop: int,
     surge: FloatArray | None = None,
 ) -> FloatArray:
-    """What a chain of input maps makes of inputs from `first` to before `stop`, side by side."""
-    drive = chain.wrap(Measured(inputs, 0, surge), run, [Span(first, first, stop)])
+    """What an input map makes of inputs from `first` to before `stop`, side by side."""
+    drive = input_map.drive(inputs, [Span(first, first, stop)], run=run, surge=surge)
     return np.concatenate(drive.rows(first, stop), axis=1)
 
 
@@ -307,36 +304,34 @@ def regressors(model: Model, part: Part) -> FloatArray:
     ndarray, shape (time, column)
         NaN where a row reads what is not there.
     """
-    maps = Chain.of(model.signature.input_map).maps
-    chain = Chain(tuple(_at_once(each) for each in maps if not isinstance(each, Lead)))
+    input_map = _at_once(model.signature.input_map)
     run = part.run.sel(time=slice(part.time[0] - 1e-6, part.time[-1] + 1e-6))
-    size, reach = run.sizes["time"], chain.reads(Span(0, 0, 1))
+    size, reach = run.sizes["time"], input_map.reads(Span(0, 0, 1))
     first, stop = -reach.first, size - (reach.stop - 1)
-    width = sum(map(len, chain.regressors(model.signature.input_labels)))
+    width = sum(map(len, input_map.regressors(model.signature.input_labels)))
     out = np.full((size, width), np.nan)
     if stop > first:
         values, surge = channel_matrix(run, model.inputs, "the run"), None
         if (follows := model.signature.input_map.follows) is not None:
             surge = channel_matrix(run, [model.states[follows.column]], "the run")[:, 0]
-        out[first:stop] = driven(chain, values, run, first, stop, surge)
+        out[first:stop] = driven(input_map, values, run, first, stop, surge)
     return out
 
 
-def _at_once(each: InputMap) -> InputMap:
-    if isinstance(each, Following):
-        observed = None if each.observed is None else _observed_at_once(each.observed)
-        return replace(each, lead=0, observed=observed)
-    return _observed_at_once(each) if isinstance(each, Observed) else each
-
-
-def _observed_at_once(each: Observed) -> Observed:
-    now = [
-        replace(one, lags=(0,), lead=HALF_WIDTH / one.cutoff)  # the middle of its filter
-        if isinstance(one, SlowSquares)
-        else one
-        for one in each.observables
-    ]
-    return replace(each, observables=tuple(now), lead=0)
+def _at_once(input_map: InputMap) -> InputMap:
+    """The map without look-ahead and lags, and without limits of what is above training."""
+    follows, observed = input_map.follows, input_map.observed
+    if observed is not None:
+        now = [
+            replace(each, lags=(0,), lead=HALF_WIDTH / each.cutoff)  # the middle of its filter
+            if isinstance(each, SlowSquares)
+            else each
+            for each in observed.observables
+        ]
+        observed = replace(observed, observables=tuple(now), tops=())
+    if follows is not None:
+        follows = replace(follows, lead=0)
+    return replace(input_map, lead=0, observed=observed, follows=follows)
 
 
 def single_model(model: Model) -> HankelDMDcModel:

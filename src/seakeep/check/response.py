@@ -28,8 +28,6 @@ from seakeep.core.spectra import Spectra, cross_spectra, segment_length
 from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDcModel, HankelEnsemble, Model
 from seakeep.models.engine import Dynamics
-from seakeep.models.following import Following
-from seakeep.models.inputs import Chain, Lead
 from seakeep.models.labelled import mean_period
 
 WAVE = "wave"
@@ -56,7 +54,7 @@ def response(
 
     Parameters
     ----------
-    model : HankelDMDcModel, LinearModel or HankelEnsemble
+    model : HankelDMDcModel or HankelEnsemble
         The model.
     frequencies : array_like, shape (frequency,), optional
         Hz; by default 120 around those that were trained.
@@ -133,9 +131,8 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
 
 def _lead(model: Model) -> int:
     """Samples by which delayed columns lead."""
-    maps = Chain.of(model.signature.input_map).maps
-    carried = sum(each.lead for each in maps if isinstance(each, Following))
-    return carried + sum(each.samples for each in maps if isinstance(each, Lead))
+    input_map = model.signature.input_map
+    return input_map.lead if input_map.follows is None else input_map.follows.lead
 
 
 def _dynamics(model: Model) -> list[Dynamics]:

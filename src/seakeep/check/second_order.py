@@ -20,9 +20,7 @@ from seakeep.check.parts import (
 from seakeep.check.response import measured_response, transfer
 from seakeep.errors import DataError, RequestError
 from seakeep.models import HankelDMDcModel, Model
-from seakeep.models.inputs import Chain
-from seakeep.models.interface import Span
-from seakeep.models.labelled import mean_period
+from seakeep.models.labelled import Span, mean_period
 
 PERIODS = 32
 """Encounter periods in which all probing waves repeat: differences are multiples of its inverse."""
@@ -135,12 +133,12 @@ def _wave(samples: int, cycles: int, turns: FloatArray, amplitude: float) -> Flo
 
 def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:
     """Regressors over one repetition of inputs that repeat, (samples, n + m)."""
-    chain = Chain.of(model.signature.input_map)
-    size, reach = len(inputs), chain.reads(Span(0, 0, 1))
+    input_map = model.signature.input_map
+    size, reach = len(inputs), input_map.reads(Span(0, 0, 1))
     before, after = -(-max(-reach.first, 0) // size), -(-max(reach.stop, 1) // size)
     first = before * size
     tiled = np.tile(inputs, (before + 1 + after, 1))
-    return driven(chain, tiled, None, first, first + size)
+    return driven(input_map, tiled, None, first, first + size)
 
 
 def _offsets(

@@ -63,22 +63,22 @@ def export(
         if path is not None:
             check_place(path, suffix)
     from seakeep.hosts import write_c, write_estimator, write_fmu, write_onnx
-    from seakeep.hosts.program import program_of
+    from seakeep.hosts.program import exportable, timing
 
-    program = program_of(_single(model, member))
+    linear = exportable(_single(model, member))
     written: list[Path] = []
     if c is not None:
-        written += (write_estimator if estimator else write_c)(program.model, c, model.stem)
+        written += (write_estimator if estimator else write_c)(linear, c, model.stem)
     if fmu is not None:
-        written.append(write_fmu(program.model, fmu))
+        written.append(write_fmu(linear, fmu))
     if onnx is not None:
-        written.append(write_onnx(program.model, onnx, steps or 1))
+        written.append(write_onnx(linear, onnx, steps or 1))
     if mat is not None:
-        written.append(program.model.to_mat(mat))
+        written.append(linear.to_mat(mat))
     say(f"Wrote {', '.join(map(str, written))}.")
     if fmu is not None:
         say(_binary(fmu))
-    say(program.timing)
+    say(timing(linear))
 
 
 def _check_beside(is_given: bool, target: Path | None, option: str) -> None:

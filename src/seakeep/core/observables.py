@@ -63,47 +63,37 @@ def derivative(series: FloatArray, order: int, dt: float) -> FloatArray:
 
 
 def slow_squares(
-    series: FloatArray,
-    orders: Sequence[int],
-    kernel: FloatArray,
-    middle: int,
-    lags: Sequence[int],
-    dt: float,
+    series: FloatArray, order: int, kernel: FloatArray, shifts: Sequence[int], dt: float
 ) -> FloatArray:
-    """Slow parts of squares of a series and of its derivatives, at lags.
+    """Slow part of the square of a derivative of a series, at several lags.
 
     Parameters
     ----------
     series : ndarray, shape (time,)
         Elevation.
-    orders : sequence of {0, 1, 2}
-        Orders of the derivatives that are squared.
+    order : {0, 1, 2}
+        Order of the derivative that is squared.
     kernel : ndarray, shape (2 half + 1,)
         Low-pass filter, :func:`slow_kernel`.
-    middle : int
-        Samples by which the middle of the filter lies ahead of the instant of a row, at lag 0.
-    lags : sequence of int
-        Lags of the columns, samples.
+    shifts : sequence of int
+        Samples by which the middle of the filter lies ahead of the instant of a row, per column.
     dt : float
         Time step, s.
 
     Returns
     -------
-    ndarray, shape (time, len(orders) × len(lags))
-        Order by order, lag by lag. A row is NaN where it needs a sample that `series` does not
-        hold: ``middle + half + 1`` samples ahead (``middle + half`` if only the elevation itself
-        is squared) down to ``half + 1 + max(lags) - middle`` behind.
+    ndarray, shape (time, len(shifts))
+        A row is NaN where it needs a sample that `series` does not hold: ``shift + half + 1``
+        ahead (``shift + half`` of the elevation itself) down to ``half + 1 - shift`` behind.
     """
     count, half = len(series), len(kernel) // 2
-    out = np.full((count, len(orders) * len(lags)), np.nan)
-    for row, order in enumerate(orders):
-        slow = np.full(count, np.nan)
-        if count >= len(kernel):
-            square = derivative(series, order, dt) ** 2
-            slow[half : count - half] = np.convolve(square, kernel, "valid")
-        for column, lag in enumerate(lags, start=row * len(lags)):
-            shift = middle - lag  # row j holds the slow part at j + shift
-            first, last = max(0, -shift), min(count, count - shift)
-            if first < last:
-                out[first:last, column] = slow[first + shift : last + shift]
+    out = np.full((count, len(shifts)), np.nan)
+    if count < len(kernel):
+        return out
+    slow = np.full(count, np.nan)
+    slow[half : count - half] = np.convolve(derivative(series, order, dt) ** 2, kernel, "valid")
+    for column, shift in enumerate(shifts):  # row j holds the slow part at j + shift
+        first, last = max(0, -shift), min(count, count - shift)
+        if first < last:
+            out[first:last, column] = slow[first + shift : last + shift]
     return out

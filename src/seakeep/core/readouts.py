@@ -8,6 +8,7 @@ function that is linear between the knots.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -85,10 +86,10 @@ class LinearHinges:
         # hinges.
         terms = [(column, None) for column in self.linear]
         terms += [(c, q) for c, knots in zip(self.columns, self.knots, strict=True) for q in knots]
-        value = np.full(states.shape[:-1], self.weights[0])
+        value: Any = self.weights[0]
         for (column, knot), weight in zip(terms, self.weights[1:], strict=True):
             state = states[..., column]
-            value += weight * (state if knot is None else np.maximum(state - knot, 0.0))
+            value = value + weight * (state if knot is None else np.maximum(state - knot, 0.0))
         result: FloatArray = np.maximum(value, self.floor)
         return result
 

@@ -56,11 +56,6 @@ class Place:
         result: FloatArray = np.clip(found, self.lowest, self.grid[-1])
         return result
 
-    def squared(self, place: FloatArray) -> FloatArray:
-        """Slow surge squared."""
-        result: FloatArray = (place - self.centre) ** 2
-        return result
-
 
 def read_table(
     place: Place, table: FloatArray, samples: IntArray, places: FloatArray

@@ -10,14 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
 from seakeep.core.readouts import LinearHinges
 from seakeep.files import MARK, check_output, make_folder, replacing
-from seakeep.hosts.program import Program, program_of
-from seakeep.models import Model
+from seakeep.hosts.program import exportable
+from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
-from seakeep.models.observables import SLOPE, Formula, Power, Product, Term
+from seakeep.models.observables import SlowSquare, Term
+from seakeep.signals.expressions import Text
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -25,8 +27,6 @@ if TYPE_CHECKING:
 __all__ = ["content_of", "identifier", "rendered", "sources", "write_c", "write_sources"]
 
 KIND = "C source"
-OPERATORS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
-FUNCTIONS = {"power": "pow", "abs": "fabs"}
 
 
 def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
@@ -56,7 +56,7 @@ def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
     Numbers are written in hexadecimal, so that none is rounded. ``cc -std=c99 -Wall -Werror``
     compiles the code without a warning.
     """
-    return write_sources(sources(program_of(model), identifier(name)), folder)
+    return write_sources(sources(exportable(model), identifier(name)), folder)
 
 
 def write_sources(texts: Mapping[str, str], folder: str | Path) -> list[Path]:
@@ -76,50 +76,59 @@ def identifier(name: str) -> str:
     return made if made[:1].isalpha() else f"m_{made}"
 
 
-def sources(program: Program, name: str) -> dict[str, str]:
+def sources(model: HankelDMDcModel, name: str) -> dict[str, str]:
     """Text of the C files by their names."""
-    content = content_of(program, name)
+    content = content_of(model, name)
     return {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
 
 
-def content_of(program: Program, name: str) -> dict[str, Any]:
+def content_of(model: HankelDMDcModel, name: str) -> dict[str, Any]:
     """What the templates of C show of a model."""
-    signature = program.model.signature
-    n, m = program.sizes
+    signature, input_map = model.signature, model.signature.input_map
+    follows, observed = input_map.follows, input_map.observed
+    back = 0 if follows is None else follows.back
     kernels: list[FloatArray] = []
-    terms = {delayed: program.terms(delayed) for delayed in (True, False)}
-    code = {key: [_term(each, kernels) for each in found] for key, found in terms.items()}
+    every = [Text(f"u[{place}]", _number) for place in range(len(signature.inputs))]
+    u = np.array([every], dtype=object)
+    delayed, direct = list(map(str, every)), list[str]()
+    if observed is not None:
+        for each in observed.bound:
+            back = max(back, each.before - input_map.lead * each.delayed)
+            group = delayed if each.delayed else direct
+            for term in each.terms:
+                group += _columns(term, u, observed.limits, kernels)
+        limited = zip(direct, observed.tops, observed.slopes, strict=True)
+        direct = [f"rising({text}, {_number(top)}, {_number(by)})" for text, top, by in limited]
+    scales = (signature.state_scale, signature.input_scale, signature.direct_scale)
     return {
         "name": name,
         "upper": name.upper(),
         "mark": f"{MARK}: {KIND}, written by seakeep {metadata.version('seakeep')}:",
-        "following": program.following,
-        "banks": program.banks,
+        "following": follows,
+        "banks": () if follows is None else follows.banks(None),
         "x_rows": signature.state_samples,
         "dt": signature.dt,
         "N": len(signature.states),
         "Q": len(signature.inputs),
         "s": signature.state_delays,
         "z": signature.input_delays,
-        "n": n,
-        "m": m,
-        "rows": len(program.model.coefficients),
-        "coefficients": program.model.coefficients,
-        "scales": program.scales,
-        "lead": program.lead,
+        "n": signature.input_scale.mean.size,
+        "m": signature.direct_scale.mean.size,
+        "rows": len(model.coefficients),
+        "coefficients": model.coefficients,
+        "scales": dict(zip(("state", "delayed", "direct"), scales, strict=True)),
+        "lead": input_map.lead,
         "lead_samples": signature.lead_samples,
-        "history": program.history,
-        "window": program.back + 1 + signature.lead_samples,
-        "now": program.back,
+        "history": input_map.history(signature.input_delays),
+        "window": back + 1 + signature.lead_samples,
+        "now": back,
         "state_labels": signature.state_labels,
         "input_labels": signature.input_labels,
-        "delayed": [*(f"u[{place}]" for place in range(len(signature.inputs))), *code[True]],
-        "direct": code[False],
-        "powers": any("bounded_power" in each for group in code.values() for each in group),
+        "delayed": delayed,
+        "direct": direct,
         "kernels": kernels,
         "growth": GROWTH,
         "fade": fading(signature),
-        "slope": SLOPE,
         "readouts": [
             {"column": each.column, "code": _hinges(each.function)}
             for each in signature.readouts
@@ -166,32 +175,17 @@ def _text(value: str) -> str:
     return f'"{escaped.decode()}"'
 
 
-def _term(term: Term, kernels: list[FloatArray]) -> str:
-    """Expression of C in u, the inputs of the row; a filter is put beside the other ones."""
-    if isinstance(term, Product):
-        return " * ".join(f"u[{place}]" for place in term.places)
-    if isinstance(term, Power):
-        return f"bounded_power(u[{term.place}], {term.power}, {_number(term.limit)})"
-    if isinstance(term, Formula):
-        return term.expression.fold(_number, lambda name: f"u[{term.places[name]}]", _operation)
+def _columns(
+    term: Term, u: npt.NDArray[np.object_], limits: FloatArray, kernels: list[FloatArray]
+) -> list[str]:
+    """Expressions of C in u, the inputs of the row; a filter is put beside the other ones."""
+    if not isinstance(term, SlowSquare):
+        return [str(each) for each in term.columns(u, limits)[0]]
     number = next((k for k, each in enumerate(kernels) if each is term.kernel), len(kernels))
     if number == len(kernels):
         kernels.append(term.kernel)
-    middle, half = f"u + ({term.shift}) * Q + {term.place}", len(term.kernel) // 2
-    return f"slow_square({middle}, {term.order}, kernel_{number}, {half}, {_number(term.top)})"
-
-
-def _operation(name: str, values: list[str]) -> str:
-    """Operation of an expression in C."""
-    if name in OPERATORS:
-        return f"({values[0]} {OPERATORS[name]} {values[1]})"
-    if name == "negative":
-        return f"(-{values[0]})"
-    if name == "average":
-        return f"(({' + '.join(values)}) / {len(values)}.0)"
-    if name == "square":
-        return f"pow({values[0]}, 2.0)"
-    return f"{FUNCTIONS.get(name, name)}({', '.join(values)})"
+    filtered = f"{term.order}, kernel_{number}, {len(term.kernel) // 2}"
+    return [f"slow_square(u + ({shift}) * Q + {term.place}, {filtered})" for shift in term.shifts]
 
 
 def _hinges(function: LinearHinges) -> str:

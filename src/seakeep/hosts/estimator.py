@@ -7,7 +7,7 @@ from pathlib import Path
 
 from seakeep.errors import RequestError
 from seakeep.hosts.c import content_of, identifier, rendered, sources, write_sources
-from seakeep.hosts.program import program_of
+from seakeep.hosts.program import exportable
 from seakeep.models import Model
 from seakeep.signals.prediction import MEMORY
 
@@ -38,17 +38,17 @@ def write_estimator(
     RequestError
         If the model cannot be exported, or a file is there that seakeep did not write.
     """
-    program = program_of(model)
-    fitted, signature = program.model, program.model.signature
-    if program.lead or program.observed is not None or program.following is not None:
+    linear = exportable(model)
+    signature = linear.signature
+    if not signature.input_map.is_identity:
         raise RequestError(
             "an estimator in C takes models whose steps read waves as they are measured, and this "
             "one has a look-ahead, observables or carried waves. Run model.live() in Python, or "
             "fit it without them."
         )
     name = identifier(name)
-    content = content_of(program, name) | fitted.live(noise=noise).equations
+    content = content_of(linear, name) | linear.live(noise=noise).equations
     content |= {"begins": signature.history_samples, "memory": MEMORY}
     files = ("estimator.h", "estimator.c")
     more = {f"{name}_{file}": rendered(file, **content) for file in files}
-    return write_sources(sources(program, name) | more, folder)
+    return write_sources(sources(linear, name) | more, folder)

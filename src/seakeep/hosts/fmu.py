@@ -13,13 +13,13 @@ import uuid
 import zipfile
 from importlib import metadata
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
 from seakeep.hosts.c import identifier, rendered, sources
-from seakeep.hosts.program import Program, program_of
-from seakeep.models import Model
+from seakeep.hosts.program import exportable, timing
+from seakeep.models import HankelDMDcModel, Model
 
 __all__ = ["compiler", "write_fmu"]
 
@@ -60,8 +60,8 @@ def write_fmu(model: Model, path: str | Path) -> Path:
     """
     target = Path(path)
     check_output(target, KIND)
-    program, name = program_of(model), identifier(target.stem)
-    files = sources(program, name)
+    linear, name = exportable(model), identifier(target.stem)
+    files = sources(linear, name)
     digest = hashlib.sha256("".join(files.values()).encode()).digest()
     content: dict[str, Any] = {
         "name": name,
@@ -69,11 +69,10 @@ def write_fmu(model: Model, path: str | Path) -> Path:
         "mark": f"{MARK}: {KIND},",
         "guid": f"{{{uuid.UUID(bytes=digest[:16])}}}",
         "dt": model.dt,
-        "start": _start(program),
+        **_described(linear),
     }
     files["fmi2.c"] = rendered("fmi2.c", **content)
-    described = _description(program, content["start"])
-    description = rendered("modelDescription.xml", **content, **described)
+    description = rendered("modelDescription.xml", **content)
     with (
         tempfile.TemporaryDirectory() as folder,
         replacing(target) as temporary,
@@ -120,47 +119,42 @@ def _compiled(compiler: list[str], folder: Path, name: str, suffix: str) -> Path
     return made
 
 
-class _Channel(NamedTuple):
-    """An input or an output, as the model description has it."""
-
-    name: str
-    unit: str
-    description: str
-    start: float
-    rows: int
-    is_output: bool
-
-
-def _start(program: Program) -> list[float]:
-    """Values of inputs and outputs before any are known: their means in training."""
-    signature = program.model.signature
-    inputs = signature.input_scale.centre[: len(signature.inputs)]
-    return [*inputs.tolist(), *signature.state_scale.centre.tolist()]
-
-
-def _description(program: Program, start: list[float]) -> dict[str, Any]:
+def _described(model: HankelDMDcModel) -> dict[str, Any]:
     """What the model description says beside names and numbers."""
-    signature = program.model.signature
+    signature = model.signature
     inputs, states = signature.input_labels, signature.state_labels
-    lengths = [program.history + signature.lead_samples] * len(inputs)
-    lengths += [signature.state_samples] * len(states)
-    channels = [
-        _Channel(_part(label.name), label.units, label.long_name, value, rows, place >= len(inputs))
-        for place, (label, value, rows) in enumerate(
-            zip(inputs + states, start, lengths, strict=True)
+    history = signature.input_map.history(signature.input_delays) + signature.lead_samples
+    # Before any are known, inputs and outputs are their means in training.
+    means = (signature.input_scale.centre[: len(inputs)], signature.state_scale.centre)
+    groups = [
+        [
+            {
+                "name": _part(label.name),
+                "unit": label.units,
+                "description": label.long_name,
+                "start": start,
+                "rows": rows,
+                "is_output": labels is states,
+            }
+            for label, start in zip(labels, mean.tolist(), strict=True)
+        ]
+        for labels, mean, rows in zip(
+            (inputs, states), means, (history, signature.state_samples), strict=True
         )
     ]
+    channels = [*groups[0], *groups[1]]
     return {
         "version": metadata.version("seakeep"),
-        "timing": program.timing,
+        "timing": timing(model),
         # Structured names are ASCII.
-        "convention": "structured" if all(each.name.isascii() for each in channels) else "flat",
+        "convention": "structured" if all(c["name"].isascii() for c in channels) else "flat",
         "channels": channels,
+        "start": [channel["start"] for channel in channels],
         # Histories stand in the order of C: those of the states, row by row, then the inputs'.
         "histories": [
             (channel, row + 1)
-            for group in (channels[len(inputs) :], channels[: len(inputs)])
-            for row in range(group[0].rows if group else 0)
+            for group in groups[::-1]
+            for row in range(group[0]["rows"] if group else 0)
             for channel in group
         ],
         "units": sorted({label.units for label in inputs + states if label.units}),

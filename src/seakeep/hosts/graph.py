@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from seakeep.arrays import IntArray, whole_number
-from seakeep.core.readouts import LinearHinges
 from seakeep.core.recursion import Place
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
-from seakeep.hosts.program import Program, program_of
-from seakeep.models import Model
-from seakeep.models.following import Following
-from seakeep.models.observables import SLOPE, Formula, Power, Product, SlowSquare, Term
+from seakeep.hosts.program import exportable, timing
+from seakeep.models import HankelDMDcModel, Model
+from seakeep.models.interface import Signature
+from seakeep.models.observables import Observed, SlowSquare, Term
 
 if TYPE_CHECKING:
     import onnx
@@ -35,12 +34,17 @@ OPERATORS = {
     "subtract": "Sub",
     "multiply": "Mul",
     "divide": "Div",
+    "matmul": "MatMul",
     "power": "Pow",
     "negative": "Neg",
-    "abs": "Abs",
+    "absolute": "Abs",
     "sqrt": "Sqrt",
     "sin": "Sin",
+    "floor": "Floor",
+    "maximum": "Max",
+    "minimum": "Min",
 }
+"""Operators of ONNX by the functions of numpy."""
 
 
 def write_onnx(model: Model, path: str | Path, steps: int = 1) -> Path:
@@ -84,115 +88,145 @@ def write_onnx(model: Model, path: str | Path, steps: int = 1) -> Path:
     target = Path(path)
     check_output(target, KIND)
     count = whole_number(steps, "steps")
-    made = _model(program_of(model), int(count))
+    made = _model(exportable(model), int(count))
     onnx.checker.check_model(made, full_check=True)
     with replacing(target) as temporary:
         temporary.write_bytes(made.SerializeToString())
     return target
 
 
-_Values = list[tuple[str, tuple[int, ...]]]
-"""Names of values and their shapes."""
+_Value = Any
+"""A value of a graph, which type checkers take for the array that numpy's functions return."""
+_Values = dict[str, tuple[_Value, tuple[int, ...]]]
+"""Values and their shapes by name."""
 
 
-class _Nodes:
+class _Graph:
     """Nodes and constants of a graph as they are added; every value has a name of its own."""
 
-    def __init__(self, dt: float, prefix: str = "") -> None:
-        self.dt, self.prefix = dt, prefix
+    def __init__(self, prefix: str = "") -> None:
+        self.prefix = prefix
         self.nodes: list[onnx.NodeProto] = []
         self.constants: list[onnx.TensorProto] = []
 
-    def constant(self, value: Any) -> str:
-        """Name of a constant."""
-        from onnx import numpy_helper
+    def __call__(self, operator: str, *inputs: Any, into: str = "", **attributes: Any) -> _Value:
+        """Value of an operator; inputs are values or constants."""
+        from onnx import helper, numpy_helper
 
-        name = f"{self.prefix}constant_{len(self.constants)}"
-        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
-        return name
-
-    def __call__(self, operator: str, *inputs: Any, into: str = "", **attributes: Any) -> str:
-        """Name of the value of an operator; inputs are names or constants."""
-        from onnx import helper
-
-        names = [each if isinstance(each, str) else self.constant(each) for each in inputs]
+        names = []
+        for each in inputs:
+            if not isinstance(each, _Array):
+                constant = np.array(each, order="C")
+                each = _Array(self, f"{self.prefix}constant_{len(self.constants)}")
+                self.constants.append(numpy_helper.from_array(constant, each.name))
+            names.append(each.name)
         made = into or f"{self.prefix}value_{len(self.nodes)}"
         self.nodes.append(helper.make_node(operator, names, [made], **attributes))
-        return made
+        return _Array(self, made)
 
 
-def _model(program: Program, steps: int) -> onnx.ModelProto:
+class _Array(NDArrayOperatorsMixin):
+    """A value of a graph, to which the arithmetic of numpy adds nodes.
+
+    What a model computes in Python, it writes so itself.
+    """
+
+    def __init__(self, graph: _Graph, name: str) -> None:
+        self.graph, self.name = graph, name
+
+    def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any) -> _Value:
+        values = [each if isinstance(each, _Array) else np.asarray(each, float) for each in inputs]
+        if function is np.square:
+            return self.graph("Mul", *values, *values)
+        if function is np.cos:  # onnxruntime knows no cosine in double precision
+            return np.sin(values[0] + np.pi / 2)
+        return self.graph(OPERATORS[function.__name__], *values)
+
+    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> _Value:
+        assert function is np.concatenate
+        return self.graph("Concat", *args[0], **kwargs)
+
+    def __getitem__(self, key: Any) -> _Value:
+        """Samples (a slice or indices), or columns where the key is a pair."""
+        axis = 0
+        if isinstance(key, tuple):
+            axis, key = -1, key[1]
+        if isinstance(key, slice):
+            stop = END if key.stop is None else key.stop
+            return self.graph("Slice", self, [key.start or 0], [stop], [axis])
+        return self.graph("Gather", self, key, axis=axis)
+
+    def reshape(self, *shape: int) -> _Value:
+        """The same values in another shape."""
+        return self.graph("Reshape", self, shape)
+
+
+def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
     """The forecast as a graph: regressors of all steps, then a scan over them."""
     from onnx import TensorProto, helper
 
     def value(name: str, *shape: int) -> onnx.ValueInfoProto:
         return helper.make_tensor_value_info(name, TensorProto.DOUBLE, shape)
 
-    signature, coefficients = program.model.signature, program.model.coefficients
+    signature, coefficients = model.signature, model.coefficients
     N, s, scale = len(signature.states), signature.state_delays, signature.state_scale
     rows, extended = len(coefficients), N * (s + 1)
-    graph, step = _Nodes(signature.dt), _Nodes(signature.dt, "step_")
-    size, following = signature.state_samples, program.following
-    turned = graph("Gather", "x_history", np.arange(size - 1, size - s - 2, -1), axis=0)
-    deviations = graph("Div", graph("Sub", turned, scale.mean), scale.std)
-    # What is handed from step to step, and what each step takes: names and shapes.
-    handed: _Values = [(graph("Reshape", deviations, [extended]), (extended,))]
-    taken: _Values = [(_forcing(graph, program, steps), (rows,))]
-    before = ["state"]
-    if following is not None:
-        table, more = _tables(graph, following, program, steps)
-        taken.append((table, (following.place.count, program.sizes[0])))
-        handed += more
-        before += ["surge", "line"]
-    after = [f"{name}_after" for name in before]
-    added = "forced" if following is None else _followed(step, following, program)
-    moved = step("Add", step("MatMul", coefficients[:, :extended], "state"), added)
-    kept = step("Slice", "state", [0], [extended - rows])
-    step("Concat", moved, kept, into="state_after", axis=0)
-    step("Slice", moved, [0], [N], into="newest")
-    if following is not None:
-        column = following.follows.column
-        surge = _column(step, step("Unsqueeze", "newest", [0]), column)
-        surge = step("Add", step("Mul", surge, scale.std[column]), scale.mean[column])
-        older = step("Slice", "surge", [0], [-1])
-        step("Concat", step("Squeeze", surge, [0]), older, into="surge_after", axis=0)
-    takes = ["forced", "places"][: len(taken)]
+    size, follows = signature.state_samples, signature.input_map.follows
+    graph, step = _Graph(), _Graph("step_")
+    history, u = _Array(graph, "x_history"), _Array(graph, "u")
+    newest_first = scale.deviations(history[np.arange(size - 1, size - s - 2, -1)])
+    # What is handed from step to step, and what each step takes: values and shapes.
+    handed: _Values = {"state": (newest_first.reshape(extended), (extended,))}
+    taken: _Values = {"forced": (_forcing(graph, u, model, steps), (rows,))}
+    added = _Array(step, "forced")
+    if follows is not None:
+        table, remembered = _tables(graph, u, history, signature, steps)
+        taken["places"] = (table, (follows.place.count, len(signature.input_scale.mean)))
+        handed |= remembered
+        added = _followed(step, model, added)
+    state = _Array(step, "state")
+    moved = coefficients[:, :extended] @ state + added
+    step("Concat", moved, state[: extended - rows], into="state_after", axis=0)
+    newest = step("Slice", moved, [0], [N], [0], into="newest")
+    if follows is not None:
+        surge = newest * scale.std + scale.mean
+        line = [surge[follows.column : follows.column + 1], _Array(step, "surge")[:-1]]
+        step("Concat", *line, into="surge_after", axis=0)
     body = helper.make_graph(
         step.nodes,
         "step",
-        [value(name, *shape) for name, (_, shape) in zip(before, handed, strict=True)]
-        + [value(name, *shape) for name, (_, shape) in zip(takes, taken, strict=True)],
-        [value(name, *shape) for name, (_, shape) in zip(after, handed, strict=True)]
-        + [value("newest", N)],
+        [value(name, *shape) for name, (_, shape) in (handed | taken).items()],
+        [
+            *(value(f"{name}_after", *shape) for name, (_, shape) in handed.items()),
+            value("newest", N),
+        ],
         step.constants,
     )
     scan = helper.make_node(
         "Scan",
-        [name for name, _ in handed + taken],
-        [f"last_{name}" for name in before] + ["series"],
+        [each.name for each, _ in (handed | taken).values()],
+        [*(f"last_{name}" for name in handed), "series"],
         body=body,
         num_scan_inputs=len(taken),
     )
     graph.nodes.append(scan)
 
-    x = graph("Add", graph("Mul", "series", scale.std), scale.mean)
-    if following is None:  # delayed rows that are regressed are no past
-        last = graph("Reshape", "last_state", [s + 1, N])
-        last = graph("Gather", last, np.arange(s, -1, -1), axis=0)
-        graph("Add", graph("Mul", last, scale.std), scale.mean, into="x_after")
+    x = _Array(graph, "series") * scale.std + scale.mean
+    if follows is None:  # delayed rows that are regressed are no past
+        last = _Array(graph, "last_state").reshape(s + 1, N)[np.arange(s, -1, -1)]
+        graph("Add", last * scale.std, scale.mean, into="x_after")
     else:
-        graph("Slice", graph("Concat", "x_history", x, axis=0), [steps], [END], [0], into="x_after")
-    read = {
-        each.column: _hinges(graph, each.function, x)
-        for each in signature.readouts
-        if each.function is not None
-    }
-    columns = [read.get(column) or _column(graph, x, column) for column in range(N)]
-    graph("Concat", *columns, into="x", axis=1)
+        every = graph("Concat", history, x, axis=0)
+        graph("Slice", every, [steps], [END], [0], into="x_after")
+    columns = {column: x[:, column : column + 1] for column in range(N)}
+    for each in signature.readouts:
+        if each.function is not None:
+            columns[each.column] = each.function(x).reshape(steps, 1)
+    graph("Concat", *columns.values(), into="x", axis=1)
     given = [value("x_history", size, N)]
     if signature.inputs:
-        length = program.history + signature.lead_samples + steps
-        given.append(value("u", length, len(signature.inputs)))
+        length = signature.input_map.history(signature.input_delays)
+        given.append(value("u", length + signature.lead_samples + steps, len(signature.inputs)))
     made = helper.make_graph(
         graph.nodes,
         "forecast",
@@ -200,213 +234,132 @@ def _model(program: Program, steps: int) -> onnx.ModelProto:
         [value("x", steps, N), value("x_after", size, N)],
         graph.constants,
     )
-    model = helper.make_model(
+    whole = helper.make_model(
         made,
-        doc_string=f"{MARK}: {KIND}. {program.timing}",
+        doc_string=f"{MARK}: {KIND}. {timing(model)}",
         producer_name="seakeep",
         producer_version=metadata.version("seakeep"),
         opset_imports=[helper.make_opsetid("", OPSET)],
         ir_version=IR,
     )
-    helper.set_model_props(
-        model,
-        {
-            "states": ", ".join(signature.states),
-            "inputs": ", ".join(signature.inputs),
-            "dt": repr(signature.dt),
-            "lead_samples": str(signature.lead_samples),
-        },
-    )
-    return model
+    words = {"dt": repr(signature.dt), "lead_samples": str(signature.lead_samples)}
+    words |= {"states": ", ".join(signature.states), "inputs": ", ".join(signature.inputs)}
+    helper.set_model_props(whole, words)
+    return whole
 
 
-def _forcing(graph: _Nodes, program: Program, steps: int) -> str:
+def _forcing(graph: _Graph, u: _Value, model: HankelDMDcModel, steps: int) -> _Value:
     """What inputs add at each step, (steps, rows); without what the surge drives."""
-    signature, coefficients = program.model.signature, program.model.coefficients
-    z, now, n = signature.input_delays, program.history, program.sizes[0]
-    weights = coefficients[:, len(signature.states) * (signature.state_delays + 1) :]
+    signature, input_map = model.signature, model.signature.input_map
+    z, n, observed = signature.input_delays, signature.input_scale.mean.size, input_map.observed
+    now = input_map.history(z)
+    weights = model.coefficients[:, len(signature.states) * (signature.state_delays + 1) :]
     groups, parts = [], []
-    if signature.inputs and program.following is None:
-        terms: list[Term] = [Product((place,)) for place in range(len(signature.inputs))]
-        terms += program.terms(True)
-        first, count = now - z + program.lead, z + steps
-        values = _standardised(graph, program, "delayed", terms, first, count)
-        order = np.arange(steps)[:, None] + np.arange(z, -1, -1)
-        rows = graph("Gather", values, order, axis=0)
-        groups.append(graph("Reshape", rows, [steps, (z + 1) * n]))
+    if signature.inputs and input_map.follows is None:
+        rows = u[now - z + input_map.lead : now + input_map.lead + steps]
+        values = signature.input_scale.deviations(_with_delayed(observed, rows))
+        windows = values[np.arange(steps)[:, None] + np.arange(z, -1, -1)]
+        groups.append(windows.reshape(steps, (z + 1) * n))
         parts.append(weights[:, : (z + 1) * n])
-    if still := program.terms(False):
-        groups.append(_standardised(graph, program, "direct", still, now, steps))
-        parts.append(weights[:, (z + 1) * n :][:, : len(still)])
+    if observed is not None and observed.slopes.size:
+        terms = [term for each in observed.bound if not each.delayed for term in each.terms]
+        values = np.concatenate(
+            [_column(graph, term, u, now, steps, observed) for term in terms], axis=1
+        )
+        values = values - (1.0 - observed.slopes) * np.maximum(values - observed.tops, 0.0)
+        count, scale = observed.slopes.size, signature.direct_scale
+        groups.append((values - scale.mean[:count]) / scale.std[:count])
+        parts.append(weights[:, (z + 1) * n :][:, :count])
     if not groups:
-        return graph.constant(np.zeros((steps, len(coefficients))))
-    return graph("MatMul", graph("Concat", *groups, axis=1), np.concatenate(parts, axis=1).T)
+        return graph("Identity", np.zeros((steps, len(model.coefficients))))
+    return np.concatenate(groups, axis=1) @ np.concatenate(parts, axis=1).T
 
 
-def _standardised(
-    graph: _Nodes, program: Program, kind: str, terms: Sequence[Term], first: int, count: int
-) -> str:
-    """Standardised columns of terms, (count, terms), from the row `first` of the inputs on."""
-    rows = graph("Slice", "u", [first], [first + count], [0])
-    columns = [
-        _slow_square(graph, term, first, count)
-        if isinstance(term, SlowSquare)
-        else _term(graph, term, rows)
-        for term in terms
-    ]
-    mean, std = (
-        each[: len(terms)] for each in (program.scales[kind].mean, program.scales[kind].std)
-    )
-    return graph("Div", graph("Sub", graph("Concat", *columns, axis=1), mean), std)
+def _with_delayed(observed: Observed | None, rows: _Value) -> _Value:
+    """Inputs beside the columns that take the input delays."""
+    columns = [rows]
+    if observed is not None:
+        terms = [term for each in observed.bound if each.delayed for term in each.terms]
+        columns += [term.columns(rows, observed.limits) for term in terms]
+    return np.concatenate(columns, axis=1)
+
+
+def _column(
+    graph: _Graph, term: Term, u: _Value, first: int, count: int, observed: Observed
+) -> _Value:
+    """Columns of a term without delays from the row `first` of the inputs on, (count, columns).
+
+    A filter is a product of rows around each row.
+    """
+    if not isinstance(term, SlowSquare):
+        return term.columns(u[first : first + count], observed.limits)
+    value, dt = u[:, term.place], term.dt
+    if term.order == 1:
+        value = (value[2:] - value[:-2]) / (2.0 * dt)
+    elif term.order == 2:
+        value = (value[2:] + value[:-2] - 2.0 * value[1:-1]) / dt**2
+    half, shifts = len(term.kernel) // 2, np.array(term.shifts)
+    around = np.arange(count)[:, None] + shifts
+    around = around[..., None] + np.arange(-half, half + 1) + first - (term.order > 0)
+    return np.square(value)[around] @ term.kernel[::-1]  # a convolution runs backwards
 
 
 def _tables(
-    graph: _Nodes, following: Following, program: Program, steps: int
-) -> tuple[str, _Values]:
+    graph: _Graph, u: _Value, history: _Value, signature: Signature, steps: int
+) -> tuple[_Value, _Values]:
     """Standardised rows of the steps at all places, and what the first step remembers.
 
     That are the last surges and the rows before the start, both newest first.
     """
-    signature, place = program.model.signature, following.place
-    z, n, past = signature.input_delays, program.sizes[0], place.taps.size
-    count, columns, scale = z + steps, [], program.scales["delayed"]
-    samples = program.history - z + np.arange(count)
-    banks = {each.column: each for each in program.banks}
+    follows = signature.input_map.follows
+    assert follows is not None
+    place, z, n = follows.place, signature.input_delays, signature.input_scale.mean.size
+    count, columns, past = z + steps, [], place.taps.size
+    samples = signature.input_map.history(z) - z + np.arange(count)
+    around = samples[:, None] + np.arange(-follows.back, follows.ahead + 1)
+    banks = {each.column: each for each in follows.banks(None)}
     for column in range(len(signature.inputs)):
-        total = graph("Gather", _column(graph, "u", column), samples, axis=0)
-        total = graph("Expand", total, np.array([count, place.count]))
-        if column in banks:
-            around = samples[:, None] + np.arange(-following.back, following.ahead + 1)
-            total = ""
-            for number, probe in enumerate(banks[column].columns):
-                record = graph("Squeeze", _column(graph, "u", probe), [1])
-                windows = graph("Gather", record, around)
-                part = graph("MatMul", windows, banks[column].taps[:, number].T)
-                total = graph("Add", total, part) if total else part
-        columns.append(graph("Reshape", total, [count * place.count, 1]))
-    inputs = graph("Concat", *columns, axis=1)
-    terms = [_term(graph, term, inputs) for term in program.terms(True)]
-    rows = graph("Concat", inputs, *terms, axis=1)
-    rows = graph("Div", graph("Sub", rows, scale.mean), scale.std)
-    table = graph("Reshape", rows, [count, place.count, n])
-    surge = graph("Squeeze", _column(graph, "x_history", following.follows.column), [1])
-    last = signature.state_samples - 1 - np.arange(past)
-    before = graph("Gather", surge, last - np.arange(z, 0, -1)[:, None])
-    line = _between(graph, place, graph("MatMul", before, place.taps), rows, np.arange(z))
-    line = graph("Gather", line, np.arange(z - 1, -1, -1), axis=0)
-    remembered: _Values = [
-        (graph("Gather", surge, last), (past,)),
-        (graph("Reshape", line, [z * n]), (z * n,)),
-    ]
-    return graph("Slice", table, [z], [END], [0]), remembered
+        total = graph("Expand", u[:, column : column + 1][samples], np.array([count, place.count]))
+        if bank := banks.get(column):
+            parts = [u[:, at][around] @ bank.taps[:, i].T for i, at in enumerate(bank.columns)]
+            total = sum(parts[1:], parts[0])
+        columns.append(total.reshape(count * place.count, 1))
+    rows = _with_delayed(signature.input_map.observed, np.concatenate(columns, axis=1))
+    rows = signature.input_scale.deviations(rows)
+    surge, last = history[:, follows.column], signature.state_samples - 1 - np.arange(past)
+    before = surge[last - np.arange(z, 0, -1)[:, None]]
+    line = _between(graph, place, before @ place.taps, rows, np.arange(z))[np.arange(z - 1, -1, -1)]
+    return rows.reshape(count, place.count, n)[z:], {
+        "surge": (surge[last], (past,)),
+        "line": (line.reshape(z * n), (z * n,)),
+    }
 
 
-def _followed(step: _Nodes, following: Following, program: Program) -> str:
+def _followed(step: _Graph, model: HankelDMDcModel, forced: _Value) -> _Value:
     """What is added in a step whose waves are read at the place of its surge."""
-    signature, place, scale = program.model.signature, following.place, program.scales["direct"]
-    on_states = len(signature.states) * (signature.state_delays + 1)
-    weights, line = program.model.coefficients[:, on_states:], signature.input_delays
-    line = line * program.sizes[0]
-    here = step("MatMul", "surge", place.taps[:, None])
-    row = _between(step, place, here, "places", np.arange(1))
-    driving = step("Concat", step("Squeeze", row, [0]), "line", axis=0)
-    step("Slice", driving, [0], [line], into="line_after")
-    delayed = step("MatMul", weights[:, : line + program.sizes[0]], driving)
-    apart = step("Sub", _clipped(step, place, here), np.array(place.centre))
-    square = step("Div", step("Sub", step("Mul", apart, apart), scale.mean[-1]), scale.std[-1])
-    return step("Add", step("Add", "forced", delayed), step("Mul", square, weights[:, -1]))
+    signature, follows = model.signature, model.signature.input_map.follows
+    assert follows is not None
+    place, scale = follows.place, signature.direct_scale
+    weights = model.coefficients[:, len(signature.states) * (signature.state_delays + 1) :]
+    line = signature.input_delays * signature.input_scale.mean.size
+    here = _Array(step, "surge") @ place.taps[:, None]
+    row = _between(step, place, here, _Array(step, "places"), np.arange(1))
+    driving = step("Concat", row.reshape(-1), _Array(step, "line"), axis=0)
+    step("Slice", driving, [0], [line], [0], into="line_after")
+    square = (np.square(_clipped(place, here) - place.centre) - scale.mean[-1]) / scale.std[-1]
+    width = line + signature.input_scale.mean.size
+    return forced + weights[:, :width] @ driving + square * weights[:, -1]
 
 
-def _clipped(graph: _Nodes, place: Place, here: str) -> str:
-    above = graph("Max", here, np.array(place.lowest))
-    return graph("Min", above, np.array(place.grid[-1]))
+def _clipped(place: Place, here: _Value) -> _Value:
+    return np.minimum(np.maximum(here, place.lowest), place.grid[-1])
 
 
-def _between(graph: _Nodes, place: Place, here: str, rows: str, samples: IntArray) -> str:
+def _between(graph: _Graph, place: Place, here: _Value, rows: _Value, samples: IntArray) -> _Value:
     """Rows, (samples × places, n), read at a place for each sample; see ``read_table``."""
-    apart = graph("Sub", _clipped(graph, place, here), np.array(place.lowest))
-    on_grid = graph("Div", apart, np.array(place.spacing))
-    below = graph("Min", graph("Floor", on_grid), np.array(place.count - 2.0))
-    part = graph("Unsqueeze", graph("Sub", on_grid, below), [1])
+    on_grid = (_clipped(place, here) - place.lowest) / place.spacing
+    below = np.minimum(np.floor(on_grid), place.count - 2.0)
+    part = graph("Unsqueeze", on_grid - below, [1])
     at = graph("Add", graph("Cast", below, to=INT64), samples * place.count)
-    lower = graph("Gather", rows, at, axis=0)
-    upper = graph("Gather", rows, graph("Add", at, np.array(1)), axis=0)
-    return graph("Add", lower, graph("Mul", part, graph("Sub", upper, lower)))
-
-
-def _column(graph: _Nodes, table: str, place: int) -> str:
-    return graph("Slice", table, [place], [place + 1], [1])
-
-
-def _term(graph: _Nodes, term: Term, rows: str) -> str:
-    """Column of a term of the inputs in each row, shape (rows, 1)."""
-    assert not isinstance(term, SlowSquare)
-    if isinstance(term, Formula):
-        return term.expression.fold(
-            lambda number: graph.constant(np.array([[number]])),
-            lambda name: _column(graph, rows, term.places[name]),
-            lambda name, values: _operation(graph, name, values),
-        )
-    if isinstance(term, Power):
-        u = value = _column(graph, rows, term.place)
-        grown = graph("Add", graph("Div", graph("Mul", u, u), np.array(term.limit)), np.array(1.0))
-        calm = graph("Div", u, graph("Sqrt", grown))
-        for _ in range(term.power - 1):
-            value = graph("Mul", value, calm)
-        return value
-    value = _column(graph, rows, term.places[0])
-    for place in term.places[1:]:
-        value = graph("Mul", value, _column(graph, rows, place))
-    return value
-
-
-def _slow_square(graph: _Nodes, term: SlowSquare, first: int, count: int) -> str:
-    """Filtered square of a derivative; the filter is a product of rows around each row."""
-    u, dt = _column(graph, "u", term.place), graph.dt
-
-    def part(start: int, stop: int) -> str:
-        return graph("Slice", u, [start], [stop], [0])
-
-    if term.order == 0:
-        value = u
-    elif term.order == 1:
-        value = graph("Div", graph("Sub", part(2, END), part(0, -2)), np.array(2.0 * dt))
-    else:
-        twice = graph("Mul", part(1, -1), np.array(2.0))
-        ends = graph("Add", part(2, END), part(0, -2))
-        value = graph("Div", graph("Sub", ends, twice), np.array(dt**2))
-    half = len(term.kernel) // 2
-    around = np.arange(count)[:, None] + np.arange(-half, half + 1)
-    around += first + term.shift - (term.order > 0)
-    square = graph("Squeeze", graph("Mul", value, value), [1])
-    # A convolution runs backwards.
-    slow = graph("MatMul", graph("Gather", square, around, axis=0), term.kernel[::-1, None])
-    if not np.isfinite(term.top):
-        return slow
-    over = graph("Max", graph("Sub", slow, np.array(term.top)), np.array(0.0))
-    return graph("Sub", slow, graph("Mul", over, np.array(1.0 - SLOPE)))
-
-
-def _operation(graph: _Nodes, name: str, values: list[str]) -> str:
-    """Operation of an expression."""
-    if name == "square":
-        return graph("Mul", values[0], values[0])
-    if name == "cos":  # onnxruntime knows no cosine in double precision
-        return graph("Sin", graph("Add", values[0], np.array(np.pi / 2)))
-    if name == "average":
-        total = values[0]
-        for each in values[1:]:
-            total = graph("Add", total, each)
-        return graph("Div", total, np.array(float(len(values))))
-    return graph(OPERATORS[name], *values)
-
-
-def _hinges(graph: _Nodes, function: LinearHinges, states: str) -> str:
-    """Channel as a function of the states, shape (steps, 1)."""
-    columns = [_column(graph, states, column) for column in function.linear]
-    for column, knots in zip(function.columns, function.knots, strict=True):
-        bent = graph("Sub", _column(graph, states, column), knots[None])
-        columns.append(graph("Max", bent, np.array(0.0)))
-    value = graph("MatMul", graph("Concat", *columns, axis=1), function.weights[1:, None])
-    value = graph("Add", value, np.array(function.weights[0]))
-    return graph("Max", value, np.array(function.floor))
+    lower, upper = rows[at], rows[graph("Add", at, np.array(1))]
+    return lower + part * (upper - lower)

@@ -1,9 +1,10 @@
 """Models identified from prepared runs, ensembles of them, and their forecasts."""
 
+from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.ensemble import BandForecast, HankelEnsemble, HeldEnsemble
 from seakeep.models.executor import processes
-from seakeep.models.inputs import FittedAlignment, ProbeAlignment
-from seakeep.models.interface import InputMap, Model, Needs, Signature, Spec
+from seakeep.models.inputs import InputMap
+from seakeep.models.interface import Model, Needs, Signature, Spec
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live, load_live

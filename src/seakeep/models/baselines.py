@@ -18,101 +18,87 @@ from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
 from seakeep.models import store
+from seakeep.models.checks import Json, check_integer, check_keys
 from seakeep.models.engine import Windows, cut_lost
 from seakeep.models.forecasts import SingleModel, counted
-from seakeep.models.inputs import ProbeAlignment
-from seakeep.models.interface import Role, Signature
+from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
-from seakeep.models.linear import HankelDMDcModel
-from seakeep.models.observables import Observable
+from seakeep.models.linear import HankelDMDcModel, packed, unpacked
 from seakeep.models.readouts import ReadOuts
-from seakeep.models.settings import (
-    DelayRows,
-    HankelSettings,
-    History,
-    RidgeScale,
-    check_integer,
-    periods_to_samples,
-)
+from seakeep.models.settings import DelayRows, HankelSettings, RidgeScale, periods_to_samples
+from seakeep.models.store import content, numbers
 from seakeep.models.training import Training, TrainingData, gather
 from seakeep.models.validity import Coverage
 
-__all__ = ["ARX", "FIR", "HoldLast", "LinearModel", "LinearSpec", "Mean", "Subspace"]
-
-
-class LinearModel(HankelDMDcModel):
-    """A linear model whose delayed states shift exactly, under a name of its own."""
-
-    title: ClassVar[str]
-
-    def summary(self) -> str:
-        """Text that describes the model and its training data."""
-        return "\n".join([f"{self.title}, dt {self.dt:g} s", *self.lines()])
-
-
-class ARXModel(LinearModel):
-    """Model fitted by :class:`ARX`."""
-
-    kind: ClassVar[str] = "arx"
-    title: ClassVar[str] = "ARX: least squares on past states and inputs"
-
-
-class FIRModel(LinearModel):
-    """Model fitted by :class:`FIR`: a filter of the inputs."""
-
-    kind: ClassVar[str] = "fir"
-    title: ClassVar[str] = "FIR: a filter of the inputs, without states"
-
-
-class MeanModel(LinearModel):
-    """Model fitted by :class:`Mean`: the means of the states."""
-
-    kind: ClassVar[str] = "mean"
-    title: ClassVar[str] = "Mean of the training windows"
-
-
-class HoldLastModel(LinearModel):
-    """Model fitted by :class:`HoldLast`: only the spread of the states."""
-
-    kind: ClassVar[str] = "hold_last"
-    title: ClassVar[str] = "Hold last: the state at the start, kept constant"
+__all__ = ["ARX", "FIR", "Constant", "HoldLast", "LinearSpec", "Mean", "Subspace"]
 
 
 @dataclass(frozen=True)
-class LinearSpec(HankelSettings):
-    """A baseline that is a linear model: it finds coefficients, the rest is common."""
+class Constant:
+    """A model of nothing but the last state: its deviation from the mean, times a factor.
 
+    Parameters
+    ----------
+    window : int or str, optional
+        Snapshots per run; None takes all up to ``stop``.
+    """
+
+    kind: ClassVar[str]
+    title: ClassVar[str]
+    factor: ClassVar[float]
     role: ClassVar[Role] = "reference"
     is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
-    model: ClassVar[type[LinearModel]]
-    delay_rows: DelayRows = field(default="exact", init=False, repr=False)
-    rank: int | None = field(default=None, init=False, repr=False)
-    readouts: ReadOuts = field(default=(), init=False, repr=False)
-    stable: bool | float = field(default=False, init=False, repr=False)
+    window: int | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "window", self._settings.window)
+
+    @property
+    def _settings(self) -> HankelSettings:
+        """Settings of the windows from which moments are taken."""
+        return HankelSettings(0, 0, 0.0, window=self.window, history="inside")
+
+    def resolved(self, dt: float, encounter_period: float | None) -> Self:
+        """Settings whose window counts in samples."""
+        return replace(self, window=self._settings.resolved(dt, encounter_period).window)
+
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
+        """Samples that it asks of its runs."""
+        return self._settings.needs(dt)
 
     def fit(
-        self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
-    ) -> LinearModel:
-        """Fit the model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
-        named = as_runs(runs)
-        spec = self.resolved_in(named, inputs)
-        data = gather(named, states, inputs, stop, spec)
-        return self.model.fitted(spec, data, spec.solve(data), named)
+        self, runs: Runs, states: Sequence[str], inputs: Sequence[str] = (), stop: Stop = None
+    ) -> HankelDMDcModel:
+        """Take the moments of the states; arguments and errors as :meth:`seakeep.HankelDMDc.fit`.
 
-    def solve(self, data: TrainingData) -> Solution:
-        """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""
-        raise NotImplementedError
+        `inputs` are accepted and not read.
+        """
+        named = as_runs(runs)
+        settings = self._settings.resolved_in(named, [])
+        data = gather(named, states, [], stop, settings)
+        size = len(data.state_labels)
+        solution = Solution(self.factor * np.eye(size), "svd", 0.0, size * bool(self.factor))
+        spec = replace(self, window=settings.window)
+        return HankelDMDcModel.fitted(spec, data, data.signature(settings), solution, named)
+
+    def to_json(self) -> Json:
+        """Settings as JSON values."""
+        return {"window": self._settings.to_json()["window"]}
 
     @classmethod
-    def restore(cls, dataset: xr.Dataset) -> LinearModel:
+    def from_json(cls, content: Json) -> Self:
+        """Settings from JSON values; an unknown key or a value out of range raises an error."""
+        check_keys(cls, content)
+        return cls(**content)
+
+    @classmethod
+    def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
         """Rebuild the model that a file holds."""
-        settings = cls.from_json(store.content(dataset, "settings"))
-        return cls.model.from_dataset(dataset, settings)
+        return HankelDMDcModel.from_dataset(dataset, cls.from_json(content(dataset, "settings")))
 
 
-@dataclass(frozen=True)
-class Mean(LinearSpec):
+class Mean(Constant):
     """The mean of each state over the training windows, at all instants (climatology).
 
     No model of a stationary response should be worse over a long horizon; its NRMSE is one where
@@ -120,7 +106,7 @@ class Mean(LinearSpec):
 
     Parameters
     ----------
-    window : int, optional
+    window : int or str, optional
         Snapshots per run; None takes all up to ``stop``.
 
     Examples
@@ -130,50 +116,54 @@ class Mean(LinearSpec):
     0
     """
 
-    kind: ClassVar[str] = "mean"
-    model: ClassVar[type[LinearModel]] = MeanModel
-    state_delays: int = field(default=0, init=False, repr=False)
-    input_delays: int = field(default=0, init=False, repr=False)
-    ridge: float = field(default=0.0, init=False, repr=False)
-    window: int | None = None
-    history: History = field(default="inside", init=False, repr=False)
-    ridge_scale: RidgeScale = field(default="absolute", init=False, repr=False)
-    standardize: bool = field(default=True, init=False, repr=False)
-    alignment: ProbeAlignment | None = field(default=None, init=False, repr=False)
-    lead: int = field(default=0, init=False, repr=False)
-    observables: tuple[Observable, ...] = field(default=(), init=False, repr=False)
-
-    def fit(
-        self, runs: Runs, states: Sequence[str], inputs: Sequence[str] = (), stop: Stop = None
-    ) -> LinearModel:
-        """Take the means; `inputs` are accepted and not read."""
-        return super().fit(runs, states, [], stop)
-
-    def solve(self, data: TrainingData) -> Solution:
-        """No deviation from the mean."""
-        size = len(data.state_labels)
-        return Solution(np.zeros((size, size)), "svd", 0.0, 0)
+    kind = "mean"
+    title = "Mean of the training windows"
+    factor = 0.0
 
 
-@dataclass(frozen=True)
-class HoldLast(Mean):
+class HoldLast(Constant):
     """The measured state at the start, at all instants (persistence).
 
     Hard to beat over a small part of a period. Inputs are not read.
 
     Parameters
     ----------
-    window : int, optional
+    window : int or str, optional
         Snapshots per run, from which the spread is taken; None takes all up to ``stop``.
     """
 
-    kind: ClassVar[str] = "hold_last"
-    model: ClassVar[type[LinearModel]] = HoldLastModel
+    kind = "hold_last"
+    title = "Hold last: the state at the start, kept constant"
+    factor = 1.0
+
+
+@dataclass(frozen=True)
+class LinearSpec(HankelSettings):
+    """A linear model of delayed states and inputs: it finds coefficients, the rest is common."""
+
+    n_members: ClassVar[int] = 1
+    delay_rows: DelayRows = field(default="exact", init=False, repr=False)
+    rank: int | None = field(default=None, init=False, repr=False)
+    readouts: ReadOuts = field(default=(), init=False, repr=False)
+    stable: bool | float = field(default=False, init=False, repr=False)
+
+    def fit(
+        self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
+    ) -> HankelDMDcModel:
+        """Fit the model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
+        named = as_runs(runs)
+        spec = self.resolved_in(named, inputs)
+        data = gather(named, states, inputs, stop, spec)
+        return HankelDMDcModel.fitted(spec, data, data.signature(spec), spec.solve(data), named)
 
     def solve(self, data: TrainingData) -> Solution:
-        """The next state is the state."""
-        size = len(data.state_labels)
-        return Solution(np.eye(size), "svd", 0.0, size)
+        """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""
+        raise NotImplementedError
+
+    @classmethod
+    def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
+        """Rebuild the model that a file holds."""
+        return HankelDMDcModel.from_dataset(dataset, cls.from_json(content(dataset, "settings")))
 
 
 @dataclass(frozen=True)
@@ -197,7 +187,7 @@ class ARX(LinearSpec):
     """
 
     kind: ClassVar[str] = "arx"
-    model: ClassVar[type[LinearModel]] = ARXModel
+    title: ClassVar[str] = "ARX: least squares on past states and inputs"
     ridge: float = 0.0
 
     @classmethod
@@ -234,7 +224,7 @@ class FIR(LinearSpec):
     """
 
     kind: ClassVar[str] = "fir"
-    model: ClassVar[type[LinearModel]] = FIRModel
+    title: ClassVar[str] = "FIR: a filter of the inputs, without states"
     state_delays: int = field(default=0, init=False, repr=False)
     ridge: float = 1e-3
     ridge_scale: RidgeScale = "per_snapshot"
@@ -278,8 +268,6 @@ class Subspace(HankelSettings):
     """
 
     kind: ClassVar[str] = "subspace"
-    role: ClassVar[Role] = "reference"
-    is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
     ridge: float = 1e-3
     delay_rows: DelayRows = field(default="exact", init=False, repr=False)
@@ -344,9 +332,9 @@ class Subspace(HankelSettings):
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> SubspaceModel:
         """Rebuild the model that a file holds."""
-        return SubspaceModel.from_dataset(
-            dataset, cls.from_json(store.content(dataset, "settings"))
-        )
+        matrices = (numbers(dataset, each.name) for each in fields(StateSpace))
+        settings = cls.from_json(content(dataset, "settings"))
+        return SubspaceModel(settings=settings, space=StateSpace(*matrices), **unpacked(dataset))
 
 
 @dataclass(frozen=True, eq=False)
@@ -367,7 +355,6 @@ class SubspaceModel(SingleModel, store.Saved):
         Waves that it was trained in.
     """
 
-    kind: ClassVar[str] = "subspace"
     settings: Subspace
     space: StateSpace = field(repr=False)
     signature: Signature = field(repr=False)
@@ -413,32 +400,12 @@ class SubspaceModel(SingleModel, store.Saved):
 
     def to_dataset(self) -> xr.Dataset:
         """The model as a Dataset: what :meth:`save` writes."""
-        space = self.space
-        return xr.Dataset(
-            {
-                "A": (("latent", "latent_before"), space.A),
-                "B": (("latent", "regressor"), space.B),
-                "C": (("state", "latent"), space.C),
-                "D": (("state", "regressor"), space.D),
-                "filter": (("latent", "past"), space.filter),
-                **store.pack_signature(self.signature),
-                **self.coverage.to_variables(),
-            },
-            attrs={
-                "settings": store.as_json(self.settings.to_json()),
-                "training": store.as_json(self.training.to_json()),
-                "signature": store.as_json(store.signature_json(self.signature)),
-            },
-        )
-
-    @classmethod
-    def from_dataset(cls, dataset: xr.Dataset, settings: Subspace) -> SubspaceModel:
-        """Rebuild a model from what :meth:`save` wrote; it is equal to the last bit."""
-        signature = store.unpack_signature(dataset)
-        return cls(
-            settings=settings,
-            space=StateSpace(*(store.numbers(dataset, each.name) for each in fields(StateSpace))),
-            signature=signature,
-            training=Training.from_json(store.content(dataset, "training")),
-            coverage=Coverage.from_dataset(dataset, signature),
-        )
+        dims = {
+            "A": ("latent", "latent_before"),
+            "B": ("latent", "regressor"),
+            "C": ("state", "latent"),
+            "D": ("state", "regressor"),
+            "filter": ("latent", "past"),
+        }
+        matrices = {name: (each, getattr(self.space, name)) for name, each in dims.items()}
+        return packed(self).assign(matrices)

@@ -25,11 +25,11 @@ from seakeep.core.calibration import (
 )
 from seakeep.errors import RequestError, warn
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice
+from seakeep.models.checks import Json, check_choice
 from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series, read_windows
 from seakeep.models.executor import Progress
-from seakeep.models.interface import Json, Signature
+from seakeep.models.interface import Signature
 from seakeep.models.members import TrainingArrays
 from seakeep.models.summaries import reduce_members
 

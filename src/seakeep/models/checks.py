@@ -4,16 +4,33 @@ from __future__ import annotations
 
 import functools
 import numbers
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import TypeAdapter
 
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 
-__all__ = ["check_choice", "check_integer", "check_keys", "of_json", "settings_of"]
+__all__ = [
+    "TINY",
+    "Json",
+    "check_choice",
+    "check_flag",
+    "check_integer",
+    "check_keys",
+    "check_number",
+    "names_of",
+    "of_json",
+    "plain",
+    "settings_of",
+]
 
+Json = dict[str, Any]
+"""Settings as JSON values."""
+TINY = float(np.finfo(float).tiny)
+"""Least number above zero."""
 Settings = TypeVar("Settings")
 Made = TypeVar("Made")
 
@@ -52,6 +69,42 @@ def check_integer(name: str, value: object, least: int, optional: bool = False) 
             f"{name} must be an integer of at least {least}{' or None' if optional else ''}; "
             f"received {value!r:.{SHOWN}}.{hint}"
         )
+
+
+def check_number(
+    name: str, value: Any, meant: str, low: float, high: float = np.inf, hint: str = ""
+) -> None:
+    """Refuse a setting that is not a finite number from `low` on and below `high`."""
+    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    if not real or not np.isfinite(value) or not low <= value < high:
+        raise RequestError(f"{name} must be {meant}; received {value!r:.{SHOWN}}.{hint}")
+
+
+def check_flag(name: str, value: object) -> None:
+    """Refuse a setting that is neither true nor false."""
+    if not isinstance(value, bool | np.bool_):
+        raise RequestError(f"{name} must be True or False; received {value!r:.{SHOWN}}.")
+
+
+def names_of(value: Any, what: str, example: str) -> tuple[str, ...]:
+    """Names in a list, each once; refuses a text, which is no list, and an empty list."""
+    is_list = isinstance(value, Iterable) and not isinstance(value, str)
+    names = tuple(dict.fromkeys(value)) if is_list else ()
+    if not names or not all(isinstance(name, str) for name in names):
+        raise RequestError(
+            f"{what} must be a list of one or more names; received {value!r:.{SHOWN}}. Write "
+            f"{example}."
+        )
+    return names
+
+
+def plain(value: Any) -> Any:
+    """Return JSON values with numbers and arrays of numpy and tuples in them as plain ones."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items()}
+    return [plain(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def settings_of(kind: type[Settings], name: str, value: object, example: str) -> Settings | None:

@@ -23,7 +23,7 @@ import scipy
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError
-from seakeep.models.interface import InputMap
+from seakeep.models.inputs import InputMap
 from seakeep.models.settings import History
 
 __all__ = ["Draw", "Sampling", "TrainOn", "draw_members"]

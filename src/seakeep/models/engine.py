@@ -28,9 +28,10 @@ from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
 from seakeep.models.executor import Progress, in_order
-from seakeep.models.following import Followed
-from seakeep.models.inputs import Measured
-from seakeep.models.interface import Drive, Follows, Scale, Signature, Span
+from seakeep.models.following import Following
+from seakeep.models.inputs import Drive
+from seakeep.models.interface import Scale, Signature
+from seakeep.models.labelled import Span
 from seakeep.models.readouts import FittedReadOut, read_out
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import instant_text
@@ -124,8 +125,8 @@ class Dynamics:
         s and z.
     state_scale, input_scale, direct_scale : Scale
         Moments of the states and of both kinds of regressors.
-    follows : Follows or None
-        Place of the vessel where the model follows its own surge.
+    follows : Following or None
+        Carriers and place of the vessel where the model follows its own surge.
     """
 
     coefficients: FloatArray
@@ -134,7 +135,7 @@ class Dynamics:
     state_scale: Scale
     input_scale: Scale
     direct_scale: Scale
-    follows: Follows | None = None
+    follows: Following | None = None
 
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray]:
@@ -249,20 +250,19 @@ def _regressors(
         delayed = np.stack([each.delayed for each in rows])
         return delayed, np.stack([each.direct[z:] for each in rows]), None, None
     place = signature.input_map.follows.place
-    followed = [(drive, span) for drive, span in pairs if isinstance(drive, Followed)]
     tables, starts, first = [], {}, 0
-    for drive in dict.fromkeys(drive for drive, _ in followed):
-        mine = [span for each, span in followed if each is drive]
+    for drive in dict.fromkeys(drives):
+        mine = [span for each, span in pairs if each is drive]
         begin, end = min(span.known for span in mine), max(span.stop for span in mine)
         starts[drive] = first - begin
         tables.append(drive.table(begin, end))
         first += end - begin
     table, steps = np.concatenate(tables), spans[0].stop - spans[0].known
-    at = np.array([starts[drive] + span.known for drive, span in followed])
-    here = np.array([drive.places(span.known, span.known + 1) for drive, span in followed])
+    at = np.array([starts[drive] + span.known for drive, span in pairs])
+    here = np.array([drive.places(span.known, span.known + 1) for drive, span in pairs])
     held = read_table(place, table, at[:, None] + np.arange(steps), here.repeat(steps, axis=1))
-    before = np.stack([drive.rows(span.first, span.known).delayed for drive, span in followed])
-    direct = np.stack([drive.direct(span.known, span.stop) for drive, span in followed])
+    before = np.stack([drive.rows(span.first, span.known).delayed for drive, span in pairs])
+    direct = np.stack([drive.direct(span.known, span.stop) for drive, span in pairs])
     return np.concatenate([before, held], axis=1), direct, table, at
 
 
@@ -368,7 +368,7 @@ class _Opened:
         if (follows := signature.input_map.follows) is not None:
             last = max(span.known for span in spans) + 1  # no later state is read
             surge = self.read([signature.states[follows.column]], first, last)[:, 0]
-        return signature.input_map.wrap(Measured(values, first, surge), self.run, spans)
+        return signature.input_map.drive(values, spans, run=self.run, first=first, surge=surge)
 
     def history(self, signature: Signature, span: Span) -> FloatArray:
         """States up to the start."""
@@ -434,8 +434,7 @@ def array_windows(
         if follows is not None:
             known = states[-history:, follows.column]
             surge = np.concatenate([np.full(history - len(known), np.nan), known])
-        measured = Measured(values, 0, surge)
-        drives.append(signature.input_map.wrap(measured, rig, [span]))
+        drives.append(signature.input_map.drive(values, [span], run=rig, surge=surge))
     time = xr.Variable(("time",), signature.dt * np.arange(1, steps + 1))
     delayed, direct, table, starts = _regressors(signature, drives, [span] * len(drives))
     return Windows(

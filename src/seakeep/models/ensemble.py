@@ -16,6 +16,7 @@ import xarray as xr
 from seakeep.arrays import FloatArray, fraction
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine, store
+from seakeep.models.alignment import FittedAlignment
 from seakeep.models.calibration import (
     Band,
     BandScale,
@@ -25,6 +26,7 @@ from seakeep.models.calibration import (
     warn_of_horizon,
     widened,
 )
+from seakeep.models.checks import Json
 from seakeep.models.draws import Draw
 from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
 from seakeep.models.executor import Progress, in_order, one_blas_thread
@@ -43,10 +45,9 @@ from seakeep.models.forecasts import (
 )
 from seakeep.models.growth import LeadErrors, Stretch, lead_errors
 from seakeep.models.html import text_html
-from seakeep.models.inputs import Chain, FittedAlignment
-from seakeep.models.interface import Json, Signature
+from seakeep.models.interface import Signature
 from seakeep.models.labelled import Runs
-from seakeep.models.linear import HankelDMDcModel, Kept
+from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live
 from seakeep.models.members import (
     TrainingArrays,
@@ -423,7 +424,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
     @property
     def alignment(self) -> FittedAlignment | None:
         """How the wave input is aligned to the vessel; the training arrays are aligned."""
-        return Chain.of(self.signature.input_map).alignment
+        return self.signature.input_map.alignment
 
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
@@ -495,7 +496,7 @@ class HankelEnsemble(_Forecasts, store.Saved):
                 rank=found.solution.rank,
                 clipped=found.solution.clipped,
             ),
-            learnt=Kept(self.coverage),
+            coverage=self.coverage,
         )
 
     def spectral_radii(

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy import sparse
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
 from seakeep.models.interface import Signature
+from seakeep.models.observables import SlowSquare
+from seakeep.signals.expressions import Text
 
 if TYPE_CHECKING:
     import control
@@ -21,16 +24,25 @@ __all__ = ["check_linear", "initial_state", "matrices", "to_control", "to_mat"]
 SYSTEM = "state-space system"
 """What a MATLAB file holds, as its head states it."""
 
+REGRESSORS = (
+    "u of the system are regressors of measured inputs i: p(k) is the output of (FilterA, FilterB, "
+    "FilterC, FilterD) for the input i(k + Lead); q = Function(p(k)); c(k) is the output of "
+    "(SlowA, SlowB, SlowC, SlowD) for the input q(Delayed+1:end); u(k) = [q(1:Delayed); "
+    "min(c, Top) + Slope .* max(c - Top, 0)]. Both filters have forgotten their start after as "
+    "many samples as they delay."
+)
+"""How a MATLAB file makes the regressors of a model with observables."""
+DIFFERENCE = np.array([1.0, -2.0, 1.0])
+
 System = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
-def matrices(
-    a_hat: FloatArray, b_hat: FloatArray, signature: Signature
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def matrices(a_hat: FloatArray, b_hat: FloatArray, signature: Signature) -> System:
     r"""A, B, C, D of the system in physical deviations.
 
-    Its state is :math:`[x_k; …; x_{k-s}; u_{k-1}; …; u_{k-z}]`, its input :math:`u_k`, its output
-    :math:`x_k`, all less their means.
+    Its state is :math:`[x_k; …; x_{k-s}; v_{k-1}; …; v_{k-z}]`, its input :math:`[v_k; w_k]`, the
+    regressors with delays and those without, its output :math:`x_k`, all less their means. Without
+    observables :math:`v_k` is the input :math:`u_k`.
 
     Parameters
     ----------
@@ -42,34 +54,103 @@ def matrices(
     Returns
     -------
     A, B, C, D : ndarray
-        Shapes (n, n), (n, Q), (N, n), (N, Q) with n = N(s+1) + Qz.
+        Shapes (q, q), (q, n + m), (N, q), (N, n + m) with q = N(s+1) + nz.
 
     Raises
     ------
     RequestError
         If the model has no input.
     """
-    states, inputs = len(signature.states), len(signature.inputs)
-    if inputs == 0:
+    delayed, direct = signature.input_scale.std, signature.direct_scale.std
+    states, n, m = len(signature.states), delayed.size, direct.size
+    if n == 0:
         raise RequestError(
             "the model has no input, and a state-space system without input cannot be represented "
             "here. Use model.A and model.eigenvalues."
         )
     scale_x = np.tile(signature.state_scale.std, signature.state_delays + 1)
-    scale_u = np.tile(signature.input_scale.std, signature.input_delays + 1)
+    scale_u = np.concatenate([np.tile(delayed, signature.input_delays + 1), direct])
     a = a_hat * scale_x[:, None] / scale_x
     b = b_hat * scale_x[:, None] / scale_u
-    extended, line = a.shape[0], inputs * signature.input_delays
+    extended, line = a.shape[0], n * signature.input_delays
     size = extended + line
     A = np.zeros((size, size))
     A[:extended, :extended] = a
-    A[:extended, extended:] = b[:, inputs:]
-    B = np.zeros((size, inputs))
-    B[:extended] = b[:, :inputs]
+    A[:extended, extended:] = b[:, n : n + line]
+    B = np.zeros((size, n + m))
+    B[:extended, :n] = b[:, :n]
+    B[:extended, n:] = b[:, n + line :]
     if line:
-        A[extended + inputs :, extended : size - inputs] = np.eye(line - inputs)
-        B[extended : extended + inputs] = np.eye(inputs)
-    return A, B, np.eye(states, size), np.zeros((states, inputs))
+        A[extended + n :, extended : size - n] = np.eye(line - n)
+        B[extended : extended + n, :n] = np.eye(n)
+    return A, B, np.eye(states, size), np.zeros((states, n + m))
+
+
+def observables(signature: Signature) -> dict[str, Any]:
+    """Observables for MATLAB: a filter of the inputs, a function of instants, and a filter of that.
+
+    Parameters
+    ----------
+    signature : Signature
+        Of a model with observables.
+
+    Returns
+    -------
+    dict
+        Contents of the file; :data:`REGRESSORS` says how they make the regressors.
+    """
+    input_map, observed = signature.input_map, signature.input_map.observed
+    assert observed is not None
+    count, lead = len(signature.inputs), signature.lead_samples
+    first = []  # weights of one output of the first filter, (sample back, input)
+    for back in (lead - input_map.lead, lead):
+        first += [{(back, place): 1.0} for place in range(count)]
+    every = [
+        Text(f"p({place + 1})", power="({0} ^ {1})", absolute="abs") for place in range(2 * count)
+    ]
+    ahead, now = (np.array([each], dtype=object) for each in (every[:count], every[count:]))
+    delayed, direct, second = list(map(str, every[:count])), list[str](), []
+    for bound in observed.bound:
+        for term in bound.terms:
+            if not isinstance(term, SlowSquare):
+                texts = term.columns(ahead if bound.delayed else now, observed.limits)[0]
+                if not bound.delayed:
+                    second += [{(0, len(direct) + at): 1.0} for at in range(len(texts))]
+                (delayed if bound.delayed else direct).extend(map(str, texts))
+                continue
+            weights = ((1.0,), (0.5 / term.dt, 0.0, -0.5 / term.dt), DIFFERENCE / term.dt**2)
+            parts = enumerate(weights[term.order])
+            first.append({(back, term.place): float(weight) for back, weight in parts})
+            half, newest = len(term.kernel) // 2, lead - (term.order > 0)
+            for shift in term.shifts:
+                taps = enumerate(term.kernel[::-1].tolist(), start=-half)
+                second.append({(newest - shift - at, len(direct)): each for at, each in taps})
+            direct.append(f"p({len(first)})^2")
+    filters = {"Filter": _shifted(first, count), "Slow": _shifted(second, len(direct))}
+    return {
+        "Function": f"@(p) [{'; '.join(delayed + direct)}]",
+        "Delayed": len(delayed),
+        "Top": np.array(observed.tops)[:, None],
+        "Slope": observed.slopes[:, None],
+        **{f"{name}{part}": each for name, made in filters.items() for part, each in made.items()},
+        "Regressors": REGRESSORS,
+    }
+
+
+def _shifted(rows: list[dict[tuple[int, int], float]], inputs: int) -> dict[str, Any]:
+    """State space of sums over the last samples: weights by (sample back, input) of each output."""
+    length = max((back for row in rows for back, _ in row), default=0)
+    weights = np.zeros((len(rows), length + 1, inputs))
+    for row, taps in zip(weights, rows, strict=True):
+        for at, weight in taps.items():
+            row[at] = weight
+    size = length * inputs
+    return {
+        "A": sparse.eye_array(size, k=-inputs, format="csc"),
+        "B": sparse.eye_array(size, inputs, format="csc"),
+        "C": weights[:, 1:].reshape(len(rows), size),
+        "D": weights[:, 0],
+    }
 
 
 def check_linear(signature: Signature) -> None:
@@ -77,8 +158,8 @@ def check_linear(signature: Signature) -> None:
     if signature.input_map.follows is not None:
         raise RequestError(
             "the model reads the waves where its own surge takes it, which no linear system can "
-            "represent. Export C sources, an FMU or an ONNX graph, use forecast_arrays, or fit a "
-            "model with alignment surge = 'measured' or 'none'."
+            "represent. Export C sources, an FMU (for Simulink too) or an ONNX graph, use "
+            "forecast_arrays, or fit a model with alignment surge = 'measured' or 'none'."
         )
 
 
@@ -112,21 +193,28 @@ def to_mat(system: System, signature: Signature, path: str | Path) -> Path:
     from scipy import io
 
     A, B, C, D = system
+    labels = [
+        each for group in signature.input_map.regressors(signature.input_labels) for each in group
+    ]
+    means = [signature.input_scale.mean, signature.direct_scale.mean]
+    observed = signature.input_map.observed is not None
     content = {
         "A": A,
         "B": B,
         "C": C,
         "D": D,
         "Ts": signature.dt,
-        "InputOffset": signature.input_scale.mean[:, None],
+        "Lead": signature.lead_samples,
+        "InputOffset": np.concatenate(means)[:, None],
         "OutputOffset": signature.state_scale.mean[:, None],
-        "InputName": _cell([label.name for label in signature.input_labels]),
+        "InputName": _cell([label.name for label in labels]),
         "OutputName": _cell([label.name for label in signature.state_labels]),
-        "InputUnit": _cell([label.units for label in signature.input_labels]),
+        "InputUnit": _cell([label.units for label in labels]),
         "OutputUnit": _cell([label.units for label in signature.state_labels]),
         "StateName": _cell(_state_names(signature)),
         "Notes": "seakeep: x(k+1) = A x(k) + B (u(k) - InputOffset), "
-        "y(k) = C x(k) + D (u(k) - InputOffset) + OutputOffset",
+        "y(k) = C x(k) + D (u(k) - InputOffset) + OutputOffset; u(k) are inputs of k + Lead",
+        **(observables(signature) if observed else {}),
     }
     target = Path(path)
     check_output(target, SYSTEM)
@@ -139,7 +227,8 @@ def to_mat(system: System, signature: Signature, path: str | Path) -> Path:
 
 def _state_names(signature: Signature) -> list[str]:
     """Names of the entries of the state, in the order of :func:`matrices`."""
-    states, inputs = signature.states, signature.inputs
+    states = signature.states
+    inputs = [label.name for label in signature.input_map.regressors(signature.input_labels)[0]]
     delayed = [(name, back) for back in range(signature.state_delays + 1) for name in states]
     delayed += [(name, back) for back in range(1, signature.input_delays + 1) for name in inputs]
     return [f"{name}(k-{back})" if back else f"{name}(k)" for name, back in delayed]

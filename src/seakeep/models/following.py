@@ -1,4 +1,4 @@
-"""The recursion as an input map: waves where the vessel is, by its own surge.
+"""The recursion: waves where the vessel is, by its own surge.
 
 For each elevation a bank of short filters reads the wave at places on a grid about the vessel
 (:mod:`seakeep.signals.carriers`); the vessel's place is a weighted sum of its last surges, measured
@@ -11,25 +11,22 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import ClassVar, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.core.recursion import Place, read_table
+from seakeep.core.recursion import Place
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
-from seakeep.models.checks import of_json
-from seakeep.models.inputs import MAPS, FittedAlignment, Measured, depth_of
-from seakeep.models.interface import Drive, Follows, Json, Regressors, Span, plain
+from seakeep.models.alignment import FittedAlignment, depth_of
 from seakeep.models.labelled import ChannelLabel
-from seakeep.models.observables import Observed
-from seakeep.signals.carriers import carried, carriers, mean_spectrum, position_taps
+from seakeep.signals.carriers import carriers, mean_spectrum, position_taps
 from seakeep.sizes import MOST_CARRIED, check_size
 from seakeep.waves import wavenumber
 
-__all__ = ["SQUARED", "Bank", "Followed", "Following"]
+__all__ = ["SQUARED", "Bank", "Following"]
 
 SQUARED = ChannelLabel("slow_surge_squared", "m^2", "slow surge about its mean, squared")
 BACK = 3.0
@@ -50,14 +47,14 @@ REACH = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """Waves carried to where the vessel is, its slow surge squared, and observables of both.
+    """Waves carried to where the vessel is, by what the model itself predicts.
 
     Parameters
     ----------
     alignment : FittedAlignment
         Elevations, positions, depth.
-    inputs : tuple of ChannelLabel
-        Inputs of the model.
+    column : int
+        Place of the surge among the states.
     dt : float
         Time step, s.
     ahead : int
@@ -72,14 +69,10 @@ class Following:
         Spectrum of the waves of training; the powers sum to one.
     place : Place
         Weights of the surge, and the grid.
-    observed : Observed or None
-        Observables: delayed ones are functions of the carried waves, others of the measured.
     """
 
-    kind: ClassVar[str] = "following"
-    reads_surge: ClassVar[bool] = False
     alignment: FittedAlignment
-    inputs: tuple[ChannelLabel, ...]
+    column: int
     dt: float
     ahead: int
     lead: int
@@ -87,16 +80,15 @@ class Following:
     band: tuple[float, float]
     power: tuple[float, ...] = field(repr=False)
     place: Place
-    observed: Observed | None = None
 
     @classmethod
     def fit(
         cls,
         alignment: FittedAlignment,
         runs: Mapping[str, xr.Dataset],
+        states: Sequence[str],
         window: int | None,
         look_ahead: int,
-        observed: Observed | None,
     ) -> Self:
         """Fit taps of the position, grid and spectrum to training runs.
 
@@ -149,7 +141,7 @@ class Following:
                    "places", "Check the units of the surge (m).")  # fmt: skip
         return cls(
             alignment=alignment,
-            inputs=labelled.channel_labels(first, alignment.inputs),
+            column=list(states).index(alignment.settings.surge_channel),
             dt=dt,
             ahead=look_ahead,
             lead=max(look_ahead, least),
@@ -163,59 +155,7 @@ class Following:
                 places,
                 float(every.mean()),
             ),
-            observed=observed,
         )
-
-    @property
-    def follows(self) -> Follows:
-        """Place of the vessel, and the state that it is a sum of."""
-        settings = self.alignment.settings
-        column = self.alignment.states.index(settings.surge_channel)
-        return Follows(self.place, column, self.reach)
-
-    @property
-    def lead_samples(self) -> int:
-        """Samples of input after an instant that its row reads."""
-        return self.reads(Span(0, 0, 1)).stop - 1
-
-    @cached_property
-    def _around(self) -> tuple[int, int]:
-        """Samples before and after an instant that its direct columns read."""
-        direct = () if self.observed is None else [b for b in self.observed.bound if not b.delayed]
-        return max([0, *(b.before for b in direct)]), max([0, *(b.ahead for b in direct)])
-
-    def history(self, input_delays: int) -> int:
-        """Samples of input before the start that a forecast with these delays reads."""
-        return -self.reads(Span(-input_delays, 0, 1)).first
-
-    def reads(self, span: Span) -> Span:
-        """Samples that rows read; as many surges are read before as the place is a sum of."""
-        before, after = self._around
-        back = max(self.back, self.place.taps.size - 1)
-        first = min(span.first - back, span.known - before)
-        return Span(first, span.known, span.stop + max(self.ahead, after))
-
-    def regressors(
-        self, inputs: tuple[ChannelLabel, ...]
-    ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
-        """Labels of the carried waves with their observables, and of what has no delays."""
-        delayed, direct = (
-            (inputs, ()) if self.observed is None else self.observed.regressors(inputs)
-        )
-        return delayed, (*direct, SQUARED)
-
-    @property
-    def stretch(self) -> tuple[FloatArray, FloatArray]:
-        """Factors of the standard deviations that columns are divided by."""
-        delayed, direct = np.ones(len(self.inputs)), np.ones(0)
-        if self.observed is not None:
-            delayed, direct = self.observed.stretch
-        return delayed, np.append(direct, 1.0)
-
-    def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Followed:
-        """Drive of a run, or of plain arrays that lie as in training."""
-        assert isinstance(drive, Measured)
-        return Followed(self, drive, self.banks(run))
 
     def banks(self, run: xr.Dataset | None) -> tuple[Bank, ...]:
         """Carriers of each elevation for the rig of a run; those of training without one.
@@ -230,7 +170,7 @@ class Following:
         for bank in found:
             if bank.errors[self._known].min() > REACH:
                 raise RequestError(
-                    f"the probe of '{self.inputs[bank.column].name}' stands "
+                    f"the probe of '{self.alignment.inputs[bank.column]}' stands "
                     f"{rig.offsets[bank.column]:+.3g} m from where it stood in training, too far "
                     f"for carriers of {(self.back + self.ahead) * self.dt:.3g} s. Correct its "
                     "position, or fit with alignment surge = 'measured' or 'none'."
@@ -270,7 +210,7 @@ class Following:
     def _rig(self, run: xr.Dataset | None) -> Rig:
         """Offsets, positions and depth of a run; those of training without one."""
         aligned, depth = self.alignment, self.alignment.water_depth
-        offsets, here = np.full(len(self.inputs), aligned.settings.offset), aligned.positions
+        offsets, here = np.full(len(aligned.inputs), aligned.settings.offset), aligned.positions
         if run is not None:
             offsets, here = aligned.offsets(run), aligned.positions_in(run)
             depth = depth_of(run, "the run", depth)
@@ -294,59 +234,17 @@ class Following:
         sound = self.place.grid[errors <= REACH]
         return (float(sound[0]), float(sound[-1])) if sound.size else (0.0, 0.0)
 
-    def look_ahead(self, run: xr.Dataset | None, dt: float) -> float:
-        """Seconds of input after an instant that its row reads."""
-        return self.lead_samples * dt
-
-    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
-        """What a forecast's attributes report of the alignment."""
-        return self.alignment.notes(run)
-
     def describe(self, dt: float) -> list[str]:
         """Lines of a summary."""
         low, high = self.reach
         known = np.max([bank.errors[self._known] for bank in self._trained], axis=0)
-        lines = [
+        return [
             f"  alignment     mode {self.alignment.settings.mode}; surge predicted, in each step",
             f"    carriers    {self.back * dt:.3g} s back and {self.ahead * dt:.3g} s ahead of all "
             f"probes; they err {known.min():.2g} to {known.max():.2g} SD where training was",
             f"    reach       {low:.3g} to {high:.3g} m of slow surge, where they err less than "
             f"{REACH:g} SD",
         ]
-        return lines + ([] if self.observed is None else self.observed.describe(dt))
-
-    def to_json(self) -> Json:
-        """All that was fitted."""
-        place = {"taps": self.place.taps.tolist()} | {
-            key: getattr(self.place, key) for key in ("lowest", "spacing", "count", "centre")
-        }
-        content = {
-            "alignment": self.alignment.to_json(),
-            "inputs": [
-                {"name": each.name, "units": each.units, "long_name": each.long_name}
-                for each in self.inputs
-            ],
-            "place": place,
-            "observed": None if self.observed is None else self.observed.to_json(),
-        }
-        content |= {key: getattr(self, key) for key in _Kept.PLAIN}
-        made: Json = plain(content)
-        return made
-
-    @classmethod
-    def from_json(cls, content: Json) -> Self:
-        """Rebuild from :meth:`to_json`."""
-        kept = of_json(_Kept, content)
-        place = kept.place
-        taps = np.array(place.taps)
-        made = Place(taps, place.lowest, place.spacing, place.count, place.centre)
-        return cls(
-            **{key: getattr(kept, key) for key in _Kept.PLAIN},
-            alignment=kept.alignment,
-            inputs=kept.inputs,
-            place=made,
-            observed=None if kept.observed is None else Observed.from_json(kept.observed),
-        )
 
 
 class Rig(NamedTuple):
@@ -379,34 +277,6 @@ def _banks(made: Following, rig: Rig) -> tuple[Bank, ...]:
     return tuple(out)
 
 
-@dataclass(frozen=True)
-class _KeptPlace:
-    """What a file holds of a place."""
-
-    taps: tuple[float, ...]
-    lowest: float
-    spacing: float
-    count: int
-    centre: float
-
-
-@dataclass(frozen=True)
-class _Kept:
-    """What a file holds of the map."""
-
-    PLAIN: ClassVar[tuple[str, ...]] = ("dt", "ahead", "lead", "back", "band", "power")
-    alignment: FittedAlignment
-    inputs: tuple[ChannelLabel, ...]
-    dt: float
-    ahead: int
-    lead: int
-    back: int
-    band: tuple[float, float]
-    power: tuple[float, ...]
-    place: _KeptPlace
-    observed: Json | None
-
-
 @dataclass(frozen=True, eq=False)
 class Bank:
     """Carriers of one elevation.
@@ -427,54 +297,3 @@ class Bank:
     columns: tuple[int, ...]
     taps: FloatArray
     errors: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Followed:
-    """Waves of a run about the vessel, and where it is by its measured surge."""
-
-    made: Following
-    measured: Measured
-    banks: tuple[Bank, ...]
-
-    def table(self, first: int, stop: int) -> FloatArray:
-        """Delayed regressors of samples at all places, shape (time, place, n)."""
-        made, low = self.made, self.measured.first
-        values = self.measured.values[first - made.back - low : stop + made.ahead - low]
-        count = made.place.count
-        out = np.empty((stop - first, count, len(made.inputs)))
-        out[:] = values[made.back : made.back + stop - first, None]
-        for bank in self.banks:
-            out[:, :, bank.column] = carried(bank.taps, values[:, bank.columns])
-        if made.observed is None:
-            return out
-        return made.observed.with_delayed(out.reshape(-1, out.shape[2])).reshape(
-            stop - first, count, -1
-        )
-
-    def direct(self, first: int, stop: int) -> FloatArray:
-        """Columns without delays that no state drives, shape (time, m − 1)."""
-        made, low = self.made, self.measured.first
-        if made.observed is None:
-            return np.empty((stop - first, 0))
-        before, after = made._around
-        begin = max(first - before, low)
-        values = self.measured.values[begin - low : stop + after - low]
-        return made.observed.direct(values)[first - begin : first - begin + stop - first]
-
-    def rows(self, first: int, stop: int) -> Regressors:
-        """Regressors by the measured surge; without one, of a vessel at rest in the mean place."""
-        table, places = self.table(first, stop), self.places(first, stop)
-        delayed = read_table(self.made.place, table, np.arange(stop - first), places)
-        squared = self.made.place.squared(places)[:, None]
-        return Regressors(delayed, np.concatenate([self.direct(first, stop), squared], axis=1))
-
-    def places(self, first: int, stop: int) -> FloatArray:
-        """Place of the vessel by its measured surge; at rest in the mean without one."""
-        place, low = self.made.place, self.measured.first
-        if self.measured.surge is None:
-            return np.full(stop - first, place.centre)
-        return place.of(self.measured.surge[first - low - place.taps.size + 1 : stop - low])
-
-
-MAPS[Following.kind] = Following

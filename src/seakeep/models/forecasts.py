@@ -109,9 +109,15 @@ class Forecaster:
 class SingleModel(Forecaster):
     """Methods of every model with one member; it adds a signature and ``free_runs``."""
 
-    kind: ClassVar[str]
     n_members: ClassVar[int] = 1
+    settings: Any
     training: Training
+
+    @property
+    def kind(self) -> str:
+        """Word of its settings in :data:`seakeep.models.registry.KINDS`."""
+        kind: str = self.settings.kind
+        return kind
 
     def free_runs(
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)

@@ -1,52 +1,27 @@
-"""Interfaces of specs, models, and input maps.
+"""Interfaces of specs and models.
 
 Helpers take a :class:`Signature`, never a whole model. A new model is a ``Spec``, a
-``Model`` and one line in :data:`seakeep.models.registry.KINDS`; a new input map is an ``InputMap``
-and one line in :data:`seakeep.models.inputs.MAPS`.
+``Model`` and one line in :data:`seakeep.models.registry.KINDS`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol, Self
+from typing import ClassVar, Literal, Protocol, Self
 
 import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.core.recursion import Place
+from seakeep.models.checks import Json
+from seakeep.models.inputs import InputMap
 from seakeep.models.labelled import ChannelLabel, Runs, Stop
 from seakeep.models.readouts import FittedReadOut
 
-__all__ = [
-    "Drive",
-    "Follows",
-    "InputMap",
-    "Json",
-    "Model",
-    "Needs",
-    "Regressors",
-    "Scale",
-    "Signature",
-    "Span",
-    "Spec",
-    "plain",
-]
-
-Json = dict[str, Any]
-"""Settings as JSON values."""
-
-
-def plain(value: Any) -> Any:
-    """Return JSON values with numbers of numpy and tuples in them as plain ones."""
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, Mapping):
-        return {str(key): plain(each) for key, each in value.items()}
-    return [plain(each) for each in value] if isinstance(value, list | tuple) else value
+__all__ = ["Model", "Needs", "Role", "Scale", "Signature", "Spec"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,116 +62,6 @@ class Scale:
         values = np.multiply(deviations, self.std, out=out)
         values += self.mean
         return values
-
-
-class Span(NamedTuple):
-    """Samples of a run that are wanted: from `first` to before `stop`; `known` is the start."""
-
-    first: int
-    known: int
-    stop: int
-
-
-class Regressors(NamedTuple):
-    """What drives the step from each of several samples, in physical units.
-
-    `delayed` regressors enter with the model's input delays; `direct` ones bring their own and
-    enter as they are.
-    """
-
-    delayed: FloatArray
-    direct: FloatArray
-
-
-class Drive(Protocol):
-    """Regressors of one run, made once and shared by members and windows."""
-
-    def rows(self, first: int, stop: int) -> Regressors:
-        """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
-
-        Rows are NaN where they need inputs that are not there.
-        """
-        ...
-
-
-class Follows(NamedTuple):
-    """Place of the vessel, the state whose last values it sums, and how far carriers reach, m."""
-
-    place: Place
-    column: int
-    reach: tuple[float, float]
-
-
-class InputMap(Protocol):
-    """How measured inputs become regressors; frozen, with settings as JSON values.
-
-    Attributes
-    ----------
-    kind : str
-        Its word in :data:`seakeep.models.inputs.MAPS`.
-    lead_samples : int
-        Samples of input after the one a step starts from that drive the step.
-    reads_surge : bool
-        Whether the measured surge is read after the start of a forecast.
-    follows : Follows or None
-        Where waves are read by what the model itself predicts: the place, and the state behind it.
-    """
-
-    kind: ClassVar[str]
-
-    @property
-    def lead_samples(self) -> int:
-        """Samples of input after the one a step starts from that drive the step."""
-        ...
-
-    @property
-    def reads_surge(self) -> bool:
-        """Whether the measured surge is read after the start."""
-        ...
-
-    @property
-    def follows(self) -> Follows | None:
-        """Place that the model follows."""
-        ...
-
-    def regressors(
-        self, inputs: tuple[ChannelLabel, ...]
-    ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
-        """Labels of the delayed and of the direct regressors made of these inputs."""
-        ...
-
-    def reads(self, span: Span) -> Span:
-        """Samples of its input that the map reads for samples of its output."""
-        ...
-
-    def history(self, input_delays: int) -> int:
-        """Samples of input before the start that a forecast with these delays reads."""
-        ...
-
-    def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Drive:
-        """Drive made of that of its input; `run` is None where plain arrays are the input."""
-        ...
-
-    def look_ahead(self, run: xr.Dataset | None, dt: float) -> float:
-        """Seconds of input after the one a step starts from that drive the step, in this run."""
-        ...
-
-    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
-        """What a forecast's attributes report of the map."""
-        ...
-
-    def describe(self, dt: float) -> list[str]:
-        """Lines of a model's summary."""
-        ...
-
-    def to_json(self) -> Json:
-        """Settings and what was fitted, as JSON values."""
-        ...
-
-    @classmethod
-    def from_json(cls, content: Json) -> Self:
-        """Rebuild from :meth:`to_json`."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,7 +156,10 @@ class Needs:
 class Model(Protocol):
     """A fitted model, as compare, study and report use it."""
 
-    kind: ClassVar[str]
+    @property
+    def kind(self) -> str:
+        """Word of its spec in TOML files and in :data:`seakeep.models.registry.KINDS`."""
+        ...
 
     @property
     def signature(self) -> Signature:
@@ -379,8 +247,8 @@ class Spec(Protocol):
         """Settings whose lengths are samples."""
         ...
 
-    def needs(self, dt: float) -> Needs:
-        """Samples that it asks of its runs at a time step."""
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
+        """Samples that it asks of its runs at a time step and an encounter period, s."""
         ...
 
     def fit(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 import xarray as xr
@@ -17,7 +17,7 @@ from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
 from seakeep.signals.waves import encounter_period
 
-__all__ = ["ChannelLabel", "as_runs", "channel_labels", "channel_matrix", "nearest_sample"]
+__all__ = ["ChannelLabel", "Span", "as_runs", "channel_labels", "channel_matrix", "nearest_sample"]
 
 Runs = xr.Dataset | Sequence[xr.Dataset] | Mapping[str, xr.Dataset]
 Stop = float | Sequence[float] | Mapping[str, float] | Mapping[str, float | None] | None
@@ -37,6 +37,14 @@ class ChannelLabel:
     name: str
     units: str
     long_name: str
+
+
+class Span(NamedTuple):
+    """Samples of a run that are wanted: from `first` to before `stop`; `known` is the start."""
+
+    first: int
+    known: int
+    stop: int
 
 
 def as_runs(runs: Runs) -> dict[str, xr.Dataset]:
@@ -248,7 +256,8 @@ def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple
     labels = channel_labels(next(iter(runs.values())), names)
     if len(runs) == 1:
         return labels
-    for number, label in enumerate(labels):
+    out = []
+    for label in labels:
         stated = {
             name: str(units)
             for name, run in runs.items()
@@ -268,13 +277,8 @@ def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple
                 f"'{next(iter(stated.values()))}', as in {next(iter(stated))}. Set its units "
                 "attribute."
             )
-        if stated:
-            labels = (
-                *labels[:number],
-                replace(label, units=next(iter(stated.values()))),
-                *labels[number + 1 :],
-            )
-    return labels
+        out.append(replace(label, units=next(iter(stated.values()), label.units)))
+    return tuple(out)
 
 
 def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> None:

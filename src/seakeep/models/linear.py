@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -16,13 +16,13 @@ from seakeep.arrays import ComplexArray, FloatArray, as_real
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import export, labelled, store
+from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
 from seakeep.models.forecasts import SingleModel, check_arrays, counted, one_run
 from seakeep.models.growth import LeadErrors, training_errors
-from seakeep.models.inputs import Chain, FittedAlignment, Measured
-from seakeep.models.interface import Scale, Signature, Span
+from seakeep.models.interface import Scale, Signature
+from seakeep.models.labelled import Span
 from seakeep.models.live import Live
-from seakeep.models.readouts import FittedReadOut
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import Training, TrainingData
 from seakeep.models.validity import Coverage
@@ -34,65 +34,55 @@ if TYPE_CHECKING:
 __all__ = ["HankelDMDcModel", "modes"]
 
 
-class Lesson(NamedTuple):
-    """What a model was fitted to; coverage and errors are computed on first use."""
-
-    data: TrainingData
-    runs: Mapping[str, xr.Dataset]
-
-
-class Kept(NamedTuple):
-    """What its file keeps of that."""
-
-    coverage: Coverage
-    errors: LeadErrors | None = None
-
-
 @dataclass(frozen=True, eq=False)
 class HankelDMDcModel(SingleModel, store.Saved):
     """An identified model; made by :meth:`HankelDMDc.fit` or :func:`seakeep.load_model`.
 
     Parameters
     ----------
-    settings : HankelSettings
-        The settings it was identified with.
+    settings : Spec
+        The settings it was identified with: those of a Hankel model or of a linear baseline.
     coefficients : ndarray, shape (N(s+1) or N, N(s+1) + n(z+1) + m)
         Regressed rows of [Â B̂], on standardised deviations.
     signature : Signature
         Time step, names and units, delays, moments, and how inputs drive the model.
     training : Training
         Runs, windows and form of the regression.
-    learnt : Lesson or Kept
-        What it was fitted to, or what its file keeps of that.
+    coverage : Coverage
+        Waves that it was trained in.
+    learnt : (TrainingData, runs) or LeadErrors, optional
+        What it was fitted to, or its errors there; a member of an ensemble has neither.
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
     """
 
-    kind: ClassVar[str] = "hankel_dmdc"
-    settings: HankelSettings
+    settings: Any
     coefficients: FloatArray = field(repr=False)
     signature: Signature = field(repr=False)
     training: Training
-    learnt: Lesson | Kept = field(repr=False)
+    coverage: Coverage = field(repr=False)
+    learnt: tuple[TrainingData, Mapping[str, xr.Dataset]] | LeadErrors | None = field(
+        default=None, repr=False
+    )
     selection: str = ""
 
     @classmethod
     def fitted(
         cls,
-        settings: HankelSettings,
+        settings: Any,
         data: TrainingData,
+        signature: Signature,
         solution: Solution,
         runs: Mapping[str, xr.Dataset],
-        readouts: tuple[FittedReadOut, ...] = (),
     ) -> Self:
         """The model that a regression on data of these runs found."""
-        signature = replace(data.signature(settings), readouts=readouts)
         return cls(
             settings=settings,
             coefficients=solution.coefficients,
             signature=signature,
             training=data.training(solution),
-            learnt=Lesson(data, runs),
+            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
+            learnt=(data, runs),
         )
 
     def __post_init__(self) -> None:
@@ -106,24 +96,16 @@ class HankelDMDcModel(SingleModel, store.Saved):
         )
 
     @cached_property
-    def coverage(self) -> Coverage:
-        """Waves that it was trained in."""
-        if isinstance(self.learnt, Kept):
-            return self.learnt.coverage
-        data = self.learnt.data
-        return Coverage.of(self.signature.inputs, data.inputs, data.dt)
-
-    @cached_property
     def errors(self) -> LeadErrors | None:
-        """Its errors in training, which :meth:`live` weighs; a member of an ensemble has none."""
-        if isinstance(self.learnt, Kept):
-            return self.learnt.errors
-        return training_errors(self.dynamics, self.learnt.data, self.signature, self.learnt.runs)
+        """Its errors in training, computed on first use, which :meth:`live` weighs."""
+        if not isinstance(self.learnt, tuple):
+            return self.learnt
+        return training_errors(self.dynamics, self.learnt[0], self.signature, self.learnt[1])
 
     @property
     def alignment(self) -> FittedAlignment | None:
         """How the wave input is aligned to the vessel, as completed from the training runs."""
-        return Chain.of(self.signature.input_map).alignment
+        return self.signature.input_map.alignment
 
     @property
     def state_scale(self) -> Scale:
@@ -155,16 +137,10 @@ class HankelDMDcModel(SingleModel, store.Saved):
         """What the inputs are divided by, shape (Q,)."""
         return self.input_scale.std
 
-    @property
-    def top(self) -> tuple[FloatArray, FloatArray]:
-        """Regressed rows of Â and B̂: N of them with exact delay rows, else all."""
-        size = len(self.states) * (self.state_delays + 1)
-        return self.coefficients[:, :size], self.coefficients[:, size:]
-
     @cached_property
     def A(self) -> FloatArray:
         """Â, shape (N(s+1), N(s+1)), on standardised deviations, newest block first."""
-        a = self.top[0].astype(float, copy=False)
+        a = self.dynamics.matrices[0].astype(float, copy=False)
         size, count = a.shape[1], len(self.states)
         if a.shape[0] == size:
             return _read_only(a)
@@ -173,7 +149,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
     @cached_property
     def B(self) -> FloatArray:
         """B̂, shape (N(s+1), Q(z+1)), on standardised deviations, newest block first."""
-        b = self.top[1].astype(float, copy=False)
+        b = self.dynamics.matrices[1].astype(float, copy=False)
         missing = self.A.shape[0] - b.shape[0]
         return _read_only(np.concatenate([b, np.zeros((missing, b.shape[1]))]))
 
@@ -268,7 +244,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
             time = np.asarray(run["time"].values, dtype=float)
             labelled.check_finite(values, self.inputs, name, 0, time)
             span = Span(0, len(values) - 1, len(values))
-            values = alignment.wrap(Measured(values), run, [span]).rows(0, len(values)).delayed
+            values = alignment.carry(run, [span])
         variables = {
             channel: ("time", values[:, column], run[channel].attrs)
             for column, channel in enumerate(self.inputs)
@@ -374,6 +350,10 @@ class HankelDMDcModel(SingleModel, store.Saved):
     def to_mat(self, path: str | Path) -> Path:
         """Write A, B, C, D, Ts, offsets, names (of the state's entries too) and units for MATLAB.
 
+        With observables the inputs of the system are the regressors; the file holds filters, as
+        state-space systems too, and a function that make them of measured inputs. Its entry
+        ``Regressors`` says how.
+
         Parameters
         ----------
         path : str or Path
@@ -385,7 +365,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
             The file. In MATLAB: ``m = load('rom.mat'); sys = idss(m.A, m.B, m.C, m.D, 'Ts',
             m.Ts, 'InputName', m.InputName, 'OutputName', m.OutputName);``
         """
-        return export.to_mat(self._system(), self.signature, path)
+        return export.to_mat(self._system(is_file=True), self.signature, path)
 
     def initial_state(self, run: xr.Dataset, start: float) -> FloatArray:
         """State of the exported system that continues a measured run.
@@ -438,13 +418,16 @@ class HankelDMDcModel(SingleModel, store.Saved):
         windows = check_arrays(self.signature, x_history, u_history, lead, 1)
         return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
 
-    def _system(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _system(self, *, is_file: bool = False) -> export.System:
         export.check_linear(self.signature)
-        if more := self.regressors[len(self.inputs) :]:
+        observed = self.signature.input_map.observed
+        if is_file and observed is not None and not all(each.terms for each in observed.bound):
+            is_file = False  # Python code from outside
+        if not is_file and (more := self.regressors[len(self.inputs) :]):
             raise RequestError(
                 f"the model is driven by observables too ({', '.join(more)}), which a state-space "
-                "system in its inputs cannot represent. Use forecast_arrays, or fit a model with "
-                "observables=[]."
+                "system in its inputs cannot represent. Use forecast_arrays, export C, an FMU, an "
+                "ONNX graph or a MATLAB file, or fit a model with observables=[]."
             )
         if read := [each.channel for each in self.signature.readouts if each.function]:
             raise RequestError(
@@ -462,6 +445,8 @@ class HankelDMDcModel(SingleModel, store.Saved):
         str
             A few lines; reading it computes the eigenvalues.
         """
+        if self.settings.title:
+            return "\n".join([f"{self.settings.title}, dt {self.dt:g} s", *self.lines()])
         rows = "exact" if self.settings.delay_rows == "exact" else "regressed"
         lines = [
             f"Hankel DMD with control: {counted(len(self.states), 'state')}, "
@@ -490,36 +475,43 @@ class HankelDMDcModel(SingleModel, store.Saved):
     def to_dataset(self) -> xr.Dataset:
         """The model as a Dataset: what :meth:`save` writes."""
         label = {"long_name": "regressed rows of [A B] on standardised deviations", "units": "1"}
-        return xr.Dataset(
-            {
-                "coefficients": (("row", "regressor"), self.coefficients, label),
-                **store.pack_signature(self.signature),
-                **self.coverage.to_variables(),
-                **({} if self.errors is None else self.errors.to_variables()),
-            },
-            attrs={
-                "settings": store.as_json(self.settings.to_json()),
-                "training": store.as_json(self.training.to_json()),
-                "signature": store.as_json(store.signature_json(self.signature)),
-                "selection": self.selection,
-            },
-        )
+        found = packed(self).assign(coefficients=(("row", "regressor"), self.coefficients, label))
+        errors = {} if self.errors is None else self.errors.to_variables()
+        return found.assign(errors).assign_attrs(selection=self.selection)
 
     @classmethod
-    def from_dataset(cls, dataset: xr.Dataset, settings: HankelSettings) -> Self:
+    def from_dataset(cls, dataset: xr.Dataset, settings: Any) -> Self:
         """Rebuild a model from :meth:`to_dataset`; it is equal to the last bit."""
-        signature = store.unpack_signature(dataset)
         return cls(
             settings=settings,
             coefficients=store.numbers(dataset, "coefficients"),
-            signature=signature,
-            training=Training.from_json(store.content(dataset, "training")),
+            learnt=LeadErrors.from_dataset(dataset),
             selection=str(dataset.attrs["selection"]),
-            learnt=Kept(
-                Coverage.from_dataset(dataset, signature),
-                LeadErrors.from_dataset(dataset),
-            ),
+            **unpacked(dataset),
         )
+
+
+def packed(model: Any) -> xr.Dataset:
+    """What all single models keep in their files; see :func:`unpacked`."""
+    attrs = {
+        "settings": model.settings.to_json(),
+        "training": model.training.to_json(),
+        "signature": store.signature_json(model.signature),
+    }
+    return xr.Dataset(
+        store.pack_signature(model.signature) | model.coverage.to_variables(),
+        attrs={key: store.as_json(each) for key, each in attrs.items()},
+    )
+
+
+def unpacked(dataset: xr.Dataset) -> dict[str, Any]:
+    """Signature, training and coverage of a single model from its file."""
+    signature = store.unpack_signature(dataset)
+    return {
+        "signature": signature,
+        "training": Training.from_json(store.content(dataset, "training")),
+        "coverage": Coverage.from_dataset(dataset, signature),
+    }
 
 
 def modes(eigenvalues: ComplexArray, dt: float) -> xr.Dataset:

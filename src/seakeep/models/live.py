@@ -36,13 +36,14 @@ from seakeep.core.recursion import read_table
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import load_sealed, write_sealed_array
 from seakeep.models import engine, store
+from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Runs, Windows
 from seakeep.models.executor import one_blas_thread
-from seakeep.models.following import Followed, Following
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors
-from seakeep.models.inputs import Chain, FittedAlignment, Measured
-from seakeep.models.interface import Signature, Span
+from seakeep.models.inputs import Drive
+from seakeep.models.interface import Signature
+from seakeep.models.labelled import Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
@@ -164,8 +165,8 @@ class Live:
         signature = self.signature
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
-        chain = Chain.of(signature.input_map)
-        self._follows, aligned = chain.follows, chain.alignment
+        self._follows = signature.input_map.follows
+        aligned = signature.input_map.alignment
         if aligned is not None and self._follows is None and aligned.carries_in(self._rig):
             raise RequestError(
                 "the model is driven by waves that are carried over whole records, which are not "
@@ -188,11 +189,10 @@ class Live:
         self._ahead = signature.lead_samples
         # Of a model that follows its own surge: the map with its carriers in this rig, and filters
         # that predict the probes from one another; rows at all places of the samples to come.
-        self._following = next((each for each in chain.maps if isinstance(each, Following)), None)
         self._table = (0, np.empty(0))
-        if self._following is not None:
-            self._banks = self._following.banks(self._rig)
-            self._foresight = self._following.foresight(self._rig, max(self._ahead, 1))
+        if self._follows is not None:
+            self._banks = self._follows.banks(self._rig)
+            self._foresight = self._follows.foresight(self._rig, max(self._ahead, 1))
         # Rows of samples, `_first` the number of the first; half of the room is always there.
         longest = max(s, signature.input_delays) + 1
         needed = 2 * (signature.history_samples + self._ahead + 1)
@@ -374,14 +374,14 @@ class Live:
                 f"{taken}. Start with at least 4 samples of all of u."
             )
         known = self._known_inputs()
-        if self._following is None and self.ready and np.isfinite(self._places).sum() >= 2:
+        if self._follows is None and self.ready and np.isfinite(self._places).sum() >= 2:
             drawn = self._drawn(known, 1, 1, 0)
             return np.where(lost, drawn.mean(axis=0)[0], inputs)  # the draws lie about it
         return np.where(lost, self._expected(known, 1)[0], inputs)
 
     def _expected(self, known: FloatArray, count: int) -> FloatArray:
         """Inputs of the next samples: in waves as those of training, or from each record."""
-        if self._following is None or not self.ready:
+        if self._follows is None or not self.ready:
             return predict_waves(known, count)
         taps, placed = self._foresight
         means = self.signature.input_scale.mean[: known.shape[1]]
@@ -481,11 +481,11 @@ class Live:
         delayed = self._rows("delayed", at - self.signature.input_delays, at + 1)
         direct = self._rows("direct", at, at + 1)[0]
         if self._follows is not None:
-            place, column, _ = self._follows
+            place, column = self._follows.place, self._follows.column
             first, table = self._table
             here = place.of(self._rows("x", at + 1 - place.taps.size, at + 1)[:, column])
             delayed[-1] = read_table(place, table, np.array([at - first]), here)[0]
-            direct[-1] = place.squared(here)[0]
+            direct[-1] = (here[0] - place.centre) ** 2
         out = self._a @ history.ravel()
         out += self._offset
         out += self._b @ delayed.ravel()
@@ -529,9 +529,9 @@ class Live:
         taken = self._count.taken
         begin = max(taken - self._record, 0)
         delayed, direct = self._rows("delayed", first, stop), self._rows("direct", first, stop)
-        if self._following is not None and self._follows is not None:
+        if self._follows is not None:
             surge = self._rows("x", begin, taken)[:, self._follows.column]
-            drive = Followed(self._following, Measured(known, begin, surge), self._banks)
+            drive = Drive(signature.input_map, known, begin, surge, self._banks)
             table, places = drive.table(first, stop), drive.places(first, stop)
             self._table = (first, table)
             delayed[:] = read_table(self._follows.place, table, np.arange(stop - first), places)
@@ -539,8 +539,8 @@ class Live:
             return
         # Direct regressors are wanted from the first prediction on.
         span = Span(first, max(first, begins - 1), stop)
-        wrapped = signature.input_map.wrap(Measured(known, begin), None, [span])
-        delayed[:], direct[:] = wrapped.rows(first, stop)
+        drive = signature.input_map.drive(known, [span], first=begin)
+        delayed[:], direct[:] = drive.rows(first, stop)
 
     @one_blas_thread()
     def forecast(

@@ -12,8 +12,7 @@ from seakeep.core.embedding import TrainingWindow, training_window
 from seakeep.core.solve import Solution, identify
 from seakeep.models.draws import Draw
 from seakeep.models.engine import Dynamics
-from seakeep.models.inputs import Chain
-from seakeep.models.interface import InputMap
+from seakeep.models.inputs import InputMap
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import lengthened, scales_of
 
@@ -103,9 +102,7 @@ def identify_member(
             ]
         )
     groups = list(zip(*parts, strict=True))
-    scales = scales_of(
-        groups, windows, arrays.channels, settings.standardize, Chain.of(input_map).stretch
-    )
+    scales = scales_of(groups, windows, arrays.channels, settings.standardize, input_map.stretch)
     states, delayed, direct = (
         [scale.deviations(values) for values in series]
         for scale, series in zip(scales, groups, strict=True)

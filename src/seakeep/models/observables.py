@@ -20,8 +20,7 @@ from seakeep.arrays import FloatArray
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_keys
-from seakeep.models.interface import Drive, Regressors, Span
+from seakeep.models.checks import TINY, check_choice, check_flag, check_keys, check_number, names_of
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals import expressions
 
@@ -32,7 +31,6 @@ __all__ = [
     "Formula",
     "Observable",
     "Observed",
-    "Observing",
     "Power",
     "Powers",
     "Product",
@@ -50,40 +48,35 @@ BOUND = 36.0
 """Squared standard deviations of an input at which its powers begin to grow like the input."""
 STIFF = 100.0
 """How much more λ weighs on powers: an error of a high wave is an error of its cube."""
-TINY = float(np.finfo(float).tiny)
 SLOPE = 0.7
 """Slope of slow squares above the largest of training: a force does not grow for ever."""
 
 
 class Product(NamedTuple):
-    """A column as the product of inputs; a power names one more than once."""
+    """A column as the product of two inputs."""
 
-    places: tuple[int, ...]
+    one: int
+    other: int
+
+    def columns(self, inputs: Any, limits: FloatArray) -> Any:
+        """The column of inputs, shape (time, Q); `limits` are those of powers."""
+        return inputs[:, [self.one]] * inputs[:, [self.other]]
 
 
 class Power(NamedTuple):
-    """A column as a power of an input that grows like it far out.
+    r"""Columns as a power of inputs that grows like these far out.
 
-    It is u^power / (1 + u²/limit)^((power − 1)/2).
+    Each is :math:`u^q/(1 + u^2/L)^{(q-1)/2}` with a limit L of its own for each input.
     """
 
-    place: int
-    power: int
-    limit: float
+    places: tuple[int, ...]
+    powers: tuple[int, ...]
 
-
-class SlowSquare(NamedTuple):
-    """A column as the low-pass filtered square of a derivative of an input.
-
-    The middle of the filter lies `shift` samples after the instant of the row. Above `top` the
-    column grows with the slope ``SLOPE``.
-    """
-
-    place: int
-    order: int
-    kernel: FloatArray
-    shift: int
-    top: float = np.inf
+    def columns(self, inputs: Any, limits: FloatArray) -> Any:
+        """The columns of inputs, shape (time, Q), power by power."""
+        u = inputs[:, list(self.places)]
+        calm = u / np.sqrt(1.0 + u * u / limits[list(self.places)])
+        return np.concatenate([u * calm ** (power - 1) for power in self.powers], axis=1)
 
 
 class Formula(NamedTuple):
@@ -92,9 +85,32 @@ class Formula(NamedTuple):
     expression: expressions.Expression
     places: Mapping[str, int]
 
+    def columns(self, inputs: Any, limits: FloatArray) -> Any:
+        """The column of inputs, shape (time, Q)."""
+        return self.expression.of(lambda name: inputs[:, [self.places[name]]])
+
+
+class SlowSquare(NamedTuple):
+    """Columns as the low-pass filtered square of a derivative of an input, at several lags.
+
+    The middle of the filter lies one of `shifts` samples after the instant of the row.
+    """
+
+    place: int
+    order: int
+    kernel: FloatArray
+    shifts: tuple[int, ...]
+    dt: float
+
+    def columns(self, inputs: FloatArray, limits: FloatArray) -> FloatArray:
+        """The columns of inputs, shape (time, Q)."""
+        return slow_squares(inputs[:, self.place], self.order, self.kernel, self.shifts, self.dt)
+
 
 Term = Product | Power | SlowSquare | Formula
-"""A column as hosts other than Python compute it."""
+"""Columns as Python and all other hosts compute them.
+
+All but slow squares are arithmetic of numpy, which arrays, texts of C and nodes of graphs know."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,35 +125,31 @@ class Bound:
         Whether the columns take the input delays of the model, or stand as they are.
     before, ahead : int
         Samples before and after instant j that row j reads.
-    columns : callable
+    columns : callable, optional
         From the inputs, shape (time, Q), to the columns, shape (time, len(labels)); rows are NaN
-        where they need samples that are not there.
+        where they need samples that are not there; by default what the terms say.
     terms : tuple of Product, Power, SlowSquare or Formula, optional
-        The columns for hosts other than Python; without them the model cannot be exported.
+        The columns as all hosts compute them; a model without runs in Python alone.
     stiffness : float, optional
         How much more λ weighs on the columns than on others.
+    slope : float, optional
+        Slope of the columns above the largest values of training.
     """
 
     labels: tuple[ChannelLabel, ...]
     delayed: bool
     before: int
     ahead: int
-    columns: Callable[[FloatArray], FloatArray]
+    columns: Callable[[FloatArray], FloatArray] | None = None
     terms: tuple[Term, ...] = ()
     stiffness: float = 1.0
+    slope: float = 1.0
 
-    def below(self, tops: FloatArray) -> Bound:
-        """Columns of slow squares that grow with the slope ``SLOPE`` above some values."""
-
-        def columns(values: FloatArray) -> FloatArray:
-            found = self.columns(values)
-            over = np.maximum(found - tops, 0.0)
-            result: FloatArray = found - (1.0 - SLOPE) * over
-            return result
-
-        pairs = zip(self.terms, tops.tolist(), strict=True)
-        terms = tuple(t._replace(top=top) if isinstance(t, SlowSquare) else t for t, top in pairs)
-        return replace(self, columns=columns, terms=terms)
+    def of(self, inputs: FloatArray, limits: FloatArray) -> FloatArray:
+        """Columns of inputs, shape (time, Q), whose powers have limits, shape (Q,)."""
+        if self.columns is not None:
+            return self.columns(inputs)
+        return np.concatenate([term.columns(inputs, limits) for term in self.terms], axis=1)
 
 
 class Observable(Protocol):
@@ -173,28 +185,27 @@ def _column(inputs: Sequence[ChannelLabel], name: str, what: str) -> int:
     return names.index(name)
 
 
-def _names(value: object, what: str) -> tuple[str, ...]:
-    names: tuple[Any, ...] = (value,)
-    if not isinstance(value, str) and isinstance(value, Iterable):
-        names = tuple(value)
-    if not names or not all(isinstance(name, str) for name in names):
-        raise RequestError(
-            f"{what}: of must name one or more inputs; "
-            f"received {value!r:.{SHOWN}}. Write of='eta_fwd'."
-        )
-    return names
-
-
-def _numbers(value: object, what: str, meant: str, fits: Callable[[Any], bool]) -> tuple[Any, ...]:
-    given: tuple[Any, ...] = tuple(value) if isinstance(value, Iterable) else (value,)
-    numbers = tuple(n.item() if isinstance(n, np.generic) else n for n in given)
+def _numbers(value: Any, what: str, meant: str, low: float, high: float = math.inf) -> Any:
+    """Numbers in a list, each once and within bounds; one number is a list of it."""
+    given = value if isinstance(value, Iterable) else (value,)
+    numbers = tuple(each.item() if isinstance(each, np.generic) else each for each in given)
     for number in numbers:
-        real = isinstance(number, int | float) and not isinstance(number, bool)
-        if not real or not math.isfinite(number) or not fits(number):
-            raise RequestError(f"{what} must be {meant}; received {number!r:.{SHOWN}}.")
+        check_number(what, number, meant, low, high)
     if not numbers or len(set(numbers)) < len(numbers):
         raise RequestError(f"{what} must be {meant}, each once; received {value!r:.{SHOWN}}.")
     return numbers
+
+
+def _integers(value: Any, what: str, meant: str, low: int, high: int) -> tuple[int, ...]:
+    numbers = _numbers(value, what, meant, low, high + 1)
+    if strange := [each for each in numbers if each != int(each)]:
+        raise RequestError(f"{what} must be {meant}; received {strange[0]!r}.")
+    return tuple(int(each) for each in numbers)
+
+
+def _inputs(value: Any, what: str) -> tuple[str, ...]:
+    listed = (value,) if isinstance(value, str) else value
+    return names_of(listed, f"{what}: of", "of='eta_fwd'")
 
 
 def _power(unit: str, power: int) -> str:
@@ -241,17 +252,19 @@ class SlowSquares:
     kind: ClassVar[str] = "slow_squares"
 
     def __post_init__(self) -> None:
-        what = "slow_squares"
-        object.__setattr__(self, "of", _names(self.of, what))
-        orders = _numbers(self.orders, f"{what}: orders", "0, 1 or 2", lambda n: n in (0, 1, 2))
-        object.__setattr__(self, "orders", tuple(int(order) for order in orders))
-        lags = _numbers(self.lags, f"{what}: lags", "encounter periods from 0", lambda n: n >= 0)
-        object.__setattr__(self, "lags", lags)
+        orders = _integers(self.orders, "slow_squares: orders", "0, 1 or 2", 0, 2)
+        lags = _numbers(self.lags, "slow_squares: lags", "encounter periods from 0", 0)
+        for name, value in (
+            ("of", _inputs(self.of, self.kind)),
+            ("orders", orders),
+            ("lags", lags),
+        ):
+            object.__setattr__(self, name, value)
         meant = "per encounter period, above 0 and at most 1"
-        _numbers((self.cutoff,), f"{what}: cutoff", meant, lambda n: 0 < n <= 1)
-        _numbers((self.lead,), f"{what}: lead", "encounter periods from 0", lambda n: n >= 0)
+        check_number("slow_squares: cutoff", self.cutoff, meant, TINY, math.nextafter(1, 2))
+        check_number("slow_squares: lead", self.lead, "encounter periods from 0", 0)
         if self.period is not None:
-            _numbers((self.period,), f"{what}: period", "seconds above 0", lambda n: n > 0)
+            check_number("slow_squares: period", self.period, "seconds above 0", TINY)
 
     def bind(
         self,
@@ -264,39 +277,21 @@ class SlowSquares:
         period = period if self.period is None else self.period / dt
         assert period is not None
         kernel, reach, ahead, lags = self._places(period)
-        middle = ahead - reach
-        labels = []
+        shifts = tuple(ahead - reach - lag for lag in lags)
+        labels, terms = [], []
         for place in places:
             label = inputs[place]
             for order in self.orders:
                 rate = ("", "/s", "/s^2")[order]
                 unit = label.units and _power(label.units + rate, 2)
                 dots = ("", "_rate", "_acceleration")[order]
-                labels += [
-                    ChannelLabel(
-                        f"slow_{label.name}{dots}_squared_{lag:g}T",
-                        unit,
-                        f"slow part of the square of {label.long_name}{dots.replace('_', ' ')}, "
-                        f"{lag:g} periods before",
-                    )
-                    for lag in self.lags
-                ]
-
-        def columns(values: FloatArray) -> FloatArray:
-            parts = [
-                slow_squares(values[:, place], self.orders, kernel, middle, lags, dt)
-                for place in places
-            ]
-            return np.concatenate(parts, axis=1)
-
-        terms = tuple(
-            SlowSquare(place, order, kernel, middle - lag)
-            for place in places
-            for order in self.orders
-            for lag in lags
-        )
-        before = max(0, reach + max(lags) - middle)
-        return Bound(tuple(labels), False, before, ahead, columns, terms)
+                terms.append(SlowSquare(place, order, kernel, shifts, dt))
+                for lag in self.lags:
+                    words = f"slow part of the square of {label.long_name}{dots.replace('_', ' ')}"
+                    name = f"slow_{label.name}{dots}_squared_{lag:g}T"
+                    labels.append(ChannelLabel(name, unit, f"{words}, {lag:g} periods before"))
+        before = max(0, reach - min(shifts))
+        return Bound(tuple(labels), False, before, ahead, terms=tuple(terms), slope=SLOPE)
 
     def reach(self, dt: float) -> tuple[int, int]:
         """Samples around an instant; see :class:`Observable`."""
@@ -345,27 +340,18 @@ class Powers:
     kind: ClassVar[str] = "powers"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "of", _names(self.of, "powers"))
-        powers = _numbers(
-            self.powers, "powers: powers", "integers from 2 to 5", lambda n: n in (2, 3, 4, 5)
-        )
-        object.__setattr__(self, "powers", tuple(int(power) for power in powers))
-        if not isinstance(self.products, bool):
-            raise RequestError(
-                f"powers: products must be true or false; received {self.products!r:.{SHOWN}}."
-            )
+        object.__setattr__(self, "of", _inputs(self.of, self.kind))
+        powers = _integers(self.powers, "powers: powers", "integers from 2 to 5", 2, 5)
+        object.__setattr__(self, "powers", powers)
+        check_flag("powers: products", self.products)
 
     def bind(
         self,
         inputs: Sequence[ChannelLabel],
         period: float | None,
         dt: float,
-        spreads: Sequence[float] = (),
     ) -> Bound:
-        """Columns for these inputs, which vary by `spreads` in training; see :class:`Observable`.
-
-        Without these the powers have no bound.
-        """
+        """Columns for these inputs; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
         pairs = list(combinations(places, 2)) if self.products else []
         labels = [
@@ -385,25 +371,9 @@ class Powers:
             )
             for a, b in pairs
         ]
-
-        limits = np.full(len(places), np.inf)
-        if spreads:
-            limits = np.array([BOUND * spreads[place] ** 2 for place in places]) + TINY
-
-        def columns(values: FloatArray) -> FloatArray:
-            chosen = values[:, places]
-            calm = np.sqrt(1.0 + chosen * chosen / limits)
-            parts = [chosen * (chosen / calm) ** (power - 1) for power in self.powers]
-            parts += [values[:, [a]] * values[:, [b]] for a, b in pairs]
-            return np.concatenate(parts, axis=1)
-
-        terms: list[Term] = [
-            Power(place, power, float(limit))
-            for power in self.powers
-            for place, limit in zip(places, limits, strict=True)
-        ]
-        terms += [Product(pair) for pair in pairs]
-        return Bound(tuple(labels), True, 0, 0, columns, tuple(terms), STIFF)
+        terms: list[Term] = [Power(tuple(places), self.powers)]
+        terms += [Product(one, other) for one, other in pairs]
+        return Bound(tuple(labels), True, 0, 0, terms=tuple(terms), stiffness=STIFF)
 
     def reach(self, dt: float) -> tuple[int, int]:
         """0, 0: the instant itself."""
@@ -523,50 +493,13 @@ def observables_of(value: object) -> tuple[Observable, ...]:
 
 
 @dataclass(frozen=True)
-class Observing:
-    """Observables that are not fitted yet; `lead` is that of the inputs they are made of."""
-
-    observables: tuple[Observable, ...]
-    lead: int = 0
-
-    def fit(
-        self,
-        runs: Mapping[str, xr.Dataset],
-        states: Sequence[str],
-        inputs: Sequence[str],
-        window: int | None,
-    ) -> Observed:
-        """Bind the observables to the inputs, and to the encounter period of the runs."""
-        name, first = next(iter(runs.items()))
-        labels = labelled.channel_labels(first, inputs)
-        counts = any(getattr(each, "period", 0.0) is None for each in self.observables)
-        period = labelled.mean_period(runs, list(inputs)) if counts else None
-        last = slice(None if window is None else -window, None)
-        records = [labelled.channel_matrix(run, inputs, name)[last] for name, run in runs.items()]
-        spreads = np.nanstd(np.concatenate(records), axis=0)
-        dt = labelled.run_step(first, name)
-        made = Observed(self.observables, self.lead, labels, dt, period, tuple(spreads.tolist()))
-        made = replace(made, tops=tuple(made.largest(records)))
-        names = [label.name for group in made.regressors(labels) for label in group]
-        for each in names:
-            if names.count(each) > 1:
-                raise RequestError(
-                    f"two inputs or observables make a column '{each}'. Give an expression "
-                    "another name, or leave one of the observables out."
-                )
-        return made
-
-
-@dataclass(frozen=True)
 class Observed:
-    """Observables beside the inputs that they are made of: an input map.
+    """Observables beside the inputs that they are made of, as fitted.
 
     Parameters
     ----------
     observables : tuple of Observable
         Functions of the inputs.
-    lead : int
-        Samples by which the inputs that arrive here look ahead already.
     inputs : tuple of ChannelLabel
         Those inputs.
     dt : float
@@ -579,16 +512,41 @@ class Observed:
         Largest value in training of each column without delays.
     """
 
-    kind: ClassVar[str] = "observables"
-    reads_surge: ClassVar[bool] = False
-    follows: ClassVar[None] = None
     observables: tuple[Observable, ...]
-    lead: int
     inputs: tuple[ChannelLabel, ...]
     dt: float
     period: float | None
     spreads: tuple[float, ...]
     tops: tuple[float, ...] = ()
+
+    @classmethod
+    def fit(
+        cls,
+        observables: tuple[Observable, ...],
+        runs: Mapping[str, xr.Dataset],
+        inputs: Sequence[str],
+        window: int | None,
+    ) -> Self:
+        """Bind observables to inputs, and to the encounter period of the runs."""
+        name, first = next(iter(runs.items()))
+        labels = labelled.channel_labels(first, inputs)
+        counts = any(getattr(each, "period", 0.0) is None for each in observables)
+        period = labelled.mean_period(runs, list(inputs)) if counts else None
+        last = slice(None if window is None else -window, None)
+        records = [labelled.channel_matrix(run, inputs, name)[last] for name, run in runs.items()]
+        spreads = np.nanstd(np.concatenate(records), axis=0)
+        dt = labelled.run_step(first, name)
+        made = cls(observables, labels, dt, period, tuple(spreads.tolist()))
+        direct = np.concatenate([made.direct(each) for each in records])
+        tops = np.fmax.reduce(direct, axis=0, initial=0.0)
+        names = [label.name for group in (labels, *made.labels) for label in group]
+        for each in names:
+            if names.count(each) > 1:
+                raise RequestError(
+                    f"two inputs or observables make a column '{each}'. Give an expression "
+                    "another name, or leave one of the observables out."
+                )
+        return replace(made, tops=tuple(tops.tolist()))
 
     def __getstate__(self) -> dict[str, Any]:
         """Fields alone: what is bound are functions, which a worker makes anew."""
@@ -596,91 +554,56 @@ class Observed:
 
     @cached_property
     def bound(self) -> tuple[Bound, ...]:
-        """The observables, ready for these inputs; slow squares below the largest of training."""
-        found, tops = [], np.array(self.tops)
-        for each in self.observables:
-            rig = self.inputs, self.period, self.dt
-            made = each.bind(*rig, self.spreads) if isinstance(each, Powers) else each.bind(*rig)
-            if isinstance(each, SlowSquares) and tops.size:
-                made = made.below(tops[: len(made.labels)])
-            if not made.delayed:
-                tops = tops[len(made.labels) :]
-            found.append(made)
-        return tuple(found)
+        """The observables, ready for these inputs."""
+        return tuple(each.bind(self.inputs, self.period, self.dt) for each in self.observables)
 
-    def largest(self, records: Sequence[FloatArray]) -> list[float]:
-        """Largest value in some records of each column without delays."""
-        direct = [self.direct(each) for each in records]
-        return [float(each) for each in np.fmax.reduce(np.concatenate(direct), axis=0, initial=0.0)]
+    @cached_property
+    def limits(self) -> FloatArray:
+        """Squares at which powers of each input begin to grow like the input."""
+        result: FloatArray = BOUND * np.square(self.spreads) + TINY
+        return result
+
+    @cached_property
+    def slopes(self) -> FloatArray:
+        """Slope of each column without delays above the largest value of training."""
+        return np.array([b.slope for b in self.bound if not b.delayed for _ in b.labels])
+
+    @cached_property
+    def labels(self) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
+        """Labels of the columns with delays, and of those without."""
+        delayed, direct = (
+            tuple(label for b in self.bound if b.delayed == wanted for label in b.labels)
+            for wanted in (True, False)
+        )
+        return delayed, direct
+
+    @property
+    def stretch(self) -> tuple[FloatArray, FloatArray]:
+        """Factors of the standard deviations that inputs and columns are divided by."""
+        delayed, direct = (
+            [math.sqrt(b.stiffness) for b in self.bound if b.delayed == wanted for _ in b.labels]
+            for wanted in (True, False)
+        )
+        return np.array([1.0] * len(self.inputs) + delayed), np.array(direct)
 
     def with_delayed(self, inputs: FloatArray) -> FloatArray:
         """Inputs, shape (time, Q), beside the columns that take the input delays."""
-        more = [bound.columns(inputs) for bound in self.bound if bound.delayed]
+        more = [bound.of(inputs, self.limits) for bound in self.bound if bound.delayed]
         return np.concatenate([inputs, *more], axis=1)
 
     def direct(self, inputs: FloatArray) -> FloatArray:
         """Columns that stand as they are, of inputs of shape (time, Q)."""
-        found = [bound.columns(inputs) for bound in self.bound if not bound.delayed]
-        return np.concatenate([np.empty((len(inputs), 0)), *found], axis=1)
+        parts = [bound.of(inputs, self.limits) for bound in self.bound if not bound.delayed]
+        found = np.concatenate([np.empty((len(inputs), 0)), *parts], axis=1)
+        if self.tops:
+            found -= (1.0 - self.slopes) * np.maximum(found - self.tops, 0.0)
+        return found
 
-    @property
-    def stretch(self) -> tuple[FloatArray, FloatArray]:
-        """Factors of the standard deviations that the columns are divided by."""
-        groups: tuple[list[float], list[float]] = [1.0] * len(self.inputs), []
-        for bound in self.bound:
-            groups[not bound.delayed].extend([math.sqrt(bound.stiffness)] * len(bound.labels))
-        return np.array(groups[0]), np.array(groups[1])
-
-    @cached_property
-    def _around(self) -> tuple[int, int, int]:
-        """Samples before and after a row that are read, and those before of delayed columns."""
-        shift = [0 if b.delayed else self.lead for b in self.bound]
-        before = max([0, *(b.before + s for b, s in zip(self.bound, shift, strict=True))])
-        after = max([0, *(b.ahead - s for b, s in zip(self.bound, shift, strict=True))])
-        return before, after, max([0, *(b.before for b in self.bound if b.delayed)])
-
-    @property
-    def lead_samples(self) -> int:
-        """Samples beyond those that the inputs read already."""
-        return self._around[1]
-
-    def history(self, input_delays: int) -> int:
-        """Samples of input before the start that a forecast with these delays reads."""
-        return -self.reads(Span(-input_delays, 0, 1)).first
-
-    def regressors(
-        self, inputs: tuple[ChannelLabel, ...]
-    ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
-        """Return the inputs and the observables with delays, and those without."""
-        more = tuple(label for b in self.bound if b.delayed for label in b.labels)
-        return inputs + more, tuple(
-            label for b in self.bound if not b.delayed for label in b.labels
-        )
-
-    def reads(self, span: Span) -> Span:
-        """Samples of input around those of the rows; direct ones count from the start on."""
-        before, after, delayed = self._around
-        first = min(span.first - delayed - self.lead, span.known - before)
-        return Span(first, span.known, span.stop + after)
-
-    def wrap(self, drive: Drive, run: xr.Dataset | None, spans: Sequence[Span]) -> Drive:
-        """Put the observables beside the inputs of a run."""
-        read = [self.reads(span) for span in spans]
-        return _Seen(drive, self, min(r.first for r in read), max(r.stop for r in read))
-
-    def look_ahead(self, run: xr.Dataset | None, dt: float) -> float:
-        """Seconds beyond those that the inputs read already."""
-        return self.lead_samples * dt
-
-    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
-        """Nothing beside the look-ahead, which every forecast reports."""
-        return {}
-
-    def describe(self, dt: float) -> list[str]:
-        """One line per observable."""
+    def describe(self, dt: float, lead: int) -> list[str]:
+        """One line per observable; `lead` is the look-ahead of the inputs."""
         lines = []
         for each, bound in zip(self.observables, self.bound, strict=True):
-            ahead = bound.ahead + (self.lead if bound.delayed else 0)
+            ahead = bound.ahead + (lead if bound.delayed else 0)
             columns = f"{len(bound.labels)} column{'' if len(bound.labels) == 1 else 's'}"
             delays = "with the input delays" if bound.delayed else "at lags of their own"
             lines.append(
@@ -690,44 +613,13 @@ class Observed:
         return lines
 
     def to_json(self) -> dict[str, Any]:
-        """Observables, inputs, time step and period."""
-        return {
-            "observables": [to_json(each) for each in self.observables],
-            "lead": self.lead,
-            "inputs": [asdict(label) for label in self.inputs],
-            "dt": self.dt,
-            "period": self.period,
-            "spreads": list(self.spreads),
-            "tops": list(self.tops),
-        }
+        """All that was fitted, as JSON values."""
+        return asdict(self) | {"observables": [to_json(each) for each in self.observables]}
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Self:
         """Rebuild from :meth:`to_json`."""
+        observables = tuple(from_json(each) for each in content["observables"])
         inputs = tuple(ChannelLabel(**each) for each in content["inputs"])
-        made = tuple(from_json(each) for each in content["observables"])
-        moments = tuple(content["spreads"]), tuple(content["tops"])
-        return cls(made, content["lead"], inputs, content["dt"], content["period"], *moments)
-
-
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """Inputs and observables of a run, from the sample `low` to before `high` of the inputs."""
-
-    inner: Drive
-    made: Observed
-    low: int
-    high: int
-
-    def rows(self, first: int, stop: int) -> Regressors:
-        before, after, _ = self.made._around
-        start, end = max(first - before, self.low), min(stop + after, self.high)
-        inner = self.inner.rows(start, end)
-        direct, lead = self.made.direct(inner.delayed), self.made.lead
-        shifted = np.full_like(direct, np.nan)  # these inputs look ahead already, by the lead
-        shifted[lead:] = direct[: len(direct) - lead]
-        inside = slice(first - start, stop - start)
-        return Regressors(
-            self.made.with_delayed(inner.delayed)[inside],
-            np.concatenate([inner.direct, shifted], axis=1)[inside],
-        )
+        moments = {key: tuple(content[key]) for key in ("spreads", "tops")}
+        return cls(**{**content, **moments, "observables": observables, "inputs": inputs})

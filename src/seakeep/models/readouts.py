@@ -12,7 +12,7 @@ from seakeep.arrays import FloatArray
 from seakeep.conventions import MOTIONS
 from seakeep.core.readouts import LinearHinges
 from seakeep.errors import SHOWN, RequestError, did_you_mean
-from seakeep.models.checks import check_choice, check_keys
+from seakeep.models.checks import Json, check_choice, check_keys, names_of, plain
 from seakeep.models.labelled import ChannelLabel
 
 __all__ = [
@@ -75,21 +75,13 @@ class ReadOut:
             )
         what = f"readouts: {self.channel}"
         check_choice(f"{what}: kind", self.kind, get_args(Asked))
-        names: Any = self.of
-        if isinstance(names, str) or not isinstance(names, Iterable):
-            raise RequestError(
-                f"{what}: of must be a list of states; "
-                f"received {names!r:.{SHOWN}}. Write of = ['surge', "
-                "'heave', 'pitch']."
-            )
-        names = tuple(names)
-        if not names or not all(isinstance(each, str) for each in names):
-            raise RequestError(f"{what}: of must name at least one state; received {list(names)}.")
+        example = "of = ['surge', 'heave', 'pitch']"
+        names = names_of(self.of, f"{what}: of", example)
         if self.channel in names:
             raise RequestError(
                 f"{what} cannot be read off itself. Leave it out of of = {list(names)}."
             )
-        object.__setattr__(self, "of", tuple(dict.fromkeys(names)))
+        object.__setattr__(self, "of", names)
 
 
 ReadOuts = tuple[ReadOut, ...] | Literal["auto"]
@@ -140,37 +132,19 @@ class FittedReadOut:
             text += " (no two runs could be held out to judge it)"
         return f"  read-out      {text}"
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """As JSON values; numbers keep all their digits."""
-        function = self.function
-        made = None
-        if function is not None:
-            made = {
-                "linear": list(function.linear),
-                "columns": list(function.columns),
-                "knots": function.knots.tolist(),
-                "weights": function.weights.tolist(),
-                "floor": function.floor if np.isfinite(function.floor) else None,
-            }
-        return {
-            "channel": self.channel,
-            "of": list(self.of),
-            "kind": self.kind,
-            "units": self.units,
-            "scores": dict(self.scores),
-            "function": made,
-        }
+        made: Json = plain(asdict(self))
+        return made
 
     @classmethod
-    def from_json(cls, content: Mapping[str, Any], states: Sequence[str]) -> Self:
-        """Rebuild from :meth:`to_json`, for a model of these states."""
-        function, column = content["function"], list(states).index(content["channel"])
+    def from_json(cls, content: Json) -> Self:
+        """Rebuild from :meth:`to_json`."""
+        function = content["function"]
         if function is not None:
-            floor = -np.inf if function["floor"] is None else function["floor"]
             arrays = {key: np.array(function[key], dtype=float) for key in ("knots", "weights")}
-            function = LinearHinges(**{**function, **arrays, "floor": floor})
-        of = tuple(content["of"])
-        return cls(**{**content, "of": of, "column": column, "function": function})
+            function = LinearHinges(**function | arrays)
+        return cls(**content | {"of": tuple(content["of"]), "function": function})
 
 
 def read_out(readouts: Sequence[FittedReadOut], values: FloatArray) -> FloatArray:

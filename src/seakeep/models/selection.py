@@ -24,10 +24,10 @@ from seakeep.core.gram import Piece, primal_system
 from seakeep.core.path import ridge_path, truncated_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
+from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.engine import Dynamics, model_runs, read_windows
 from seakeep.models.executor import Progress, in_order
 from seakeep.models.following import LEAD
-from seakeep.models.inputs import FittedAlignment, ProbeAlignment
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.members import spectral_radius
 from seakeep.models.observables import Observable, Powers, SlowSquares, named

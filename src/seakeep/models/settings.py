@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import math
-import numbers
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar, Literal, Self, get_args
 
-import numpy as np
 import xarray as xr
 
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_integer, check_keys, settings_of
-from seakeep.models.following import Following
+from seakeep.models.alignment import ProbeAlignment
+from seakeep.models.checks import (
+    TINY,
+    Json,
+    check_choice,
+    check_flag,
+    check_integer,
+    check_keys,
+    check_number,
+    plain,
+    settings_of,
+)
+from seakeep.models.following import BACK, Following
 from seakeep.models.html import settings_html
-from seakeep.models.inputs import Chain, FittedAlignment, Lead, ProbeAlignment
-from seakeep.models.interface import Json, Needs, plain
-from seakeep.models.observables import Observable, Observing, observables_of
+from seakeep.models.inputs import InputMap
+from seakeep.models.interface import Needs, Role
+from seakeep.models.observables import Observable, Observed, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
@@ -135,24 +144,16 @@ def as_length(name: str, value: Any, least: int = 0, optional: bool = False) -> 
 
 def check_seconds(name: str, value: object) -> None:
     """Refuse a period or a step that is not a positive number."""
-    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-    if not (real and math.isfinite(value) and value > 0):  # type: ignore[arg-type,operator]
-        raise RequestError(
-            f"{name} must be a positive number of seconds; received {value!r:.{SHOWN}}."
-        )
+    check_number(name, value, "a positive number of seconds", TINY)
 
 
 def check_ridge(value: object, may_choose: bool = False) -> None:
     """Refuse a λ that is not a number, zero or positive, nor "rollout" where λ can be chosen."""
     if may_choose and isinstance(value, str) and value == "rollout":
         return
-    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-    if not real or not math.isfinite(value) or value < 0:  # type: ignore[arg-type,operator]
-        raise RequestError(
-            f"ridge must be a number, zero or positive{', or the word rollout' * may_choose}; "
-            f"received {value!r:.{SHOWN}}. The paper uses 100; 0 asks for the solution of least "
-            "norm."
-        )
+    word = ", or the word rollout" * may_choose
+    hint = " The paper uses 100; 0 asks for the solution of least norm."
+    check_number("ridge", value, f"a number, zero or positive{word}", 0, hint=hint)
 
 
 STABLE_RADIUS = 0.999
@@ -162,12 +163,9 @@ encounter periods."""
 
 def check_stable(value: object) -> None:
     """Refuse what is neither true nor false nor a radius."""
-    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-    if not isinstance(value, bool) and not (real and 0 < value < 1):  # type: ignore[operator]
-        raise RequestError(
-            "stable must be True, False or a radius above 0 and below 1, to which eigenvalues are "
-            f"clipped; received {value!r:.{SHOWN}}. True is {STABLE_RADIUS:g}."
-        )
+    if not isinstance(value, bool):
+        meant = "True, False or a radius above 0 and below 1, to which eigenvalues are clipped"
+        check_number("stable", value, meant, TINY, 1.0, f" True is {STABLE_RADIUS:g}.")
 
 
 Folds = Literal["auto", "run", "sea_state"]
@@ -205,19 +203,11 @@ class Select:
 
     def __post_init__(self) -> None:
         check_choice("select: folds", self.folds, FOLDS)
-        if not isinstance(self.observables, bool):
-            raise RequestError(
-                "select: observables must be True or False; received "
-                f"{self.observables!r:.{SHOWN}}."
-            )
+        check_flag("select: observables", self.observables)
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
-            real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-            if not real or not LEAST_PERIODS < value < MOST_PERIODS:
-                raise RequestError(
-                    "select: horizon (encounter periods) and period (s) must lie between 1e-6 and "
-                    f"1e6; received {value!r:.{SHOWN}}."
-                )
+            what = "select: horizon (encounter periods) and period (s)"
+            check_number(what, value, "between 1e-6 and 1e6", LEAST_PERIODS, MOST_PERIODS)
         if not given:
             raise RequestError("select: horizon is empty. Write horizon=(15, 45).")
         object.__setattr__(self, "horizon", tuple(float(each) for each in given))
@@ -238,6 +228,10 @@ class HankelSettings:
         If a setting is out of range.
     """
 
+    kind: ClassVar[str]
+    title: ClassVar[str] = ""
+    role: ClassVar[Role] = "reference"
+    is_ensemble: ClassVar[bool] = False
     may_choose: ClassVar[bool] = False
     lengths: ClassVar[Mapping[str, int]] = {
         "window": 2,
@@ -268,10 +262,7 @@ class HankelSettings:
         check_choice("history", self.history, ("before", "inside"))
         check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
-        if not isinstance(self.standardize, bool | np.bool_):
-            raise RequestError(
-                f"standardize must be True or False; received {self.standardize!r:.{SHOWN}}."
-            )
+        check_flag("standardize", self.standardize)
         check_stable(self.stable)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
         object.__setattr__(self, "observables", observables_of(self.observables))
@@ -371,44 +362,50 @@ class HankelSettings:
         states: Sequence[str],
         inputs: Sequence[str],
         window: int | None,
-    ) -> Chain:
+    ) -> InputMap:
         """Fit the input map to training runs that end where training ends.
 
-        Where the model follows its own surge, that is one map; else the alignment, the look-ahead,
-        and the observables on both.
+        Observables of a model that follows its own surge are made of waves without look-ahead.
         """
-        arguments, lead = (runs, states, inputs, window), self.lead
-        aligned = None if self.alignment is None else self.alignment.fit(*arguments)
-        follows = isinstance(aligned, FittedAlignment) and aligned.settings.surge == "predicted"
-        observed = None
+        aligned = observed = None
+        if self.alignment is not None:
+            aligned = self.alignment.fit(runs, states, inputs, window)
         if self.observables:
-            observed = Observing(self.observables, 0 if follows else lead).fit(*arguments)
-        if isinstance(aligned, FittedAlignment) and follows:
-            return Chain((Following.fit(aligned, runs, window, lead, observed),))
-        found = (aligned, Lead(lead) if lead else None, observed)
-        return Chain(tuple(each for each in found if each is not None))
+            observed = Observed.fit(self.observables, runs, inputs, window)
+        if aligned is None or aligned.settings.surge != "predicted":
+            return InputMap(aligned, self.lead, observed)
+        follows = Following.fit(aligned, runs, states, window, self.lead)
+        return InputMap(aligned, observed=observed, follows=follows)
 
-    def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
-        """Samples of input before and after the start that the rows of a forecast read.
+    @property
+    def may_observe(self) -> tuple[Observable, ...]:
+        """Observables that a model of these settings may have."""
+        return self.observables
+
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
+        """Samples that it asks of its runs.
+
+        Parameters
+        ----------
+        dt : float
+            Time step, s.
+        encounter_period : float, optional
+            Encounter period, s, in which carriers of a model that follows its surge count.
 
         Raises
         ------
         RequestError
             If an observable counts in encounter periods and does not state its own.
         """
-        delays = self.input_delays if input_delays is None else input_delays
-        reach = [each.reach(dt) for each in self.observables]
-        before = max([delays, *(before for before, _ in reach)])
-        return before, max([self.lead, *(ahead for _, ahead in reach)])
-
-    def needs(self, dt: float) -> Needs:
-        """Samples that it asks of its runs."""
-        before, after = self.around(dt)
+        before, after = zip((0, self.lead), *(o.reach(dt) for o in self.may_observe), strict=True)
+        delayed = self.input_delays
+        if encounter_period and self.alignment and self.alignment.surge == "predicted":
+            delayed += round(BACK * encounter_period / dt)
         return Needs(
             self.window or 1,
-            max(self.state_delays, before),
+            max(self.state_delays, delayed, *before),
             self.history == "inside",
-            after,
+            max(after),
         )
 
     def _repr_html_(self) -> str:
@@ -420,7 +417,7 @@ class HankelSettings:
         content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
         select = content.get("select")
         maps = {
-            "alignment": None if self.alignment is None else self.alignment.to_json(),
+            "alignment": None if self.alignment is None else asdict(self.alignment),
             "observables": [observable_json(each) for each in self.observables],
             "readouts": readouts_json(self.readouts),
             "select": None if select is None else asdict(select),

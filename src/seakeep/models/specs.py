@@ -12,13 +12,14 @@ import xarray as xr
 
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled, store
-from seakeep.models.checks import check_choice
+from seakeep.models.alignment import ProbeAlignment
+from seakeep.models.checks import Json, check_choice
 from seakeep.models.draws import PRIORS, Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.executor import Progress
-from seakeep.models.inputs import Chain, ProbeAlignment
-from seakeep.models.interface import Json, Needs, Role, Signature, Span, Spec
-from seakeep.models.labelled import Runs, Stop, as_runs
+from seakeep.models.inputs import InputMap
+from seakeep.models.interface import Needs, Role, Signature, Spec
+from seakeep.models.labelled import Runs, Span, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.members import TrainingArrays, reach, spectral_radius
 from seakeep.models.observables import Observable
@@ -131,7 +132,6 @@ class HankelDMDc(HankelSettings):
 
     kind: ClassVar[str] = "hankel_dmdc"
     role: ClassVar[Role] = "model"
-    is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
     may_choose: ClassVar[bool] = True
     select: Select | None = None
@@ -140,15 +140,25 @@ class HankelDMDc(HankelSettings):
         super().__post_init__()
         object.__setattr__(self, "select", Select.of(self.select))
 
-    def around(self, dt: float, input_delays: int | None = None) -> tuple[int, int]:
-        """Samples around the start that a forecast reads, whichever observables are chosen."""
-        return _around_any(super().around(dt, input_delays), self.select, self.observables, dt)
+    @property
+    def may_observe(self) -> tuple[Observable, ...]:
+        """Observables that are stated, or those among which `fit` chooses."""
+        select = self.select
+        if self.observables or select is None or not select.observables:
+            return self.observables
+        return default_observables(("eta",), select.period)
+
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
+        """Samples that it asks of its runs, whichever observables are chosen."""
+        stated = None if self.select is None else self.select.period
+        return super().needs(dt, encounter_period or stated)
 
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
         """Rebuild the model that a file holds."""
-        settings = cls.from_json(store.content(dataset, "settings"))
-        return HankelDMDcModel.from_dataset(dataset, settings)
+        return HankelDMDcModel.from_dataset(
+            dataset, cls.from_json(store.content(dataset, "settings"))
+        )
 
     @classmethod
     def paper(cls, encounter_period: float, dt: float) -> Self:
@@ -336,7 +346,8 @@ class HankelDMDc(HankelSettings):
         """The model of settings that leave nothing to be chosen."""
         data = gather(named, states, inputs, stop, self)
         solution = data.regress(self, self.state_delays, all_rows=self.delay_rows == "ridge")
-        return HankelDMDcModel.fitted(self, data, solution, named, readouts)
+        signature = replace(data.signature(self), readouts=readouts)
+        return HankelDMDcModel.fitted(self, data, signature, solution, named)
 
 
 def _check_growth(model: HankelDMDcModel) -> None:
@@ -349,17 +360,6 @@ def _check_growth(model: HankelDMDcModel) -> None:
             "training runs, use fewer state delays, clip eigenvalues (stable=True), or state the "
             "ridge to have it as it is."
         )
-
-
-def _around_any(
-    around: tuple[int, int], select: Select | None, observables: tuple[Observable, ...], dt: float
-) -> tuple[int, int]:
-    """Samples around the start, with those of observables that may be chosen."""
-    if select is None or not select.observables or observables:
-        return around
-    reach = [each.reach(dt) for each in default_observables(("eta",), select.period)]
-    before, after = zip(around, *reach, strict=True)
-    return max(before), max(after)
 
 
 WINDOW = Uniform("60 T", "120 T")
@@ -474,40 +474,30 @@ class BayesianHankelDMDc(HankelSettings):
         unit: Any = getattr(getattr(self, name), "unit", "")
         return in_samples(Length(value, unit) if unit else value, dt, self.encounter_period)
 
-    def shared(self, dt: float) -> HankelSettings:
+    def shared(self, dt: float) -> HankelDMDc:
         """What all members share; its delays, window and λ are not used."""
         own = {each.name: getattr(self, each.name) for each in fields(HankelSettings)}
         unused = {"state_delays": 0, "input_delays": 0, "ridge": 0.0, "window": None}
-        return HankelSettings(**own | unused).resolved(dt, self.encounter_period)
+        return HankelDMDc(**own | unused).resolved(dt, self.encounter_period)
 
     def central(self, dt: float) -> HankelDMDc:
         """The single model at the medians of the priors."""
-        shared = self.shared(dt)
-        values = {each.name: getattr(shared, each.name) for each in fields(shared)}
-        ridge = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
-        return HankelDMDc(**values | self._lengths(0.5, dt) | {"ridge": ridge}, select=self.select)
+        return self._single(0.5, dt)
 
-    def _lengths(self, q: float, dt: float) -> dict[str, int | None]:
-        """Window and delays at a quantile, samples."""
-        found: dict[str, int | None] = {}
+    def _single(self, q: float, dt: float) -> HankelDMDc:
+        """The single model at a quantile of the window and delays, with the median of λ."""
+        made: dict[str, Any] = {}
         for name in PRIORS[:3]:
             value = self.at(name, q)
             if value is not None and not np.isfinite(value):
                 value = self.at(name, 1.0 - 1e-6)  # of a prior without an upper end
-            found[name] = None if value is None else self.samples(name, value, dt)
-        return found
+            made[name] = None if value is None else self.samples(name, value, dt)
+        made["ridge"] = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
+        return replace(self.shared(dt), **made, select=self.select)
 
-    def needs(self, dt: float) -> Needs:
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that its largest draw asks of its runs: the upper ends of the priors count."""
-        most = self._lengths(1.0, dt)
-        around = self.shared(dt).around(dt, most["input_delays"])
-        before, after = _around_any(around, self.select, self.observables, dt)
-        return Needs(
-            most["window"] or 1,
-            max(most["state_delays"] or 0, before),
-            self.history == "inside",
-            after,
-        )
+        return self._single(1.0, dt).needs(dt, self.encounter_period or encounter_period)
 
     def to_json(self) -> Json:
         """Settings as JSON values; the seed as entropy, and the spawn key behind strokes."""
@@ -815,7 +805,7 @@ def _training_arrays(
     inputs: Sequence[str],
     samples: Sequence[int],
     earliest: Sequence[int],
-    input_map: Chain,
+    input_map: InputMap,
 ) -> tuple[TrainingArrays, list[np.ndarray[Any, np.dtype[np.float64]]]]:
     """States and regressors that members learn from, and the measured inputs, physical units."""
     read, trained = [], []
@@ -834,6 +824,8 @@ def _training_arrays(
         for run, first in zip(runs.values(), earliest, strict=True)
     ]
     groups = [tuple(each) for each in zip(*read, strict=True)]
+    labels = labelled.channel_labels(next(iter(runs.values())), inputs)
+    delayed, direct = (tuple(each.name for each in made) for made in input_map.regressors(labels))
     arrays = TrainingArrays(
         names=tuple(runs),
         states=groups[0],
@@ -841,14 +833,6 @@ def _training_arrays(
         direct=groups[2],
         offsets=tuple(earliest),
         begins=tuple(begins),
-        channels=(tuple(states), *_regressor_names(input_map, runs, inputs)),
+        channels=(tuple(states), delayed, direct),
     )
     return arrays, [each for each in trained if len(each)]
-
-
-def _regressor_names(
-    input_map: Chain, runs: dict[str, xr.Dataset], inputs: Sequence[str]
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    made = input_map.regressors(labelled.channel_labels(next(iter(runs.values())), inputs))
-    delayed, direct = (tuple(label.name for label in group) for group in made)
-    return delayed, direct

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,8 +13,9 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.errors import MissingFileError, RequestError
 from seakeep.files import load_sealed, write_sealed
-from seakeep.models.inputs import Chain
-from seakeep.models.interface import Json, Scale, Signature
+from seakeep.models.checks import Json, plain
+from seakeep.models.inputs import InputMap
+from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.readouts import FittedReadOut
 
@@ -38,8 +39,6 @@ MOMENTS = ("mean", "std", "spread", "centre", "reach")
 class Saved:
     """A model that a NetCDF file can hold; it has a ``kind`` and ``to_dataset``."""
 
-    kind: ClassVar[str]
-
     def to_dataset(self) -> xr.Dataset:
         """All that :meth:`save` writes."""
         raise NotImplementedError
@@ -62,7 +61,7 @@ class Saved:
         RequestError
             If the file cannot be written, or another one than a model is there.
         """
-        dataset = self.to_dataset().assign_attrs(seakeep_kind=self.kind)
+        dataset = self.to_dataset().assign_attrs(seakeep_kind=self.kind)  # type: ignore[attr-defined]
         return write_sealed(dataset, path, MODEL)
 
 
@@ -78,11 +77,11 @@ def pack_signature(signature: Signature) -> dict[str, Any]:
 def signature_json(signature: Signature) -> Json:
     """What a signature holds beside the moments, as JSON values."""
     return {
-        "dt": float(signature.dt),
+        "dt": signature.dt,
         "states": [asdict(label) for label in signature.state_labels],
         "inputs": [asdict(label) for label in signature.input_labels],
-        "state_delays": int(signature.state_delays),
-        "input_delays": int(signature.input_delays),
+        "state_delays": signature.state_delays,
+        "input_delays": signature.input_delays,
         "input_map": signature.input_map.to_json(),
         "readouts": [each.to_json() for each in signature.readouts],
     }
@@ -96,18 +95,17 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
     }
     scales = (Scale(*(numbers(dataset, f"{group}_{each}") for each in MOMENTS)) for group in SCALES)
     state_scale, input_scale, direct_scale = scales
-    names = [label.name for label in labels["states"]]
     return Signature(
         dt=kept["dt"],
         state_labels=labels["states"],
         input_labels=labels["inputs"],
         state_delays=kept["state_delays"],
         input_delays=kept["input_delays"],
-        input_map=Chain.from_json(kept["input_map"]),
+        input_map=InputMap.from_json(kept["input_map"]),
         state_scale=state_scale,
         input_scale=input_scale,
         direct_scale=direct_scale,
-        readouts=tuple(FittedReadOut.from_json(each, names) for each in kept["readouts"]),
+        readouts=tuple(FittedReadOut.from_json(each) for each in kept["readouts"]),
     )
 
 
@@ -125,13 +123,7 @@ def numbers(dataset: xr.Dataset, name: str) -> FloatArray:
 
 def as_json(value: object) -> str:
     """Write JSON values as text; numbers of numpy become plain ones."""
-    return json.dumps(value, default=_plain)
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, np.generic):
-        return value.item()
-    raise TypeError(type(value).__name__)
+    return json.dumps(plain(value))
 
 
 def read(path: str | Path) -> xr.Dataset:

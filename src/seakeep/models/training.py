@@ -15,10 +15,10 @@ from seakeep.core.embedding import History, TrainingWindow, training_window
 from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import labelled
-from seakeep.models.checks import of_json
-from seakeep.models.inputs import Chain, Measured
-from seakeep.models.interface import Json, Regressors, Scale, Signature, Span
-from seakeep.models.labelled import ChannelLabel, Stop
+from seakeep.models.checks import Json, of_json
+from seakeep.models.inputs import InputMap, Regressors
+from seakeep.models.interface import Scale, Signature
+from seakeep.models.labelled import ChannelLabel, Span, Stop
 from seakeep.models.settings import HankelSettings
 from seakeep.sizes import LONG_MATRIX, check_numbers
 
@@ -99,7 +99,7 @@ class TrainingData:
         Names and units.
     state_scale, input_scale, direct_scale : Scale
         Moments over the windows.
-    input_map : Chain
+    input_map : InputMap
         As fitted.
     inputs : tuple of ndarray, each (time, Q)
         Measured inputs of the windows, physical units.
@@ -118,7 +118,7 @@ class TrainingData:
     state_scale: Scale
     input_scale: Scale
     direct_scale: Scale
-    input_map: Chain
+    input_map: InputMap
     inputs: tuple[FloatArray, ...]
 
     def signature(self, settings: HankelSettings) -> Signature:
@@ -272,7 +272,7 @@ def gather(
 
 
 def run_regressors(
-    input_map: Chain,
+    input_map: InputMap,
     run: xr.Dataset,
     states: Sequence[str],
     inputs: Sequence[str],
@@ -287,12 +287,12 @@ def run_regressors(
     read = input_map.reads(span)
     values = labelled.channel_matrix(run, inputs, name)
     time = np.asarray(run.variables["time"].values, dtype=float)
-    first = read.first if needed is None or input_map.maps else needed
+    first = read.first if needed is None or not input_map.is_identity else needed
     labelled.check_finite(values[first : read.stop], inputs, name, first, time)
     surge = None
     if (follows := input_map.follows) is not None:
         surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]
-    found = input_map.wrap(Measured(values, 0, surge), run, [span]).rows(span.first, span.stop)
+    found = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
     if not missing:
         return found
     return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in found))

@@ -12,15 +12,14 @@ import ast
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from functools import partialmethod
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import DataError, RequestError, did_you_mean
-
-Value = TypeVar("Value")
 
 GREATEST_EXPONENT = 16
 """A physical law has no higher power; 9**9**9 has."""
@@ -100,7 +99,7 @@ class Expression:
                 f"{', '.join(f'{name}: {array.shape}' for name, array in arrays.items())}."
             )
         with np.errstate(all="ignore"):
-            out = self.fold(np.asarray, arrays.__getitem__, _apply)
+            out = self.of(arrays.__getitem__)
         result: FloatArray = np.array(np.broadcast_to(out, shapes.pop()))
         if not np.all(np.isfinite(result)):
             bad = np.flatnonzero(~np.isfinite(result))
@@ -111,21 +110,13 @@ class Expression:
             )
         return result
 
-    def fold(
-        self,
-        number: Callable[[float], Value],
-        channel: Callable[[str], Value],
-        apply: Callable[[str, list[Value]], Value],
-    ) -> Value:
-        """Build a value from the leaves up: numbers, text in another language, nodes of a graph.
+    def of(self, channel: Callable[[str], Any]) -> Any:
+        """Value of the expression of anything that knows the arithmetic of numpy.
 
         Parameters
         ----------
-        number, channel : callable
-            Value of a number, and of a channel by its name.
-        apply : callable
-            Value of an operation on values: ``add``, ``subtract``, ``multiply``, ``divide``,
-            ``power``, ``negative`` and the functions by their names.
+        channel : callable
+            Value of a channel by its name: an array, text in another language, nodes of a graph.
 
         Returns
         -------
@@ -133,14 +124,14 @@ class Expression:
             Value of the whole.
         """
 
-        def value(node: ast.expr) -> Value:
+        def value(node: ast.expr) -> Any:
             match node:
                 case ast.Constant(float() | int() as constant):
-                    return number(float(constant))
+                    return float(constant)
                 case ast.Name(name):
                     return channel(self._quoted.get(name, name))
                 case ast.UnaryOp(ast.USub(), operand):
-                    return apply("negative", [value(operand)])
+                    return _apply("negative", [value(operand)])
                 case ast.UnaryOp(ast.UAdd(), operand):
                     return value(operand)
                 case ast.BinOp(left, operator, right) if type(operator) in _OPERATORS:
@@ -149,24 +140,75 @@ class Expression:
                         raise _RefusedError(
                             node, f"an exponent is a number from -{limit} to {limit}"
                         )
-                    return apply(_OPERATORS[type(operator)], [value(left), value(right)])
+                    return _apply(_OPERATORS[type(operator)], [value(left), value(right)])
                 case ast.Call(ast.Name(name), arguments, []):
                     if wrong := _wrong_call(name, len(arguments)):
                         raise _RefusedError(node, wrong)
-                    return apply(name, [value(argument) for argument in arguments])
+                    return _apply(name, [value(argument) for argument in arguments])
             raise _RefusedError(node)
 
         return value(self._tree)
 
 
-def _apply(name: str, values: list[FloatArray]) -> FloatArray:
-    """Value of an operation on arrays."""
-    if name == "mean":
-        return np.asarray(np.mean(values[0]))
-    if name == "average":
-        return np.asarray(sum(values[1:], values[0]) / len(values))
-    result: FloatArray = getattr(np, name)(*values)
-    return result
+@dataclass(frozen=True)
+class Text:
+    """An expression of another language, which the arithmetic of numpy on objects continues.
+
+    Parameters
+    ----------
+    text : str
+        The expression.
+    number : callable, optional
+        Text of a number.
+    power : str, optional
+        Power of ``{0}`` to ``{1}``, as C has it.
+    absolute : str, optional
+        Name of the function of the absolute value.
+    """
+
+    text: str
+    number: Callable[[float], str] = field(default=repr, repr=False)
+    power: str = "pow({0}, {1})"
+    absolute: str = "fabs"
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _with(self, pattern: str, other: Any, *, turned: bool = False) -> Text:
+        texts = (self.text, other.text if isinstance(other, Text) else self.number(float(other)))
+        return replace(self, text=pattern.format(*(texts[::-1] if turned else texts)))
+
+    __add__ = partialmethod(_with, "({0} + {1})")
+    __sub__ = partialmethod(_with, "({0} - {1})")
+    __mul__ = partialmethod(_with, "({0} * {1})")
+    __truediv__ = partialmethod(_with, "({0} / {1})")
+    __radd__ = partialmethod(_with, "({0} + {1})", turned=True)
+    __rsub__ = partialmethod(_with, "({0} - {1})", turned=True)
+    __rmul__ = partialmethod(_with, "({0} * {1})", turned=True)
+    __rtruediv__ = partialmethod(_with, "({0} / {1})", turned=True)
+
+    def __pow__(self, exponent: float) -> Text:
+        return self._with(self.power, exponent)
+
+    def __abs__(self) -> Text:
+        return self._of(self.absolute)
+
+    def _of(self, function: str) -> Text:
+        return replace(self, text=f"{function}({self.text})")
+
+    __neg__ = partialmethod(_of, "-")
+    sqrt = partialmethod(_of, "sqrt")
+    sin = partialmethod(_of, "sin")
+    cos = partialmethod(_of, "cos")
+
+
+def _apply(name: str, values: list[Any]) -> Any:
+    """Value of an operation."""
+    return (
+        sum(values[1:], values[0]) / len(values)
+        if name == "average"
+        else getattr(np, name)(*values)
+    )
 
 
 def parse(text: str) -> Expression:
@@ -206,11 +248,12 @@ def parse(text: str) -> Expression:
         return name
 
     plain = re.sub(r"`([^`]*)`", stand_in, text)
-    channels: dict[str, None] = {}
+    channels: dict[str, str] = {}
     try:
         tree = ast.parse(plain, mode="eval").body
         named = Expression(text, (), tree, quoted)
-        named.fold(lambda _: None, channels.setdefault, lambda *_: None)
+        with np.errstate(all="ignore"):
+            named.of(lambda name: Text(channels.setdefault(name, name)))
     except (SyntaxError, _RefusedError) as error:
         place, reason = getattr(error, "offset", 0) or 1, "this is not an arithmetic expression"
         if isinstance(error, _RefusedError):

@@ -170,7 +170,7 @@ def read_training(
     stop = settings.stop
     if isinstance(stop, Length):
         stop = None if period is None else stop.at(period)
-    needs = spec.needs(dt)
+    needs = spec.needs(dt, period)
     whole = needs.inside or needs.snapshots == 1 or getattr(spec, "train_on", "") == "windows"
     return spec, prepared, training_runs(prepared, None if whole else needs.snapshots), stop
 

@@ -263,9 +263,9 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
     return float(np.mean(shares)) if shares else 0.0
 
 
-def needs_of(specs: Sequence[Spec], dt: float) -> Needs:
+def needs_of(specs: Sequence[Spec], dt: float, encounter_period: float) -> Needs:
     """Samples that the most demanding of several models needs: the same windows serve all."""
-    each = [spec.needs(dt) for spec in specs]
+    each = [spec.needs(dt, encounter_period) for spec in specs]
     return Needs(
         max(needs.snapshots for needs in each),
         max(needs.history for needs in each),
@@ -367,7 +367,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
         )
         for name, each in settings.models.items()
     }
-    needs = needs_of([each.spec for each in models.values()], dt)
+    needs = needs_of([each.spec for each in models.values()], dt, period)
     training = choose_training(settings, runs, training_names, needs, study.inputs)
     tests = {
         name: choose_tests(
@@ -451,7 +451,7 @@ def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:
     """Warn once for a study, of the model and training set that hold the fewest slow periods."""
     trained = {}
     for model, spec in plan.specs.items():
-        snapshots = needs_of([spec], plan.dt).snapshots
+        snapshots = needs_of([spec], plan.dt, plan.encounter_period).snapshots
         longest = (snapshots - 1) * plan.dt if snapshots > 1 else float("inf")
         for each in plan.training if getattr(spec, "standardize", False) else ():
             seconds = sum(min(stop - begin, longest) for _, begin, stop in each.spans)

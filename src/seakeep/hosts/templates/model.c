@@ -15,7 +15,7 @@ enum {
 {% if following %}
     PLACES = {{ following.place.count }},          /* on the grid where waves are read */
     PAST = {{ following.place.taps | length }},            /* surges that the place of the vessel is a sum of */
-    SURGE = {{ following.follows.column }},
+    SURGE = {{ following.column }},
     BACK = {{ following.back }},            /* samples that carriers read, before and after */
     TAPS = {{ following.back + following.ahead + 1 }},
 {% endif %}
@@ -46,20 +46,9 @@ static const double {{ name }}[{{ size }}] = {
 {% for each in kernels %}
 {{ array("kernel_%d" % loop.index0, each) }}
 {% endfor %}
-{% if powers %}
-/* Power of an input that grows like it far out. */
-static double bounded_power(double u, int power, double limit)
-{
-    double calm = u / sqrt(1.0 + u * u / limit), out = u;
-    for (int i = 1; i < power; i++)
-        out *= calm;
-    return out;
-}
-
-{% endif %}
 {% if kernels %}
 /* Weighted sum of squares of a derivative of one input; u is its sample at the filter's middle. */
-static double slow_square(const double *u, int order, const double *kernel, int half, double top)
+static double slow_square(const double *u, int order, const double *kernel, int half)
 {
     double sum = 0.0;
     for (int k = -half; k <= half; k++) {
@@ -71,7 +60,13 @@ static double slow_square(const double *u, int order, const double *kernel, int 
             value = (at[Q] - 2.0 * at[0] + at[-Q]) / ({{ upper }}_STEP * {{ upper }}_STEP);
         sum += kernel[half - k] * value * value;
     }
-    return sum > top ? top + {{ slope }} * (sum - top) : sum;
+    return sum;
+}
+
+/* A value that grows with another slope above the largest of training. */
+static double rising(double value, double top, double slope)
+{
+    return value > top ? top + slope * (value - top) : value;
 }
 
 {% endif %}
