@@ -94,15 +94,17 @@ def test_who_identifies_them_makes_no_difference(ensemble, held, arrays):
 
 
 def test_it_says_what_it_is_and_takes(held):
-    numbers = sum(member.coefficients.size for member in held.members)
+    numbers = sum(member.coefficients.size for member in held.identified)
     assert held.nbytes == 8 * numbers
     assert "n_members=7, states=['heave', 'pitch'], inputs=['eta'], dt=0.1" in repr(held)
 
 
 def test_members_that_diverge_are_counted_and_left_out(ensemble, arrays):
-    held = ensemble.hold()
-    third = held.members[2]
-    third.coefficients[:, :2] = 9.0 * np.eye(2)  # grows by a factor of about nine a step
+    members = list(ensemble.hold().identified)
+    grown = members[2].coefficients.copy()
+    grown[:, :2] = 9.0 * np.eye(2)  # grows by a factor of about nine a step
+    members[2] = replace(members[2], coefficients=grown)
+    held = replace(ensemble, identified=tuple(members))
     found = held.forecast_arrays(**arrays, steps=STEPS)
     assert found.diverged == 1
     others = replace(ensemble, members=tuple(np.delete(ensemble.members, 2)))

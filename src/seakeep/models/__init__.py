@@ -1,6 +1,6 @@
 """Models identified from prepared runs, ensembles of them, and their forecasts."""
 
-from seakeep.models.ensemble import BandForecast, HankelEnsemble, HeldEnsemble
+from seakeep.models.ensemble import BandForecast, HankelEnsemble
 from seakeep.models.executor import processes
 from seakeep.models.inputs import FittedAlignment, ProbeAlignment
 from seakeep.models.interface import InputMap, Model, Needs, Signature, Spec
@@ -31,7 +31,6 @@ __all__ = [
     "HankelDMDc",
     "HankelDMDcModel",
     "HankelEnsemble",
-    "HeldEnsemble",
     "InputMap",
     "Live",
     "LogUniform",

@@ -30,8 +30,8 @@ from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series, read_windows
 from seakeep.models.executor import Progress
 from seakeep.models.interface import Json, Signature
-from seakeep.models.members import TrainingArrays
 from seakeep.models.summaries import reduce_members
+from seakeep.models.training import TrainingArrays
 
 __all__ = [
     "Band",
