@@ -22,7 +22,6 @@ from seakeep.models.calibration import (
     Calibration,
     calibrate,
     check_band,
-    warn_of_horizon,
     widened,
 )
 from seakeep.models.draws import Draw, draws_dataset, draws_of
@@ -537,8 +536,6 @@ class HankelEnsemble(Forecaster, store.Saved):
         level = fraction(level, "level")
         check_band(self.calibration, level, band)
         windows = self.read_windows(*one_run(run, starts), steps, ahead)
-        if band == "calibrated":
-            warn_of_horizon(self.calibration, windows.places[0][0], windows.steps)
         with member_series(self, windows, executor, progress) as (series, lost):
             values = reduce_members(series, lost, level)
         return windows, widened(self.calibration, values, band, self.signature, windows), lost
@@ -622,8 +619,6 @@ class HankelEnsemble(Forecaster, store.Saved):
         level = fraction(level, "level")
         check_band(self.calibration, level, band)
         windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
-        if band == "calibrated":
-            warn_of_horizon(self.calibration, "these arrays", int(steps))
         with one_blas_thread():
             out = self.free_runs([windows], range(self.n_members))[0][:, 0]
         kept = out[first_lost(out) < 0]
