@@ -623,9 +623,8 @@ class HankelEnsemble(Forecaster, store.Saved):
             out = self.free_runs([windows], range(self.n_members))[0][:, 0]
         kept = out[first_lost(out) < 0]
         values = statistics_of(kept, level)[None]
-        mean, std, lower, upper = widened(self.calibration, values, band, self.signature, windows)[
-            0
-        ]
+        values = widened(self.calibration, values, band, self.signature, windows)
+        mean, std, lower, upper = values[0]
         return BandForecast(mean, std, lower, upper, len(out) - len(kept))
 
     def live(

@@ -35,9 +35,7 @@ from seakeep.models.training import (
     TrainingArrays,
     check_names,
     gather,
-    last_sample,
     moments,
-    stop_instants,
     until,
 )
 from seakeep.models.validity import Coverage
@@ -727,18 +725,13 @@ class BayesianHankelDMDc(HankelSettings):
         readouts: tuple[FittedReadOut, ...],
     ) -> HankelEnsemble:
         """The ensemble of settings that leave nothing to be chosen."""
-        stops = stop_instants(stop, list(named))
         dt = labelled.common_step(named)
+        named = until(named, stop)
         shared = self.shared(dt)
         labels = labelled.common_labels(named, states), labelled.common_labels(named, inputs)
-        if shared.is_mapped:
-            named, stops = until(named, stops), dict.fromkeys(named)
         states, inputs = list(states), list(inputs)
         input_map = shared.input_map(named, states, inputs, None)
-        samples = [
-            last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name) + 1
-            for name, run in named.items()
-        ]
+        samples = [run.sizes["time"] for run in named.values()]
         spec = self._taught_by(named.values(), min(samples) * dt)
         members = draw_members(spec, dt, samples, input_map)
         reads = [

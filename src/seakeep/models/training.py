@@ -29,11 +29,9 @@ __all__ = [
     "check_names",
     "gather",
     "is_constant",
-    "last_sample",
     "moments",
     "run_regressors",
     "scales_of",
-    "stop_instants",
     "until",
 ]
 
@@ -210,29 +208,26 @@ def gather(
         "Take fewer delays, or a larger step.",
         LONG_MATRIX,
     )
-    stops = stop_instants(stop, list(runs))
     dt = labelled.common_step(runs)
+    runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
-    if settings.is_mapped:
-        runs, stops = until(runs, stops), dict.fromkeys(runs)
-    input_map = settings.input_map(dict(runs), states, inputs, window)
+    input_map = settings.input_map(runs, states, inputs, window)
     reach = max(state_delays, input_map.history(input_delays))
     pieces, read = [], []
     for name, run in runs.items():
         time = np.asarray(run.variables["time"].values, dtype=float)
-        last = last_sample(time, stops[name], name)
-        place, begin, final = _place(last, settings, input_map)
+        place, begin, final = _place(time.size - 1, settings, input_map)
         _check_length(place, final, name, window, reach, history)
         here = labelled.channel_matrix(run, states, name, slice(begin, final + 1))
         needed = min(place.first, place.first_column - state_delays)
         labelled.check_finite(here[needed - begin :], states, name, needed, time)
         needed = min(place.first, place.first_column - input_delays)
-        span = Span(begin, last, last + 1 - input_map.lead_samples)
+        span = Span(begin, place.last, place.last + 1 - input_map.lead_samples)
         found = run_regressors(input_map, run, states, inputs, name, span, needed)
         shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
-        instants = time[place.first], time[last]
+        instants = time[place.first], time[place.last]
         pieces.append(Piece(name, (here, *found), shifted, instants))
-        read.append(labelled.channel_matrix(run, inputs, name, slice(place.first, last + 1)))
+        read.append(labelled.channel_matrix(run, inputs, name, place.samples))
     data = _standardised(pieces, dt, labels, input_map, settings.standardize)
     if len(pieces) > 1:
         _warn_of_dead(pieces, 0, data.state_scale, [label.name for label in labels[0]])
@@ -440,12 +435,13 @@ def until(runs: Mapping[str, xr.Dataset], stop: Stop) -> dict[str, xr.Dataset]:
     DataError
         If the times of a run are not uniform.
     """
-    stops = stop_instants(stop, list(runs))
-    out = {}
+    stops, out = _stop_instants(stop, list(runs)), {}
     for name, run in runs.items():
         labelled.run_step(run, name)
-        last = last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name)
-        out[name] = run.isel(time=slice(0, last + 1))
+        out[name] = run
+        if (at := stops[name]) is not None:
+            last = _last_sample(np.asarray(run["time"].values, dtype=float), at, name)
+            out[name] = run.isel(time=slice(0, last + 1))
     return out
 
 
@@ -478,7 +474,7 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
         )
 
 
-def stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
+def _stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
     """Last instant of each run's window as the user gave it; None for the run's end."""
     if stop is None:
         return dict.fromkeys(names)
@@ -505,10 +501,8 @@ def _one_stop(value: object, what: str) -> float | None:
     return None if value is None else labelled.as_instant(value, what)
 
 
-def last_sample(time: FloatArray, stop: float | None, name: str) -> int:
+def _last_sample(time: FloatArray, stop: float, name: str) -> int:
     """Last sample up to and including `stop`."""
-    if stop is None:
-        return time.size - 1
     nearest = labelled.nearest_sample(time, stop, name, "stop")
     step = (time[-1] - time[0]) / (time.size - 1)
     # "up to and including": a sample later than the stop by more than rounding is not included.
