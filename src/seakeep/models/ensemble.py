@@ -227,13 +227,8 @@ class HankelEnsemble(Forecaster, store.Saved):
         data = self.arrays.data(settings, draw.run, draw.last, signature)
         all_rows = settings.delay_rows == "ridge"
         solution = data.regress(settings, settings.state_delays, all_rows=all_rows)
-        return HankelDMDcModel(
-            settings=settings,
-            coefficients=solution.coefficients,
-            signature=replace(data.signature(settings), readouts=signature.readouts),
-            training=data.training(solution),
-            learnt=Kept(self.coverage),
-        )
+        model = HankelDMDcModel.fitted(settings, data, solution, {}, signature.readouts)
+        return replace(model, learnt=Kept(self.coverage))
 
     def spectral_radii(
         self, *, executor: Executor | None = None, progress: Progress | None = None
@@ -376,7 +371,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         windows = self.read_windows(*one_run(run, [start]), steps, ahead)
         with member_series(self, windows, executor, progress) as (series, lost):
             variables = label_channels(self.signature, np.array(series[:, 0]), ("member", "time"))
-        variables["status"] = self._status(lost[:, 0], windows)
+        variables["status"] = ("member", statuses(lost[:, 0], windows, 0, self.dt))
         return xr.Dataset(
             variables,
             coords={"member": np.arange(self.n_members), "time": windows.time[0]},
@@ -424,13 +419,13 @@ class HankelEnsemble(Forecaster, store.Saved):
             run, [start], steps, level, band, ahead, executor, progress
         )
         variables = label_channels(self.signature, values[0], ("statistic", "time"))
-        variables["status"] = self._status(lost[:, 0], windows)
+        variables["status"] = ("member", statuses(lost[:, 0], windows, 0, self.dt))
         counts = {"start": windows.places[0][1]} | self._counts(level, band)
         counts |= verdict(lost, windows, self.dt)
         return xr.Dataset(
             variables,
             coords={
-                "statistic": statistic_coordinate(level, self._bounds(band)),
+                "statistic": self._statistics(level, band),
                 "member": np.arange(self.n_members),
                 "time": windows.time[0],
             },
@@ -516,7 +511,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         variables = label_channels(self.signature, values, ("window", "statistic", "lead"))
         variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
         coords = window_coords(windows, self.dt)
-        coords["statistic"] = statistic_coordinate(level, self._bounds(band))
+        coords["statistic"] = self._statistics(level, band)
         return xr.Dataset(
             variables, coords=coords, attrs=self._notes(windows) | self._counts(level, band)
         )
@@ -540,12 +535,10 @@ class HankelEnsemble(Forecaster, store.Saved):
             values = reduce_members(series, lost, level)
         return windows, widened(self.calibration, values, band, self.signature, windows), lost
 
-    def _status(self, lost: npt.NDArray[np.int64], windows: Windows) -> xr.Variable:
-        return xr.Variable(("member",), statuses(lost, windows, 0, self.dt))
-
-    def _bounds(self, band: Band) -> str:
-        """What the bounds of a calibrated band are."""
-        return self.calibration.bounds if self.calibration and band == "calibrated" else ""
+    def _statistics(self, level: float, band: Band) -> xr.Variable:
+        """Coordinate of the statistics, with what the bounds of a calibrated band are."""
+        calibrated = self.calibration if band == "calibrated" else None
+        return statistic_coordinate(level, calibrated.bounds if calibrated else "")
 
     def _counts(self, level: float, band: Band) -> dict[str, Any]:
         kind = {"band": band} if band == "calibrated" else {}
