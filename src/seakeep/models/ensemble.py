@@ -14,6 +14,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, fraction
+from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import store
 from seakeep.models.calibration import (
@@ -52,7 +53,7 @@ from seakeep.models.summaries import (
     statistic_coordinate,
     statistics_of,
 )
-from seakeep.models.training import TrainingArrays
+from seakeep.models.training import TrainingArrays, TrainingData
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
 
@@ -196,7 +197,12 @@ class HankelEnsemble(Forecaster, store.Saved):
 
     def dynamics(self, number: int) -> Dynamics:
         """What a free run of a member needs."""
-        return self.identified[number] if self.identified else self.member(number).dynamics
+        if self.identified:
+            return self.identified[number]
+        settings, data, solution = self._identified(number)
+        delays = settings.state_delays, settings.input_delays
+        scales = data.state_scale, data.input_scale, data.direct_scale
+        return Dynamics(solution.coefficients, *delays, *scales, data.input_map.follows)
 
     def member(self, number: int) -> HankelDMDcModel:
         """One member as a model of its own.
@@ -217,18 +223,23 @@ class HankelEnsemble(Forecaster, store.Saved):
         RequestError
             If there is no such member.
         """
+        settings, data, solution = self._identified(number)
+        readouts = self.signature.readouts
+        model = HankelDMDcModel.fitted(settings, data, solution, {}, readouts)
+        return replace(model, learnt=Kept(self.coverage))
+
+    def _identified(self, number: int) -> tuple[HankelSettings, TrainingData, Solution]:
+        """Settings, training data and regression of a member."""
         if not 0 <= number < self.n_members:
             raise RequestError(
                 f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
                 f"0 to {self.n_members - 1}."
             )
-        draw, signature = self.members[number], self.signature
+        draw = self.members[number]
         settings = draw.settings
-        data = self.arrays.data(settings, draw.run, draw.last, signature)
+        data = self.arrays.data(settings, draw.run, draw.last, self.signature)
         all_rows = settings.delay_rows == "ridge"
-        solution = data.regress(settings, settings.state_delays, all_rows=all_rows)
-        model = HankelDMDcModel.fitted(settings, data, solution, {}, signature.readouts)
-        return replace(model, learnt=Kept(self.coverage))
+        return settings, data, data.regress(settings, settings.state_delays, all_rows=all_rows)
 
     def spectral_radii(
         self, *, executor: Executor | None = None, progress: Progress | None = None
