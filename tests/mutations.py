@@ -41,7 +41,7 @@ MUTATIONS = (
      "signals/test_calculus.py::test_a_complementary_rate_keeps_the_steady_drift"),
     ("models/alignment.py", "speeds.std(ddof=1)", "2**0.5 * speeds.std(ddof=1)",
      "models/test_alignment.py::test_the_spread_of_celerities_is_that_between_the_runs"),
-    ("models/draws.py", "max(self.window, least) if inside", "self.window + reach if inside",
+    ("models/draws.py", "max(settings.window, least) if", "settings.window + reach if",
      "models/test_contracts.py::test_a_history_inside_the_window_is_not_counted_twice"),
     ("study/reproduce.py", "HIGH_PASS = 0.15", "HIGH_PASS = 0.25",
      "study/test_reproduce.py::test_the_edge_of_the_drift_lies_between_drift_and_waves"),

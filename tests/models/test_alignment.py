@@ -260,10 +260,10 @@ def test_aligned_members_equal_the_deterministic_model(runs, alignment):
     forecast = ensemble.forecast(run, start=60.0, steps=200)
     for number, draw in enumerate(ensemble.members):
         model = HankelDMDc(
-            draw.state_delays,
-            draw.input_delays,
-            draw.ridge,
-            window=draw.window,
+            draw.settings.state_delays,
+            draw.settings.input_delays,
+            draw.settings.ridge,
+            window=draw.settings.window,
             delay_rows="exact",
             alignment=ProbeAlignment(**alignment),
         ).fit(runs, STATES, INPUTS)

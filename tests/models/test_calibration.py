@@ -123,7 +123,7 @@ def test_no_window_touches_what_a_member_has_read(ensemble, moved, run):
     calibrated = moved
     (first, last) = ensemble.read_spans["sea"]
     # The longest draw with its delay history, up to stop.
-    needed = max(draw.needed(False) for draw in ensemble.members)
+    needed = max(draw.needed(ensemble.signature.input_map) for draw in ensemble.members)
     assert last == pytest.approx(60.0)
     assert last - first == pytest.approx((needed - 1) * DT)
     reach = ensemble.history_samples - 1

@@ -4,6 +4,7 @@ import json
 import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -413,7 +414,12 @@ class TestUnitsAndNumbers:
 
 
 def test_a_history_inside_the_window_is_not_counted_twice():
-    draw = Draw((1.0, 0.2, 0.5), 1.0, 50, state_delays=4, input_delays=12, run=None, last=None,
-                redrawn=0)  # fmt: skip
-    assert (draw.needed(True), draw.needed(False)) == (50, 62)
-    assert draw.needed(True, history=60) == 62  # a pair after the longest history
+    draws = {
+        history: Draw(HankelDMDc(4, 12, 1.0, window=50, history=history), (1.0, 0.2, 0.5))
+        for history in ("inside", "before")
+    }
+    plain, longer = (
+        SimpleNamespace(history=lambda z, most=most: most, lead_samples=0) for most in (12, 60)
+    )
+    assert [draws[key].needed(plain) for key in draws] == [50, 62]
+    assert draws["inside"].needed(longer) == 62  # a pair after the longest history

@@ -90,16 +90,16 @@ def test_members_learn_from_windows_of_long_runs_and_else_from_all_of_them():
     taught = spec.fit(long, STATES, INPUTS)
     assert taught.origin["train_on"] == "windows"
     assert {draw.run for draw in taught.members} == {0, 1, 2}
-    lengths = np.array([draw.window for draw in taught.members]) / PERIOD
+    lengths = np.array([draw.settings.window for draw in taught.members]) / PERIOD
     assert 60 <= lengths.min() < lengths.max() <= 120
-    assert len({(draw.run, draw.last, draw.window) for draw in taught.members}) == 12
+    assert len({(draw.run, draw.last, draw.settings.window) for draw in taught.members}) == 12
     regular = {**long, "c": long["c"].assign_attrs(waves="regular")}
     short = {**long, "c": sea(2, samples=round(110 * PERIOD))}
     alone = {"a": long["a"]}
     for given in (regular, short, alone):
         ensemble = spec.fit(given, STATES, INPUTS)
         assert ensemble.origin["train_on"] == "all"
-        assert {(draw.run, draw.window) for draw in ensemble.members} == {(None, None)}
+        assert {(draw.run, draw.settings.window) for draw in ensemble.members} == {(None, None)}
     again = dataclasses.replace(spec, train_on="windows", window=Uniform("60 T", "120 T"))
     assert again.fit(long, STATES, INPUTS).origin == taught.origin
 

@@ -1,7 +1,7 @@
 """Models identified from prepared runs, ensembles of them, and their forecasts."""
 
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
-from seakeep.models.ensemble import BandForecast, HankelEnsemble, HeldEnsemble
+from seakeep.models.ensemble import BandForecast, HankelEnsemble
 from seakeep.models.executor import processes
 from seakeep.models.inputs import InputMap
 from seakeep.models.interface import Model, Needs, Signature, Spec
@@ -32,7 +32,6 @@ __all__ = [
     "HankelDMDc",
     "HankelDMDcModel",
     "HankelEnsemble",
-    "HeldEnsemble",
     "InputMap",
     "Live",
     "LogUniform",

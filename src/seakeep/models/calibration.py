@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol, get_args
+from typing import Any, Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 import xarray as xr
@@ -30,8 +30,8 @@ from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series, read_windows
 from seakeep.models.executor import Progress
 from seakeep.models.interface import Signature
-from seakeep.models.members import TrainingArrays
 from seakeep.models.summaries import reduce_members
+from seakeep.models.training import TrainingArrays
 
 __all__ = [
     "Band",
@@ -43,7 +43,6 @@ __all__ = [
     "envelope_of",
     "found_margin",
     "held_out",
-    "warn_of_horizon",
     "widened",
 ]
 
@@ -63,11 +62,14 @@ class Judged(NamedTuple):
         The measurement.
     envelope : ndarray, shape (window, steps)
         Waves that drive each step; see :func:`envelope_of`.
+    starts : tuple of float
+        Starts of the windows, s.
     """
 
     values: FloatArray
     measured: FloatArray
     envelope: FloatArray
+    starts: tuple[float, ...] = ()
 
 
 class Ensemble(FreeRuns, Protocol):
@@ -152,12 +154,12 @@ class Calibration:
         """Rebuild from the values of :meth:`to_json`; None stays None."""
         if content is None:
             return None
-        found = ConformalMargin(
-            **{key: np.array(content[key]) for key in NUMBERS}, level=content["level"]
-        )
-        floor, law = (
-            None if content[key] is None else np.array(content[key]) for key in ("floor", "law")
-        )
+        arrays: dict[str, Any] = {
+            key: None if content[key] is None else np.array(content[key])
+            for key in (*NUMBERS, "floor", "law")
+        }
+        floor, law = arrays.pop("floor"), arrays.pop("law")
+        found = ConformalMargin(**arrays, level=content["level"])
         spans = {run: (first, last) for run, (first, last) in content["spans"].items()}
         return cls(found, floor, law, content["windows"], content["steps"], spans, content["folds"])
 
@@ -175,14 +177,14 @@ def calibrate(
     """Find the band of an ensemble; see :meth:`HankelEnsemble.calibrate`."""
     named = labelled.as_runs(runs)
     level = fraction(level, "level")
-    check_scale(scale)
+    check_choice("scale", scale, get_args(BandScale))
     if not (folds is None or (isinstance(folds, str) and folds == "run")):
         raise RequestError(f"folds must be 'run', or None for unread windows; received {folds!r}.")
     sources = dict.fromkeys(named, ensemble)
-    if folds:
-        sources = {name: _unread_by(ensemble, name, run) for name, run in named.items()}
-    free = _free_starts(sources, named, steps)
-    judged = _judged(sources, named, free, steps, level, executor, progress)
+    for name, run in named.items() if folds else ():
+        if (known := _read_run(ensemble, name, run)) is not None:
+            sources[name] = ensemble.without(known)
+    judged = _judged(sources, named, steps, level, executor, progress)
     history = ensemble.signature.history_samples
     if not judged:
         ahead = max(ensemble.signature.lead_samples - 1, 0)
@@ -197,10 +199,9 @@ def calibrate(
             "others teach (folds = 'run')."
         )
     found, floor, law = found_margin(judged.values(), level, scale)
-    windows = {name: len(each.measured) for name, each in judged.items()}
-    spans = {
-        n: (starts[0], starts[-1] + steps * ensemble.signature.dt) for n, starts in free.items()
-    }
+    windows = {name: len(each.starts) for name, each in judged.items()}
+    length = steps * ensemble.signature.dt
+    spans = {name: (each.starts[0], each.starts[-1] + length) for name, each in judged.items()}
     return Calibration(found, floor, law, windows, steps, spans, folds)
 
 
@@ -213,7 +214,9 @@ def found_margin(
     single run by halves; the law that is kept is that of all windows.
     """
     parts = list(judged)
-    values, measured, envelope = (np.concatenate(each) for each in zip(*parts, strict=True))
+    values, measured, envelope = (
+        np.concatenate(each) for each in list(zip(*parts, strict=True))[:3]
+    )
     mean, std, lower, upper = np.moveaxis(values, 1, 0)
     if scale == "constant":
         return conformal_margin(band_scores(lower, upper, measured), level), None, None
@@ -237,11 +240,6 @@ def found_margin(
         scores[here] = scaled_scores(mean[here], scales, measured[here])
     law = learn_scale(mean, std, measured, envelope, floor)
     return conformal_margin(scores, level), floor, law
-
-
-def check_scale(scale: str) -> None:
-    """Refuse a scale of the band that there is not."""
-    check_choice("scale", scale, get_args(BandScale))
 
 
 def held_out(
@@ -272,48 +270,34 @@ def held_out(
         Runs in which there is such a window.
     """
     level = fraction(level, "level")
-    sources = dict.fromkeys(runs, ensemble)
-    return _judged(sources, runs, _free_starts(sources, runs, steps), steps, level, executor)
-
-
-def _unread_by(ensemble: Ensemble, name: str, run: xr.Dataset) -> Ensemble:
-    """The ensemble, without what it learnt from a run."""
-    known = _read_run(ensemble, name, run)
-    return ensemble if known is None else ensemble.without(known)
-
-
-def _free_starts(
-    sources: Mapping[str, Ensemble], runs: Mapping[str, xr.Dataset], steps: int
-) -> dict[str, list[float]]:
-    """Starts of the windows of each run in which there are any."""
-    free = {name: _unread_starts(sources[name], name, run, steps) for name, run in runs.items()}
-    return {name: starts for name, starts in free.items() if starts}
+    return _judged(dict.fromkeys(runs, ensemble), runs, steps, level, executor)
 
 
 def _judged(
     sources: Mapping[str, Ensemble],
     runs: Mapping[str, xr.Dataset],
-    free: Mapping[str, list[float]],
     steps: int,
     level: float,
     executor: Executor | None,
     progress: Progress | None = None,
 ) -> dict[str, Judged]:
-    """Forecasts from these starts; a step of progress is a member in one of the runs."""
+    """Forecasts of the free windows of each run; a step of progress is a member in one run."""
+    free = {name: _free_samples(sources[name], name, run, steps) for name, run in runs.items()}
+    free = {name: places for name, places in free.items() if places}
     found: dict[str, Judged] = {}
     done, total = 0, sum(sources[name].n_members for name in free)
-    for name, starts in free.items():
-        ensemble, run = sources[name], runs[name]
+    for name, places in free.items():
+        ensemble, signature, run = sources[name], sources[name].signature, runs[name]
         tell = None if progress is None else _counted(progress, done, total, name)
         done += ensemble.n_members
-        places = [(name, start) for start in starts]
-        windows = read_windows(ensemble.signature, {name: run}, places, steps)
+        time = np.asarray(run["time"].values, dtype=float)
+        starts = tuple(float(time[at]) for at in places)
+        windows = read_windows(signature, {name: run}, [(name, start) for start in starts], steps)
         with member_series(ensemble, windows, executor, tell) as (series, lost):
             values = reduce_members(series, lost, level)
-        measured = np.stack(
-            [_measured(ensemble, run, name, start, steps) for _, start in windows.places]
-        )
-        found[name] = Judged(values, measured, envelope_of(ensemble.signature, windows))
+        states = labelled.channel_matrix(run, signature.states, name)
+        measured = np.stack([states[at + 1 : at + 1 + steps] for at in places])
+        found[name] = Judged(values, measured, envelope_of(signature, windows), starts)
     return found
 
 
@@ -336,25 +320,23 @@ def _counted(progress: Progress, before: int, total: int, name: str) -> Progress
     return lambda done, _, what: progress(before + done, total, f"{name}, {what}")
 
 
-def _unread_starts(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -> list[float]:
+def _free_samples(ensemble: Ensemble, name: str, run: xr.Dataset, steps: int) -> list[int]:
     """Starts of windows end to end in a run, clear of what members have read of it."""
     whole_number(steps, "steps")
-    time = np.asarray(run["time"].values, dtype=float)
-    slack = 1e-6 * ensemble.signature.dt
+    time, signature = np.asarray(run["time"].values, dtype=float), ensemble.signature
+    slack = 1e-6 * signature.dt
     known = _read_run(ensemble, name, run)
-    read = None if known is None else ensemble.read_spans[known]
-    starts, at = [], ensemble.signature.history_samples - 1
+    begin, end = (np.inf, -np.inf) if known is None else ensemble.read_spans[known]
+    places, at = [], signature.history_samples - 1
     # The last step reads the input beyond its own end where the model looks further ahead.
-    reach = steps + max(ensemble.signature.lead_samples - 1, 0)
-    while at + reach < time.size:
+    while at + steps + max(signature.lead_samples - 1, 0) < time.size:
         # The instants at + 1 … at + steps are forecast.
-        if read and time[at + 1] <= read[1] + slack and time[at + steps] >= read[0] - slack:
-            at = max(at, int(np.searchsorted(time, read[1] - slack)))
-            read = None
+        if time[at + 1] <= end + slack and time[at + steps] >= begin - slack:
+            at = int(np.searchsorted(time, end - slack))
             continue
-        starts.append(float(time[at]))
+        places.append(at)
         at += steps
-    return starts
+    return places
 
 
 def _read_run(ensemble: Ensemble, name: str, run: xr.Dataset) -> str | None:
@@ -376,28 +358,14 @@ def _holds(
     time = np.asarray(run["time"].values, dtype=float)
     if not time.size:
         return False
-    dt = ensemble.signature.dt
-    ahead = round((begin - time[0]) / dt)  # samples of the run before the states
+    ahead = round((begin - time[0]) / ensemble.signature.dt)  # samples before the states
     first, skipped = max(ahead, 0), max(-ahead, 0)
     count = min(time.size - first, len(states) - skipped)
-    if (
-        count < 1
-        or abs(time[first] - begin - skipped * ensemble.signature.dt) > 0.5 * ensemble.signature.dt
-    ):
+    if count < 1:
         return False
-    held = labelled.channel_matrix(
-        run, ensemble.signature.states, name, slice(first, first + count)
-    )
+    here = slice(first, first + count)
+    held = labelled.channel_matrix(run, ensemble.signature.states, name, here)
     return bool(np.array_equal(held, states[skipped : skipped + count]))
-
-
-def _measured(
-    ensemble: Ensemble, run: xr.Dataset, name: str, start: float, steps: int
-) -> FloatArray:
-    at = labelled.nearest_sample(np.asarray(run["time"].values, dtype=float), start, name)
-    return labelled.channel_matrix(
-        run, ensemble.signature.states, name, slice(at + 1, at + 1 + steps)
-    )
 
 
 def check_band(calibration: Calibration | None, level: float, band: Band) -> None:
@@ -433,16 +401,6 @@ def check_band(calibration: Calibration | None, level: float, band: Band) -> Non
         )
 
 
-def warn_of_horizon(calibration: Calibration | None, name: str, steps: int) -> None:
-    """Warn where a forecast is longer than those that its calibrated band was made from."""
-    if calibration is not None and steps > calibration.steps:
-        warn(
-            f"the forecast of {name} is longer than the {calibration.steps} instants that "
-            "the band was calibrated for: its coverage is not guaranteed there. Calibrate with "
-            "longer windows."
-        )
-
-
 def widened(
     calibration: Calibration | None,
     values: FloatArray,
@@ -450,9 +408,18 @@ def widened(
     signature: Signature,
     windows: Windows,
 ) -> FloatArray:
-    """Statistics of shape (window, 4, steps, N) with the bounds of a band that was checked."""
+    """Statistics of shape (window, 4, steps, N) with the bounds of a band that was checked.
+
+    Warns where a forecast is longer than those that its calibrated band was made from.
+    """
     if band == "members" or calibration is None:
         return values
+    if windows.steps > calibration.steps:
+        warn(
+            f"the forecast of {windows.places[0][0]} is longer than the {calibration.steps} "
+            "instants that the band was calibrated for: its coverage is not guaranteed there. "
+            "Calibrate with longer windows."
+        )
     mean, std, lower, upper = np.moveaxis(values, 1, 0)
     scale = None
     if calibration.floor is not None:

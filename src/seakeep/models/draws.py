@@ -14,44 +14,58 @@ and counted.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import scipy
+import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.errors import DataError
+from seakeep.errors import DataError, SeakeepWarning
 from seakeep.models.inputs import InputMap
-from seakeep.models.settings import History
+from seakeep.models.priors import unit_of
+from seakeep.models.settings import HankelSettings, History
 
-__all__ = ["Draw", "Sampling", "TrainOn", "draw_members"]
+__all__ = [
+    "DRAWN",
+    "Draw",
+    "Sampling",
+    "TrainOn",
+    "child",
+    "draw_members",
+    "draws_dataset",
+    "draws_of",
+]
 
 Sampling = Literal["monte_carlo", "sobol"]
 TrainOn = Literal["all", "runs", "windows", "auto"]
 
 PRIORS = ("window", "state_delays", "input_delays", "ridge")
 """Settings that are drawn, in the order of a member's numbers."""
+DRAWN = {
+    "window": "length of the training window",
+    "state_delays": "longest delay of the states",
+    "input_delays": "longest delay of the inputs",
+}
 MOST_REDRAWS = 1000
 """After so many infeasible draws of one member the priors are taken not to fit the data."""
 
 
 @dataclass(frozen=True)
 class Draw:
-    """Settings of one member.
+    """A member: its settings, and what trains it.
 
     Parameters
     ----------
+    settings : HankelSettings
+        As of a :class:`HankelDMDc`, in samples.
     drawn : tuple of float
         Window and delays of states and inputs as drawn, in the units of their priors; the first is
         NaN where all of a run trains.
-    ridge : float
-        λ.
-    window : int or None
-        m, samples.
-    state_delays, input_delays : int
-        s and z.
     run : int or None
         The run that trains, None for all of them.
     last : int or None
@@ -60,25 +74,28 @@ class Draw:
         Infeasible draws before this one.
     """
 
+    settings: HankelSettings
     drawn: tuple[float, float, float]
-    ridge: float
-    window: int | None
-    state_delays: int
-    input_delays: int
-    run: int | None
-    last: int | None
-    redrawn: int
+    run: int | None = None
+    last: int | None = None
+    redrawn: int = 0
 
-    def needed(self, inside: bool, history: int = 0, lead: int = 0) -> int:
-        """Samples of a run that the window, its history and its look-ahead take.
-
-        `history` is what the input map reads before an instant, and `lead` what it reads after.
-        """
-        reach = max(self.state_delays, self.input_delays, history)
-        least = reach + 2 + max(lead - 1, 0)
-        if self.window is None:
+    def needed(self, input_map: InputMap) -> int:
+        """Samples of a run that the window, its history and its look-ahead take."""
+        settings = self.settings
+        reach = max(settings.state_delays, input_map.history(settings.input_delays))
+        least = reach + 2 + max(input_map.lead_samples - 1, 0)
+        if settings.window is None:
             return least
-        return max(self.window, least) if inside else self.window + reach
+        inside = settings.history == "inside"
+        return max(settings.window, least) if inside else settings.window + reach
+
+    def first(self, run: int, samples: int, input_map: InputMap) -> int:
+        """Earliest of the samples of a run that the member reads; their number if it reads none."""
+        if self.run not in (None, run):
+            return samples
+        end = samples if self.last is None else self.last + 1
+        return 0 if self.settings.window is None else end - self.needed(input_map)
 
 
 class Drawn(Protocol):
@@ -91,11 +108,10 @@ class Drawn(Protocol):
     @property
     def train_on(self) -> TrainOn: ...
     @property
-    def history(self) -> History: ...
-    @property
     def seed_sequence(self) -> np.random.SeedSequence: ...
     def at(self, name: str, q: float) -> float | None: ...
     def samples(self, name: str, value: float, dt: float) -> int: ...
+    def shared(self, dt: float) -> HankelSettings: ...
 
 
 def child(seed: np.random.SeedSequence, member: int) -> np.random.Generator:
@@ -128,44 +144,56 @@ def draw_members(spec: Drawn, dt: float, samples: Sequence[int], input_map: Inpu
     DataError
         If a member finds no feasible draw in a thousand.
     """
-    seed = spec.seed_sequence
+    seed, shared = spec.seed_sequence, spec.shared(dt)
     points = np.empty((spec.n_members, 0))
     if spec.sampling == "sobol":
         scrambling = np.random.default_rng(seed)
-        engine = scipy.stats.qmc.Sobol(4, scramble=True, rng=scrambling)
+        engine = scipy.stats.qmc.Sobol(len(PRIORS), scramble=True, rng=scrambling)
         # A power of two, the balance of which the net keeps; the first n_members are used.
         points = engine.random_base2(max(spec.n_members - 1, 1).bit_length())
     return [
-        _draw_member(spec, dt, samples, input_map, child(seed, member), points[member])
-        for member in range(spec.n_members)
+        _draw_member(spec, shared, dt, samples, input_map, child(seed, number), points[number])
+        for number in range(spec.n_members)
     ]
 
 
 def _draw_member(
     spec: Drawn,
+    shared: HankelSettings,
     dt: float,
     samples: Sequence[int],
     input_map: InputMap,
     generator: np.random.Generator,
     point: FloatArray,
 ) -> Draw:
-    inside = spec.history == "inside"
     refused = ""
     for redrawn in range(MOST_REDRAWS):
-        quantiles = point if point.size and not redrawn else generator.random(4)
-        drawn = _quantiles_of(spec, quantiles)
-        if refused := _not_finite(drawn):
+        quantiles = point if point.size and not redrawn else generator.random(len(PRIORS))
+        values = [spec.at(name, float(q)) for name, q in zip(PRIORS, quantiles, strict=True)]
+        drawn = {name: x for name, x in zip(PRIORS, values, strict=True) if x is not None}
+        if wrong := [f"{name} = {x}" for name, x in drawn.items() if not np.isfinite(x)]:
+            refused = (
+                f"the last one gave {wrong[0]}. Check the parameters of that prior, or give it "
+                "bounds."
+            )
             continue
-        draw = _rounded(spec, dt, drawn, redrawn)
-        if refused := _out_of_range(draw, inside):
+        own: dict[str, Any] = {
+            name: x if name == "ridge" else spec.samples(name, x, dt) for name, x in drawn.items()
+        }
+        if refused := _out_of_range(own, shared.history):
             continue
-        needed = draw.needed(inside, input_map.history(draw.input_delays), input_map.lead_samples)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeakeepWarning)  # given when the priors were made
+            settings = replace(shared, **own)
+        lengths = drawn.get("window", np.nan), drawn["state_delays"], drawn["input_delays"]
+        draw = Draw(settings, lengths, redrawn=redrawn)
+        needed = draw.needed(input_map)
         run = None if spec.train_on == "all" else int(generator.integers(len(samples)))
         if (min(samples) if run is None else samples[run]) < needed:
             refused = (
                 f"the shortest run has {min(samples)} samples up to stop, and the last draw asked "
-                f"for {needed} (window {draw.window}, delays {draw.state_delays} and "
-                f"{draw.input_delays}). Give longer runs or a later stop, or narrow the priors."
+                f"for {needed} (window {settings.window}, delays {settings.state_delays} and "
+                f"{settings.input_delays}). Give longer runs or a later stop, or narrow the priors."
             )
             continue
         if run is None:
@@ -177,50 +205,70 @@ def _draw_member(
     raise DataError(f"no feasible draw in {MOST_REDRAWS}: {refused}")
 
 
-def _quantiles_of(spec: Drawn, quantiles: FloatArray) -> dict[str, float]:
-    found = {name: spec.at(name, float(q)) for name, q in zip(PRIORS, quantiles, strict=True)}
-    return {name: value for name, value in found.items() if value is not None}
-
-
-def _not_finite(drawn: dict[str, float]) -> str:
-    """What is wrong with quantiles that cannot be rounded; empty where nothing is."""
-    wrong = [f"{name} = {value}" for name, value in drawn.items() if not np.isfinite(value)]
-    if not wrong:
-        return ""
-    return f"the last one gave {wrong[0]}. Check the parameters of that prior, or give it bounds."
-
-
-def _out_of_range(draw: Draw, inside: bool) -> str:
+def _out_of_range(own: dict[str, Any], history: History) -> str:
     """What is wrong with a draw for any runs; empty where nothing is."""
-    for name in ("state_delays", "input_delays", "ridge"):
-        if (value := getattr(draw, name)) < 0:
+    s, z = own["state_delays"], own["input_delays"]
+    for name in PRIORS[1:]:
+        if own[name] < 0:
             return (
-                f"the last one gave {name} = {value:.6g}, which is negative. Move the prior above "
-                "zero."
+                f"the last one gave {name} = {own[name]:.6g}, which is negative. Move the prior "
+                "above zero."
             )
-    least = draw.needed(inside) if inside else 2
-    if draw.window is not None and draw.window < least:
-        within = (
-            f" with delays of {draw.state_delays} and {draw.input_delays} inside it"
-            if inside
-            else ""
-        )
+    inside = history == "inside"
+    least = max(s, z) + 2 if inside else 2
+    if "window" in own and own["window"] < least:
+        within = f" with delays of {s} and {z} inside it" if inside else ""
         return (
-            f"the last one gave a window of {draw.window} samples{within}, and {least} are "
+            f"the last one gave a window of {own['window']} samples{within}, and {least} are "
             "needed. Raise window, or lower the delays."
         )
     return ""
 
 
-def _rounded(spec: Drawn, dt: float, drawn: dict[str, float], redrawn: int) -> Draw:
-    lengths = {name: spec.samples(name, drawn[name], dt) for name in PRIORS[:3] if name in drawn}
-    return Draw(
-        drawn=(drawn.get("window", np.nan), drawn["state_delays"], drawn["input_delays"]),
-        ridge=drawn["ridge"],
-        window=lengths.get("window"),
-        state_delays=lengths["state_delays"],
-        input_delays=lengths["input_delays"],
-        run=None,
-        last=None,
-        redrawn=redrawn,
-    )
+INTEGERS = {
+    "window_samples": "length of the training window; −1 for all of a run",
+    "state_delays_samples": "number of delayed copies of the states",
+    "input_delays_samples": "number of delayed copies of the inputs",
+    "training_run": "run that trains; −1 for all",
+    "last_sample": "last sample of the training window; −1 for that at stop",
+    "redrawn": "infeasible draws before this one",
+}
+
+
+def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Dataset:
+    """Draws over ``member``; see ``HankelEnsemble.draws``."""
+    drawn = np.array([draw.drawn for draw in members], dtype=float)
+    variables: dict[str, Any] = {
+        name: ("member", values, {"long_name": label, "units": unit_of(origin[name])})
+        for (name, label), values in zip(DRAWN.items(), drawn.T, strict=True)
+    }
+    ridge = np.array([draw.settings.ridge for draw in members], dtype=float)
+    variables["ridge"] = ("member", ridge, {"long_name": "ridge λ", "units": "1"})
+    rows = [
+        (each.window, each.state_delays, each.input_delays, draw.run, draw.last, draw.redrawn)
+        for draw in members
+        for each in (draw.settings,)
+    ]
+    for (name, label), column in zip(INTEGERS.items(), zip(*rows, strict=True), strict=True):
+        values = np.array([-1 if each is None else each for each in column], dtype=np.int64)
+        variables[name] = ("member", values, {"long_name": label, "units": "1"})
+    attrs = {
+        "ensemble": json.dumps(dict(origin)),
+        "redrawn": sum(draw.redrawn for draw in members),
+    }
+    return xr.Dataset(variables, coords={"member": np.arange(len(members))}, attrs=attrs)
+
+
+def draws_of(dataset: xr.Dataset, shared: HankelSettings) -> tuple[Draw, ...]:
+    """Rebuild draws from :func:`draws_dataset` and what all members share."""
+    columns = (dataset[name].values.tolist() for name in ("ridge", *INTEGERS))
+    rows = zip(*columns, strict=True)
+    drawn = zip(*(dataset[name].values.tolist() for name in DRAWN), strict=True)
+    members = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)  # given when the priors were made
+        for lengths, (ridge, window, s, z, run, last, redrawn) in zip(drawn, rows, strict=True):
+            length, number, end = (None if each < 0 else each for each in (window, run, last))
+            settings = replace(shared, ridge=ridge, window=length, state_delays=s, input_delays=z)
+            members.append(Draw(settings, lengths, number, end, redrawn))
+    return tuple(members)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
@@ -14,8 +14,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, fraction
+from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
-from seakeep.models import engine, store
+from seakeep.models import store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.calibration import (
     Band,
@@ -23,12 +24,11 @@ from seakeep.models.calibration import (
     Calibration,
     calibrate,
     check_band,
-    warn_of_horizon,
     widened,
 )
 from seakeep.models.checks import Json
-from seakeep.models.draws import Draw
-from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
+from seakeep.models.draws import Draw, draws_dataset, draws_of
+from seakeep.models.engine import Dynamics, Windows, first_lost, linear_runs, member_series
 from seakeep.models.executor import Progress, in_order, one_blas_thread
 from seakeep.models.forecasts import (
     Forecaster,
@@ -49,39 +49,18 @@ from seakeep.models.interface import Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live
-from seakeep.models.members import (
-    TrainingArrays,
-    identify_member,
-    spectral_radius,
-    window_ends,
-)
-from seakeep.models.priors import unit_of
 from seakeep.models.settings import HankelSettings
 from seakeep.models.summaries import (
     reduce_members,
     statistic_coordinate,
     statistics_of,
 )
-from seakeep.models.training import Training
+from seakeep.models.training import TrainingArrays, TrainingData
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
 
-__all__ = ["BandForecast", "HankelEnsemble", "HeldEnsemble"]
+__all__ = ["BandForecast", "HankelEnsemble", "spectral_radius"]
 
-DRAWN = {
-    "window": "length of the training window",
-    "state_delays": "longest delay of the states",
-    "input_delays": "longest delay of the inputs",
-}
-ROUNDED = {
-    "window_samples": ("window", "length of the training window; −1 for all of a run"),
-    "state_delays_samples": ("state_delays", "number of delayed copies of the states"),
-    "input_delays_samples": ("input_delays", "number of delayed copies of the inputs"),
-    "training_run": ("run", "run that trains; −1 for all"),
-    "last_sample": ("last", "last sample of the training window; −1 for that at stop"),
-    "redrawn": ("redrawn", "infeasible draws before this one"),
-}
-OPTIONAL = ("window", "run", "last")
 SAMPLING = {"monte_carlo": "Monte Carlo", "sobol": "Sobol"}
 TRAIN_ON = {
     "all": "together",
@@ -90,20 +69,282 @@ TRAIN_ON = {
 }
 
 
-class _Forecasts(Forecaster):
-    """Forecasts of several members, shared by ensembles and held ensembles."""
+class BandForecast(NamedTuple):
+    """Forecast of an ensemble as plain arrays, physical units.
 
+    Attributes
+    ----------
+    mean, std, lower, upper : ndarray, shape (steps, N)
+        Mean, standard deviation and bounds over the members, at k + 1 … k + steps.
+    diverged : int
+        Members that diverged and are left out of all four.
+    """
+
+    mean: FloatArray
+    std: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    diverged: int
+
+
+@dataclass(frozen=True, eq=False)
+class HankelEnsemble(Forecaster, store.Saved):
+    """Ensemble of models that differ in their settings or their training data.
+
+    Made by :meth:`BayesianHankelDMDc.fit` or :func:`seakeep.load_model`. It holds draws and
+    training arrays; a member's matrices exist only while they are used.
+
+    Parameters
+    ----------
+    settings : HankelSettings
+        Settings that all members share.
+    origin : dict
+        Priors, seed and rules that made the draws, as JSON values.
+    members : tuple of Draw
+        Settings of each member, and what trains it.
+    arrays : TrainingArrays
+        Training data of the members.
+    signature : Signature
+        Time step, names and units, longest delays, and how inputs drive the members.
+    coverage : Coverage
+        Waves that they were trained in.
+    calibration : Calibration, optional
+        Numbers that make the calibrated band; see :meth:`calibrate`.
+    selection : str
+        How free runs chose what the settings left open; empty where they stated all.
+    identified : tuple of Dynamics
+        All members with their matrices, where :meth:`hold` keeps them; empty where each call
+        identifies them anew.
+    """
+
+    kind: ClassVar[str] = "bayesian_hankel_dmdc"
+    settings: HankelSettings
     origin: Json
-    calibration: Calibration | None
+    members: tuple[Draw, ...]
+    arrays: TrainingArrays
+    signature: Signature
+    coverage: Coverage
+    calibration: Calibration | None = None
+    selection: str = ""
+    identified: tuple[Dynamics, ...] = field(default=(), repr=False)
+
+    def __repr__(self) -> str:
+        return (
+            f"{type(self).__name__}(n_members={self.n_members}, states={self.states}, "
+            f"inputs={self.inputs}, dt={self.dt:g}; print(ensemble.summary()) says more)"
+        )
+
+    def _repr_html_(self) -> str:
+        """Summary, for notebooks."""
+        return text_html(self.summary())
 
     @property
     def n_members(self) -> int:
         """Number of members."""
-        raise NotImplementedError
+        return len(self.members)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the coefficients that :meth:`hold` keeps."""
+        return sum(member.coefficients.nbytes for member in self.identified)
+
+    @cached_property
+    def draws(self) -> xr.Dataset:
+        """Drawn settings, over ``member``.
+
+        ``window``, ``state_delays`` and ``input_delays`` as drawn, in the units of their priors
+        (NaN where all of a run trains), the integers ``…_samples`` they became (−1 for all of a
+        run), ``ridge``, the run that trains (−1 for all) and its last sample (−1 for ``stop``),
+        and how many infeasible draws came before.
+        """
+        return draws_dataset(self.members, self.origin)
+
+    @cached_property
+    def training_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant of the training windows in each run that trains a member, s."""
+        spans: dict[str, tuple[float, float]] = {}
+        for run, name in enumerate(self.arrays.names):
+            ends = [
+                self.arrays.span(run, draw.settings, draw.last, self.dt)
+                for draw in self.members
+                if draw.run in (None, run)
+            ]
+            if ends:
+                spans[name] = min(first for first, _ in ends), max(stop for _, stop in ends)
+        return spans
+
+    @cached_property
+    def read_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant that any member reads of each run, delay history included, s."""
+        arrays = self.arrays
+        return {
+            name: (begin, begin + (len(x) - 1) * self.dt)
+            for name, begin, x in zip(arrays.names, arrays.begins, arrays.states, strict=True)
+            if len(x)
+        }
+
+    @property
+    def alignment(self) -> FittedAlignment | None:
+        """How the wave input is aligned to the vessel; the training arrays are aligned."""
+        return self.signature.input_map.alignment
 
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
-        raise NotImplementedError
+        found = [self.dynamics(number) for number in members]
+        return linear_runs(found, groups, self.signature.readouts)
+
+    def system_matrices(self) -> Iterator[FloatArray]:
+        """Â of each member."""
+        return (self.member(number).A for number in range(self.n_members))
+
+    def dynamics(self, number: int) -> Dynamics:
+        """What a free run of a member needs."""
+        if self.identified:
+            return self.identified[number]
+        settings, data, solution = self._identified(number)
+        delays = settings.state_delays, settings.input_delays
+        scales = data.state_scale, data.input_scale, data.direct_scale
+        return Dynamics(solution.coefficients, *delays, *scales, data.input_map.follows)
+
+    def member(self, number: int) -> HankelDMDcModel:
+        """One member as a model of its own.
+
+        Parameters
+        ----------
+        number : int
+            Number of the member, from zero.
+
+        Returns
+        -------
+        HankelDMDcModel
+            Equal to :class:`HankelDMDc` with the member's settings and data: means and standard
+            deviations are those of its own windows (paper, section System identification setup).
+
+        Raises
+        ------
+        RequestError
+            If there is no such member.
+        """
+        settings, data, solution = self._identified(number)
+        return HankelDMDcModel(
+            settings=settings,
+            coefficients=solution.coefficients,
+            signature=replace(data.signature(settings), readouts=self.signature.readouts),
+            training=data.training(solution),
+            coverage=self.coverage,
+        )
+
+    def _identified(self, number: int) -> tuple[HankelSettings, TrainingData, Solution]:
+        """Settings, training data and regression of a member."""
+        if not 0 <= number < self.n_members:
+            raise RequestError(
+                f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
+                f"0 to {self.n_members - 1}."
+            )
+        draw = self.members[number]
+        settings = draw.settings
+        data = self.arrays.data(settings, draw.run, draw.last, self.signature)
+        all_rows = settings.delay_rows == "ridge"
+        return settings, data, data.regress(settings, settings.state_delays, all_rows=all_rows)
+
+    def spectral_radii(
+        self, *, executor: Executor | None = None, progress: Progress | None = None
+    ) -> FloatArray:
+        """Largest modulus of an eigenvalue of each member; a member is stable below one.
+
+        Found once for an ensemble in memory; its file does not depend on it.
+
+        Parameters
+        ----------
+        executor, progress
+            As in :meth:`forecast`.
+
+        Returns
+        -------
+        ndarray, shape (member,)
+
+        Warns
+        -----
+        SeakeepWarning
+            When they are found, if one or more are not below one.
+        """
+        if not self._radii:
+            found = in_order(_spectral_radius, self, range(self.n_members), executor, progress)
+            radii = np.array(list(found))
+            radii.flags.writeable = False
+            self._radii.append(radii)
+            _warn_of_unstable(radii)
+        return self._radii[0]
+
+    @cached_property
+    def _radii(self) -> list[FloatArray]:
+        """Spectral radii, once they have been asked for."""
+        return []
+
+    def summary(self) -> str:
+        """Text that describes the ensemble and the stability of its members.
+
+        Returns
+        -------
+        str
+            A few lines; the first reading finds the :meth:`spectral_radii`.
+        """
+        origin, settings, draws = self.origin, self.settings, self.members
+        count = self.n_members
+        refused = sum(draw.redrawn for draw in draws)
+        scale = ", per snapshot pair" if settings.ridge_scale == "per_snapshot" else ""
+        lines = [
+            f"Ensemble of {counted(count, 'Hankel DMD model')} with control: "
+            f"{counted(len(self.states), 'state')}, {counted(len(self.inputs), 'input')}, "
+            f"dt {self.dt:g} s",
+            f"  states        {', '.join(with_units(self.state_labels))}",
+            f"  inputs        {', '.join(with_units(self.input_labels)) or 'none (autonomous)'}",
+            f"  draws         {SAMPLING[origin['sampling']]}, seed {origin['seed']}; "
+            f"{refused or 'none'} infeasible and drawn again",
+            f"  window        {self._drawn('window')}",
+            f"  state delay   {self._drawn('state_delays')}",
+            f"  input delay   {self._drawn('input_delays')}",
+            f"  ridge         {_range(self.draws.ridge.values, '.4g')}{scale}; delay rows "
+            f"{'exact' if settings.delay_rows == 'exact' else 'regressed'}",
+            f"  history       {self.history_samples} samples up to the start of a forecast",
+            *self.signature.input_map.describe(self.dt),
+            *(each.describe() for each in self.signature.readouts),
+            f"  training      {counted(len(self.arrays.names), 'run')}"
+            + (f", {TRAIN_ON[origin['train_on']]}" if len(self.arrays.names) > 1 else ""),
+        ]
+        lines += [
+            f"    {name}: {span_text(*span, self.dt)}" for name, span in self.training_spans.items()
+        ]
+        if self.selection:
+            lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
+        if (calibration := self.calibration) is not None:
+            found, count_of = calibration.found, sum(calibration.windows.values())
+            line = (
+                f"  band          calibrated for {found.level:g} on "
+                f"{counted(count_of, 'window')} of {calibration.steps} steps: "
+            )
+            if calibration.floor is None:
+                line += f"wider by {_range(found.margin / self.state_spread, '.2g')} "
+            else:
+                what = "a learnt scale" if calibration.scale == "learnt" else "spread"
+                line += (
+                    f"{_range(found.margin, '.2g')} times {what} and a floor of "
+                    f"{_range(calibration.floor / self.state_spread, '.2g')} "
+                )
+            lines.append(line + "training SD either way")
+        radii = self.spectral_radii()
+        unstable = int(np.count_nonzero(radii >= 1.0))
+        verdict = (
+            f"{unstable} of {count} UNSTABLE: their long forecasts diverge"
+            if unstable
+            else "stable"
+        )
+        clipped = "" if settings.radius is None else f", clipped to {settings.radius:g}"
+        lines.append(
+            f"  stability     spectral radius {_range(radii, '.6f')}, median "
+            f"{np.median(radii):.6f} ({verdict}{clipped})"
+        )
+        return "\n".join(lines)
 
     @property
     def state_spread(self) -> FloatArray:
@@ -147,7 +388,7 @@ class _Forecasts(Forecaster):
         windows = self.read_windows(*one_run(run, [start]), steps, ahead)
         with member_series(self, windows, executor, progress) as (series, lost):
             variables = label_channels(self.signature, np.array(series[:, 0]), ("member", "time"))
-        variables["status"] = self._status(lost[:, 0], windows)
+        variables["status"] = ("member", statuses(lost[:, 0], windows, 0, self.dt))
         return xr.Dataset(
             variables,
             coords={
@@ -199,13 +440,13 @@ class _Forecasts(Forecaster):
             run, [start], steps, level, band, ahead, executor, progress
         )
         variables = label_channels(self.signature, values[0], ("statistic", "time"))
-        variables["status"] = self._status(lost[:, 0], windows)
+        variables["status"] = ("member", statuses(lost[:, 0], windows, 0, self.dt))
         counts = {"start": windows.places[0][1]} | self._counts(level, band)
         counts |= verdict(lost, windows, self.dt)
         return xr.Dataset(
             variables,
             coords={
-                "statistic": statistic_coordinate(level, self._bounds(band)),
+                "statistic": self._statistics(level, band),
                 "member": np.arange(self.n_members),
                 "diverged_at": lost_instants(lost[:, 0], windows),
                 "time": windows.time[0],
@@ -292,7 +533,7 @@ class _Forecasts(Forecaster):
         variables = label_channels(self.signature, values, ("window", "statistic", "lead"))
         variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
         coords = window_coords(windows, self.dt)
-        coords["statistic"] = statistic_coordinate(level, self._bounds(band))
+        coords["statistic"] = self._statistics(level, band)
         return xr.Dataset(
             variables, coords=coords, attrs=self._notes(windows) | self._counts(level, band)
         )
@@ -312,18 +553,14 @@ class _Forecasts(Forecaster):
         level = fraction(level, "level")
         check_band(self.calibration, level, band)
         windows = self.read_windows(*one_run(run, starts), steps, ahead)
-        if band == "calibrated":
-            warn_of_horizon(self.calibration, windows.places[0][0], windows.steps)
         with member_series(self, windows, executor, progress) as (series, lost):
             values = reduce_members(series, lost, level)
         return windows, widened(self.calibration, values, band, self.signature, windows), lost
 
-    def _status(self, lost: npt.NDArray[np.int64], windows: Windows) -> xr.Variable:
-        return xr.Variable(("member",), statuses(lost, windows, 0, self.dt))
-
-    def _bounds(self, band: Band) -> str:
-        """What the bounds of a calibrated band are."""
-        return self.calibration.bounds if self.calibration and band == "calibrated" else ""
+    def _statistics(self, level: float, band: Band) -> xr.Variable:
+        """Coordinate of the statistics, with what the bounds of a calibrated band are."""
+        calibrated = self.calibration if band == "calibrated" else None
+        return statistic_coordinate(level, calibrated.bounds if calibrated else "")
 
     def _counts(self, level: float, band: Band) -> dict[str, Any]:
         kind = {"band": band} if band == "calibrated" else {}
@@ -333,277 +570,7 @@ class _Forecasts(Forecaster):
         notes = forecast_notes(self.signature, windows)
         return {"run": notes.pop("run"), "ensemble": json.dumps(self.origin), **notes}
 
-
-@dataclass(frozen=True, eq=False)
-class HankelEnsemble(_Forecasts, store.Saved):
-    """Ensemble of models that differ in their settings or their training data.
-
-    Made by :meth:`BayesianHankelDMDc.fit` or :func:`seakeep.load_model`. It holds draws and
-    training arrays; a member's matrices exist only while they are used.
-
-    Parameters
-    ----------
-    settings : HankelSettings
-        Settings that all members share.
-    origin : dict
-        Priors, seed and rules that made the draws, as JSON values.
-    members : tuple of Draw
-        Settings of each member.
-    arrays : TrainingArrays
-        Training data of the members.
-    signature : Signature
-        Time step, names and units, longest delays, and how inputs drive the members.
-    coverage : Coverage
-        Waves that they were trained in.
-    calibration : Calibration, optional
-        Numbers that make the calibrated band; see :meth:`calibrate`.
-    selection : str
-        How free runs chose what the settings left open; empty where they stated all.
-    """
-
-    kind: ClassVar[str] = "bayesian_hankel_dmdc"
-    settings: HankelSettings
-    origin: Json
-    members: tuple[Draw, ...]
-    arrays: TrainingArrays
-    signature: Signature
-    coverage: Coverage
-    calibration: Calibration | None = None
-    selection: str = ""
-
-    def __repr__(self) -> str:
-        return (
-            f"{type(self).__name__}(n_members={self.n_members}, states={self.states}, "
-            f"inputs={self.inputs}, dt={self.dt:g}; print(ensemble.summary()) says more)"
-        )
-
-    def _repr_html_(self) -> str:
-        """Summary, for notebooks."""
-        return text_html(self.summary())
-
-    @property
-    def n_members(self) -> int:
-        """Number of members."""
-        return len(self.members)
-
-    @cached_property
-    def draws(self) -> xr.Dataset:
-        """Drawn settings, over ``member``.
-
-        ``window``, ``state_delays`` and ``input_delays`` as drawn, in the units of their priors
-        (NaN where all of a run trains), the integers ``…_samples`` they became (−1 for all of a
-        run), ``ridge``, the run that trains (−1 for all) and its last sample (−1 for ``stop``),
-        and how many infeasible draws came before.
-        """
-        return draws_dataset(self.members, self.origin)
-
-    @cached_property
-    def training_spans(self) -> dict[str, tuple[float, float]]:
-        """First and last instant of the training windows in each run that trains a member, s."""
-        spans: dict[str, tuple[float, float]] = {}
-        for run, name in enumerate(self.arrays.names):
-            ends = [
-                window_ends(self.arrays, draw, run, self.dt)
-                for draw in self.members
-                if draw.run in (None, run)
-            ]
-            if ends:
-                spans[name] = min(first for first, _ in ends), max(stop for _, stop in ends)
-        return spans
-
-    @cached_property
-    def read_spans(self) -> dict[str, tuple[float, float]]:
-        """First and last instant that any member reads of each run, delay history included, s."""
-        arrays = self.arrays
-        return {
-            name: (begin, begin + (len(x) - 1) * self.dt)
-            for name, begin, x in zip(arrays.names, arrays.begins, arrays.states, strict=True)
-            if len(x)
-        }
-
-    @property
-    def alignment(self) -> FittedAlignment | None:
-        """How the wave input is aligned to the vessel; the training arrays are aligned."""
-        return self.signature.input_map.alignment
-
-    def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
-        """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
-        found = [self.dynamics(number) for number in members]
-        return linear_runs(found, groups, self.signature.readouts)
-
-    def system_matrices(self) -> Iterator[FloatArray]:
-        """Â of each member."""
-        return (self.member(number).A for number in range(self.n_members))
-
-    def dynamics(self, number: int) -> Dynamics:
-        """A member identified: what a free run of it needs."""
-        draw, input_map = self._draw(number), self.signature.input_map
-        return identify_member(self.arrays, self.settings, input_map, draw).dynamics
-
-    def _draw(self, number: int) -> Draw:
-        if not 0 <= number < self.n_members:
-            raise RequestError(
-                f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
-                f"0 to {self.n_members - 1}."
-            )
-        return self.members[number]
-
-    def member(self, number: int) -> HankelDMDcModel:
-        """One member as a model of its own.
-
-        Parameters
-        ----------
-        number : int
-            Number of the member, from zero.
-
-        Returns
-        -------
-        HankelDMDcModel
-            Equal to :class:`HankelDMDc` with the member's settings and data.
-
-        Raises
-        ------
-        RequestError
-            If there is no such member.
-        """
-        draw, signature = self._draw(number), self.signature
-        found = identify_member(self.arrays, self.settings, signature.input_map, draw)
-        ends = [window_ends(self.arrays, draw, run, self.dt) for run in found.runs]
-        return HankelDMDcModel(
-            settings=replace(
-                self.settings,
-                state_delays=draw.state_delays,
-                input_delays=draw.input_delays,
-                ridge=draw.ridge,
-                window=draw.window,
-            ),
-            coefficients=found.solution.coefficients,
-            signature=replace(
-                signature,
-                state_delays=draw.state_delays,
-                input_delays=draw.input_delays,
-                state_scale=found.dynamics.state_scale,
-                input_scale=found.dynamics.input_scale,
-                direct_scale=found.dynamics.direct_scale,
-            ),
-            training=Training(
-                runs=tuple(self.arrays.names[run] for run in found.runs),
-                first=tuple(first for first, _ in ends),
-                stop=tuple(stop for _, stop in ends),
-                columns=tuple(window.columns for window in found.windows),
-                method=found.solution.method,
-                ridge=found.solution.ridge,
-                rank=found.solution.rank,
-                clipped=found.solution.clipped,
-            ),
-            coverage=self.coverage,
-        )
-
-    def spectral_radii(
-        self, *, executor: Executor | None = None, progress: Progress | None = None
-    ) -> FloatArray:
-        """Largest modulus of an eigenvalue of each member; a member is stable below one.
-
-        Found once for an ensemble in memory; its file does not depend on it.
-
-        Parameters
-        ----------
-        executor, progress
-            As in :meth:`forecast`.
-
-        Returns
-        -------
-        ndarray, shape (member,)
-
-        Warns
-        -----
-        SeakeepWarning
-            When they are found, if one or more are not below one.
-        """
-        if not self._radii:
-            found = in_order(_radius, self, range(self.n_members), executor, progress)
-            radii = np.array(list(found))
-            radii.flags.writeable = False
-            self._radii.append(radii)
-            _warn_of_unstable(radii)
-        return self._radii[0]
-
-    @cached_property
-    def _radii(self) -> list[FloatArray]:
-        """Spectral radii, once they have been asked for."""
-        return []
-
-    def summary(self) -> str:
-        """Text that describes the ensemble and the stability of its members.
-
-        Returns
-        -------
-        str
-            A few lines; the first reading finds the :meth:`spectral_radii`.
-        """
-        origin, settings, draws = self.origin, self.settings, self.members
-        count = self.n_members
-        refused = sum(draw.redrawn for draw in draws)
-        scale = ", per snapshot pair" if settings.ridge_scale == "per_snapshot" else ""
-        lines = [
-            f"Ensemble of {counted(count, 'Hankel DMD model')} with control: "
-            f"{counted(len(self.states), 'state')}, {counted(len(self.inputs), 'input')}, "
-            f"dt {self.dt:g} s",
-            f"  states        {', '.join(with_units(self.state_labels))}",
-            f"  inputs        {', '.join(with_units(self.input_labels)) or 'none (autonomous)'}",
-            f"  draws         {SAMPLING[origin['sampling']]}, seed {origin['seed']}; "
-            f"{refused or 'none'} infeasible and drawn again",
-            f"  window        {_drawn(self, 0, [d.window for d in draws if d.window])}",
-            f"  state delay   {_drawn(self, 1, [d.state_delays for d in draws])}",
-            f"  input delay   {_drawn(self, 2, [d.input_delays for d in draws])}",
-            f"  ridge         {_range([d.ridge for d in draws], '.4g')}{scale}; delay rows "
-            f"{'exact' if settings.delay_rows == 'exact' else 'regressed'}",
-            f"  history       {self.history_samples} samples up to the start of a forecast",
-            *self.signature.input_map.describe(self.dt),
-            *(each.describe() for each in self.signature.readouts),
-            f"  training      {counted(len(self.arrays.names), 'run')}"
-            + (f", {TRAIN_ON[origin['train_on']]}" if len(self.arrays.names) > 1 else ""),
-        ]
-        lines += [
-            f"    {name}: {span_text(*span, self.dt)}" for name, span in self.training_spans.items()
-        ]
-        if self.selection:
-            lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
-        if (calibration := self.calibration) is not None:
-            found, count_of = calibration.found, sum(calibration.windows.values())
-            line = (
-                f"  band          calibrated for {found.level:g} on "
-                f"{counted(count_of, 'window')} of {calibration.steps} steps: "
-            )
-            if calibration.floor is None:
-                line += f"wider by {_range(found.margin / self.state_spread, '.2g')} "
-            else:
-                what = "a learnt scale" if calibration.scale == "learnt" else "spread"
-                line += (
-                    f"{_range(found.margin, '.2g')} times {what} and a floor of "
-                    f"{_range(calibration.floor / self.state_spread, '.2g')} "
-                )
-            lines.append(line + "training SD either way")
-        radii = self.spectral_radii()
-        unstable = int(np.count_nonzero(radii >= 1.0))
-        verdict = (
-            f"{unstable} of {count} UNSTABLE: their long forecasts diverge"
-            if unstable
-            else "stable"
-        )
-        clipped = "" if settings.radius is None else f", clipped to {settings.radius:g}"
-        lines.append(
-            f"  stability     spectral radius {_range(radii, '.6f')}, median "
-            f"{np.median(radii):.6f} ({verdict}{clipped})"
-        )
-        return "\n".join(lines)
-
-    def hold(
-        self,
-        *,
-        executor: Executor | None = None,
-        progress: Progress | None = None,
-    ) -> HeldEnsemble:
+    def hold(self, *, executor: Executor | None = None, progress: Progress | None = None) -> Self:
         """Identify all members once and keep them, for forecasts in a loop or on board.
 
         Parameters
@@ -613,13 +580,100 @@ class HankelEnsemble(_Forecasts, store.Saved):
 
         Returns
         -------
-        HeldEnsemble
-            Its ``forecast_arrays`` gives mean and band from plain arrays. It takes N(N(s+1) +
-            Q(z+1)) numbers per member with exact delay rows, and s + 1 times as many with
-            regressed ones.
+        HankelEnsemble
+            The same, with members :attr:`identified`: N(N(s+1) + Q(z+1)) numbers per member with
+            exact delay rows, and s + 1 times as many with regressed ones.
         """
-        found = in_order(_identify, self, range(self.n_members), executor, progress)
-        return HeldEnsemble(self, tuple(found))
+        numbers = range(self.n_members)
+        return replace(
+            self, identified=tuple(in_order(_dynamics, self, numbers, executor, progress))
+        )
+
+    def forecast_arrays(
+        self,
+        x_history: npt.ArrayLike,
+        u_history: npt.ArrayLike,
+        u_future: npt.ArrayLike,
+        steps: int,
+        level: float = 0.95,
+        *,
+        band: Band = "members",
+        ahead: str = "refuse",
+    ) -> BandForecast:
+        """Free runs of all members from arrays, reduced to mean and band.
+
+        Parameters
+        ----------
+        x_history : array_like, shape (at least s + 1, N)
+            States up to and including instant k, oldest first, physical units, in the order of
+            ``ensemble.states``; s is the longest of a member (``ensemble.state_delays``).
+        u_history : array_like, shape (at least z + 1, Q)
+            Inputs up to and including instant k, in the order of ``ensemble.inputs``, aligned
+            already if the ensemble aligns them; z likewise.
+        u_future : array_like, shape (at least steps − 1 + lead_samples, Q)
+            Inputs at k + 1, k + 2, …; shape (0, 0) for members without input.
+        steps : int
+            Number of instants.
+        level : float, optional
+            Probability between ``lower`` and ``upper``.
+        band : {"members", "calibrated"}, optional
+            As in :meth:`HankelEnsemble.forecast_summary`.
+        ahead
+            As in :meth:`HankelDMDcModel.forecast_arrays`.
+
+        Returns
+        -------
+        BandForecast
+            The numbers of :meth:`HankelEnsemble.forecast_summary`.
+
+        Raises
+        ------
+        RequestError
+            If a shape or name does not fit, or there is no such band.
+        """
+        level = fraction(level, "level")
+        check_band(self.calibration, level, band)
+        windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
+        with one_blas_thread():
+            out = self.free_runs([windows], range(self.n_members))[0][:, 0]
+        kept = out[first_lost(out) < 0]
+        values = statistics_of(kept, level)[None]
+        values = widened(self.calibration, values, band, self.signature, windows)
+        mean, std, lower, upper = values[0]
+        return BandForecast(mean, std, lower, upper, len(out) - len(kept))
+
+    def live(
+        self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
+    ) -> Live:
+        """Put the members into service; arguments and errors as :meth:`HankelDMDcModel.live`.
+
+        The filter predicts with the mean of the members, whose errors on what they learnt from
+        are found here; a forecast runs all of them.
+        """
+        kept = self if self.identified else self.hold()
+        return Live(kept, kept.identified, kept.errors, like=like, noise=noise)
+
+    @cached_property
+    def errors(self) -> LeadErrors:
+        """Errors of the members' mean on what they learnt from."""
+        signature, arrays = self.signature, self.arrays
+        members = [self.dynamics(number) for number in range(self.n_members)]
+        stretches = [
+            Stretch(x, u, v, signature.history_samples - 1, min(len(x) - 1, len(u)))
+            for x, u, v in zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
+        ]
+        return lead_errors(members, stretches, signature.readouts)
+
+    def _drawn(self, name: str) -> str:
+        """A length as drawn, and in samples."""
+        samples = self.draws[f"{name}_samples"].values
+        if samples[0] < 0:
+            return "all of a run"
+        rounded = _of(_range(samples, "d"), "samples")
+        drawn = self.draws[name]
+        if drawn.attrs["units"] == "samples":
+            return rounded
+        return f"{_of(_range(drawn.values, '.4g'), drawn.attrs['units'])} ({rounded})"
 
     def calibrate(
         self,
@@ -699,18 +753,19 @@ class HankelEnsemble(_Forecasts, store.Saved):
         names = self.arrays.names
         if run not in names:
             raise RequestError(f"no run '{run}' trains. Those that do: {', '.join(names)}.")
-        kept = [number for number, name in enumerate(names) if name != run]
+        left_out = names.index(run)
         members = tuple(
-            draw if draw.run is None else replace(draw, run=kept.index(draw.run))
+            draw if draw.run is None or draw.run < left_out else replace(draw, run=draw.run - 1)
             for draw in self.members
-            if kept and (draw.run is None or draw.run in kept)
+            if len(names) > 1 and draw.run != left_out
         )
         if not members:
             raise RequestError(
                 f"no member learnt from another run than '{run}', and none is left to forecast "
                 "it. Train on several runs, or calibrate on a run that does not train."
             )
-        return replace(self, members=members, arrays=self.arrays.only(kept), calibration=None)
+        arrays = self.arrays.without(left_out)
+        return replace(self, members=members, arrays=arrays, calibration=None, identified=())
 
     def to_dataset(self) -> xr.Dataset:
         """The ensemble as a Dataset: what :meth:`save` writes."""
@@ -747,30 +802,18 @@ class HankelEnsemble(_Forecasts, store.Saved):
     ) -> HankelEnsemble:
         """Rebuild an ensemble from :meth:`to_dataset`; its members are equal to the last bit."""
         place = store.content(dataset, "runs")
-        delayed, direct = signature.input_map.regressors(signature.input_labels)
-        names = (
-            tuple(signature.states),
-            tuple(label.name for label in delayed),
-            tuple(label.name for label in direct),
-        )
-        states, delayed_series, direct_series = (
-            tuple(store.numbers(dataset, f"{group}_{run}") for run in range(len(place["names"])))
+        series: dict[str, Any] = {
+            group: tuple(
+                store.numbers(dataset, f"{group}_{run}") for run in range(len(place["names"]))
+            )
             for group in ("states", "delayed", "direct")
-        )
-        arrays = TrainingArrays(
-            names=tuple(place["names"]),
-            states=states,
-            delayed=delayed_series,
-            direct=direct_series,
-            offsets=tuple(place["offsets"]),
-            begins=tuple(place["begins"]),
-            channels=names,
-        )
+        }
+        places = {key: tuple(values) for key, values in place.items()}
         return cls(
             settings=settings,
             origin=origin,
-            members=_draws(dataset),
-            arrays=arrays,
+            members=draws_of(dataset, settings),
+            arrays=TrainingArrays(**series, **places),
             signature=signature,
             coverage=Coverage.from_dataset(dataset, signature),
             calibration=Calibration.from_json(store.content(dataset, "calibration")),
@@ -778,197 +821,20 @@ class HankelEnsemble(_Forecasts, store.Saved):
         )
 
 
-def _radius(ensemble: HankelEnsemble, number: int) -> float:
-    return spectral_radius(ensemble.dynamics(number))
-
-
-def _identify(ensemble: HankelEnsemble, number: int) -> Dynamics:
+def _dynamics(ensemble: HankelEnsemble, number: int) -> Dynamics:
     return ensemble.dynamics(number)
 
 
-class BandForecast(NamedTuple):
-    """Forecast of an ensemble as plain arrays, physical units.
-
-    Attributes
-    ----------
-    mean, std, lower, upper : ndarray, shape (steps, N)
-        Mean, standard deviation and bounds over the members, at k + 1 … k + steps.
-    diverged : int
-        Members that diverged and are left out of all four.
-    """
-
-    mean: FloatArray
-    std: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    diverged: int
+def _spectral_radius(ensemble: HankelEnsemble, number: int) -> float:
+    return spectral_radius(ensemble.dynamics(number))
 
 
-@dataclass(frozen=True, eq=False)
-class HeldEnsemble(_Forecasts):
-    """Members with their matrices, for forecasts in a loop or on board.
-
-    Made by :meth:`HankelEnsemble.hold`. A :class:`~seakeep.models.HankelEnsemble` identifies its
-    members anew in each call and so needs little memory; here each is identified once. It
-    forecasts runs as the ensemble does, and plain arrays with :meth:`forecast_arrays`.
-
-    Parameters
-    ----------
-    ensemble : HankelEnsemble
-        Where the members come from.
-    members : tuple of Dynamics
-        All of them, identified.
-    """
-
-    ensemble: HankelEnsemble
-    members: tuple[Dynamics, ...]
-
-    def __repr__(self) -> str:
-        return (
-            f"{type(self).__name__}(n_members={len(self.members)}, states={self.states}, "
-            f"inputs={self.inputs}, dt={self.dt:g}, "
-            f"{self.nbytes / 2**20:.0f} MiB)"
-        )
-
-    @property
-    def n_members(self) -> int:
-        """Number of members."""
-        return len(self.members)
-
-    @property
-    def signature(self) -> Signature:  # type: ignore[override]
-        """Signature of the ensemble."""
-        return self.ensemble.signature
-
-    @property
-    def origin(self) -> Json:  # type: ignore[override]
-        """Priors, seed and rules of the ensemble."""
-        return self.ensemble.origin
-
-    @property
-    def calibration(self) -> Calibration | None:  # type: ignore[override]
-        """Calibration of the ensemble."""
-        return self.ensemble.calibration
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the members' coefficients."""
-        return sum(member.coefficients.nbytes for member in self.members)
-
-    def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
-        """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
-        found = [self.members[number] for number in members]
-        return linear_runs(found, groups, self.signature.readouts)
-
-    def forecast_arrays(
-        self,
-        x_history: npt.ArrayLike,
-        u_history: npt.ArrayLike,
-        u_future: npt.ArrayLike,
-        steps: int,
-        level: float = 0.95,
-        *,
-        band: Band = "members",
-        ahead: str = "refuse",
-    ) -> BandForecast:
-        """Free runs of all members from arrays, reduced to mean and band.
-
-        Parameters
-        ----------
-        x_history : array_like, shape (at least s + 1, N)
-            States up to and including instant k, oldest first, physical units, in the order of
-            ``ensemble.states``; s is the longest of a member (``ensemble.state_delays``).
-        u_history : array_like, shape (at least z + 1, Q)
-            Inputs up to and including instant k, in the order of ``ensemble.inputs``, aligned
-            already if the ensemble aligns them; z likewise.
-        u_future : array_like, shape (at least steps − 1 + lead_samples, Q)
-            Inputs at k + 1, k + 2, …; shape (0, 0) for members without input.
-        steps : int
-            Number of instants.
-        level : float, optional
-            Probability between ``lower`` and ``upper``.
-        band : {"members", "calibrated"}, optional
-            As in :meth:`HankelEnsemble.forecast_summary`.
-        ahead
-            As in :meth:`HankelDMDcModel.forecast_arrays`.
-
-        Returns
-        -------
-        BandForecast
-            The numbers of :meth:`HankelEnsemble.forecast_summary`.
-
-        Raises
-        ------
-        RequestError
-            If a shape or name does not fit, or there is no such band.
-        """
-        level = fraction(level, "level")
-        check_band(self.calibration, level, band)
-        windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
-        if band == "calibrated":
-            warn_of_horizon(self.calibration, "these arrays", int(steps))
-        with one_blas_thread():
-            out = self.free_runs([windows], range(self.n_members))[0][:, 0]
-        kept = out[engine.first_lost(out) < 0]
-        values = statistics_of(kept, level)[None]
-        mean, std, lower, upper = widened(self.calibration, values, band, self.signature, windows)[
-            0
-        ]
-        return BandForecast(mean, std, lower, upper, len(out) - len(kept))
-
-    def live(
-        self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
-    ) -> Live:
-        """Put the members into service; arguments and errors as :meth:`HankelDMDcModel.live`.
-
-        The filter predicts with the mean of the members, whose errors on what they learnt from
-        are found here; a forecast runs all of them.
-        """
-        return Live(self, self.members, self.errors, like=like, noise=noise)
-
-    @cached_property
-    def errors(self) -> LeadErrors:
-        """Errors of the members' mean on what they learnt from."""
-        signature, arrays = self.signature, self.ensemble.arrays
-        stretches = [
-            Stretch(x, u, v, signature.history_samples - 1, min(len(x) - 1, len(u)))
-            for x, u, v in zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
-        ]
-        return lead_errors(self.members, stretches, signature.readouts)
-
-
-def draws_dataset(members: Sequence[Draw], origin: Mapping[str, Any]) -> xr.Dataset:
-    """Draws over ``member``; see ``HankelEnsemble.draws``."""
-    drawn = np.array([draw.drawn for draw in members], dtype=float).reshape(-1, len(DRAWN))
-    variables: dict[str, Any] = {
-        name: ("member", values, {"long_name": label, "units": unit_of(origin[name])})
-        for (name, label), values in zip(DRAWN.items(), drawn.T, strict=True)
-    }
-    ridge = np.array([draw.ridge for draw in members], dtype=float)
-    variables["ridge"] = ("member", ridge, {"long_name": "ridge λ", "units": "1"})
-    for name, (attribute, label) in ROUNDED.items():
-        values = [getattr(draw, attribute) for draw in members]
-        integers = np.array([-1 if value is None else value for value in values], dtype=np.int64)
-        variables[name] = ("member", integers, {"long_name": label, "units": "1"})
-    attrs = {
-        "ensemble": json.dumps(dict(origin)),
-        "redrawn": sum(draw.redrawn for draw in members),
-    }
-    return xr.Dataset(variables, coords={"member": np.arange(len(members))}, attrs=attrs)
-
-
-def _draws(dataset: xr.Dataset) -> tuple[Draw, ...]:
-    columns: dict[str, list[Any]] = {"ridge": dataset["ridge"].values.tolist()}
-    for name, (attribute, _) in ROUNDED.items():
-        values = dataset[name].values.tolist()
-        columns[attribute] = [
-            None if each < 0 and attribute in OPTIONAL else each for each in values
-        ]
-    drawn = zip(*(dataset[name].values.tolist() for name in DRAWN), strict=True)
-    return tuple(
-        Draw(drawn=lengths, **dict(zip(columns, each, strict=True)))
-        for lengths, each in zip(drawn, zip(*columns.values(), strict=True), strict=True)
-    )
+def spectral_radius(dynamics: Dynamics) -> float:
+    """Largest modulus of an eigenvalue of Â."""
+    top, _ = dynamics.matrices
+    size, states = top.shape[1], len(dynamics.state_scale.mean)
+    square = top if len(top) == size else np.concatenate([top, np.eye(size - states, size)])
+    return float(np.abs(np.linalg.eigvals(square)).max())
 
 
 def _warn_of_unstable(radii: FloatArray) -> None:
@@ -980,16 +846,6 @@ def _warn_of_unstable(radii: FloatArray) -> None:
             "left out of mean and band. Raise the ridge, train on more data, use shorter state "
             "delays, or look for transients at the ends of the training runs."
         )
-
-
-def _drawn(ensemble: HankelEnsemble, place: int, samples: Sequence[int]) -> str:
-    """A length as drawn, and in samples."""
-    if not samples:
-        return "all of a run"
-    rounded = _of(_range(samples, "d"), "samples")
-    values = [draw.drawn[place] for draw in ensemble.members]
-    unit = unit_of(ensemble.origin[tuple(DRAWN)[place]])
-    return rounded if unit == "samples" else f"{_of(_range(values, '.4g'), unit)} ({rounded})"
 
 
 def _range(values: Sequence[float] | FloatArray, form: str) -> str:

@@ -124,7 +124,7 @@ class Live:
 
     Parameters
     ----------
-    model : HankelDMDcModel or HeldEnsemble
+    model : HankelDMDcModel or HankelEnsemble
         What forecasts.
     members : sequence of Dynamics
         Its members; the filter predicts with the mean of their one-step predictions.
@@ -749,7 +749,7 @@ def load_live(model: Servable, path: str | Path) -> Live:
 
     Parameters
     ----------
-    model : HankelDMDcModel or HeldEnsemble
+    model : HankelDMDcModel or HankelEnsemble
         The model that was in service.
     path : str or Path
         The file.

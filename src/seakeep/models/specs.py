@@ -15,13 +15,11 @@ from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.checks import Json, check_choice
 from seakeep.models.draws import PRIORS, Sampling, TrainOn, draw_members
-from seakeep.models.ensemble import HankelEnsemble
+from seakeep.models.ensemble import HankelEnsemble, spectral_radius
 from seakeep.models.executor import Progress
-from seakeep.models.inputs import InputMap
 from seakeep.models.interface import Needs, Role, Signature, Spec
-from seakeep.models.labelled import Runs, Span, Stop, as_runs
+from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
-from seakeep.models.members import TrainingArrays, reach, spectral_radius
 from seakeep.models.observables import Observable
 from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
 from seakeep.models.readouts import FittedReadOut
@@ -34,12 +32,10 @@ from seakeep.models.settings import (
     periods_to_samples,
 )
 from seakeep.models.training import (
+    TrainingArrays,
     check_names,
     gather,
-    last_sample,
     moments,
-    run_regressors,
-    stop_instants,
     until,
 )
 from seakeep.models.validity import Coverage
@@ -718,37 +714,42 @@ class BayesianHankelDMDc(HankelSettings):
         readouts: tuple[FittedReadOut, ...],
     ) -> HankelEnsemble:
         """The ensemble of settings that leave nothing to be chosen."""
-        stops = stop_instants(stop, list(named))
         dt = labelled.common_step(named)
+        named = until(named, stop)
         shared = self.shared(dt)
         labels = labelled.common_labels(named, states), labelled.common_labels(named, inputs)
-        if shared.is_mapped:
-            named, stops = until(named, stops), dict.fromkeys(named)
         states, inputs = list(states), list(inputs)
         input_map = shared.input_map(named, states, inputs, None)
-        samples = [
-            last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name) + 1
-            for name, run in named.items()
-        ]
+        samples = [run.sizes["time"] for run in named.values()]
         spec = self._taught_by(named.values(), min(samples) * dt)
         members = draw_members(spec, dt, samples, input_map)
-        earliest = reach(members, samples, self.history == "inside", input_map)
-        arrays, trained = _training_arrays(named, states, inputs, samples, earliest, input_map)
+        reads = [
+            (min(draw.first(run, count, input_map) for draw in members), count)
+            for run, count in enumerate(samples)
+        ]
+        arrays = TrainingArrays.read(named, states, inputs, reads, input_map)
+        parts = zip(named.items(), reads, strict=True)
+        trained = [
+            labelled.channel_matrix(run, inputs, name, slice(*read))
+            for (name, run), read in parts
+            if read[0] < read[1]
+        ]
         # Direct regressors have no value where they need inputs from before the record; no member
         # reads them there.
         direct = tuple(values[np.isfinite(values).all(axis=1)] for values in arrays.direct)
         series = (arrays.states, arrays.delayed, direct)
         arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
+        groups = (labels[0], *input_map.regressors(labels[1]))
         scales = [
-            moments(each, None, channels, standardize=False)
-            for each, channels in zip(series, arrays.channels, strict=True)
+            moments(each, None, [label.name for label in group], standardize=False)
+            for each, group in zip(series, groups, strict=True)
         ]
         signature = Signature(
             dt=dt,
             state_labels=labels[0],
             input_labels=labels[1],
-            state_delays=max(draw.state_delays for draw in members),
-            input_delays=max(draw.input_delays for draw in members),
+            state_delays=max(draw.settings.state_delays for draw in members),
+            input_delays=max(draw.settings.input_delays for draw in members),
             input_map=input_map,
             state_scale=scales[0],
             input_scale=scales[1],
@@ -797,42 +798,3 @@ def _step_of(dt: float | None, runs: Runs | None) -> float:
     if dt is not None:
         labelled.check_step(*next((run, name) for name, run in named.items()), dt)
     return step
-
-
-def _training_arrays(
-    runs: dict[str, xr.Dataset],
-    states: Sequence[str],
-    inputs: Sequence[str],
-    samples: Sequence[int],
-    earliest: Sequence[int],
-    input_map: InputMap,
-) -> tuple[TrainingArrays, list[np.ndarray[Any, np.dtype[np.float64]]]]:
-    """States and regressors that members learn from, and the measured inputs, physical units."""
-    read, trained = [], []
-    for (name, run), first, end in zip(runs.items(), earliest, samples, strict=True):
-        time = np.asarray(run["time"].values, dtype=float)
-        x = labelled.channel_matrix(run, states, name, slice(first, end))
-        labelled.check_finite(x, states, name, first, time)
-        span = Span(first, end - 1, max(end - input_map.lead_samples, first))
-        found = run_regressors(input_map, run, states, inputs, name, span)
-        for values in (x, *found):
-            values.flags.writeable = False
-        read.append((x, *found))
-        trained.append(labelled.channel_matrix(run, inputs, name, slice(first, end)))
-    begins = [
-        float(np.asarray(run["time"].values, dtype=float)[min(first, run.sizes["time"] - 1)])
-        for run, first in zip(runs.values(), earliest, strict=True)
-    ]
-    groups = [tuple(each) for each in zip(*read, strict=True)]
-    labels = labelled.channel_labels(next(iter(runs.values())), inputs)
-    delayed, direct = (tuple(each.name for each in made) for made in input_map.regressors(labels))
-    arrays = TrainingArrays(
-        names=tuple(runs),
-        states=groups[0],
-        delayed=groups[1],
-        direct=groups[2],
-        offsets=tuple(earliest),
-        begins=tuple(begins),
-        channels=(tuple(states), delayed, direct),
-    )
-    return arrays, [each for each in trained if len(each)]

@@ -161,9 +161,7 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
         lost = lost | forecast[name].isnull().any(others)
     variables = {}
     for name in channels:
-        values = forecast[name].transpose("member", ...)
-        gone = lost.transpose("member", ...)
-        variables[name] = _statistics_variable(values, gone, level)
+        variables[name] = _statistics_variable(forecast[name].transpose("member", ...), lost, level)
     members, dropped = forecast.sizes["member"], int(lost.sum())
     coords: Mapping[str, object] = {
         str(name): coordinate
@@ -178,15 +176,12 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
 
 
 def _statistics_variable(values: xr.DataArray, lost: xr.DataArray, level: float) -> xr.Variable:
-    dims = [str(dim) for dim in values.dims[1:]]
-    if "window" not in lost.dims:
-        result = statistics_of(values.values[~lost.values], level)
-        return xr.Variable(("statistic", *dims), result, values.attrs)
-    result = np.stack(
-        [
-            statistics_of(values.isel(window=w).values[~lost.isel(window=w).values], level)
-            for w in range(values.sizes["window"])
-        ]
-    )
-    rest = [dim for dim in dims if dim != "window"]
-    return xr.Variable(("window", "statistic", *rest), result, values.attrs)
+    """Statistics of a channel (member, …) without the members that are lost, window by window."""
+    if "window" in lost.dims:
+        windows = range(lost.sizes["window"])
+        pairs = ((values.isel(window=each), lost.isel(window=each)) for each in windows)
+        rows = [_statistics_variable(*pair, level) for pair in pairs]
+        dims = ("window", *rows[0].dims)
+        return xr.Variable(dims, np.stack([row.values for row in rows]), values.attrs)
+    result = statistics_of(values.values[~lost.values], level)
+    return xr.Variable(("statistic", *values.dims[1:]), result, values.attrs)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Self, cast
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 import xarray as xr
@@ -24,16 +24,14 @@ from seakeep.sizes import LONG_MATRIX, check_numbers
 
 __all__ = [
     "Training",
+    "TrainingArrays",
     "TrainingData",
     "check_names",
     "gather",
     "is_constant",
-    "last_sample",
-    "lengthened",
     "moments",
     "run_regressors",
     "scales_of",
-    "stop_instants",
     "until",
 ]
 
@@ -119,7 +117,7 @@ class TrainingData:
     input_scale: Scale
     direct_scale: Scale
     input_map: InputMap
-    inputs: tuple[FloatArray, ...]
+    inputs: tuple[FloatArray, ...] = ()
 
     def signature(self, settings: HankelSettings) -> Signature:
         """What a forecast must know of a model that was fitted to these data."""
@@ -210,56 +208,85 @@ def gather(
         "Take fewer delays, or a larger step.",
         LONG_MATRIX,
     )
-    stops = stop_instants(stop, list(runs))
     dt = labelled.common_step(runs)
+    runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
-    if settings.is_mapped:
-        runs, stops = until(runs, stops), dict.fromkeys(runs)
-    input_map = settings.input_map(dict(runs), states, inputs, window)
-    lead, reach = input_map.lead_samples, max(state_delays, input_map.history(input_delays))
-    pieces = []
+    input_map = settings.input_map(runs, states, inputs, window)
+    reach = max(state_delays, input_map.history(input_delays))
+    pieces, read = [], []
     for name, run in runs.items():
         time = np.asarray(run.variables["time"].values, dtype=float)
-        last = last_sample(time, stops[name], name)
-        place = training_window(last, window, state_delays, reach, history)
-        # A step from j reads the input up to j + lead, and none after the window.
-        final = last - max(lead - 1, 0)
+        place, begin, final = _place(time.size - 1, settings, input_map)
         _check_length(place, final, name, window, reach, history)
-        begin = min(place.first, place.first_column - reach)
         here = labelled.channel_matrix(run, states, name, slice(begin, final + 1))
         needed = min(place.first, place.first_column - state_delays)
         labelled.check_finite(here[needed - begin :], states, name, needed, time)
         needed = min(place.first, place.first_column - input_delays)
-        span = Span(begin, last, last + 1 - lead)
+        span = Span(begin, place.last, place.last + 1 - input_map.lead_samples)
         found = run_regressors(input_map, run, states, inputs, name, span, needed)
-        u, v = (lengthened(values, len(here)) for values in found)
         shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
-        read = labelled.channel_matrix(run, inputs, name, slice(place.first, last + 1))
-        pieces.append(((here, u, v), shifted, read, time[place.first], time[last]))
+        instants = time[place.first], time[place.last]
+        pieces.append(Piece(name, (here, *found), shifted, instants))
+        read.append(labelled.channel_matrix(run, inputs, name, place.samples))
+    data = _standardised(pieces, dt, labels, input_map, settings.standardize)
+    if len(pieces) > 1:
+        _warn_of_dead(pieces, 0, data.state_scale, [label.name for label in labels[0]])
+        delayed = [label.name for label in input_map.regressors(labels[1])[0]]
+        _warn_of_dead(pieces, 1, data.input_scale, delayed)
+    return replace(data, inputs=tuple(read))
 
-    groups, windows, trained, first, end = zip(*pieces, strict=True)
-    series = [tuple(each) for each in zip(*groups, strict=True)]
-    names = tuple(runs)
-    delayed_labels, direct_labels = input_map.regressors(labels[1])
-    channels = [
-        [label.name for label in group] for group in (labels[0], delayed_labels, direct_labels)
+
+class Piece(NamedTuple):
+    """What a run gives to train with, physical units, and its window in samples of these arrays."""
+
+    name: str
+    series: tuple[FloatArray, FloatArray, FloatArray]
+    window: TrainingWindow
+    instants: tuple[float, float]
+
+
+def _place(
+    last: int, settings: HankelSettings, input_map: InputMap
+) -> tuple[TrainingWindow, int, int]:
+    """Window that ends at a sample, the first sample that it reads, and its last successor.
+
+    A step from j reads the input up to j + lead, and none after the window.
+    """
+    delays = settings.state_delays
+    reach = max(delays, input_map.history(settings.input_delays))
+    place = training_window(last, settings.window, delays, reach, settings.history)
+    begin = min(place.first, place.first_column - reach)
+    return place, begin, last - max(input_map.lead_samples - 1, 0)
+
+
+def _standardised(
+    pieces: Sequence[Piece],
+    dt: float,
+    labels: tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]],
+    input_map: InputMap,
+    standardize: bool,
+) -> TrainingData:
+    """Deviations from the moments of these windows (paper, System identification setup)."""
+    series = [
+        [_lengthened(piece.series[group], len(piece.series[0])) for piece in pieces]
+        for group in range(3)
     ]
-    scales = scales_of(series, windows, channels, settings.standardize, input_map.stretch)
-    if len(names) > 1:
-        _warn_of_dead(names, series[0], windows, scales[0], channels[0])
-        _warn_of_dead(names, series[1], windows, scales[1], channels[1])
-    x, delayed, direct = (
+    windows = [piece.window for piece in pieces]
+    groups = (labels[0], *input_map.regressors(labels[1]))
+    channels = [[label.name for label in group] for group in groups]
+    scales = scales_of(series, windows, channels, standardize, input_map.stretch)
+    x, u, w = (
         tuple(scale.deviations(values) for values in each)
         for scale, each in zip(scales, series, strict=True)
     )
     return TrainingData(
-        names=names,
+        names=tuple(piece.name for piece in pieces),
         states=x,
-        delayed=delayed,
-        direct=direct,
-        windows=windows,
-        first_instants=first,
-        last_instants=end,
+        delayed=u,
+        direct=w,
+        windows=tuple(windows),
+        first_instants=tuple(piece.instants[0] for piece in pieces),
+        last_instants=tuple(piece.instants[1] for piece in pieces),
         dt=dt,
         state_labels=labels[0],
         input_labels=labels[1],
@@ -267,8 +294,90 @@ def gather(
         input_scale=scales[1],
         direct_scale=scales[2],
         input_map=input_map,
-        inputs=trained,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingArrays:
+    """What members of an ensemble are identified from, in physical units.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Runs.
+    states, delayed, direct : tuple of ndarray, each (time, channel)
+        States and both kinds of regressors, from the earliest sample that a member reads on.
+        Regressors end before the run's stop by what the model looks ahead.
+    offsets : tuple of int
+        Sample of the run at which its arrays start.
+    begins : tuple of float
+        Instant of the first sample of the arrays, s.
+    """
+
+    names: tuple[str, ...]
+    states: tuple[FloatArray, ...]
+    delayed: tuple[FloatArray, ...]
+    direct: tuple[FloatArray, ...]
+    offsets: tuple[int, ...]
+    begins: tuple[float, ...]
+
+    @classmethod
+    def read(
+        cls,
+        runs: Mapping[str, xr.Dataset],
+        states: Sequence[str],
+        inputs: Sequence[str],
+        samples: Sequence[tuple[int, int]],
+        input_map: InputMap,
+    ) -> Self:
+        """Samples from the first to before the second of each run."""
+        read = []
+        for (name, run), (first, end) in zip(runs.items(), samples, strict=True):
+            time = np.asarray(run["time"].values, dtype=float)
+            x = labelled.channel_matrix(run, states, name, slice(first, end))
+            labelled.check_finite(x, states, name, first, time)
+            span = Span(first, end - 1, max(end - input_map.lead_samples, first))
+            u, v = run_regressors(input_map, run, states, inputs, name, span)
+            for values in (x, u, v):
+                values.flags.writeable = False
+            read.append((name, x, u, v, first, float(time[min(first, time.size - 1)])))
+        return cls(*zip(*read, strict=True))
+
+    def without(self, run: int) -> Self:
+        """Those of the other runs."""
+        parts = (getattr(self, each.name) for each in fields(self))
+        return type(self)(*(part[:run] + part[run + 1 :] for part in parts))
+
+    def span(
+        self, run: int, settings: HankelSettings, last: int | None, dt: float
+    ) -> tuple[float, float]:
+        """First and last instant of a training window that ends at a sample of the run, s."""
+        end = self._end(run, last)
+        stop = self.begins[run] + end * dt
+        samples = end + 1 if settings.window is None else settings.window
+        return stop - (samples - 1) * dt, stop
+
+    def _end(self, run: int, last: int | None) -> int:
+        """Last sample of a window in the arrays of a run."""
+        return len(self.states[run]) - 1 if last is None else last - self.offsets[run]
+
+    def data(
+        self, settings: HankelSettings, run: int | None, last: int | None, signature: Signature
+    ) -> TrainingData:
+        """What :func:`gather` makes of these runs, or of one of them, with these settings.
+
+        The windows end at a sample of the run, None for the end of what is given.
+        """
+        input_map, pieces = signature.input_map, []
+        for each in range(len(self.names)) if run is None else (run,):
+            place, begin, final = _place(self._end(each, last), settings, input_map)
+            cut = slice(begin, final + 1)
+            shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
+            series = self.states[each][cut], self.delayed[each][cut], self.direct[each][cut]
+            instants = self.span(each, settings, last, signature.dt)
+            pieces.append(Piece(self.names[each], series, shifted, instants))
+        labels = signature.state_labels, signature.input_labels
+        return _standardised(pieces, signature.dt, labels, input_map, settings.standardize)
 
 
 def run_regressors(
@@ -298,7 +407,7 @@ def run_regressors(
     return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in found))
 
 
-def lengthened(values: FloatArray, length: int) -> FloatArray:
+def _lengthened(values: FloatArray, length: int) -> FloatArray:
     """Rows with the last one repeated where a look-ahead leaves one without: it is no column."""
     missing = length - len(values)
     return np.concatenate([values, values[-1:]]) if missing > 0 else values
@@ -326,12 +435,13 @@ def until(runs: Mapping[str, xr.Dataset], stop: Stop) -> dict[str, xr.Dataset]:
     DataError
         If the times of a run are not uniform.
     """
-    stops = stop_instants(stop, list(runs))
-    out = {}
+    stops, out = _stop_instants(stop, list(runs)), {}
     for name, run in runs.items():
         labelled.run_step(run, name)
-        last = last_sample(np.asarray(run["time"].values, dtype=float), stops[name], name)
-        out[name] = run.isel(time=slice(0, last + 1))
+        out[name] = run
+        if (at := stops[name]) is not None:
+            last = _last_sample(np.asarray(run["time"].values, dtype=float), at, name)
+            out[name] = run.isel(time=slice(0, last + 1))
     return out
 
 
@@ -364,7 +474,7 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
         )
 
 
-def stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
+def _stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
     """Last instant of each run's window as the user gave it; None for the run's end."""
     if stop is None:
         return dict.fromkeys(names)
@@ -391,31 +501,23 @@ def _one_stop(value: object, what: str) -> float | None:
     return None if value is None else labelled.as_instant(value, what)
 
 
-def last_sample(time: FloatArray, stop: float | None, name: str) -> int:
+def _last_sample(time: FloatArray, stop: float, name: str) -> int:
     """Last sample up to and including `stop`."""
-    if stop is None:
-        return time.size - 1
     nearest = labelled.nearest_sample(time, stop, name, "stop")
     step = (time[-1] - time[0]) / (time.size - 1)
     # "up to and including": a sample later than the stop by more than rounding is not included.
     return nearest if time[nearest] <= stop + 1e-3 * step else max(nearest - 1, 0)
 
 
-def _warn_of_dead(
-    runs: Sequence[str],
-    series: Sequence[FloatArray],
-    windows: Sequence[TrainingWindow],
-    scale: Scale,
-    names: Sequence[str],
-) -> None:
+def _warn_of_dead(pieces: Sequence[Piece], group: int, scale: Scale, names: Sequence[str]) -> None:
     """Warn of channels that move in some runs and stand still in others."""
-    for run, values, window in zip(runs, series, windows, strict=True):
-        seen = values[window.samples]
+    for piece in pieces:
+        seen = piece.series[group][piece.window.samples]
         for column in np.flatnonzero(is_constant(seen) & (scale.spread > 0)).tolist():
             warn(
-                f"channel '{names[column]}' of {run} is constant ({seen[0, column]:.6g}) over its "
-                "training window, and moves in other runs. If its sensor was dead, leave this run "
-                "out: the model would learn that nothing moves."
+                f"channel '{names[column]}' of {piece.name} is constant ({seen[0, column]:.6g}) "
+                "over its training window, and moves in other runs. If its sensor was dead, leave "
+                "this run out: the model would learn that nothing moves."
             )
 
 

@@ -94,7 +94,7 @@ def nowcast(
 
     Parameters
     ----------
-    model : HankelDMDcModel or HeldEnsemble
+    model : HankelDMDcModel or HankelEnsemble
         What has ``live``.
     run : Dataset
         A prepared run; in its test span, if it states one, forecasts start at even distances.
