@@ -10,7 +10,7 @@ import xarray as xr
 from seakeep.report.sections.data import chosen
 from seakeep.report.sections.errors import bands, regular, scales
 from seakeep.study import StudyResult
-from seakeep.study.judge import MEASURES, band_parts, box_table
+from seakeep.study.judge import MEASURES, band_tables, box_table
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def result():
         .assign_coords(run=["short"], name=names),
         "tests/t": test,
         "statistics/boxes": box_table(test).expand_dims(test=["t"]),
-        "statistics/bands": band_parts(test, None, 0.95).expand_dims(test=["t"]),
+        "statistics/bands": band_tables(test, None, 0.95)["bands"].expand_dims(test=["t"]),
     }  # fmt: skip
     attrs = {"settings": json.dumps(settings), "models": json.dumps({"m": {"ensemble": True}})}
     return StudyResult(None, attrs, groups)

@@ -26,10 +26,10 @@ from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.engine import Dynamics, model_runs, read_windows
+from seakeep.models.ensemble import spectral_radius
 from seakeep.models.executor import Progress, in_order
 from seakeep.models.following import LEAD
 from seakeep.models.interface import Scale, Signature
-from seakeep.models.members import spectral_radius
 from seakeep.models.observables import Observable, Powers, SlowSquares, named
 from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
