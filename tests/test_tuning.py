@@ -1,5 +1,6 @@
 """``seakeep.tune`` and ``seakeep tune``: the table, the figure, the file, and going on."""
 
+import json
 import shutil
 import sys
 import tomllib
@@ -309,3 +310,35 @@ def test_a_tuned_file_states_what_was_varied_in_periods_and_the_preset_it_goes_w
     assert round(float(tomllib.loads(text)["model"]["input_delays"].split()[0]) * 31.37) == 1234
     text = tuned_campaign(before.replace('"1 T"', "3"), None, spec, ["lead"], None, 20.0)
     assert tomllib.loads(text)["model"]["lead"] == 15
+
+
+def test_a_search_that_was_interrupted_goes_on(tmp_path):
+    kept = tmp_path / "kept.json"
+    done = []
+
+    def stop(number, total, what):
+        done.append(number)
+        if number == 2:
+            raise KeyboardInterrupt
+
+    more = {"vary": ["ridge"], "horizon": (15,), "resume": kept}
+    with pytest.raises(KeyboardInterrupt):
+        seakeep.tune(SPEC, runs(), STATES, INPUTS, progress=stop, **more)
+    assert len(json.loads(kept.read_text())["scores"]) == 1  # the second was not handed on
+    counted = []
+    again = seakeep.tune(
+        SPEC, runs(), STATES, INPUTS, progress=lambda *each: counted.append(each), **more
+    )
+    assert len(counted) == 2  # of three folds
+    whole = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,))
+    assert again.table.identical(whole.table)
+    with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
+        seakeep.tune(SPEC, runs(2), STATES, INPUTS, **more)
+    shifted = {name: run.assign_coords(time=run["time"] + 1.0) for name, run in runs().items()}
+    longer = {name: run.assign_attrs(encounter_period=2.0) for name, run in runs().items()}
+    for others in (shifted, longer):  # the same values
+        with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
+            seakeep.tune(SPEC, others, STATES, INPUTS, **more)
+    kept.write_text("[]")
+    with pytest.raises(RequestError, match="keeps no scores of a search"):
+        seakeep.tune(SPEC, runs(), STATES, INPUTS, **more)

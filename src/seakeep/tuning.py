@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import hashlib
+import json
+from collections.abc import Collection, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +15,9 @@ import xarray as xr
 
 from seakeep.arrays import Progress
 from seakeep.errors import RequestError
+from seakeep.files import read_bytes, replacing
 from seakeep.models import HankelDMDc
-from seakeep.models.labelled import Runs, Stop, as_runs
+from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
 from seakeep.models.selection import Selected, select
 from seakeep.models.settings import FOLDS, Folds
 from seakeep.models.training import check_names, until
@@ -113,6 +117,7 @@ def tune(
     executor: Executor | None = None,
     seed: int = 0,
     progress: Progress | None = None,
+    resume: str | Path | None = None,
 ) -> TuneResult:
     """Choose settings by the error of free runs on training runs that are held out in turn.
 
@@ -144,6 +149,8 @@ def tune(
         Of the bootstrap of the intervals.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
+    resume : str or Path, optional
+        File that keeps the scores, so that an interrupted search continues.
 
     Returns
     -------
@@ -153,7 +160,8 @@ def tune(
     Raises
     ------
     RequestError
-        If `vary` names something else, or the delay rows are not exact.
+        If `vary` names something else, the delay rows are not exact, or a file to resume is of
+        other runs or settings.
     DataError
         As :meth:`HankelDMDc.fit`.
     """
@@ -166,9 +174,14 @@ def tune(
     check_names(states, inputs)
     if spec.select is not None and spec.select.observables:
         vary = list(dict.fromkeys([*vary, "observables"]))
+    named = until(as_runs(runs), stop)
+    known: MutableMapping[str, Any] = {}
+    if resume is not None:
+        asked = [spec.to_json(), sorted(vary), list(horizon), folds]
+        known = _Scores(Path(resume), _digest(asked, named, [*states, *inputs]))
     found = select(
         spec,
-        until(as_runs(runs), stop),
+        named,
         list(states),
         list(inputs),
         vary=vary,
@@ -178,8 +191,48 @@ def tune(
         executor=executor,
         progress=progress,
         seed=seed,
+        known=known,
     )
     return TuneResult(replace(found.settings, select=None), found.rows, found.note, found.readouts)
+
+
+def _digest(asked: object, runs: dict[str, xr.Dataset], channels: Sequence[str]) -> str:
+    """Checksum of what a search depends on."""
+    found = hashlib.sha256(json.dumps(asked, sort_keys=True).encode())
+    for name, run in runs.items():
+        found.update(name.encode())
+        facts = {key: run[key].attrs for key in channels} | {"run": run.attrs}
+        found.update(repr(facts).encode())
+        for values in (run["time"].values, channel_matrix(run, channels, name)):
+            found.update(np.ascontiguousarray(values).tobytes())
+    return found.hexdigest()
+
+
+class _Scores(dict[str, Any]):
+    """Scores in a file: each one that is added is written."""
+
+    def __init__(self, path: Path, digest: str) -> None:
+        self.path, self.digest = path, digest
+        if path.exists():
+            try:
+                content = json.loads(read_bytes(path))
+                known, scores = content["digest"], dict(content["scores"])
+            except (ValueError, LookupError, TypeError) as error:
+                raise RequestError(
+                    f"{path} keeps no scores of a search ({error}). Name another file, or remove "
+                    "it."
+                ) from None
+            if known != digest:
+                raise RequestError(
+                    f"{path} keeps scores of other runs or settings. Name another file, or remove "
+                    "it to start anew."
+                )
+            self.update(scores)
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        super().__setitem__(key, value)
+        with replacing(self.path) as place:
+            place.write_text(json.dumps({"digest": self.digest, "scores": self}), encoding="utf-8")
 
 
 def tuned_campaign(

@@ -46,7 +46,7 @@ def tune(
 
     Each candidate is fitted to all training runs but one and judged by free runs on that one.
     The choice is written into a copy of the campaign file, and all that was tried into a CSV file
-    beside it.
+    beside it. After an interruption, the same command continues the search.
 
     Example: seakeep tune docs/tutorial/campaign.toml --vary input_delays
     """
@@ -80,6 +80,7 @@ def tune(
         spec, _, runs, stop = read_training(read, model, progress)
     assert isinstance(spec, HankelDMDc)
     period = read.encounter_period() if counts_in_periods(settings) else None
+    scores = target.with_suffix(".scores.json")
     chosen = spec.select or Select(period=period)
     varied = {*(vary or ["observables"]), *(["observables"] if chosen.observables else [])}
     with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
@@ -94,6 +95,7 @@ def tune(
             stop=stop,
             executor=executor,
             progress=progress,
+            resume=scores,
         )
     typer.echo(found.describe())
     samples = None if period is None else period / labelled.common_step(runs)
@@ -101,6 +103,7 @@ def tune(
     with replacing(target) as place:
         text = tuned_campaign(before, model, found.spec, varied, preset_of(settings), samples)
         place.write_text(text, encoding="utf-8")
+    scores.unlink(missing_ok=True)
     say(f"Wrote {target}. Fit it with: seakeep fit {target} -o model.nc")
     if not found.table.sizes["trial"]:
         return

@@ -9,7 +9,8 @@ of a candidate and a fold gives the whole path of λ (:mod:`seakeep.core.path`).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import json
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -65,6 +66,8 @@ Columns = tuple[ProbeAlignment | None, int | None]
 """An alignment, and the look-ahead in samples where it is part of it: columns of their own."""
 Scores = tuple[FloatArray, FloatArray]
 """Scores, shape (level, window), and weights of the windows, which sum to one in a fold."""
+Known = MutableMapping[str, list[list[Any]]]
+"""Scores and weights by candidate and fold, as JSON values."""
 ALIKE = 0.03
 """Part of the lowest error by which the chosen λ may be worse.
 
@@ -360,6 +363,7 @@ def _judge(
     problems: Mapping[Columns, Problem],
     trials: dict[Settings, Trial],
     candidates: Iterable[Settings],
+    known: Known,
     executor: Executor | None,
     progress: Progress | None,
     later: int = 0,
@@ -373,14 +377,22 @@ def _judge(
         if progress is not None:
             progress(before + done, before + total + after, what)
 
-    units = list(itertools.product(new, folds))
+    keys = {unit: _key(*unit) for unit in itertools.product(new, folds)}
+    units = [unit for unit, key in keys.items() if key not in known]
     found = in_order(_unit, problems, units, executor, tell, "candidate and fold")
+    for unit, made in zip(units, found, strict=True):
+        known[keys[unit]] = [part.tolist() for part in made]
     for candidate in new:
-        scores, weights = zip(*itertools.islice(found, len(folds)), strict=True)
+        parts = [map(np.array, known[keys[candidate, fold]]) for fold in folds]
+        scores, weights = zip(*parts, strict=True)
         joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
         levels = problems[_columns_of(candidate)].levels(candidate)
         every = np.concatenate(scores, axis=1)
         trials[candidate] = Trial(levels, every, joined / joined.sum())
+
+
+def _key(candidate: HankelSettings, fold: int) -> str:
+    return json.dumps([candidate.to_json(), fold], sort_keys=True)
 
 
 def _unit(problems: Mapping[Columns, Problem], item: tuple[HankelSettings, int]) -> Scores:
@@ -504,6 +516,7 @@ def select(
     executor: Executor | None = None,
     progress: Progress | None = None,
     seed: int = 0,
+    known: Known | None = None,
 ) -> Selected[Settings]:
     """Choose settings by free runs on training runs that are held out in turn.
 
@@ -537,6 +550,8 @@ def select(
         Called with what is done.
     seed : int
         Of the bootstrap of the intervals.
+    known : mapping, optional
+        Scores and weights by candidate and fold that need not be computed; new ones are added.
 
     Returns
     -------
@@ -584,18 +599,19 @@ def select(
         complete = replace(settings, readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
     trials: dict[Settings, Trial] = {}
+    work = ({} if known is None else known), executor, progress
     best, later = base, sum(len(changes) - 1 for changes in steps)  # the best is among them
     for changes in ([{}], *steps):
         later -= len(changes) - 1
         tried = [replace(best, **change) for change in changes]
-        _judge(problems, trials, tried, executor, progress, later)
+        _judge(problems, trials, tried, *work, later)
         best = min(trials, key=lambda each: float(trials[each].means.min()))
     taken, level = _best(problems, trials, best, 0.0 if folds == "sea_state" else ALIKE)
     without = {
         left: replace(taken, observables=tuple(o for o in taken.observables if o != left))
         for left in taken.observables
     }
-    _judge(problems, trials, without.values(), executor, progress)
+    _judge(problems, trials, without.values(), *work)
     worth = "".join(
         f"; without {named(left)} {trials[less].means.min():.3f}" for left, less in without.items()
     )
