@@ -1,6 +1,5 @@
 """The three acts of ``seakeep reproduce``: one tank, the same windows, and a page over them."""
 
-import html
 import os
 import signal
 import subprocess
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from markupsafe import escape
 from started import started
 from tutorial_study import put_tutorial
 
@@ -235,7 +235,7 @@ def test_the_page_over_the_acts_links_to_theirs(played):
     page = write_reproduction(played, read_reproduction(played)).read_text("utf-8")
     for act in ACTS[:2]:
         assert f'href="{act.name}/report.html"' in page
-        assert html.escape(act.title) in page
+        assert escape(act.title) in page
     for name in ("short", "acts", "claims", "channels_irregular", "waves", "positions"):
         assert f'id="table-{name}"' in page
 

@@ -53,7 +53,8 @@ def check(
     warn_of_runs(runs.values(), [*identified.states, *identified.inputs])
     try:
         channels = (identified.states, identified.inputs)
-        baselines = fit_baselines(read, *channels, prepared=None if run else runs)
+        prepared = None if run else runs
+        baselines = fit_baselines(read, *channels, prepared=prepared, beside=identified)
     except SeakeepError as error:
         say(f"Note: no baselines to compare with: {error}")
         baselines = {}

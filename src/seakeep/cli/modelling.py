@@ -374,7 +374,7 @@ def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str
     first = next(iter(fitted.values()))
     channels = max((each.inputs for each in fitted.values()), key=len)
     with progress_bar("Baselines") as progress:
-        found = fit_baselines(campaign, first.states, channels, progress)
+        found = fit_baselines(campaign, first.states, channels, progress, beside=first)
     names = {kind: kind if kind not in fitted else f"{kind} (baseline)" for kind in found}
     return {**fitted, **{names[kind]: each for kind, each in found.items()}}
 

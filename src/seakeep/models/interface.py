@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar, Literal, Protocol, Self
+from typing import Any, ClassVar, Literal, Protocol, Self
 
 import numpy as np
 import xarray as xr
@@ -159,6 +159,11 @@ class Model(Protocol):
     @property
     def kind(self) -> str:
         """Word of its spec in TOML files and in :data:`seakeep.models.registry.KINDS`."""
+        ...
+
+    @property
+    def settings(self) -> Any:
+        """Settings that it was fitted with; of an ensemble, those that its members share."""
         ...
 
     @property

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -24,6 +25,8 @@ from seakeep.study.plan import between
 from seakeep.study.resolve import build_spec, can_align, counts_in_periods, mistakes_of
 from seakeep.toml import Length, refusal
 
+MAPS = {"alignment", "lead", "observables"}
+"""Settings that say how measured inputs drive a model."""
 NOTHING_TRAINS = (
     "no run of the campaign trains a model. Give one role = 'train', or a span "
     "train = [start, end]."
@@ -181,6 +184,8 @@ def fit_baselines(
     inputs: Sequence[str],
     progress: Progress | None = None,
     prepared: Mapping[str, xr.Dataset] | None = None,
+    *,
+    beside: Model | None = None,
 ) -> dict[str, Model]:
     """Fit every baseline, with its recommended settings, to the training runs of a campaign.
 
@@ -194,6 +199,9 @@ def fit_baselines(
         Called as ``progress(done, total, run)`` while runs are prepared.
     prepared : mapping of str to Dataset, optional
         Prepared runs, the training runs among them; by default these are prepared here.
+    beside : Model, optional
+        Model whose look-ahead, alignment and observables the baselines take, so that what differs
+        is the method.
 
     Returns
     -------
@@ -219,8 +227,10 @@ def fit_baselines(
     found: dict[str, Model] = {}
     for kind in (kind for kind, each in KINDS.items() if each.role == "reference"):
         recommended = getattr(KINDS[kind], "recommended", None)
-        spec = KINDS[kind]() if recommended is None else recommended(period, dt)
+        spec: Any = KINDS[kind]() if recommended is None else recommended(period, dt)
         try:
+            if beside is not None:
+                spec = replace(spec, **_input_map(spec, beside.settings))
             found[kind] = spec.fit(runs, states, inputs)
         except SeakeepError as error:
             warn(
@@ -229,6 +239,12 @@ def fit_baselines(
                 f"{kind}, and name its file beside the model's."
             )
     return found
+
+
+def _input_map(spec: Any, settings: Any) -> dict[str, Any]:
+    """Settings of an input map that a spec has in common with those of a model."""
+    own, others = ({each.name for each in fields(part) if each.init} for part in (spec, settings))
+    return {name: getattr(settings, name) for name in MAPS & own & others}
 
 
 def _prepared_tests(campaign: Campaign, known: Collection[str]) -> dict[str, xr.Dataset]:

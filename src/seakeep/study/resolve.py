@@ -195,7 +195,8 @@ def resolve_model(
     filled: Spec | None = None
     if preset is not None:
         filled = getattr(kind, preset)(encounter_period, dt)
-        if alignment is not None and "alignment" in known:
+        # That of the preset is optional: windows of runs that allow none have no room for it.
+        if "alignment" in known and (alignment or (not aligned and "alignment" not in stated)):
             filled = replace(cast("Any", filled), alignment=alignment)
     data = {"encounter_period": encounter_period, "dt": dt}
     spec = _made(kind, filled, {**from_study, **stated}, data).resolved(dt, encounter_period)
