@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -67,7 +68,7 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
     divergence, beside = divergence_table(first, "bayesian", "paper"), ", beside the paper's"
     links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
     sections += [
-        section("channels", tables=heat),
+        section("channels", tables=[acts_table(results), *heat]),
         Section("densities", f"Divergence of the densities{beside}", tables=(divergence,)),
         section("waves", tables=wave_tables(first)),
         section("studies", links=links),
@@ -80,14 +81,15 @@ def _played(results: Results) -> list[Act]:
 
 
 def _summary(results: Results) -> Section:
-    """What the acts found: one sentence, one figure, one short table; the whole one is folded."""
+    """What the acts found: one sentence, one figure, one short table."""
+    short = short_table(results)
     repeats = [result.groups.get("repeats") for result in results.values()]
     return section(
         "summary",
-        more=(finding(results), still_water(results), NOTE),
+        more=(finding(results), NOTE),
         points=[f"{act.title}. {act.sentence}" for act in _played(results)],
         figures=(drawing("acts", partial(acts_figure, results)),),
-        tables=(short_table(results), acts_table(results)),
+        tables=(replace(short, note=f"{short.note} {still_water(results)}"),),
         # Once what several studies warn of.
         notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each is not None)),
     )
