@@ -234,10 +234,7 @@ def _propagator(
 ) -> _Propagator:
     """The propagator that costs least; of one step where a longer one overflows."""
     if len(a) == count < a.shape[1]:
-        block, row, per_state = SHIFTING_COST
-        best = round(math.sqrt(steps * block / (row + per_state * count)))
-        times = max(1, min(steps, best, -(-OUTPUT_ROWS // count)))
-        propagator = _shifting_propagator(a, b, channels, times)
+        propagator = _shifting_propagator(a, b, channels, _shifting_steps(count, steps))
         if np.isfinite(propagator.output_state).all():
             return propagator
         return _shifting_propagator(a, b, channels, 1)
@@ -248,6 +245,13 @@ def _propagator(
     if times and not np.isfinite(propagator.state).all():
         propagator = _square_propagator(a, b, count, channels, 0)
     return propagator
+
+
+def _shifting_steps(states: int, steps: int) -> int:
+    """Steps of an exact-shift propagator that cost least over a free run."""
+    block, row, state = SHIFTING_COST
+    best = round(math.sqrt(steps * block / (row + state * states)))
+    return max(1, min(steps, best, -(-OUTPUT_ROWS // states)))
 
 
 def _shifting_propagator(
