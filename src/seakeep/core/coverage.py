@@ -355,11 +355,6 @@ class BoxStatistics:
     count: int
     left_out: int
 
-    @property
-    def interquartile_range(self) -> float:
-        """Height of the box."""
-        return self.upper_quartile - self.lower_quartile
-
 
 def box_statistics(values: npt.ArrayLike, reach: float = 1.5) -> BoxStatistics:
     """Quartiles, whiskers and outliers of a sample (Tukey), as matplotlib draws them.

@@ -351,11 +351,6 @@ class HankelSettings:
             return None
         return STABLE_RADIUS if self.stable is True else float(self.stable)
 
-    @property
-    def is_mapped(self) -> bool:
-        """Whether inputs drive the model otherwise than as they are."""
-        return bool(self.alignment is not None or self.lead or self.observables)
-
     def input_map(
         self,
         runs: dict[str, xr.Dataset],
