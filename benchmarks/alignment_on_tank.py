@@ -40,10 +40,10 @@ ALIGNMENTS["predicted, dispersion"] = seakeep.ProbeAlignment(mode="dispersion", 
 ALIGNMENTS["none"] = None
 
 
-def irregular_runs():
-    """Mean encounter period, and the irregular runs of the tank as `seakeep prepare` makes them."""
+def irregular_runs(settings=None):
+    """Mean encounter period, and the irregular runs of a tank as `seakeep prepare` makes them."""
     with tempfile.TemporaryDirectory() as folder:
-        runs = deliver(Path(folder)).campaign.prepare()
+        runs = deliver(Path(folder), settings).campaign.prepare()
     period = next(iter(runs.values())).attrs["encounter_period"]
     return period, {name: used(run) for name, run in runs.items()}
 

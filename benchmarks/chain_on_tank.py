@@ -53,9 +53,9 @@ def irregular(settings: TankSettings) -> list[str]:
     return [name for name, run in settings.runs.items() if run.spectrum is not None]
 
 
-def deliver(folder: Path) -> Delivered:
+def deliver(folder: Path, settings: TankSettings | None = None) -> Delivered:
     """Play the irregular runs into a folder and take the truth out of it."""
-    settings = default_settings()
+    settings = settings or default_settings()
     play(settings, folder, names=irregular(settings))
     truth = {}
     for path in sorted((folder / "truth").iterdir()):

@@ -6,7 +6,7 @@ of the two others. A step adds one thing to the step above it: data, look-ahead,
 ridge and observables, read-outs. FIR gets the same data, look-ahead and input map; its length and
 its ridge are those that err least where each training run is forecast by a model of the other.
 
-    python benchmarks/steps_on_tank.py [--out FILE.md]
+    python benchmarks/steps_on_tank.py [--losses FACTOR] [--out FILE.md]
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from timing import machine
 import seakeep
 from seakeep.baselines import FIR
 from seakeep.models.settings import periods_to_samples
+from seakeep.tank.settings import default_settings
 
 SLOW = ("surge", "mooring_bow", "mooring_stern")
 STEPS = (
@@ -39,6 +40,17 @@ LENGTHS, RIDGES = (2, 3, 5), (1e-4, 1e-3, 1e-2, 1e-1)
 """Encounter periods and λ per snapshot among which FIR's are chosen."""
 MEASURED = seakeep.ProbeAlignment(mode="dispersion", surge="measured")
 FOLLOWS = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
+
+
+def with_losses(factor):
+    """The default tank with viscous damping of the vessel times a factor."""
+    settings = default_settings()
+    scaled = {
+        name: damping.model_copy(update={k: factor * v for k, v in damping})
+        for name in ("linear_damping", "quadratic_damping")
+        for damping in [getattr(settings.vessel, name)]
+    }
+    return settings.model_copy(update={"vessel": settings.vessel.model_copy(update=scaled)})
 
 
 def specs(period, dt):
@@ -133,9 +145,12 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     place = Path(__file__).parent / "results" / "steps_on_tank.md"
     parser.add_argument("--out", type=Path, default=place, help="file for the table")
+    parser.add_argument(
+        "--losses", type=float, default=1.0, help="factor on the vessel's viscous losses"
+    )
     options = parser.parse_args(arguments)
     warnings.simplefilter("ignore", seakeep.SeakeepWarning)
-    period, runs = irregular_runs()
+    period, runs = irregular_runs(with_losses(options.losses))
     heads = ("step", "HDMDc: waves", "HDMDc: slow", "FIR: waves", "FIR: slow")
     rows = [heads, ["---"] * len(heads)]
     for row in rows_of(period, runs):
@@ -144,8 +159,9 @@ def main(arguments=None):
     facts = machine()
     text = f"""# What each step to the recommended model brings
 
-Made by `python benchmarks/steps_on_tank.py` with seakeep {seakeep.__version__}, Python
-{facts["python"]}, on {facts["cores"]} cores of an {facts["processor"]}.
+Made by `python benchmarks/steps_on_tank.py --losses {options.losses:g}` with seakeep
+{seakeep.__version__}, Python {facts["python"]}, on {facts["cores"]} cores of an
+{facts["processor"]}.
 
 Three irregular runs of the virtual tank, each forecast over {PERIODS} T̂ by models of the other two.
 NRMSE per window, averaged over the eight channels that follow the waves and over the three that

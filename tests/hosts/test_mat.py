@@ -25,6 +25,7 @@ def evaluated(text, p):
     return np.stack([eval(row, FUNCTIONS | {"p": p}) for row in rows], axis=1)
 
 
+@pytest.mark.filterwarnings("ignore:.*spmatrix")  # older scipy does not take the argument
 @pytest.mark.parametrize("name", ["full", "arx"])
 def test_a_mat_file_with_observables_computes_the_forecast(cases, tmp_path, name):
     case = cases[name]
