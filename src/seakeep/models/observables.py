@@ -157,12 +157,7 @@ class Observable(Protocol):
 
     kind: ClassVar[str]
 
-    def bind(
-        self,
-        inputs: Sequence[ChannelLabel],
-        period: float | None,
-        dt: float,
-    ) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Columns for these inputs.
 
         `period` is the encounter period in samples, None where no observable of the model has a
@@ -266,12 +261,7 @@ class SlowSquares:
         if self.period is not None:
             check_number("slow_squares: period", self.period, "seconds above 0", TINY)
 
-    def bind(
-        self,
-        inputs: Sequence[ChannelLabel],
-        period: float | None,
-        dt: float,
-    ) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
         period = period if self.period is None else self.period / dt
@@ -345,12 +335,7 @@ class Powers:
         object.__setattr__(self, "powers", powers)
         check_flag("powers: products", self.products)
 
-    def bind(
-        self,
-        inputs: Sequence[ChannelLabel],
-        period: float | None,
-        dt: float,
-    ) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
         pairs = list(combinations(places, 2)) if self.products else []
@@ -414,12 +399,7 @@ class Expression:
             )
         expressions.parse(self.expression)
 
-    def bind(
-        self,
-        inputs: Sequence[ChannelLabel],
-        period: float | None,
-        dt: float,
-    ) -> Bound:
+    def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         parsed = expressions.parse(self.expression)
         places = {name: _column(inputs, name, self.kind) for name in parsed.channels}

@@ -216,15 +216,14 @@ def gather(
     pieces, read = [], []
     for name, run in runs.items():
         time = np.asarray(run.variables["time"].values, dtype=float)
-        place, begin, final = _place(time.size - 1, settings, input_map)
-        _check_length(place, final, name, window, reach, history)
-        here = labelled.channel_matrix(run, states, name, slice(begin, final + 1))
+        place, shifted, cut = _place(time.size - 1, settings, input_map)
+        _check_length(place, cut.stop - 1, name, window, reach, history)
+        begin, here = cut.start, labelled.channel_matrix(run, states, name, cut)
         needed = min(place.first, place.first_column - state_delays)
         labelled.check_finite(here[needed - begin :], states, name, needed, time)
         needed = min(place.first, place.first_column - input_delays)
         span = Span(begin, place.last, place.last + 1 - input_map.lead_samples)
         found = run_regressors(input_map, run, states, inputs, name, span, needed)
-        shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
         instants = time[place.first], time[place.last]
         pieces.append(Piece(name, (here, *found), shifted, instants))
         read.append(labelled.channel_matrix(run, inputs, name, place.samples))
@@ -247,8 +246,8 @@ class Piece(NamedTuple):
 
 def _place(
     last: int, settings: HankelSettings, input_map: InputMap
-) -> tuple[TrainingWindow, int, int]:
-    """Window that ends at a sample, the first sample that it reads, and its last successor.
+) -> tuple[TrainingWindow, TrainingWindow, slice]:
+    """Window that ends at a sample, the same in what it reads up to its last successor, and that.
 
     A step from j reads the input up to j + lead, and none after the window.
     """
@@ -256,7 +255,9 @@ def _place(
     reach = max(delays, input_map.history(settings.input_delays))
     place = training_window(last, settings.window, delays, reach, settings.history)
     begin = min(place.first, place.first_column - reach)
-    return place, begin, last - max(input_map.lead_samples - 1, 0)
+    final = last - max(input_map.lead_samples - 1, 0)
+    shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
+    return place, shifted, slice(begin, final + 1)
 
 
 def _standardised(
@@ -370,9 +371,7 @@ class TrainingArrays:
         """
         input_map, pieces = signature.input_map, []
         for each in range(len(self.names)) if run is None else (run,):
-            place, begin, final = _place(self._end(each, last), settings, input_map)
-            cut = slice(begin, final + 1)
-            shifted = TrainingWindow(place.first - begin, final - begin, place.first_column - begin)
+            _, shifted, cut = _place(self._end(each, last), settings, input_map)
             series = self.states[each][cut], self.delayed[each][cut], self.direct[each][cut]
             instants = self.span(each, settings, last, signature.dt)
             pieces.append(Piece(self.names[each], series, shifted, instants))
