@@ -300,14 +300,14 @@ def write_netcdf(
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
-    made = io.BytesIO()
-    with h5netcdf.File(made, "w") as file:
+    buffer = io.BytesIO()
+    with h5netcdf.File(buffer, "w") as file:
         dataset.dump_to_store(H5NetCDFStore(file, mode="a"), encoding=encoding or {})
-    _seal(path, made)
+    _seal(path, buffer)
 
 
-def _seal(path: Path, made: io.BytesIO) -> None:
-    with path.open("wb") as whole, made.getbuffer() as content:
+def _seal(path: Path, buffer: io.BytesIO) -> None:
+    with path.open("wb") as whole, buffer.getbuffer() as content:
         whole.write(content)
         whole.write(SEAL + hashlib.sha256(content).hexdigest().encode())
 
@@ -407,14 +407,14 @@ def write_sealed_array(
     """Write one series ``values`` as :func:`write_sealed` does, in a few milliseconds."""
     import h5py
 
-    target, made = Path(path), io.BytesIO()
+    target, buffer = Path(path), io.BytesIO()
     check_output(target, kind)
-    with h5py.File(made, "w") as file:
+    with h5py.File(buffer, "w") as file:
         file.attrs.update({**attrs, **_head(kind)})
         file["values"] = values
         file["values"].make_scale("values")  # a dimension of NetCDF
     with replacing(target) as temporary:
-        _seal(temporary, made)
+        _seal(temporary, buffer)
     return target
 
 

@@ -197,15 +197,15 @@ def sync(run: Run, clocks: Mapping[str, Clock] | None = None) -> Run:
     if clocks is not None:
         return replace(run, clocks=clocks)
     reference, *others = run.loggers.values()
-    found = {reference.name: Clock()}
+    by_reference = {reference.name: Clock()}
     instruments = run.settings.instruments
     for each in others:
         try:
-            found[each.name] = _clock(each, reference, instruments[each.name], instruments)
+            by_reference[each.name] = _clock(each, reference, instruments[each.name], instruments)
         except SeakeepError as error:
             place = f"run '{run.name}', clock of '{each.name}' ({each.path})"
             raise type(error)(f"{place}: {error}") from None
-    return replace(run, clocks=found)
+    return replace(run, clocks=by_reference)
 
 
 def _clock(
@@ -269,7 +269,7 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
     """Logger that holds each channel."""
     if len(run.loggers) == 1:
         return dict.fromkeys(channels, next(iter(run.loggers)))
-    found = {}
+    homes = {}
     for name, each in channels.items():
         if each.instrument is not None:
             if each.instrument not in run.loggers:
@@ -278,7 +278,7 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
                     f"channels.{name}.instrument: run '{run.name}' has no file of "
                     f"'{each.instrument}'.{near} Its files: {', '.join(run.loggers)}."
                 )
-            found[name] = each.instrument
+            homes[name] = each.instrument
             continue
         column, tables = each.column or name, [one.columns for one in run.loggers.values()]
         having = [key for key, one in run.loggers.items() if one.columns.find(column) is not None]
@@ -294,19 +294,19 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
                 f"run '{run.name}': the column '{column}' of channel '{name}' stands in the files "
                 f"of {' and '.join(having)}. State instrument = '{having[0]}' in [channels.{name}]."
             )
-        found[name] = having[0]
-    return found
+        homes[name] = having[0]
+    return homes
 
 
 def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings]) -> xr.Dataset:
     """Channels of one logger, gaps and jitter as they are."""
     time = run.clocks[logger.name].reference(logger.time)
-    kept = _recorded(time, run, logger)
+    records = _recorded(time, run, logger)
     variables = {}
     for name, each in channels.items():
         values, attributes = _converted(name, each, run, logger)
-        variables[name] = ("time", values[kept], attributes)
-    coordinate = ("time", time[kept], {"units": "s", "long_name": "time"})
+        variables[name] = ("time", values[records], attributes)
+    coordinate = ("time", time[records], {"units": "s", "long_name": "time"})
     return xr.Dataset(variables, {"time": coordinate})
 
 
@@ -473,13 +473,13 @@ def flag_samples(data: xr.Dataset, replaced: bool) -> xr.Dataset:
         there = (flags & (MISSING | BRIDGED)) == 0
         if np.isfinite(step := reading_step(x)):
             data[name].attrs["reading_step"] = step
-        held = find_held(x, dt) & there
-        for start, end in stretches(held):  # what stands before a gap that was filled
-            held[start:end] = end - start > 2
-        outlier, edge = find_outliers(x) & there & ~held, saturated(x, held)
+        stuck = find_held(x, dt) & there
+        for start, end in stretches(stuck):  # what stands before a gap that was filled
+            stuck[start:end] = end - start > 2
+        outlier, edge = find_outliers(x) & there & ~stuck, saturated(x, stuck)
         flags[outlier] |= OUTLIER
         flags[edge] |= SATURATED
-        flags[held & ~edge] |= STUCK
+        flags[stuck & ~edge] |= STUCK
         if replaced and outlier.any():
             filled = bridge(np.where(outlier, np.nan, x), dt, np.inf).values
             data[name] = data[name].copy(data=filled)
@@ -511,8 +511,8 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
             continue
         data = groups[home[name]]
         step = uniform_step(data["time"].to_numpy(), f"run '{run.name}'")
-        made = derive(data.variables, name, settings, step, run.name)
-        groups[home[name]] = data.assign({name: made.pop(name)}).assign_coords(made)
+        variable = derive(data.variables, name, settings, step, run.name)
+        groups[home[name]] = data.assign({name: variable.pop(name)}).assign_coords(variable)
     return replace(run, groups=groups, late=tuple(late))
 
 
@@ -790,9 +790,9 @@ def attributes_of(
         if span is None and settings.serves == use:
             span = whole
         if span is not None:
-            kept = time[inside(time, span, dt)]
-            if kept.size:
-                attributes[f"{use}_span"] = (float(kept[0]), float(kept[-1]))
+            used = time[inside(time, span, dt)]
+            if used.size:
+                attributes[f"{use}_span"] = (float(used[0]), float(used[-1]))
     for logger, clock in list(clocks.items())[1:]:
         attributes |= {
             f"clock_{logger}": clock.describe(),
@@ -814,10 +814,10 @@ def celerity_of(run: xr.Dataset, dt: float, campaign: CampaignSettings) -> float
     apart = campaign.rig.positions[channels[1]] - campaign.rig.positions[channels[0]]
     try:
         first, last = (run[name].to_numpy() for name in channels)
-        found = effective_celerity(first, last, dt, apart, depth)
+        celerity = effective_celerity(first, last, dt, apart, depth)
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
         return None
-    return found.celerity
+    return celerity.celerity
 
 
 def version() -> str:

@@ -240,9 +240,11 @@ class FIR(LinearSpec):
             raise RequestError(
                 "a FIR model is a filter of its inputs and has none; name at least one input."
             )
-        found = data.regress(self, None)
-        size = len(found.coefficients)
-        return replace(found, coefficients=np.hstack([np.zeros((size, size)), found.coefficients]))
+        system = data.regress(self, None)
+        size = len(system.coefficients)
+        return replace(
+            system, coefficients=np.hstack([np.zeros((size, size)), system.coefficients])
+        )
 
 
 @dataclass(frozen=True)

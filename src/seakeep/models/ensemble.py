@@ -190,8 +190,8 @@ class HankelEnsemble(Forecaster, store.Saved):
 
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
-        found = [self.dynamics(number) for number in members]
-        return linear_runs(found, groups, self.signature.readouts)
+        runs = [self.dynamics(number) for number in members]
+        return linear_runs(runs, groups, self.signature.readouts)
 
     def system_matrices(self) -> Iterator[FloatArray]:
         """Â of each member."""
@@ -269,8 +269,8 @@ class HankelEnsemble(Forecaster, store.Saved):
             When they are found, if one or more are not below one.
         """
         if not self._radii:
-            found = in_order(_spectral_radius, self, range(self.n_members), executor, progress)
-            radii = np.array(list(found))
+            values = in_order(_spectral_radius, self, range(self.n_members), executor, progress)
+            radii = np.array(list(values))
             radii.flags.writeable = False
             self._radii.append(radii)
             _warn_of_unstable(radii)
@@ -318,17 +318,17 @@ class HankelEnsemble(Forecaster, store.Saved):
         if self.selection:
             lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
         if (calibration := self.calibration) is not None:
-            found, count_of = calibration.found, sum(calibration.windows.values())
+            margin, count_of = calibration.conformal, sum(calibration.windows.values())
             line = (
-                f"  band          calibrated for {found.level:g} on "
+                f"  band          calibrated for {margin.level:g} on "
                 f"{counted(count_of, 'window')} of {calibration.steps} steps: "
             )
             if calibration.floor is None:
-                line += f"wider by {_range(found.margin / self.state_spread, '.2g')} "
+                line += f"wider by {_range(margin.margin / self.state_spread, '.2g')} "
             else:
                 what = "a learnt scale" if calibration.scale == "learnt" else "spread"
                 line += (
-                    f"{_range(found.margin, '.2g')} times {what} and a floor of "
+                    f"{_range(margin.margin, '.2g')} times {what} and a floor of "
                     f"{_range(calibration.floor / self.state_spread, '.2g')} "
                 )
             lines.append(line + "training SD either way")
@@ -636,11 +636,11 @@ class HankelEnsemble(Forecaster, store.Saved):
         windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
         with one_blas_thread():
             out = self.free_runs([windows], range(self.n_members))[0][:, 0]
-        kept = out[first_lost(out) < 0]
-        values = statistics_of(kept, level)[None]
+        complete = out[first_lost(out) < 0]
+        values = statistics_of(complete, level)[None]
         values = widened(self.calibration, values, band, self.signature, windows)
         mean, std, lower, upper = values[0]
-        return BandForecast(mean, std, lower, upper, len(out) - len(kept))
+        return BandForecast(mean, std, lower, upper, len(out) - len(complete))
 
     def live(
         self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
@@ -650,8 +650,8 @@ class HankelEnsemble(Forecaster, store.Saved):
         The filter predicts with the mean of the members, whose errors on what they learnt from
         are found here; a forecast runs all of them.
         """
-        kept = self if self.identified else self.hold()
-        return Live(kept, kept.identified, kept.errors, like=like, noise=noise)
+        members = self if self.identified else self.hold()
+        return Live(members, members.identified, members.errors, like=like, noise=noise)
 
     @cached_property
     def errors(self) -> LeadErrors:
@@ -729,8 +729,8 @@ class HankelEnsemble(Forecaster, store.Saved):
         DataError
             If a run cannot be used.
         """
-        found = calibrate(self, runs, steps, level, scale, folds, executor, progress)
-        return replace(self, calibration=found)
+        calibration = calibrate(self, runs, steps, level, scale, folds, executor, progress)
+        return replace(self, calibration=calibration)
 
     def without(self, run: str) -> HankelEnsemble:
         """The same draws as they learn from the other runs, to forecast a run that trained.

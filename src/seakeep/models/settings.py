@@ -299,12 +299,12 @@ class HankelSettings:
             If a length counts in encounter periods and there is none.
         """
         stated = {name: getattr(self, name) for name in self.lengths}
-        made: dict[str, Any] = {
+        values: dict[str, Any] = {
             name: in_samples(value, dt, encounter_period)
             for name, value in stated.items()
             if isinstance(value, Length)
         }
-        return replace(self, **made) if made else self
+        return replace(self, **values) if values else self
 
     def resolved_in(self, runs: dict[str, xr.Dataset], inputs: Sequence[str]) -> Self:
         """Settings whose lengths are samples of some runs, with the period that these have."""
@@ -417,8 +417,8 @@ class HankelSettings:
             "readouts": readouts_json(self.readouts),
             "select": None if select is None else asdict(select),
         }
-        made: Json = plain({key: maps.get(key, _written(each)) for key, each in content.items()})
-        return made
+        written: Json = plain({key: maps.get(key, _written(each)) for key, each in content.items()})
+        return written
 
     @classmethod
     def from_json(cls, content: Json) -> Self:

@@ -223,9 +223,9 @@ def gather(
         labelled.check_finite(here[needed - begin :], states, name, needed, time)
         needed = min(place.first, place.first_column - input_delays)
         span = Span(begin, place.last, place.last + 1 - input_map.lead_samples)
-        found = run_regressors(input_map, run, states, inputs, name, span, needed)
+        regressors = run_regressors(input_map, run, states, inputs, name, span, needed)
         instants = time[place.first], time[place.last]
-        pieces.append(Piece(name, (here, *found), shifted, instants))
+        pieces.append(Piece(name, (here, *regressors), shifted, instants))
         read.append(labelled.channel_matrix(run, inputs, name, place.samples))
     data = _standardised(pieces, dt, labels, input_map, settings.standardize)
     if len(pieces) > 1:
@@ -400,10 +400,10 @@ def run_regressors(
     surge = None
     if (follows := input_map.follows) is not None:
         surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]
-    found = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
+    rows = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
     if not missing:
-        return found
-    return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in found))
+        return rows
+    return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in rows))
 
 
 def _lengthened(values: FloatArray, length: int) -> FloatArray:
@@ -564,16 +564,16 @@ def scales_of(
     later = windows
     if channels[2]:
         later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
-    found = [
+    scales = [
         moments(values, spans, names, standardize)
         for values, spans, names in zip(series, (windows, windows, later), channels, strict=True)
     ]
     if stretch is None or not standardize:
-        return found
+        return scales
     more = [
-        replace(scale, std=scale.std * by) for scale, by in zip(found[1:], stretch, strict=True)
+        replace(scale, std=scale.std * by) for scale, by in zip(scales[1:], stretch, strict=True)
     ]
-    return [found[0], *more]
+    return [scales[0], *more]
 
 
 def moments(
