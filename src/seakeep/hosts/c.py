@@ -24,8 +24,6 @@ from seakeep.signals.expressions import Text
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-__all__ = ["content_of", "identifier", "rendered", "sources", "write_c", "write_sources"]
-
 KIND = "C source"
 
 

@@ -10,8 +10,6 @@ from seakeep.hosts.program import exportable
 from seakeep.models import Model
 from seakeep.signals.prediction import MEMORY
 
-__all__ = ["write_estimator"]
-
 
 def write_estimator(
     model: Model, folder: str | Path, name: str = "rom", noise: Mapping[str, float] | None = None

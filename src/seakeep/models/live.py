@@ -47,8 +47,6 @@ from seakeep.models.labelled import Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
-__all__ = ["Live", "load_live"]
-
 STATE = "live state"
 """Kind of the files of :meth:`Live.save`."""
 PAIRS = 8

@@ -16,17 +16,6 @@ from seakeep.files import MARK, replacing, write_netcdf
 from seakeep.signals import MotionAgreement, Track, compare_motion
 from seakeep.signals.tracking import FLAGS, LABELS
 
-__all__ = [
-    "CONTACT_SHEET",
-    "HEADER",
-    "TRACK",
-    "agreement_words",
-    "track_text",
-    "track_words",
-    "write_contact_sheet",
-    "write_track",
-]
-
 TRACK, CONTACT_SHEET = "track", "contact sheet"
 """Kinds of files, as their marks say it."""
 HEADER = r"time \[s\],surge \[m\],heave \[m\],pitch \[deg\],centroid_x \[pixel\],"
