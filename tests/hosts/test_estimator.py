@@ -184,19 +184,19 @@ def measured(run, model):
 
 
 @pytest.mark.parametrize("name", ["full", "short", "autonomous", "following", "following_now"])
-@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
 def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
     """Look-ahead, observables, carried waves and read-outs, with samples lost."""
     model = cases[name].model
-    noises = {model.states[0]: noise} if noise else {}
+    noises = {model.states[-1]: noise} if noise else {}
     write_estimator(model, tmp_path, "rom", noises)
     subprocess.run(
         ["cc", *FLAGS, "-o", "rom.so", "rom.c", "rom_estimator.c", "-lm"], cwd=tmp_path, check=True
     )
     found, live = Estimator(ctypes.CDLL(str(tmp_path / "rom.so")), "rom"), model.live(noise=noises)
     u, y = measured(cases[name].run, model)
-    # The same sums in another order; gains of a sinusoid in little noise amplify their rounding.
-    close = {"rtol": 0, "atol": (1e-9 if "following" in name else 1e-12) * np.nanmax(np.abs(y))}
+    # The same sums in another order, through gains of the order of ten.
+    close = {"rtol": 0, "atol": (1e-10 if "following" in name else 1e-12) * np.nanmax(np.abs(y))}
     for at in range(300):
         assert found.step(u[at], y[at]) == 0
         np.testing.assert_allclose(found.state, live.step(u[at], y[at]), **close, err_msg=str(at))
