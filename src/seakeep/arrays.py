@@ -15,25 +15,6 @@ import numpy.typing as npt
 
 from seakeep.errors import DataError, RequestError, SeakeepError
 
-__all__ = [
-    "BoolArray",
-    "ComplexArray",
-    "FloatArray",
-    "IntArray",
-    "Progress",
-    "as_bundle",
-    "as_pair",
-    "as_real",
-    "as_series",
-    "as_table",
-    "finite",
-    "fraction",
-    "number",
-    "positive",
-    "time_step",
-    "whole_number",
-]
-
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.intp]

@@ -25,26 +25,6 @@ if TYPE_CHECKING:
 
     from seakeep.arrays import FloatArray
 
-__all__ = [
-    "MARK",
-    "check_output",
-    "check_place",
-    "check_report",
-    "existing_file",
-    "expanded",
-    "is_there",
-    "load_sealed",
-    "make_folder",
-    "read_bytes",
-    "read_sealed",
-    "reading",
-    "replacing",
-    "sha256_of",
-    "write_netcdf",
-    "write_sealed",
-    "write_sealed_array",
-]
-
 FORMAT = 5
 """Format of sealed files; one of another format is refused, and made again."""
 MARK = "seakeep_file"

@@ -11,8 +11,6 @@ from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.signals.time_axis import check_order, instant_text
 
-__all__ = ["Paired", "channel_names", "pair"]
-
 INSTANT_TOLERANCE = 0.01
 """Part of a step by which an instant of one Dataset may differ from that of another."""
 

@@ -10,8 +10,6 @@ import math
 
 from seakeep.errors import RequestError, warn
 
-__all__ = ["check_numbers", "check_size", "too_large"]
-
 MOST_NUMBERS = 250_000_000
 """Numbers that a run, or the redrawn series of a bootstrap, hold at once: 1907 MiB."""
 LONG_NUMBERS = 50_000_000

@@ -30,32 +30,6 @@ from pydantic import (
 from seakeep.errors import SHOWN, MissingFileError, RequestError, did_you_mean, wanted
 from seakeep.files import read_bytes
 
-__all__ = [
-    "Count",
-    "Delay",
-    "Duration",
-    "Finite",
-    "Instant",
-    "Length",
-    "Mistake",
-    "Names",
-    "NotNegative",
-    "Pair",
-    "Positive",
-    "Span",
-    "Table",
-    "Window",
-    "in_seconds",
-    "lengths",
-    "number",
-    "optional",
-    "parse_length",
-    "read_toml",
-    "refusal",
-    "unknown_key",
-    "validated",
-]
-
 KNOWN_BY = {
     "campaign": ("channels", "rig", "preparation"),
     "study": ("study", "tests", "training"),

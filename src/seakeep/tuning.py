@@ -26,8 +26,6 @@ from seakeep.toml import Length
 if TYPE_CHECKING:
     from seakeep.report.style import Figure
 
-__all__ = ["TuneResult", "tune", "tuned_campaign"]
-
 LENGTHS = ("state_delays", "input_delays", "lead")
 FIRST = "# seakeep_file: tuned campaign\n"
 COLUMNS = {

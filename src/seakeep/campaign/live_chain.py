@@ -23,8 +23,6 @@ from seakeep.conventions import conversion
 from seakeep.errors import RequestError, SeakeepError, did_you_mean
 from seakeep.files import load_sealed, write_sealed_array
 
-__all__ = ["LiveChain"]
-
 STATE = "state of a live chain"
 """Kind of the files of :meth:`LiveChain.save`."""
 

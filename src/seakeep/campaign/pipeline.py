@@ -83,8 +83,6 @@ from seakeep.signals.time_axis import instant_text, span_text, stretches
 from seakeep.sizes import LONG_NUMBERS, check_numbers
 from seakeep.toml import Length, number
 
-__all__ = ["Run", "checked", "cleaned", "cropped", "derived", "mapped", "read", "resampled", "sync"]
-
 Reader = Callable[[Path, Options], Columns]
 COMMON = "the common step"
 """Place of derived channels whose sources come from several loggers."""

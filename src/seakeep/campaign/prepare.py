@@ -39,8 +39,6 @@ from seakeep.signals import Clock, uniform_step
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length
 
-__all__ = ["Campaign", "Progress", "read_campaign"]
-
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
 

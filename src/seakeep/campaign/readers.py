@@ -20,8 +20,6 @@ from seakeep.formats import Columns, is_recording_folder, read_columns
 from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
 from seakeep.signals.time_axis import check_order, instant_text
 
-__all__ = ["expand", "read_table"]
-
 _TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "sec", "seconds",
           "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
 COUNTED = 64

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.campaign.pipeline import version
-from seakeep.campaign.prepare import Campaign, Progress
+from seakeep.campaign.prepare import Campaign
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, warn
 from seakeep.files import check_output, load_sealed, make_folder, write_sealed
-
-__all__ = ["load_prepared", "prepared_folder", "write_prepared"]
 
 PREPARED = "prepared run"
 """Kind of these files, which sets them apart from measurements."""

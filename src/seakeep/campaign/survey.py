@@ -27,8 +27,6 @@ from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, w
 from seakeep.signals.synchronisation import without_doubtful_drift
 from seakeep.signals.waves import energy_period
 
-__all__ = ["Failures", "ReadOnce", "Survey", "as_one", "spare", "survey"]
-
 Failures = dict[str, SeakeepError]
 """Errors by run: a run that cannot be read must not stop the others."""
 

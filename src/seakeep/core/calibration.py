@@ -16,18 +16,6 @@ import numpy.typing as npt
 from seakeep.arrays import FloatArray, as_real, finite, fraction
 from seakeep.errors import DataError, RequestError
 
-__all__ = [
-    "ConformalMargin",
-    "band_scale",
-    "band_scores",
-    "calibrated_bounds",
-    "conformal_margin",
-    "learn_scale",
-    "scaled_scores",
-    "spread_floor",
-    "wave_envelope",
-]
-
 FLOOR = 0.25
 """Part of the root mean square error below which the scale of a band never falls."""
 CALM = 0.05

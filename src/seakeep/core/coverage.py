@@ -11,17 +11,6 @@ from scipy import special
 from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction, number
 from seakeep.errors import DataError, RequestError
 
-__all__ = [
-    "BandCoverage",
-    "BoxStatistics",
-    "CoverageTable",
-    "band_crps",
-    "box_statistics",
-    "coverage",
-    "coverage_table",
-    "winkler_score",
-]
-
 WAVE_PARTS = ("lowest waves", "middle waves", "highest waves")
 HORIZON_PARTS = ("first third", "middle third", "last third")
 """Parts of a coverage table, after "all"."""

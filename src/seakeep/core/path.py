@@ -13,8 +13,6 @@ from scipy import linalg
 
 from seakeep.arrays import FloatArray
 
-__all__ = ["ridge_path", "truncated_path"]
-
 
 def ridge_path(gram: FloatArray, right: FloatArray, ridges: Sequence[float]) -> FloatArray:
     """Coefficients of ridge regressions of one problem at several λ.

@@ -19,8 +19,6 @@ import numpy as np
 
 from seakeep.arrays import FloatArray, IntArray
 
-__all__ = ["Place", "Recursion", "read_table", "recursion"]
-
 
 @dataclass(frozen=True, eq=False)
 class Place:

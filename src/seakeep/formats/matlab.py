@@ -17,8 +17,6 @@ from seakeep.formats.reader import Options, decoding
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["read_matlab"]
-
 _NAME_KEYS = ("names", "channels", "labels", "channel_names", "name")
 _UNIT_KEYS = ("units", "unit")
 _RATE_KEYS = ("fs", "Fs", "FS", "sampling_rate", "sample_rate")

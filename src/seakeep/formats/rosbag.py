@@ -18,8 +18,6 @@ from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.formats.columns import Columns
 from seakeep.formats.reader import Options, decoding
 
-__all__ = ["read_recording"]
-
 _STANDARD = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
 _UNITS = {
     "angular_velocity": "rad/s", "linear_acceleration": "m/s^2", "force": "N", "torque": "N m",

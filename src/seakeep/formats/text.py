@@ -21,8 +21,6 @@ from seakeep.errors import DataError, warn
 from seakeep.formats.columns import Columns, is_unit, same_unit, unique_names
 from seakeep.formats.reader import Options
 
-__all__ = ["read_text"]
-
 HEAD = 40
 """Lines that may stand above a header, and from which the layout is recognised."""
 

@@ -21,8 +21,6 @@ from seakeep.hosts.c import identifier, rendered, sources
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
 
-__all__ = ["compiler", "write_fmu"]
-
 KIND = "functional mock-up unit"
 PLATFORMS = {
     ("Linux", "x86_64"): ("linux64", ".so"),

@@ -21,8 +21,6 @@ from seakeep.models.observables import Observed, SlowSquare, Term
 if TYPE_CHECKING:
     import onnx
 
-__all__ = ["write_onnx"]
-
 KIND = "graph for ONNX"
 OPSET, IR = 17, 8
 """Versions of the operators and of the file: those of ONNX 1.12, of 2022."""

@@ -40,8 +40,6 @@ from seakeep.signals.propagation import (
 )
 from seakeep.waves import group_speed
 
-__all__ = ["FittedAlignment", "ProbeAlignment", "depth_of"]
-
 Mode = Literal["effective", "dispersion"]
 Surge = Literal["measured", "predicted", "none"]
 

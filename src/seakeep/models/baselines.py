@@ -30,8 +30,6 @@ from seakeep.models.store import content, numbers
 from seakeep.models.training import Training, TrainingData, gather
 from seakeep.models.validity import Coverage
 
-__all__ = ["ARX", "FIR", "Constant", "HoldLast", "LinearSpec", "Mean", "Subspace"]
-
 
 @dataclass(frozen=True)
 class Constant:

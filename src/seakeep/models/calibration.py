@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple, Protocol, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, fraction, whole_number
+from seakeep.arrays import FloatArray, Progress, fraction, whole_number
 from seakeep.core.calibration import (
     ConformalMargin,
     band_scale,
@@ -28,23 +28,9 @@ from seakeep.models import labelled
 from seakeep.models.checks import Json, check_choice
 from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series, read_windows
-from seakeep.models.executor import Progress
 from seakeep.models.interface import Signature
 from seakeep.models.summaries import reduce_members
 from seakeep.models.training import TrainingArrays
-
-__all__ = [
-    "Band",
-    "BandScale",
-    "Calibration",
-    "Judged",
-    "calibrate",
-    "check_band",
-    "envelope_of",
-    "held_out",
-    "learn_margin",
-    "widened",
-]
 
 Band = Literal["members", "calibrated"]
 BandScale = Literal["spread", "constant", "learnt"]
@@ -76,12 +62,15 @@ class Ensemble(FreeRuns, Protocol):
     """Members of an ensemble that a calibration uses."""
 
     @property
-    def arrays(self) -> TrainingArrays: ...
+    def arrays(self) -> TrainingArrays:
+        """What the members were trained on."""
+
     @property
-    def read_spans(self) -> dict[str, tuple[float, float]]: ...
+    def read_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant that members have read, of each run, s."""
+
     def without(self, run: str) -> Ensemble:
         """Members as they learn from the other runs."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

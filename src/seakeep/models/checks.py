@@ -13,20 +13,6 @@ from pydantic import TypeAdapter
 
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 
-__all__ = [
-    "TINY",
-    "Json",
-    "check_choice",
-    "check_flag",
-    "check_integer",
-    "check_keys",
-    "check_number",
-    "names_of",
-    "of_json",
-    "plain",
-    "settings_of",
-]
-
 Json = dict[str, Any]
 """Settings as JSON values."""
 TINY = float(np.finfo(float).tiny)

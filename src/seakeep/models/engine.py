@@ -21,13 +21,13 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, whole_number
+from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress, whole_number
 from seakeep.core.recursion import Recursion, read_table, recursion
 from seakeep.core.rollout import rollouts
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
-from seakeep.models.executor import Progress, in_order
+from seakeep.models.executor import in_order
 from seakeep.models.following import Following
 from seakeep.models.inputs import Drive
 from seakeep.models.interface import Scale, Signature
@@ -35,21 +35,6 @@ from seakeep.models.labelled import Span
 from seakeep.models.readouts import FittedReadOut, read_out
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import instant_text
-
-__all__ = [
-    "Dynamics",
-    "Windows",
-    "array_windows",
-    "cut_lost",
-    "first_lost",
-    "group_series",
-    "linear_runs",
-    "member_series",
-    "model_runs",
-    "read_groups",
-    "read_windows",
-    "run_members",
-]
 
 GROWTH = 10.0
 """A free run is lost where a state is this many times as far from the training mean as training,
@@ -148,9 +133,13 @@ class Runs(Protocol):
     """An object that makes free runs: a model, an ensemble, or members that are held."""
 
     @property
-    def signature(self) -> Signature: ...
+    def signature(self) -> Signature:
+        """Channels, delays, input map and scales."""
+
     @property
-    def n_members(self) -> int: ...
+    def n_members(self) -> int:
+        """Number of members; one for a single model."""
+
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs of members over groups of windows, each (member, window, steps, N).
 

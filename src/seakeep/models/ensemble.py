@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, fraction
+from seakeep.arrays import FloatArray, Progress, fraction
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import store
@@ -29,7 +29,7 @@ from seakeep.models.calibration import (
 from seakeep.models.checks import Json
 from seakeep.models.draws import Draw, draws_dataset, draws_of
 from seakeep.models.engine import Dynamics, Windows, first_lost, linear_runs, member_series
-from seakeep.models.executor import Progress, in_order, one_blas_thread
+from seakeep.models.executor import in_order, one_blas_thread
 from seakeep.models.forecasts import (
     Forecaster,
     check_arrays,
@@ -58,8 +58,6 @@ from seakeep.models.summaries import (
 from seakeep.models.training import TrainingArrays, TrainingData
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
-
-__all__ = ["BandForecast", "HankelEnsemble", "spectral_radius"]
 
 SAMPLING = {"monte_carlo": "Monte Carlo", "sobol": "Sobol"}
 TRAIN_ON = {

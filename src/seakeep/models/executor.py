@@ -31,18 +31,6 @@ import threadpoolctl
 from seakeep.arrays import Progress
 from seakeep.errors import RequestError, SeakeepError
 
-__all__ = [
-    "Progress",
-    "WorkerLostError",
-    "as_finished",
-    "in_order",
-    "make_executor",
-    "on_this_machine",
-    "one_blas_thread",
-    "processes",
-    "submitting",
-]
-
 Data = TypeVar("Data")
 Item = TypeVar("Item")
 Result = TypeVar("Result")

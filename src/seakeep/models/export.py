@@ -19,8 +19,6 @@ from seakeep.signals.expressions import Text
 if TYPE_CHECKING:
     import control
 
-__all__ = ["check_linear", "initial_state", "matrices", "to_control", "to_mat"]
-
 SYSTEM = "state-space system"
 """What a MATLAB file holds, as its head states it."""
 

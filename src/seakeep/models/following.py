@@ -26,8 +26,6 @@ from seakeep.signals.carriers import carriers, mean_spectrum, position_taps
 from seakeep.sizes import MOST_CARRIED, check_size
 from seakeep.waves import wavenumber
 
-__all__ = ["SQUARED", "Bank", "Following"]
-
 SQUARED = ChannelLabel("slow_surge_squared", "m^2", "slow surge about its mean, squared")
 BACK = 3.0
 """Encounter periods before an instant from which carriers read the probes.

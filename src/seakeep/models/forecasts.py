@@ -10,34 +10,17 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray, as_real, whole_number
+from seakeep.arrays import FloatArray, IntArray, Progress, as_real, whole_number
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine
 from seakeep.models.checks import check_choice
 from seakeep.models.engine import Windows, first_lost
-from seakeep.models.executor import Progress
 from seakeep.models.html import text_html
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import ChannelLabel, run_name
 from seakeep.models.training import Training
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import instant_text, span_text
-
-__all__ = [
-    "Forecaster",
-    "SingleModel",
-    "check_arrays",
-    "counted",
-    "label_channels",
-    "lost_instants",
-    "one_run",
-    "rows_by_name",
-    "status_text",
-    "statuses",
-    "verdict",
-    "window_coords",
-    "with_units",
-]
 
 
 class Forecaster:

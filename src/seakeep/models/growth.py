@@ -18,8 +18,6 @@ from seakeep.models.interface import Signature
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.training import TrainingData
 
-__all__ = ["WINDOWS", "LeadErrors", "Stretch", "lead_errors", "training_errors"]
-
 WINDOWS = 48
 """Free runs that the errors are averaged over; a root mean square is known to a tenth then."""
 STEPS = 1024

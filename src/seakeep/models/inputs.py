@@ -26,8 +26,6 @@ from seakeep.models.labelled import ChannelLabel, Span
 from seakeep.models.observables import Observed
 from seakeep.signals.carriers import carried
 
-__all__ = ["Drive", "InputMap", "Regressors"]
-
 
 class Regressors(NamedTuple):
     """What drives the step from each of several samples, in physical units.

@@ -17,8 +17,6 @@ from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
 from seakeep.signals.waves import encounter_period
 
-__all__ = ["ChannelLabel", "Span", "as_runs", "channel_labels", "channel_matrix", "nearest_sample"]
-
 Runs = xr.Dataset | Sequence[xr.Dataset] | Mapping[str, xr.Dataset]
 Stop = float | Sequence[float] | Mapping[str, float] | Mapping[str, float | None] | None
 """Last instant of the training window, s: one for all runs, or one per run."""

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     import control
     from scipy import signal
 
-__all__ = ["HankelDMDcModel", "modes"]
-
 
 @dataclass(frozen=True, eq=False)
 class HankelDMDcModel(SingleModel, store.Saved):

@@ -24,21 +24,6 @@ from seakeep.models.checks import TINY, check_choice, check_flag, check_keys, ch
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals import expressions
 
-__all__ = [
-    "OBSERVABLES",
-    "Bound",
-    "Expression",
-    "Formula",
-    "Observable",
-    "Observed",
-    "Power",
-    "Powers",
-    "Product",
-    "SlowSquare",
-    "SlowSquares",
-    "Term",
-]
-
 HALF_WIDTH = 0.5
 """Half of the length of the low-pass filter of :class:`SlowSquares`, in periods of its cutoff.
 

@@ -14,9 +14,6 @@ from seakeep.models.linear import HankelDMDcModel
 from seakeep.signals import encounter_period
 from seakeep.waves import phase_speed
 
-__all__ = ["ProbeOffset", "estimate_probe_offset"]
-
-
 COARSE = 20  # distances on either side of zero
 FINE = 24  # distances on either side of the best, a sixth as far apart
 BLOCKS = 10

@@ -18,17 +18,6 @@ import numpy as np
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.toml import Length, parse_length
 
-__all__ = [
-    "Distribution",
-    "Fixed",
-    "LogUniform",
-    "Prior",
-    "Uniform",
-    "prior_json",
-    "prior_of",
-    "unit_of",
-]
-
 Bound = float | str | Length
 """Number, or a length such as ``"10 T"``."""
 

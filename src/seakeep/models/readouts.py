@@ -15,17 +15,6 @@ from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models.checks import Json, check_choice, check_keys, names_of, plain
 from seakeep.models.labelled import ChannelLabel
 
-__all__ = [
-    "FittedReadOut",
-    "ReadOut",
-    "ReadOutKind",
-    "ReadOuts",
-    "read_out",
-    "readouts_asked",
-    "readouts_json",
-    "readouts_of",
-]
-
 ReadOutKind = Literal["none", "hinge", "stacked"]
 Asked = Literal["hinge", "stacked", "auto"]
 

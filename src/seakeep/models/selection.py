@@ -18,7 +18,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray
+from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.gram import Piece, primal_system
@@ -28,7 +28,7 @@ from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.engine import Dynamics, model_runs, read_windows
 from seakeep.models.ensemble import spectral_radius
-from seakeep.models.executor import Progress, in_order
+from seakeep.models.executor import in_order
 from seakeep.models.following import LEAD
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.observables import Observable, Powers, SlowSquares, named
@@ -37,19 +37,6 @@ from seakeep.models.settings import Folds, HankelSettings, Select
 from seakeep.models.stacking import PERIODS, Held, fit_readouts
 from seakeep.models.training import TrainingData, gather, scales_of
 from seakeep.signals import repeated_waves
-
-__all__ = [
-    "RIDGES",
-    "VARIED",
-    "Problem",
-    "Selected",
-    "Trial",
-    "default_observables",
-    "groups_of",
-    "readouts_for",
-    "select",
-    "settle",
-]
 
 RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-10, -1))
 """λ per snapshot pair that are tried, half a decade apart.

@@ -36,20 +36,6 @@ from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
 from seakeep.sizes import LEAST_PERIODS, MOST_PERIODS
 from seakeep.toml import Length, parse_length
 
-__all__ = [
-    "DelayRows",
-    "HankelSettings",
-    "History",
-    "RidgeScale",
-    "Select",
-    "as_length",
-    "check_integer",
-    "check_ridge",
-    "check_seconds",
-    "in_samples",
-    "periods_to_samples",
-]
-
 DelayRows = Literal["ridge", "exact"]
 RidgeScale = Literal["absolute", "per_snapshot"]
 

@@ -10,13 +10,13 @@ from typing import Any, ClassVar, Literal, Self, get_args
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.checks import Json, check_choice
+from seakeep.models.checks import Json, check_choice, check_integer
 from seakeep.models.draws import PRIORS, Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble, spectral_radius
-from seakeep.models.executor import Progress
 from seakeep.models.interface import Needs, Role, Signature, Spec
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
@@ -27,7 +27,6 @@ from seakeep.models.selection import Selected, default_observables, readouts_for
 from seakeep.models.settings import (
     HankelSettings,
     Select,
-    check_integer,
     in_samples,
     periods_to_samples,
 )
@@ -40,8 +39,6 @@ from seakeep.models.training import (
 )
 from seakeep.models.validity import Coverage
 from seakeep.toml import Length
-
-__all__ = ["BayesianHankelDMDc", "HankelDMDc"]
 
 PAPER_RIDGE = 100.0
 STATE_PERIODS, INPUT_PERIODS, LEAD_PERIODS = 1.0, 3.0, 0.75

@@ -14,8 +14,6 @@ from seakeep.errors import DataError
 from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOutKind
 from seakeep.models.training import TrainingData
 
-__all__ = ["PERIODS", "Held", "fit_readouts"]
-
 PERIODS = 15.0
 """Length of the free runs that a stacked read-out learns from, encounter periods."""
 RIDGE = 1e-2

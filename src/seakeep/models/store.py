@@ -19,17 +19,6 @@ from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.readouts import FittedReadOut
 
-__all__ = [
-    "Saved",
-    "as_json",
-    "content",
-    "numbers",
-    "pack_signature",
-    "read",
-    "signature_json",
-    "unpack_signature",
-]
-
 MODEL = "model"
 """Kind of these files."""
 SCALES = ("state", "input", "direct")

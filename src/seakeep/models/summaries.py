@@ -11,9 +11,6 @@ import xarray as xr
 from seakeep.arrays import FloatArray, fraction
 from seakeep.errors import RequestError
 
-__all__ = ["STATISTICS", "reduce_members", "summarize"]
-
-
 STATISTICS = ("mean", "std", "lower", "upper")
 CHUNK = 8 * 2**20
 """Bytes of all members that are reduced at a time."""

@@ -22,19 +22,6 @@ from seakeep.models.labelled import ChannelLabel, Span, Stop
 from seakeep.models.settings import HankelSettings
 from seakeep.sizes import LONG_MATRIX, check_numbers
 
-__all__ = [
-    "Training",
-    "TrainingArrays",
-    "TrainingData",
-    "check_names",
-    "gather",
-    "is_constant",
-    "moments",
-    "run_regressors",
-    "scales_of",
-    "until",
-]
-
 
 @dataclass(frozen=True)
 class Training:

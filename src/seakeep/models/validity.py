@@ -17,8 +17,6 @@ from seakeep.models import labelled, store
 from seakeep.models.interface import Model, Signature
 from seakeep.waves import GRAVITY
 
-__all__ = ["Coverage", "outside_training"]
-
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""

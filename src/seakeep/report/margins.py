@@ -9,8 +9,6 @@ from seakeep.models import HankelEnsemble
 from seakeep.models.forecasts import counted
 from seakeep.report.tables import Table
 
-__all__ = ["margins_table"]
-
 
 def margins_table(ensemble: HankelEnsemble) -> Table:
     """Margins of the channels, or factors and floors of their scale, and what they rest on."""

@@ -16,17 +16,6 @@ from seakeep.files import MARK, replacing, write_netcdf
 from seakeep.signals import MotionAgreement, Track, compare_motion
 from seakeep.signals.tracking import FLAGS, LABELS
 
-__all__ = [
-    "CONTACT_SHEET",
-    "HEADER",
-    "TRACK",
-    "agreement_words",
-    "track_text",
-    "track_words",
-    "write_contact_sheet",
-    "write_track",
-]
-
 TRACK, CONTACT_SHEET = "track", "contact sheet"
 """Kinds of files, as their marks say it."""
 HEADER = r"time \[s\],surge \[m\],heave \[m\],pitch \[deg\],centroid_x \[pixel\],"
@@ -120,7 +109,8 @@ def _doubt(agreement: MotionAgreement) -> str:
         return (
             f"at {agreement.rival_lag:+.3f} s the correlation is "
             f"{agreement.rival_correlation:.4f}, nearly as high: the lag is known only up to "
-            "whole wave periods. Let a trigger that both recorded decide (--lamp), or take an irregular run."
+            "whole wave periods. Let a trigger that both recorded decide (--lamp), or take an "
+            "irregular run."
         )
     if not agreement.enclosed:
         return (

@@ -17,8 +17,6 @@ from scipy import linalg, signal
 from seakeep.arrays import FloatArray, IntArray
 from seakeep.waves import wavenumber
 
-__all__ = ["carried", "carriers", "mean_spectrum", "position_taps", "slow_position"]
-
 NOISE = 1e-2
 """Noise of the probes that carriers are designed for, per variance of the waves.
 

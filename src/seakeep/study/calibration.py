@@ -13,8 +13,6 @@ from seakeep.signals.time_axis import instant_text, span_text
 from seakeep.study.comparison import instant_of
 from seakeep.study.plan import between
 
-__all__ = ["calibration_parts"]
-
 
 def calibration_parts(
     campaign: Campaign,

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.campaign import Campaign, load_prepared
-from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, Spec, outside_training

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.campaign import read_campaign, write_prepared
-from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, check_report, is_there, replacing
 from seakeep.models.executor import on_this_machine, submitting

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from seakeep.campaign.prepare import Progress
+from seakeep.arrays import Progress
 from seakeep.errors import SeakeepError, warn
 from seakeep.models.executor import WorkerLostError, as_finished
 from seakeep.sizes import LONG_CELLS, MOST_CELLS, check_size

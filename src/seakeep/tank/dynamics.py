@@ -36,21 +36,6 @@ from seakeep.tank.seas import Sea
 from seakeep.tank.settings import DriftSettings, TankSettings
 from seakeep.waves import GRAVITY, wavenumber
 
-__all__ = [
-    "DivergenceError",
-    "Motion",
-    "Rig",
-    "assemble_rig",
-    "drift_coefficient",
-    "drift_envelopes",
-    "linear_response",
-    "mean_drift",
-    "sea_losses",
-    "simulate",
-    "tensions",
-]
-
-
 LIMITS = {"surge": 20.0, "heave": 2.0, "pitch": 1.2, "piston": 2.0, "slosh": 2.0}
 """Beyond these (m, rad) a simulation has left the physics it was made for."""
 

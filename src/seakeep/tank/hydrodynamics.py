@@ -21,20 +21,6 @@ from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import reading
 
-__all__ = [
-    "CONVENTIONS",
-    "Hydrodynamics",
-    "Kernel",
-    "Pool",
-    "excitation_at",
-    "far_field_at",
-    "impedance",
-    "load_hydrodynamics",
-    "radiation_kernel",
-    "response",
-]
-
-
 CONVENTIONS = {
     "format": "seakeep-hydrodynamics 2",
     "time_convention": "exp(-i omega t)",

@@ -32,8 +32,6 @@ from seakeep.tank.seas import Sea, sea_of_run
 from seakeep.tank.settings import TankSettings
 from seakeep.tank.video import SIDE_VIEW, render_side_view
 
-__all__ = ["check_settings", "generator", "play", "play_run", "truth"]
-
 CAMPAIGN_FILE = "campaign.toml"
 LOGGERS = ("wave_probes", "mru", "loads", "video", "all")
 SINGLE_RATE = 100.0  # Hz, where all instruments share a logger

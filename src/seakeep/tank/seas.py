@@ -16,17 +16,6 @@ from seakeep.errors import RequestError
 from seakeep.tank.settings import FacilitySettings, RunPlan, SpectrumSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
 
-__all__ = [
-    "Sea",
-    "irregular_sea",
-    "jonswap",
-    "pierson_moskowitz",
-    "regular_sea",
-    "sea_of_run",
-    "spectral_density",
-]
-
-
 BLOCK = 512  # instants evaluated at a time at a fixed place
 
 
