@@ -97,31 +97,11 @@ def content_of(model: HankelDMDcModel, name: str) -> dict[str, Any]:
                 group += _columns(term, u, observed.limits, kernels)
         limited = zip(direct, observed.tops, observed.slopes, strict=True)
         direct = [f"rising({text}, {_number(top)}, {_number(by)})" for text, top, by in limited]
-    scales = (signature.state_scale, signature.input_scale, signature.direct_scale)
     return {
         "name": name,
-        "upper": name.upper(),
         "mark": f"{MARK}: {KIND}, written by seakeep {metadata.version('seakeep')}:",
-        "following": follows,
-        "banks": () if follows is None else follows.banks(None),
-        "x_rows": signature.state_samples,
-        "dt": signature.dt,
-        "N": len(signature.states),
-        "Q": len(signature.inputs),
-        "s": signature.state_delays,
-        "z": signature.input_delays,
-        "n": signature.input_scale.mean.size,
-        "m": signature.direct_scale.mean.size,
-        "rows": len(model.coefficients),
-        "coefficients": model.coefficients,
-        "scales": dict(zip(("state", "delayed", "direct"), scales, strict=True)),
-        "lead": input_map.lead,
-        "lead_samples": signature.lead_samples,
-        "history": input_map.history(signature.input_delays),
-        "window": back + 1 + signature.lead_samples,
+        "model": model,
         "now": back,
-        "state_labels": signature.state_labels,
-        "input_labels": signature.input_labels,
         "delayed": delayed,
         "direct": direct,
         "kernels": kernels,

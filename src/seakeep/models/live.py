@@ -188,6 +188,7 @@ class Live:
         # Of a model that follows its own surge: the map with its carriers in this rig, and filters
         # that predict the probes from one another; rows at all places of the samples to come.
         self._table = (0, np.empty(0))
+        self._foresight: tuple[FloatArray, tuple[int, ...]] | None = None
         if self._follows is not None:
             self._banks = self._follows.banks(self._rig)
             self._foresight = self._follows.foresight(self._rig, max(self._ahead, 1))
@@ -275,15 +276,18 @@ class Live:
 
     @property
     def equations(self) -> dict[str, Any]:
-        """What the filter computes with, for hosts: x' = offset + a x̂ + b û, blocks oldest first.
+        """What the filter computes with, for hosts: x' = offset + a x̂ + b û + d v, oldest first.
 
         Variances of process and measurement noise, mean and spread of the states, errors of free
-        runs by lead, and the samples of input that waves to come are predicted from.
+        runs by lead, and what inputs are predicted from: samples of their records, means, and
+        filters of a model that follows its own surge.
         """
         scale, noises = self.signature.state_scale, {"process": self._filter.process}
         noises |= {"noise": self._filter.noise, "errors": self.errors.rms}
         moments = {"centre": scale.centre, "spread": scale.spread, "record": self._record}
-        return {"a": self._a, "b": self._b, "offset": self._offset} | noises | moments
+        inputs = {"means": self.signature.input_scale.mean, "foresight": self._foresight}
+        parts = {"a": self._a, "b": self._b, "d": self._d, "offset": self._offset}
+        return parts | noises | moments | inputs
 
     def _rows(self, name: str, first: int, stop: int) -> FloatArray:
         """A view of some samples, by their numbers."""
@@ -379,7 +383,7 @@ class Live:
 
     def _expected(self, known: FloatArray, count: int) -> FloatArray:
         """Inputs of the next samples: in waves as those of training, or from each record."""
-        if self._follows is None or not self.ready:
+        if self._foresight is None or not self.ready:
             return predict_waves(known, count)
         taps, placed = self._foresight
         means = self.signature.input_scale.mean[: known.shape[1]]
@@ -458,6 +462,7 @@ class Live:
             update, measured = self._update_of(at), self._rows("y", at, at + 1)[0]
             predicted = self.signature.state_scale.centre
             if at >= self.signature.history_samples:
+                self._place(at - 1)
                 predicted = self._predicted(history, at - 1)
             innovation = measured - predicted
             history[:-1] = history[1:]
@@ -474,16 +479,21 @@ class Live:
             if is_final:
                 self._judge(at, update, innovation)
 
+    def _place(self, at: int) -> None:
+        """Read the waves of the sample `at` where the estimates up to it place the vessel."""
+        if self._follows is None:
+            return
+        place, (first, table) = self._follows.place, self._table
+        surge = self._rows("x", at + 1 - place.taps.size, at + 1)[:, self._follows.column]
+        here = place.of(surge)
+        read = read_table(place, table, np.array([at - first]), here)
+        self._rows("delayed", at, at + 1)[:] = read
+        self._rows("direct", at, at + 1)[0, -1] = (here[0] - place.centre) ** 2
+
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""
         delayed = self._rows("delayed", at - self.signature.input_delays, at + 1)
         direct = self._rows("direct", at, at + 1)[0]
-        if self._follows is not None:
-            place, column = self._follows.place, self._follows.column
-            first, table = self._table
-            here = place.of(self._rows("x", at + 1 - place.taps.size, at + 1)[:, column])
-            delayed[-1] = read_table(place, table, np.array([at - first]), here)[0]
-            direct[-1] = (here[0] - place.centre) ** 2
         out = self._a @ history.ravel()
         out += self._offset
         out += self._b @ delayed.ravel()
