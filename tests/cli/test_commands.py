@@ -584,7 +584,7 @@ MISTAKES = [
     (f"forecast ensemble.nc {FROM_20} -o no/f.nc", r"the folder no does not exist"),
     (f"fit {CAMPAIGN} -o m.nc --workers 0", r"Invalid value for '--workers'"),
     (f"prepare {CAMPAIGN} -o model.nc", r"cannot make the folder model\.nc: File exists"),
-    (f"fit {CAMPAIGN} -o .", r"cannot write \.: it is a folder\. Name a file in it"),
+    (f"fit {CAMPAIGN} -o .", r"cannot write \.: it is a folder\. Name a file\."),
     (f"compare . {CAMPAIGN}", r"\. is a folder, .* A model file is expected here"),
     (f"compare {CAMPAIGN} model.nc", r"is a campaign file, and a model file is expected"),
     ("datasets fetch ntnu", r"no data set 'ntnu'\."),

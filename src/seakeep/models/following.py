@@ -23,7 +23,6 @@ from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, depth_of
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals.carriers import carriers, mean_spectrum, position_taps
-from seakeep.sizes import MOST_CARRIED, check_size
 from seakeep.waves import wavenumber
 
 SQUARED = ChannelLabel("slow_surge_squared", "m^2", "slow surge about its mean, squared")
@@ -135,8 +134,6 @@ class Following:
         peak = wavenumber(omega[[np.argmax(power)]], alignment.water_depth)[0]
         spacing = 2 * np.pi / float(peak) / PER_WAVE
         places = int(np.ceil((high - low + 2 * margin) / spacing)) + 2
-        check_size("the surge spans so many waves that waves are read at", places, MOST_CARRIED,
-                   "places", "Check the units of the surge (m).")  # fmt: skip
         return cls(
             alignment=alignment,
             column=list(states).index(alignment.settings.surge_channel),

@@ -33,7 +33,6 @@ from seakeep.models.observables import Observable, Observed, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
-from seakeep.sizes import LEAST_PERIODS, MOST_PERIODS
 from seakeep.toml import Length, parse_length
 
 DelayRows = Literal["ridge", "exact"]
@@ -193,7 +192,7 @@ class Select:
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
             what = "select: horizon (encounter periods) and period (s)"
-            check_number(what, value, "between 1e-6 and 1e6", LEAST_PERIODS, MOST_PERIODS)
+            check_number(what, value, "between 1e-6 and 1e6", 1e-6, 1e6)
         if not given:
             raise RequestError("select: horizon is empty. Write horizon=(15, 45).")
         object.__setattr__(self, "horizon", tuple(float(each) for each in given))

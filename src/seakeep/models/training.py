@@ -20,7 +20,6 @@ from seakeep.models.inputs import InputMap, Regressors
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import ChannelLabel, Span, Stop
 from seakeep.models.settings import HankelSettings
-from seakeep.sizes import LONG_MATRIX, check_numbers
 
 
 @dataclass(frozen=True)
@@ -188,13 +187,6 @@ def gather(
     states, inputs = list(states), list(inputs)  # arrays of names are welcome too
     window, history = settings.window, settings.history
     state_delays, input_delays = settings.state_delays, settings.input_delays
-    rows = len(states) * (state_delays + 1)
-    check_numbers(
-        f"state_delays = {state_delays} of {len(states)} states: a matrix of {rows} rows takes",
-        rows**2,
-        "Take fewer delays, or a larger step.",
-        LONG_MATRIX,
-    )
     dt = labelled.common_step(runs)
     runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)

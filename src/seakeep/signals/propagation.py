@@ -34,7 +34,6 @@ from seakeep.signals.calculus import predicted_extension
 from seakeep.signals.lags import correlation_peak, peak_place
 from seakeep.signals.leakage import is_regular
 from seakeep.signals.waves import encounter_period, welch_segments
-from seakeep.sizes import MOST_PLACES, MOST_TERMS
 from seakeep.waves import group_speed, phase_speed, wavenumber
 
 EARLIEST = 1e-3
@@ -213,6 +212,9 @@ def effective_celerity(
     return EffectiveCelerity(apart / lag, lag, height, bounds)
 
 
+MOST_PLACES, MOST_TERMS = 100_000, 4000
+"""Distances tried for a pair of probes, and polynomials in the distance of a carried wave: beyond
+them positions are not in metres, or the record is sampled far finer than its waves."""
 GROUPS = 10
 """Groups of frequencies, each left out once for the spread."""
 NEIGHBOURS = 4
