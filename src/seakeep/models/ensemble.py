@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, fraction
+from seakeep.arrays import FloatArray, Progress, fraction
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import store
@@ -29,7 +29,7 @@ from seakeep.models.calibration import (
 from seakeep.models.checks import Json
 from seakeep.models.draws import Draw, draws_dataset, draws_of
 from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
-from seakeep.models.executor import Progress, in_order
+from seakeep.models.executor import in_order
 from seakeep.models.forecasts import (
     Forecaster,
     check_arrays,
@@ -54,8 +54,6 @@ from seakeep.models.summaries import reduce_members, statistic_coordinate
 from seakeep.models.training import TrainingArrays, TrainingData
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
-
-__all__ = ["BandForecast", "HankelEnsemble", "spectral_radius"]
 
 SAMPLING = {"monte_carlo": "Monte Carlo", "sobol": "Sobol"}
 TRAIN_ON = {
@@ -199,8 +197,8 @@ class HankelEnsemble(Forecaster, store.Saved):
 
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
-        found = [self.dynamics(number) for number in members]
-        return linear_runs(found, groups, self.signature.readouts)
+        runs = [self.dynamics(number) for number in members]
+        return linear_runs(runs, groups, self.signature.readouts)
 
     def system_matrices(self) -> Iterator[FloatArray]:
         """Â of each member."""
@@ -278,8 +276,8 @@ class HankelEnsemble(Forecaster, store.Saved):
             When they are found, if one or more are not below one.
         """
         if not self._radii:
-            found = in_order(_spectral_radius, self, range(self.n_members), executor, progress)
-            radii = np.array(list(found))
+            values = in_order(_spectral_radius, self, range(self.n_members), executor, progress)
+            radii = np.array(list(values))
             radii.flags.writeable = False
             self._radii.append(radii)
             _warn_of_unstable(radii)
@@ -329,17 +327,17 @@ class HankelEnsemble(Forecaster, store.Saved):
         if self.selection:
             lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
         if (calibration := self.calibration) is not None:
-            found, count_of = calibration.found, sum(calibration.windows.values())
+            margin, count_of = calibration.conformal, sum(calibration.windows.values())
             line = (
-                f"  band          calibrated for {found.level:g} on "
+                f"  band          calibrated for {margin.level:g} on "
                 f"{counted(count_of, 'window')} of {calibration.steps} steps: "
             )
             if calibration.floor is None:
-                line += f"wider by {_range(found.margin / self.state_spread, '.2g')} "
+                line += f"wider by {_range(margin.margin / self.state_spread, '.2g')} "
             else:
                 what = "a learnt scale" if calibration.scale == "learnt" else "spread"
                 line += (
-                    f"{_range(found.margin, '.2g')} times {what} and a floor of "
+                    f"{_range(margin.margin, '.2g')} times {what} and a floor of "
                     f"{_range(calibration.floor / self.state_spread, '.2g')} "
                 )
             lines.append(line + "training SD either way")
@@ -659,8 +657,8 @@ class HankelEnsemble(Forecaster, store.Saved):
         The filter predicts with the mean of the members, or with what they are centred on, whose
         errors on what they learnt from are found here; a forecast runs all of them.
         """
-        kept = self if self.identified else self.hold()
-        return Live(kept, kept._means, kept.errors, like=like, noise=noise)
+        members = self if self.identified else self.hold()
+        return Live(members, members._means, members.errors, like=like, noise=noise)
 
     @property
     def _means(self) -> list[Dynamics]:
@@ -743,8 +741,8 @@ class HankelEnsemble(Forecaster, store.Saved):
         DataError
             If a run cannot be used.
         """
-        found = calibrate(self, runs, steps, level, scale, folds, executor, progress)
-        return replace(self, calibration=found)
+        calibration = calibrate(self, runs, steps, level, scale, folds, executor, progress)
+        return replace(self, calibration=calibration)
 
     def without(self, run: str) -> HankelEnsemble:
         """The same draws as they learn from the other runs, to forecast a run that trained.

@@ -10,13 +10,13 @@ from typing import Any, ClassVar, Literal, Self, get_args
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.checks import Json, check_choice, check_flag
+from seakeep.models.checks import Json, check_choice, check_flag, check_integer
 from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble, spectral_radius
-from seakeep.models.executor import Progress
 from seakeep.models.interface import Needs, Role, Signature, Spec
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
@@ -27,7 +27,6 @@ from seakeep.models.selection import Selected, default_observables, readouts_for
 from seakeep.models.settings import (
     HankelSettings,
     Select,
-    check_integer,
     in_samples,
     periods_to_samples,
 )
@@ -40,8 +39,6 @@ from seakeep.models.training import (
 )
 from seakeep.models.validity import Coverage
 from seakeep.toml import Length
-
-__all__ = ["BayesianHankelDMDc", "HankelDMDc"]
 
 PAPER_RIDGE = 100.0
 STATE_PERIODS, INPUT_PERIODS, LEAD_PERIODS = 1.0, 3.0, 0.75
@@ -268,8 +265,8 @@ class HankelDMDc(HankelSettings):
         named = until(as_runs(runs), stop)
         channels = list(states), list(inputs)
         spec = self.resolved_in(named, inputs)
-        found = settle(spec, self.select, named, *channels, executor=executor, progress=progress)
-        return replace(found, settings=replace(found.settings, select=None))
+        choice = settle(spec, self.select, named, *channels, executor=executor, progress=progress)
+        return replace(choice, settings=replace(choice.settings, select=None))
 
     def fit(
         self,
@@ -317,12 +314,12 @@ class HankelDMDc(HankelSettings):
         """
         named = as_runs(runs)
         if left_open(self):
-            found = selected or self.settled(
+            choice = selected or self.settled(
                 named, states, inputs, stop, executor=executor, progress=progress
             )
-            model = found.settings._fitted(named, states, inputs, stop, found.readouts)
+            model = choice.settings._fitted(named, states, inputs, stop, choice.readouts)
             _check_growth(model)
-            return replace(model, selection=found.describe())
+            return replace(model, selection=choice.describe())
         spec = self.resolved_in(named, inputs)
         readouts: tuple[FittedReadOut, ...] = ()
         if self.readouts:
@@ -495,14 +492,14 @@ class BayesianHankelDMDc(HankelSettings):
 
     def _single(self, q: float, dt: float) -> HankelDMDc:
         """The single model at a quantile of the window and delays, with the median of λ."""
-        made: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for name in PRIORS[:3]:
             value = self.at(name, q)
             if value is not None and not np.isfinite(value):
                 value = self.at(name, 1.0 - 1e-6)  # of a prior without an upper end
-            made[name] = None if value is None else self.samples(name, value, dt)
-        made["ridge"] = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
-        return replace(self.shared(dt), **made, select=self.select)
+            values[name] = None if value is None else self.samples(name, value, dt)
+        values["ridge"] = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
+        return replace(self.shared(dt), **values, select=self.select)
 
     def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that its largest draw asks of its runs: the upper ends of the priors count."""
@@ -637,21 +634,21 @@ class BayesianHankelDMDc(HankelSettings):
             central.settled(runs, states, inputs, stop, executor=executor, progress=progress)
         )
 
-    def _adopt(self, found: Selected[HankelDMDc]) -> Selected[BayesianHankelDMDc]:
+    def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[BayesianHankelDMDc]:
         """Priors around what :meth:`central` found."""
         ridge, scale = self.ridge, self.ridge_scale
         if isinstance(ridge, str):
-            best = float(found.settings.ridge)
+            best = float(choice.settings.ridge)
             ridge, scale = LogUniform(best / 3.0, best * 3.0), "per_snapshot"
         spec = replace(
             self,
             ridge=ridge,
             ridge_scale=scale,
-            observables=found.settings.observables,
-            readouts=found.settings.readouts,
+            observables=choice.settings.observables,
+            readouts=choice.settings.readouts,
             select=None,
         )
-        return Selected(spec, found.rows, found.note, found.readouts)
+        return Selected(spec, choice.rows, choice.note, choice.readouts)
 
     def fit(
         self,
@@ -689,13 +686,13 @@ class BayesianHankelDMDc(HankelSettings):
         check_names(states, inputs)
         spec = self.resolved_in(named, inputs)
         if left_open(spec):
-            found = (
+            choice = (
                 spec.settled(named, states, inputs, stop, executor=executor, progress=progress)
                 if selected is None
                 else spec._adopt(selected)
             )
-            ensemble = found.settings._drawn(named, states, inputs, stop, found.readouts)
-            return replace(ensemble, selection=found.describe())
+            ensemble = choice.settings._drawn(named, states, inputs, stop, choice.readouts)
+            return replace(ensemble, selection=choice.describe())
         readouts: tuple[FittedReadOut, ...] = ()
         if spec.readouts:
             central = spec.central(labelled.common_step(named))
