@@ -147,6 +147,7 @@ class LinearSpec(HankelSettings):
     rank: int | None = field(default=None, init=False, repr=False)
     readouts: ReadOuts = field(default=(), init=False, repr=False)
     stable: bool | float = field(default=False, init=False, repr=False)
+    memory: int = field(default=0, init=False, repr=False)
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
@@ -278,6 +279,7 @@ class Subspace(HankelSettings):
     rank: int | None = field(default=None, init=False, repr=False)
     readouts: ReadOuts = field(default=(), init=False, repr=False)
     stable: bool | float = field(default=False, init=False, repr=False)
+    memory: int = field(default=0, init=False, repr=False)
     order: int | None = field(default=None, kw_only=True)
     future: int | None = None
 
