@@ -49,12 +49,12 @@ def expand(file: str, folder: Path) -> Path:
     """
 
     def value(match: re.Match[str]) -> str:
-        if not (found := os.environ.get(match[1])):
+        if not (setting := os.environ.get(match[1])):
             raise RequestError(
                 f"the file {file!r} needs the environment variable {match[1]}, which is not set. "
                 f"Set it to the folder of the data: export {match[1]}=/path/to/data"
             )
-        return found
+        return setting
 
     return folder / expanded(_VARIABLE.sub(value, file))
 

@@ -69,11 +69,11 @@ def write_prepared(
     missing = [name for name in wanted if name not in steps]
     done = len(steps)
 
-    def told(count: int, _: int, name: str) -> None:
+    def report(count: int, _: int, name: str) -> None:
         if progress is not None:
             progress(done + count, len(wanted), name)
 
-    for name, run in campaign.each_prepared(missing, told, failed):
+    for name, run in campaign.each_prepared(missing, report, failed):
         write_sealed(run, files[name], PREPARED)
         steps[name] = run.attrs["dt"]
     if len(set(steps.values())) > 1:  # that of fresh runs was another, which only all runs show

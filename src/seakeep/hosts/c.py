@@ -70,8 +70,8 @@ def write_sources(texts: Mapping[str, str], folder: str | Path) -> list[Path]:
 
 def identifier(name: str) -> str:
     """Name for C made of that of a file."""
-    made = re.sub(r"\W", "_", name, flags=re.ASCII)
-    return made if made[:1].isalpha() else f"m_{made}"
+    text = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return text if text[:1].isalpha() else f"m_{text}"
 
 
 def sources(model: HankelDMDcModel, name: str) -> dict[str, str]:
@@ -124,7 +124,7 @@ def rendered(template: str, **content: Any) -> str:
 def _environment() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-    made = Environment(
+    environment = Environment(
         loader=PackageLoader("seakeep.hosts"),
         autoescape=select_autoescape(["xml"]),
         undefined=StrictUndefined,
@@ -132,8 +132,8 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters |= {"hex": _number, "numbers": _numbers, "text": _text}
-    return made
+    environment.filters |= {"hex": _number, "numbers": _numbers, "text": _text}
+    return environment
 
 
 def _number(value: float) -> str:
@@ -149,7 +149,7 @@ def _numbers(values: FloatArray) -> str:
 
 def _text(value: str) -> str:
     """Literal of C for any text."""
-    escaped = re.sub(rb"[^\w /^.-]", lambda found: b"\\%03o" % ord(found[0]), value.encode())
+    escaped = re.sub(rb"[^\w /^.-]", lambda match: b"\\%03o" % ord(match[0]), value.encode())
     return f'"{escaped.decode()}"'
 
 

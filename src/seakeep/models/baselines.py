@@ -144,6 +144,7 @@ class LinearSpec(HankelSettings):
     rank: int | None = field(default=None, init=False, repr=False)
     readouts: ReadOuts = field(default=(), init=False, repr=False)
     stable: bool | float = field(default=False, init=False, repr=False)
+    memory: int = field(default=0, init=False, repr=False)
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
@@ -238,9 +239,11 @@ class FIR(LinearSpec):
             raise RequestError(
                 "a FIR model is a filter of its inputs and has none; name at least one input."
             )
-        found = data.regress(self, None)
-        size = len(found.coefficients)
-        return replace(found, coefficients=np.hstack([np.zeros((size, size)), found.coefficients]))
+        system = data.regress(self, None)
+        size = len(system.coefficients)
+        return replace(
+            system, coefficients=np.hstack([np.zeros((size, size)), system.coefficients])
+        )
 
 
 @dataclass(frozen=True)
@@ -273,6 +276,7 @@ class Subspace(HankelSettings):
     rank: int | None = field(default=None, init=False, repr=False)
     readouts: ReadOuts = field(default=(), init=False, repr=False)
     stable: bool | float = field(default=False, init=False, repr=False)
+    memory: int = field(default=0, init=False, repr=False)
     order: int = field(kw_only=True)
     future: int | None = None
 

@@ -160,8 +160,8 @@ def check_keys(kind: type, table: Mapping[str, object], what: str = "") -> None:
 
 def of_json(kind: type[Made], content: Mapping[str, Any]) -> Made:
     """Rebuild a dataclass from its fields as JSON values, those of dataclasses in it included."""
-    made: Made = _adapter(kind).validate_python(content)  # type: ignore[arg-type]
-    return made
+    value: Made = _adapter(kind).validate_python(content)  # type: ignore[arg-type]
+    return value
 
 
 @functools.cache

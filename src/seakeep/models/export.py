@@ -130,7 +130,11 @@ def observables(signature: Signature) -> dict[str, Any]:
         "Delayed": len(delayed),
         "Top": np.array(observed.tops)[:, None],
         "Slope": observed.slopes[:, None],
-        **{f"{name}{part}": each for name, made in filters.items() for part, each in made.items()},
+        **{
+            f"{name}{part}": each
+            for name, filter_parts in filters.items()
+            for part, each in filter_parts.items()
+        },
         "Regressors": REGRESSORS,
     }
 

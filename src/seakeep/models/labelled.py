@@ -366,21 +366,23 @@ def mean_period(runs: Mapping[str, xr.Dataset], inputs: Sequence[str]) -> float:
     """
     steps = {name: run_step(run, name) for name, run in runs.items()}
     key = "encounter_period"
-    found = [float(run.attrs[key]) / steps[name] for name, run in runs.items() if key in run.attrs]
-    if found:
-        return float(np.mean(found))
+    periods = [
+        float(run.attrs[key]) / steps[name] for name, run in runs.items() if key in run.attrs
+    ]
+    if periods:
+        return float(np.mean(periods))
     reason = f"no input ({', '.join(inputs) or 'none'}) is a wave elevation, eta_…."
     for name, run in runs.items():
         if (wave := wave_channel(run, inputs, name)) is None:
             continue
         series = channel_matrix(run, [wave], name)[:, 0]
         try:
-            found.append(encounter_period(series[np.isfinite(series)], steps[name]) / steps[name])
+            periods.append(encounter_period(series[np.isfinite(series)], steps[name]) / steps[name])
         except (DataError, RequestError) as error:
             reason = f"{name}, channel '{wave}': {error}"
-    if not found:
+    if not periods:
         raise DataError(
             f"the encounter period is not known: no run states it, and {reason} Set "
             "run.attrs['encounter_period'] (s)."
         )
-    return float(np.mean(found))
+    return float(np.mean(periods))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
 from collections.abc import Mapping, Sequence
@@ -33,7 +34,6 @@ from seakeep.models.observables import Observable, Observed, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
-from seakeep.sizes import LEAST_PERIODS, MOST_PERIODS
 from seakeep.toml import Length, parse_length
 
 DelayRows = Literal["ridge", "exact"]
@@ -193,7 +193,7 @@ class Select:
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
             what = "select: horizon (encounter periods) and period (s)"
-            check_number(what, value, "between 1e-6 and 1e6", LEAST_PERIODS, MOST_PERIODS)
+            check_number(what, value, "between 1e-6 and 1e6", 1e-6, 1e6)
         if not given:
             raise RequestError("select: horizon is empty. Write horizon=(15, 45).")
         object.__setattr__(self, "horizon", tuple(float(each) for each in given))
@@ -224,6 +224,7 @@ class HankelSettings:
         "state_delays": 0,
         "input_delays": 0,
         "lead": 0,
+        "memory": 0,
     }
     """Settings that are lengths, and the least number of samples of each."""
     state_delays: int
@@ -240,6 +241,7 @@ class HankelSettings:
     observables: tuple[Observable, ...] = ()
     readouts: ReadOuts = ()
     stable: bool | float = False
+    memory: int = 0
 
     def __post_init__(self) -> None:
         for name in (*self.lengths, "ridge"):
@@ -254,6 +256,12 @@ class HankelSettings:
         object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "readouts", readouts_of(self.readouts))
         self._check_readouts()
+        if self.memory and (self.delay_rows != "exact" or self.stable is not False):
+            raise RequestError(
+                "memory averages delayed states, which takes delay_rows = 'exact' and stable = "
+                f"False; received delay_rows = '{self.delay_rows}', stable = {self.stable}. Change "
+                "them, or set memory = 0."
+            )
         if self.rank is not None and self.ridge != 0 and not isinstance(self.ridge, Prior):
             ridge = self.ridge if isinstance(self.ridge, str) else f"{self.ridge:g}"
             warn(
@@ -285,12 +293,12 @@ class HankelSettings:
             If a length counts in encounter periods and there is none.
         """
         stated = {name: getattr(self, name) for name in self.lengths}
-        made: dict[str, Any] = {
+        values: dict[str, Any] = {
             name: in_samples(value, dt, encounter_period)
             for name, value in stated.items()
             if isinstance(value, Length)
         }
-        return replace(self, **made) if made else self
+        return replace(self, **values) if values else self
 
     def resolved_in(self, runs: dict[str, xr.Dataset], inputs: Sequence[str]) -> Self:
         """Settings whose lengths are samples of some runs, with the period that these have."""
@@ -329,6 +337,22 @@ class HankelSettings:
                 f"delay_rows = '{self.delay_rows}', rank = {self.rank}. Change them, or take "
                 "kind = 'hinge'."
             )
+
+    @property
+    def blocks(self) -> list[tuple[int, int]]:
+        """Of each block of delays that is averaged the delay before its first, and its last.
+
+        They begin after s, and double in length up to the memory.
+        """
+        edges = [self.state_delays]
+        while edges[-1] < self.memory:
+            edges.append(min(max(2 * edges[-1], 1), self.memory))
+        return list(itertools.pairwise(edges))
+
+    @property
+    def state_reach(self) -> int:
+        """Longest delay of the states: s, or the memory."""
+        return max(self.state_delays, self.memory)
 
     @property
     def radius(self) -> float | None:
@@ -384,7 +408,7 @@ class HankelSettings:
             delayed += round(BACK * encounter_period / dt)
         return Needs(
             self.window or 1,
-            max(self.state_delays, delayed, *before),
+            max(self.state_reach, delayed, *before),
             self.history == "inside",
             max(after),
         )
@@ -403,8 +427,8 @@ class HankelSettings:
             "readouts": readouts_json(self.readouts),
             "select": None if select is None else asdict(select),
         }
-        made: Json = plain({key: maps.get(key, _written(each)) for key, each in content.items()})
-        return made
+        written: Json = plain({key: maps.get(key, _written(each)) for key, each in content.items()})
+        return written
 
     @classmethod
     def from_json(cls, content: Json) -> Self:

@@ -11,7 +11,13 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
-from seakeep.core.embedding import History, TrainingWindow, training_window
+from seakeep.core.embedding import (
+    History,
+    TrainingWindow,
+    block_means,
+    spread_means,
+    training_window,
+)
 from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import labelled
@@ -20,7 +26,6 @@ from seakeep.models.inputs import InputMap, Regressors
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import ChannelLabel, Span, Stop
 from seakeep.models.settings import HankelSettings
-from seakeep.sizes import LONG_MATRIX, check_numbers
 
 
 @dataclass(frozen=True)
@@ -112,7 +117,7 @@ class TrainingData:
             dt=self.dt,
             state_labels=self.state_labels,
             input_labels=self.input_labels,
-            state_delays=settings.state_delays,
+            state_delays=settings.state_reach,
             input_delays=settings.input_delays,
             input_map=self.input_map,
             state_scale=self.state_scale,
@@ -123,20 +128,33 @@ class TrainingData:
     def regress(
         self, settings: HankelSettings, state_delays: int | None, *, all_rows: bool = False
     ) -> Solution:
-        """Rows of the next states, or of all delayed ones, from these data."""
-        return identify(
+        """Rows of the next states, or of all delayed ones, from these data.
+
+        Means over blocks of delayed states enter as regressors without delays; the rows that are
+        returned spread them over these delays.
+        """
+        blocks = settings.blocks
+        solution = identify(
             self.states,
             self.delayed,
             self.windows,
             state_delays=state_delays,
             input_delays=settings.input_delays,
-            direct=self.direct,
+            direct=[
+                np.concatenate([direct, block_means(states, blocks)], axis=1)
+                for direct, states in zip(self.direct, self.states, strict=True)
+            ],
             ridge=float(settings.ridge),
             per_snapshot=settings.ridge_scale == "per_snapshot",
             rank=settings.rank,
             all_rows=all_rows,
             radius=settings.radius,
         )
+        count = len(self.state_labels)
+        if not blocks:
+            return solution
+        spread = spread_means(solution.coefficients, count, settings.state_delays, blocks)
+        return replace(solution, coefficients=spread)
 
     def training(self, solution: Solution) -> Training:
         """What a model that was fitted to these data keeps of them."""
@@ -187,14 +205,7 @@ def gather(
     check_names(states, inputs)
     states, inputs = list(states), list(inputs)  # arrays of names are welcome too
     window, history = settings.window, settings.history
-    state_delays, input_delays = settings.state_delays, settings.input_delays
-    rows = len(states) * (state_delays + 1)
-    check_numbers(
-        f"state_delays = {state_delays} of {len(states)} states: a matrix of {rows} rows takes",
-        rows**2,
-        "Take fewer delays, or a larger step.",
-        LONG_MATRIX,
-    )
+    state_delays, input_delays = settings.state_reach, settings.input_delays
     dt = labelled.common_step(runs)
     runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
@@ -210,9 +221,9 @@ def gather(
         labelled.check_finite(here[needed - begin :], states, name, needed, time)
         needed = min(place.first, place.first_column - input_delays)
         span = Span(begin, place.last, place.last + 1 - input_map.lead_samples)
-        found = run_regressors(input_map, run, states, inputs, name, span, needed)
+        regressors = run_regressors(input_map, run, states, inputs, name, span, needed)
         instants = time[place.first], time[place.last]
-        pieces.append(Piece(name, (here, *found), shifted, instants))
+        pieces.append(Piece(name, (here, *regressors), shifted, instants))
         read.append(labelled.channel_matrix(run, inputs, name, place.samples))
     data = _standardised(pieces, dt, labels, input_map, settings.standardize)
     if len(pieces) > 1:
@@ -238,7 +249,7 @@ def _place(
 
     A step from j reads the input up to j + lead, and none after the window.
     """
-    delays = settings.state_delays
+    delays = settings.state_reach
     reach = max(delays, input_map.history(settings.input_delays))
     place = training_window(last, settings.window, delays, reach, settings.history)
     begin = min(place.first, place.first_column - reach)
@@ -387,10 +398,10 @@ def run_regressors(
     surge = None
     if (follows := input_map.follows) is not None:
         surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]
-    found = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
+    rows = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
     if not missing:
-        return found
-    return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in found))
+        return rows
+    return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in rows))
 
 
 def _lengthened(values: FloatArray, length: int) -> FloatArray:
@@ -551,16 +562,16 @@ def scales_of(
     later = windows
     if channels[2]:
         later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
-    found = [
+    scales = [
         moments(values, spans, names, standardize)
         for values, spans, names in zip(series, (windows, windows, later), channels, strict=True)
     ]
     if stretch is None or not standardize:
-        return found
+        return scales
     more = [
-        replace(scale, std=scale.std * by) for scale, by in zip(found[1:], stretch, strict=True)
+        replace(scale, std=scale.std * by) for scale, by in zip(scales[1:], stretch, strict=True)
     ]
-    return [found[0], *more]
+    return [scales[0], *more]
 
 
 def moments(

@@ -188,13 +188,13 @@ def _robust(results: Results) -> Judged:
 
 
 def _trend(results: Results) -> Judged:
-    found = {}
+    growths = {}
     for act in ("paper", "raw"):
         at = results[act].groups["statistics/trend"].sel(test="irregular", band="all")
         each = np.stack([at[key].sel(model=[SINGLE, ENSEMBLE]) for key in BOUNDS], axis=1)
-        found[act] = [Interval(*(1.0 + row)) for row in each]
-    texts = (" and ".join(each.change() for each in of_act) for of_act in found.values())
-    within = [v for e in found["paper"] for v in (e.below(1 + AGED), opposite(e.below(1 - AGED)))]
+        growths[act] = [Interval(*(1.0 + row)) for row in each]
+    texts = (" and ".join(each.change() for each in of_act) for of_act in growths.values())
+    within = [v for e in growths["paper"] for v in (e.below(1 + AGED), opposite(e.below(1 - AGED)))]
     return "{}; act (b): {}".format(*texts), all_of(within)
 
 
@@ -262,21 +262,22 @@ def _against_single(
 
 
 def _better(results: Results, statistic: Statistic) -> Judged:
-    found = _against_single(results["paper"], SEA, statistic)
-    words = ", ".join(f"{words} {each.change()}" for words, each in found.items())
-    return words, all_of(each.below(1.0) for each in found.values())
+    differences = _against_single(results["paper"], SEA, statistic)
+    words = ", ".join(f"{words} {each.change()}" for words, each in differences.items())
+    return words, all_of(each.below(1.0) for each in differences.values())
 
 
 def _always_better(results: Results) -> Judged:
     result = results["paper"]
-    found = [
+    differences = [
         each.below(1.0)
         for test in result.tests
         for each in _against_single(result, (test,)).values()
     ]
-    better, worse, unknown = (found.count(each) for each in (True, False, None))
-    return f"better in {better}, worse in {worse}, undecided in {unknown} of {len(found)}", all_of(
-        found
+    better, worse, unknown = (differences.count(each) for each in (True, False, None))
+    return (
+        f"better in {better}, worse in {worse}, undecided in {unknown} of {len(differences)}",
+        all_of(differences),
     )
 
 
@@ -315,12 +316,12 @@ def _slow_loads(results: Results) -> Judged:
         for values in (test["measured"].values, test["mean"].sel(model=ENSEMBLE).values[order])
     )
     errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
-    found = {
+    by_statistic = {
         name.removeprefix("mooring_"): _interval(result, SEA, _median, errors[..., [k]])
         for k, name in enumerate(LOADS)
     }
-    words = ", ".join(f"{name} {each.text()}" for name, each in found.items())
-    return f"act (b): {words}", all_of(each.below(1.0) for each in found.values())
+    words = ", ".join(f"{name} {each.text()}" for name, each in by_statistic.items())
+    return f"act (b): {words}", all_of(each.below(1.0) for each in by_statistic.values())
 
 
 def _peaks(results: Results) -> Judged:
@@ -352,12 +353,14 @@ def _against_irregular(results: Results) -> Judged:
         ours, sea = (median_of(np.where(part, averages, np.nan)) for part in (kind, ~kind))
         return ours / sea
 
-    found = {
+    differences = {
         words: _interval(result, tests, ratio, _cells(result, tests, key), labels)
         for key, words in MEASURES.items()
     }
-    words = ", ".join(f"{words} {each.change()}" for words, each in found.items())
-    return words, all_of([opposite(found["ANRMSE"].below(1.0)), found["NAMMAE"].below(1.0)])
+    words = ", ".join(f"{words} {each.change()}" for words, each in differences.items())
+    return words, all_of(
+        [opposite(differences["ANRMSE"].below(1.0)), differences["NAMMAE"].below(1.0)]
+    )
 
 
 def _phase(results: Results) -> Judged:

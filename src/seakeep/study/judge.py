@@ -424,9 +424,9 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
         change, level, growth, rng=rng, blocks=blocks, n_series=DIFFERENCES, signed=True
     )
     values = np.stack([change(level.values[None], growth.values[None])[0], *bounds])
-    found = _table(values, ("number", *coords), ("change", "lower", "upper"), coords)
+    growths = _table(values, ("number", *coords), ("change", "lower", "upper"), coords)
     lines = _table(series, (*coords, "number", "time"), TREND_LINES, {**coords, "time": time})
-    return xr.merge([found, lines])
+    return xr.merge([growths, lines])
 
 
 def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:

@@ -25,7 +25,7 @@ from seakeep.core import embed, metrics
 from seakeep.errors import DataError, SeakeepError
 from seakeep.formats.netcdf import opened_netcdf
 from seakeep.models import Spec
-from seakeep.models.calibration import Judged, envelope_of, found_margin, held_out
+from seakeep.models.calibration import Judged, envelope_of, held_out, learn_margin
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.linear import HankelDMDcModel
@@ -334,7 +334,7 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
     floor: FloatArray | None = nothing
     law: FloatArray | None = np.tile(nothing, (4, 1))
     if judged:
-        margin, floor, law = found_margin(judged, statistics.level, statistics.scale)
+        margin, floor, law = learn_margin(judged, statistics.level, statistics.scale)
         out = {key: ("channel", getattr(margin, key)) for key in keys}
     out["windows"] = sum(len(each.measured) for each in judged)
     if statistics.scale != "constant":
@@ -382,8 +382,8 @@ def collect(plan: Plan, facts: Groups, read: Callable[[Unit], Groups]) -> Groups
     for model, key in product(plan.models, ("eigenvalues", "draws", "regularisation")):
         if each := of(model, key):
             several = key == "regularisation"  # of the others there is the first alone
-            found = _along("training", each) if several else next(iter(each.values()))
-            out[f"{key}/{model}"] = found
+            group = _along("training", each) if several else next(iter(each.values()))
+            out[f"{key}/{model}"] = group
     return out
 
 

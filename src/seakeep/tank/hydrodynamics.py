@@ -243,8 +243,8 @@ def _inside(hydro: Hydrodynamics, omega: npt.ArrayLike) -> FloatArray:
 def _between(hydro: Hydrodynamics, values: ComplexArray, omega: npt.ArrayLike) -> ComplexArray:
     """Values between the solver's frequencies, by cubic splines."""
     parts = np.stack([values.real, values.imag], axis=-1)
-    found = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(_inside(hydro, omega))
-    return np.asarray(found[..., 0] + 1j * found[..., 1], dtype=complex)
+    spline = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(_inside(hydro, omega))
+    return np.asarray(spline[..., 0] + 1j * spline[..., 1], dtype=complex)
 
 
 def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:

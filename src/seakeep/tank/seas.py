@@ -152,8 +152,8 @@ def regular_sea(
     shift = rng.uniform(0.03, 0.06, 2)
     omega = centre * np.array([1.0, 1.0 - shift[0], 1.0 + shift[1]])
     amplitude = 0.5 * height * np.array([1.0, unsteadiness, unsteadiness])
-    kept = slice(0, 3 if unsteadiness > 0 else 1)
-    omega, amplitude, phase = omega[kept], amplitude[kept], phase[kept]
+    components = slice(0, 3 if unsteadiness > 0 else 1)
+    omega, amplitude, phase = omega[components], amplitude[components], phase[components]
     return Sea(omega, amplitude, phase, wavenumber(omega, depth))
 
 
