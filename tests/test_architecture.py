@@ -14,7 +14,6 @@ SOURCE = Path(__file__).parents[1] / "src" / "seakeep"
 
 FLOORS = (
     ("errors",),
-    ("sizes",),
     ("arrays",),
     ("files",),
     ("conventions", "waves"),

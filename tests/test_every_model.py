@@ -115,7 +115,7 @@ def answers(model, campaign, runs, folder):
         "forecast": compared[0].forecast,
         "compared": comparison_table(compared),
         "refused": checked.refused,
-        **checked.found,
+        **checked.results,
         "C": answer(lambda: [each.read_text() for each in write_c(model, folder / "c")]),
         "FMU": answer(lambda: unpacked(write_fmu(model, folder / "model.fmu"))),
         "ONNX": answer(lambda: write_onnx(model, folder / "model.onnx").read_bytes()),

@@ -44,8 +44,8 @@ def test_a_failure_leaves_the_old_file_and_no_litter(tmp_path):
         ("a.txt", 28, r"cannot write .*a\.txt: No space left on device\. The f.*Free space"),
         ("a.txt", 13, r"Permission denied\. .* folder that you may write to"),
         ("no/a.txt", None, r"does not exist\. Create it first"),
-        (".", None, r"it is a folder\. Name a file in it"),
-        ("old/b", None, r"old is a file, not a folder\. Choose another place"),
+        (".", None, r"it is a folder\. Name a file\."),
+        ("old/b", None, r"the folder .*old does not exist\. Create it first"),
     ],
 )
 def test_what_keeps_a_file_from_being_written_is_named(tmp_path, place, error, message):

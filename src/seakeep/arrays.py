@@ -15,25 +15,6 @@ import numpy.typing as npt
 
 from seakeep.errors import DataError, RequestError, SeakeepError
 
-__all__ = [
-    "BoolArray",
-    "ComplexArray",
-    "FloatArray",
-    "IntArray",
-    "Progress",
-    "as_bundle",
-    "as_pair",
-    "as_real",
-    "as_series",
-    "as_table",
-    "finite",
-    "fraction",
-    "number",
-    "positive",
-    "time_step",
-    "whole_number",
-]
-
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.intp]
@@ -235,10 +216,10 @@ def number(value: Any, name: str) -> float:
 
 def positive(value: object, name: str, unit: str) -> float:
     """Return a finite, positive number as a float."""
-    found = number(value, name)
-    if not np.isfinite(found) or found <= 0:
+    result = number(value, name)
+    if not np.isfinite(result) or result <= 0:
         raise RequestError(f"{name} must be positive ({unit}); received {value!r}.")
-    return found
+    return result
 
 
 def time_step(value: object) -> float:
@@ -248,10 +229,10 @@ def time_step(value: object) -> float:
 
 def fraction(value: object, name: str) -> float:
     """Return a number between 0 and 1, both excluded."""
-    found = number(value, name)
-    if not 0 < found < 1:
+    result = number(value, name)
+    if not 0 < result < 1:
         raise RequestError(f"{name} must lie between 0 and 1; received {value!r}.")
-    return found
+    return result
 
 
 def whole_number(value: object, name: str, least: int = 1) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import errno
 import functools
 import hashlib
 import io
@@ -20,30 +19,9 @@ from typing import TYPE_CHECKING, Any
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
 
 if TYPE_CHECKING:
-    import h5py
     import xarray as xr
 
     from seakeep.arrays import FloatArray
-
-__all__ = [
-    "MARK",
-    "check_output",
-    "check_place",
-    "check_report",
-    "existing_file",
-    "expanded",
-    "is_there",
-    "load_sealed",
-    "make_folder",
-    "read_bytes",
-    "read_sealed",
-    "reading",
-    "replacing",
-    "sha256_of",
-    "write_netcdf",
-    "write_sealed",
-    "write_sealed_array",
-]
 
 FORMAT = 5
 """Format of sealed files; one of another format is refused, and made again."""
@@ -76,21 +54,11 @@ def existing_file(path: Path | str) -> Path:
         refuses to look at it.
     """
     place = expanded(path)
-    try:
-        mode = place.stat().st_mode
-    except (FileNotFoundError, NotADirectoryError):
-        raise _missing(place) from None
-    except (OSError, ValueError) as error:  # names with NUL raise ValueError
-        raise _unreadable(path, error) from None
-    if stat.S_ISDIR(mode):
-        raise MissingFileError(
-            f"{path} is a folder, and only regular files are read. Give the file in it."
-        )
-    if not stat.S_ISREG(mode):
-        raise MissingFileError(
-            f"{path} is a pipe or a device, and only regular files are read. Copy what comes out "
-            "of it into a file first."
-        )
+    if not is_there(place):
+        raise _missing(place)
+    if not place.is_file():
+        what = "a folder" if place.is_dir() else "a pipe or a device"
+        raise MissingFileError(f"{path} is {what}, and only regular files are read. Give a file.")
     return place
 
 
@@ -104,12 +72,8 @@ def is_there(path: Path) -> bool:
     """
     try:
         return path.exists()
-    except (OSError, ValueError) as error:
+    except OSError as error:
         raise _unreadable(path, error) from None
-
-
-def _reason(error: Exception) -> str:
-    return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
 @contextmanager
@@ -199,12 +163,14 @@ def expanded(path: str | Path) -> Path:
 
 
 def _unreadable(path: Path | str, error: Exception) -> MissingFileError:
-    reason, mend = _reason(error), "Correct the path."
+    mend = "Correct the path."
     if isinstance(error, PermissionError):
         mend = "Change its permissions, or copy it to a place that you may read."
-    elif isinstance(error, OSError) and error.errno == errno.EIO:
-        mend = "Copy the file again, or check the disk."
-    return MissingFileError(f"{path} cannot be read: {reason}. {mend}")
+    return MissingFileError(f"{path} cannot be read: {_reason(error)}. {mend}")
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
 
 
 def _missing(path: Path) -> MissingFileError:
@@ -264,7 +230,7 @@ def replacing(path: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         mend = "Free space on the disk or choose another place."
-        if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        if isinstance(error, PermissionError):
             mend = "Choose a folder that you may write to, or change its permissions."
         raise RequestError(
             f"cannot write {path}: {error.strerror or error}. The file that was there before, if "
@@ -300,16 +266,20 @@ def write_netcdf(
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
-    made = io.BytesIO()
-    with h5netcdf.File(made, "w") as file:
+    buffer = io.BytesIO()
+    with h5netcdf.File(buffer, "w") as file:
         dataset.dump_to_store(H5NetCDFStore(file, mode="a"), encoding=encoding or {})
-    _seal(path, made)
+    _seal(path, buffer)
 
 
-def _seal(path: Path, made: io.BytesIO) -> None:
-    with path.open("wb") as whole, made.getbuffer() as content:
+def _seal(path: Path, buffer: io.BytesIO) -> None:
+    with path.open("wb") as whole, buffer.getbuffer() as content:
         whole.write(content)
-        whole.write(SEAL + hashlib.sha256(content).hexdigest().encode())
+        whole.write(_seal_of(content))
+
+
+def _seal_of(content: bytes | memoryview) -> bytes:
+    return SEAL + hashlib.sha256(content).hexdigest().encode()
 
 
 def read_sealed(path: Path | str) -> io.BytesIO:
@@ -333,39 +303,18 @@ def read_sealed(path: Path | str) -> io.BytesIO:
     MissingFileError
         If there is no such file, or it cannot be read.
     DataError
-        If its checksum is missing or another one, or values of it lie in other files.
+        If its checksum is missing or another one.
     """
-    # Here, so that commands that read no such file start without HDF5.
-    import h5py
-
-    content, stated = _content(read_bytes(path))
-    if hashlib.sha256(content).hexdigest() != stated:
+    file, length = read_bytes(path), len(SEAL) + hashlib.sha256().digest_size * 2
+    is_sealed = file[-length:].startswith(SEAL)
+    content, stated = (file[:-length], file[-length:]) if is_sealed else (file, b"")
+    if _seal_of(content) != stated:
         why = "its checksum is another one" if stated else "it has no checksum at its end"
         raise DataError(
             f"{path} was cut off, altered or damaged, or seakeep did not write it: {why}. Copy it "
             "again, or remove it and make it anew."
         )
-    sealed = io.BytesIO(content)
-    with h5py.File(sealed, "r") as file:
-        if outside := next(_outside(file), None):
-            raise DataError(
-                f"{path}: the values of {outside} lie in another file, which seakeep does not "
-                "write. Remove it and make it anew."
-            )
-    return sealed
-
-
-def _outside(group: h5py.Group) -> Iterator[str]:
-    """Names of a group and those below it whose values HDF5 would take from other files."""
-    import h5py
-
-    for name in group:
-        if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
-            yield name
-        elif isinstance(item := group[name], h5py.Group):
-            yield from _outside(item)
-        elif isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
-            yield name
+    return io.BytesIO(content)
 
 
 def write_sealed(
@@ -407,14 +356,14 @@ def write_sealed_array(
     """Write one series ``values`` as :func:`write_sealed` does, in a few milliseconds."""
     import h5py
 
-    target, made = Path(path), io.BytesIO()
+    target, buffer = Path(path), io.BytesIO()
     check_output(target, kind)
-    with h5py.File(made, "w") as file:
+    with h5py.File(buffer, "w") as file:
         file.attrs.update({**attrs, **_head(kind)})
         file["values"] = values
         file["values"].make_scale("values")  # a dimension of NetCDF
     with replacing(target) as temporary:
-        _seal(temporary, made)
+        _seal(temporary, buffer)
     return target
 
 
@@ -464,14 +413,6 @@ def load_sealed(path: Path | str, kind: str) -> xr.Dataset:
     return dataset
 
 
-def _content(file: bytes) -> tuple[bytes, str]:
-    """Content of a file, and the checksum behind it; empty where there is none."""
-    length = len(SEAL) + hashlib.sha256().digest_size * 2
-    if file[-length:].startswith(SEAL):
-        return file[:-length], file[len(SEAL) - length :].decode("ascii", "replace")
-    return file, ""
-
-
 def check_place(path: Path, suffix: str | None = None) -> None:
     """Refuse a path that cannot be written, before the work starts.
 
@@ -487,25 +428,9 @@ def check_place(path: Path, suffix: str | None = None) -> None:
     RequestError
         If it is a folder or a device, its own folder does not exist, or its name says another kind.
     """
-    try:
-        mode = path.stat().st_mode
-    except (FileNotFoundError, NotADirectoryError):
-        mode = stat.S_IFREG
-    except (OSError, ValueError) as error:
-        raise RequestError(f"cannot write {path}: {_reason(error)}. Choose another name.") from None
-    if stat.S_ISDIR(mode):
-        raise RequestError(
-            f"cannot write {path}: it is a folder. Name a file in it, such as {path / 'model.nc'}."
-        )
-    if not stat.S_ISREG(mode):
-        raise RequestError(
-            f"cannot write {path}: it is a pipe or a device, and only regular files are replaced. "
-            "Choose another name."
-        )
-    if path.parent.exists() and not path.parent.is_dir():
-        raise RequestError(
-            f"cannot write {path}: {path.parent} is a file, not a folder. Choose another place."
-        )
+    if is_there(path) and not path.is_file():
+        what = "a folder" if path.is_dir() else "a pipe or a device"
+        raise RequestError(f"cannot write {path}: it is {what}. Name a file.")
     if not path.parent.is_dir():
         raise RequestError(
             f"cannot write {path}: the folder {path.parent} does not exist. Create it first."
@@ -548,7 +473,7 @@ def check_output(
             f"{path} is read by this command and would be overwritten by the {kind}. "
             "Choose another name."
         )
-    with existing_file(path).open("rb") as file:
+    with path.open("rb") as file:
         start = file.read(HEAD)
         file.seek(-min(HEAD, path.stat().st_size), os.SEEK_END)
         both = (start + file.read()).decode("utf-8", "replace")  # PDF keeps its mark at the end

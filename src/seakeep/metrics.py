@@ -235,16 +235,16 @@ def anrmse_differences(
     level = fraction(interval, "interval")
     runs, draws, blocks = [], [], 0.0
     for seed, (truth, *forecasts) in enumerate(zip(measured, *predicted, strict=True)):
-        found = [_paired(each, truth) for each in forecasts]
-        cases = [(of.arrays["predicted"], of.arrays["measured"], known) for of, known in found]
+        pairs = [_paired(each, truth) for each in forecasts]
+        cases = [(of.arrays["predicted"], of.arrays["measured"], known) for of, known in pairs]
         block = max(_block(p, m) for p, m, _ in cases)
         own = np.array([float(core.anrmse(predicted=p, measured=m, **k)) for p, m, k in cases])
         redrawn = np.stack([_redrawn(core.anrmse, p, m, k, block, seed) for p, m, k in cases])
         redrawn = np.where(np.isnan(own)[:, None], np.nan, redrawn)
-        held = cases[0][1].shape[-2] / block
-        runs.append(_with_bounds(own, redrawn, held, level))
+        block_count = cases[0][1].shape[-2] / block
+        runs.append(_with_bounds(own, redrawn, block_count, level))
         draws.append(redrawn)
-        blocks += held
+        blocks += block_count
     over_runs = {key: np.stack([run[key] for run in runs], axis=-1) for key in runs[0]}
     means = over_runs["anrmse"].mean(axis=-1)
     pooled = _with_bounds(means, np.mean(draws, axis=0), blocks, level)

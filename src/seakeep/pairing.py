@@ -11,8 +11,6 @@ from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.signals.time_axis import check_order, instant_text
 
-__all__ = ["Paired", "channel_names", "pair"]
-
 INSTANT_TOLERANCE = 0.01
 """Part of a step by which an instant of one Dataset may differ from that of another."""
 
@@ -70,15 +68,15 @@ def pair(**sides: xr.Dataset) -> Paired:
     arrays = {first: _stacked(reference, names, (*lead, "time"), first)}
     for side, data in others:
         _check_channels(names, reference, data, first, side)
-        found = _at_instants(data[names], reference, side, first)
-        further = {str(dim) for dim in found.dims} - {"time"}
+        matched = _at_instants(data[names], reference, side, first)
+        further = {str(dim) for dim in matched.dims} - {"time"}
         if strange := sorted(further - set(lead)):
             raise RequestError(
                 f"{side} has the dimension '{strange[0]}' and {first} has not. Select one of it: "
                 f"{side}.isel({strange[0]}=0)."
             )
-        xr.align(reference, found, join="exact", exclude={"time"})  # the same windows, members …
-        values = _stacked(found, names, (*(dim for dim in lead if dim in further), "time"), side)
+        xr.align(reference, matched, join="exact", exclude={"time"})  # the same windows, members …
+        values = _stacked(matched, names, (*(dim for dim in lead if dim in further), "time"), side)
         if further:
             missing = [axis for axis, dim in enumerate(lead) if dim not in further]
             shape = arrays[first].shape

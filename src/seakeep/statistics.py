@@ -161,7 +161,7 @@ def jsd_interval(
             f"measured has the dimensions {measured[pairs.names[0]].dims}; ('time',) is needed. "
             "Select one run."
         )
-    found = []
+    draws = []
     for column, (name, child) in enumerate(zip(pairs.names, rng.spawn(p.shape[-1]), strict=True)):
         series, block = m[:, column], block_length
         try:
@@ -171,7 +171,7 @@ def jsd_interval(
                 if choice.capped:
                     warn(f"channel '{name}': {bootstrap.too_long(choice, series.size)}")
             rows = p[..., column].reshape(-1, series.size)
-            found.append(
+            draws.append(
                 divergence.jsd_interval(rows, series, block_length=block, rng=child, **settings)
             )
         except DataError as error:
@@ -179,12 +179,12 @@ def jsd_interval(
     arrays = ("draws", "noise", "grid", "predicted", "measured")
     keys = [field.name for field in fields(JsdInterval) if field.name not in arrays]
     return xr.Dataset(
-        {key: ("channel", [getattr(item, key) for item in found])
+        {key: ("channel", [getattr(item, key) for item in draws])
          for key in (*keys, "uncertainty")},
         coords={"channel": pairs.names},
         attrs={
             "units": "nat",
-            "n_series": found[0].draws.shape[1],
+            "n_series": draws[0].draws.shape[1],
             "bandwidth": settings.get("bandwidth", "paper"),
         },
     )  # fmt: skip
@@ -231,14 +231,14 @@ def coverage_table(
         first = pairs.names[0]  # a height beside the bounds of a channel, at their instants
         alone = xr.Dataset({first: waves.assign_attrs(units="")})
         heights = pair(lower=lower[[first]], waves=alone).arrays["waves"][..., 0]
-    found = of_arrays.coverage_table(**pairs.arrays, level=level, waves=heights)
+    shares = of_arrays.coverage_table(**pairs.arrays, level=level, waves=heights)
     dims = {"instants": ("part",)}
     table = xr.Dataset(
         {
             key: (dims.get(key, ("part", "channel")), values)
-            for key, values in vars(found).items()
+            for key, values in vars(shares).items()
             if key != "parts"
         },
-        coords={"part": list(found.parts), **_channels(pairs.names, measured)},
+        coords={"part": list(shares.parts), **_channels(pairs.names, measured)},
     )
     return table.assign_attrs(level=level)

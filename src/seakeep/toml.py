@@ -30,32 +30,6 @@ from pydantic import (
 from seakeep.errors import SHOWN, MissingFileError, RequestError, did_you_mean, wanted
 from seakeep.files import read_bytes
 
-__all__ = [
-    "Count",
-    "Delay",
-    "Duration",
-    "Finite",
-    "Instant",
-    "Length",
-    "Mistake",
-    "Names",
-    "NotNegative",
-    "Pair",
-    "Positive",
-    "Span",
-    "Table",
-    "Window",
-    "in_seconds",
-    "lengths",
-    "number",
-    "optional",
-    "parse_length",
-    "read_toml",
-    "refusal",
-    "unknown_key",
-    "validated",
-]
-
 KNOWN_BY = {
     "campaign": ("channels", "rig", "preparation"),
     "study": ("study", "tests", "training"),
@@ -120,10 +94,10 @@ def parse_length(text: str) -> Length:
 
 
 def _length(value: object) -> Length:
-    found = value if isinstance(value, Length) else parse_length(str(value))
-    if found.unit == "/T":
+    length = value if isinstance(value, Length) else parse_length(str(value))
+    if length.unit == "/T":
         raise ValueError("a length is written like '1.5 T' or '0.5 s'")
-    return found
+    return length
 
 
 def _is(words: str, fits: Callable[[float], bool]) -> AfterValidator:
@@ -245,8 +219,8 @@ def in_seconds(table: Settings, period: float) -> Settings:
     RequestError
         If a span of which one end counts in periods runs backwards.
     """
-    found: Settings = _resolved(table, period, ())
-    return found
+    settings: Settings = _resolved(table, period, ())
+    return settings
 
 
 def _resolved(value: Any, period: float, place: tuple[str, ...]) -> Any:
@@ -303,20 +277,20 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
     """
     text = _text_of(path, what, mend)
     try:
-        found = tomllib.loads(text.replace("\r\n", "\n"))
+        table = tomllib.loads(text.replace("\r\n", "\n"))
     except tomllib.TOMLDecodeError as error:
         raise RequestError(
             f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
             "one 'key = value' per line, and each table and key once." + _if_no_toml(path, what)
         ) from None
     for other, keys in KNOWN_BY.items():
-        tables = [f"[{key}]" for key in keys if key in found]
-        if tables and not any(key in found for key in KNOWN_BY[what]):
+        tables = [f"[{key}]" for key in keys if key in table]
+        if tables and not any(key in table for key in KNOWN_BY[what]):
             raise RequestError(
                 f"{path} is a {other} file (it has {', '.join(tables)}), and a {what} file is "
                 "expected here. Name the right file."
             )
-    return found
+    return table
 
 
 def _text_of(path: Path, what: str, mend: str) -> str:
@@ -389,13 +363,13 @@ def refusal(source: Path | str, what: str, mistakes: Iterable[Mistake]) -> Reque
     text = ""
     if isinstance(source, Path):
         text = source.read_bytes().decode("utf-8-sig", "replace")
-    told = []
+    lines = []
     for place, words in dict.fromkeys(mistakes):
         number = _line_of(text, place)
         line = "" if number is None else f"line {number}, "
-        told.append(f"  {line}{'.'.join(place) or 'the file'}: {words}")
-    heading = "1 mistake" if len(told) == 1 else f"{len(told)} mistakes"
-    return RequestError(f"{source}: {heading} in the {what} file\n" + "\n".join(told))
+        lines.append(f"  {line}{'.'.join(place) or 'the file'}: {words}")
+    heading = "1 mistake" if len(lines) == 1 else f"{len(lines)} mistakes"
+    return RequestError(f"{source}: {heading} in the {what} file\n" + "\n".join(lines))
 
 
 def _line_of(text: str, place: tuple[str, ...]) -> int | None:
@@ -414,7 +388,7 @@ def _line_of(text: str, place: tuple[str, ...]) -> int | None:
 
 
 def _parts(dotted: str) -> tuple[str, ...]:
-    return tuple("".join(found) for found in _PART.findall(dotted))
+    return tuple("".join(match) for match in _PART.findall(dotted))
 
 
 def _mistakes_of(error: ValidationError, root: type[BaseModel]) -> list[Mistake]:
@@ -486,5 +460,5 @@ def _within(annotation: Any) -> Any:
     """Return the table or the dict that an annotation allows, behind unions and annotations."""
     if typing.get_origin(annotation) is dict or hasattr(annotation, "model_fields"):
         return annotation
-    found = map(_within, typing.get_args(annotation))
-    return next((each for each in found if each is not None), None)
+    inner = map(_within, typing.get_args(annotation))
+    return next((each for each in inner if each is not None), None)

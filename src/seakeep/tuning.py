@@ -26,8 +26,6 @@ from seakeep.toml import Length
 if TYPE_CHECKING:
     from seakeep.report.style import Figure
 
-__all__ = ["TuneResult", "tune", "tuned_campaign"]
-
 LENGTHS = ("state_delays", "input_delays", "lead")
 FIRST = "# seakeep_file: tuned campaign\n"
 COLUMNS = {
@@ -179,7 +177,7 @@ def tune(
     if resume is not None:
         asked = [spec.to_json(), sorted(vary), list(horizon), folds]
         known = _Scores(Path(resume), _digest(asked, named, [*states, *inputs]))
-    found = select(
+    search_result = select(
         spec,
         named,
         list(states),
@@ -193,19 +191,24 @@ def tune(
         seed=seed,
         known=known,
     )
-    return TuneResult(replace(found.settings, select=None), found.rows, found.note, found.readouts)
+    return TuneResult(
+        replace(search_result.settings, select=None),
+        search_result.rows,
+        search_result.note,
+        search_result.readouts,
+    )
 
 
 def _digest(asked: object, runs: dict[str, xr.Dataset], channels: Sequence[str]) -> str:
     """Checksum of what a search depends on."""
-    found = hashlib.sha256(json.dumps(asked, sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode())
     for name, run in runs.items():
-        found.update(name.encode())
+        digest.update(name.encode())
         facts = {key: run[key].attrs for key in channels} | {"run": run.attrs}
-        found.update(repr(facts).encode())
+        digest.update(repr(facts).encode())
         for values in (run["time"].values, channel_matrix(run, channels, name)):
-            found.update(np.ascontiguousarray(values).tobytes())
-    return found.hexdigest()
+            digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
 
 
 class _Scores(dict[str, Any]):

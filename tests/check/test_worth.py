@@ -50,7 +50,7 @@ def checked(model, runs, baselines):
 
 
 def test_errors_are_those_of_the_tests_and_verdicts_follow_from_them(model, runs, checked):
-    found = checked.found["worth"]
+    found = checked.results["worth"]
     assert found.attrs["of"] == "tests"
     assert [*found["run"].values] == ["one", "two"]
     free = free_runs(model, {"one": runs["one"]})["one"]
@@ -80,11 +80,11 @@ def test_the_page_starts_with_the_verdict(checked):
 
 
 def test_training_is_judged_apart(model, runs, checked):
-    found = checked.found
+    found = checked.results
     assert found["residuals"].attrs["of"] == "tests"
     assert found["training_residuals"].attrs["of"] == "training"
     alone = check_model(model, {"train": runs["train"]})
-    assert "training_residuals" not in alone.found
+    assert "training_residuals" not in alone.results
     points = check_sections(alone)[0].points
     assert points[0].startswith("No run tests the model.")
 
@@ -123,7 +123,7 @@ def test_a_baseline_that_is_lost_does_not_count_and_is_named(model, runs, baseli
     ],
 )
 def test_worse_than_a_baseline_is_said(checked, low, words):
-    found = checked.found["worth"].copy(deep=True)
+    found = checked.results["worth"].copy(deep=True)
     found["better"][:], found["rival"][:] = False, "fir"
     found["change_lower"][:], found["change_upper"][:] = low, 0.71
     text = next(each for each in worded(found) if each.startswith("Irregular waves, surge"))

@@ -301,9 +301,9 @@ def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
     unseen = seakeep.read_campaign(place / CAMPAIGN).prepare(names=["unseen"])["unseen"]
     part = unseen.sel(time=slice(None, 60.001))
     expected = ensemble.calibrate(part, steps=200, level=0.9, scale="constant")
-    margin = expected.calibration.found.margin
+    margin = expected.calibration.conformal.margin
     found = seakeep.load_model(place / "wide.nc").calibration
-    np.testing.assert_array_equal(found.found.margin, margin)
+    np.testing.assert_array_equal(found.conformal.margin, margin)
     assert re.search(rf"heave +m +{margin[0]:.4g} ".replace(".", r"\."), out)
 
     options = f"{CAMPAIGN} --start 60 --steps 200"
@@ -335,7 +335,7 @@ def test_calibrate_scales_by_the_spread_and_folds_over_the_runs_that_train(run, 
     assert "Factor k and floor f, ±k·√(σ² + f²), of the 95 % band, from" in out
     found = seakeep.load_model(place / "folds.nc").calibration
     assert (found.scale, found.folds) == ("spread", "run")
-    k, floor = found.found.margin[0], found.floor[0]
+    k, floor = found.conformal.margin[0], found.floor[0]
     assert re.search(rf"heave +m +{k:.2f} +{floor:.4g} ".replace(".", r"\."), out)
 
 
@@ -584,7 +584,7 @@ MISTAKES = [
     (f"forecast ensemble.nc {FROM_20} -o no/f.nc", r"the folder no does not exist"),
     (f"fit {CAMPAIGN} -o m.nc --workers 0", r"Invalid value for '--workers'"),
     (f"prepare {CAMPAIGN} -o model.nc", r"cannot make the folder model\.nc: File exists"),
-    (f"fit {CAMPAIGN} -o .", r"cannot write \.: it is a folder\. Name a file in it"),
+    (f"fit {CAMPAIGN} -o .", r"cannot write \.: it is a folder\. Name a file\."),
     (f"compare . {CAMPAIGN}", r"\. is a folder, .* A model file is expected here"),
     (f"compare {CAMPAIGN} model.nc", r"is a campaign file, and a model file is expected"),
     ("datasets fetch ntnu", r"no data set 'ntnu'\."),

@@ -423,7 +423,7 @@ def test_file_that_is_not_there(tmp_path):
     with pytest.raises(RequestError, match=r"there is no folder .*nowhere\. Correct the path"):
         read_table(tmp_path / "nowhere" / "run1.csv")
     with pytest.raises(
-        RequestError, match=r"is a folder, and only regular files are read\. Give the file in it"
+        RequestError, match=r"is a folder, and only regular files are read\. Give a file\."
     ):
         read_table(tmp_path)
 

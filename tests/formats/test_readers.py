@@ -41,11 +41,6 @@ class TestPaths:
         with pytest.raises(MissingFileError, match=reason):
             read_table(path)
 
-    def test_a_loop_of_links(self, tmp_path):
-        (tmp_path / "a").symlink_to(tmp_path / "b")
-        (tmp_path / "b").symlink_to(tmp_path / "a")
-        self.refused(tmp_path / "a", r"a cannot be read: Too many levels of symbolic links\. Corre")
-
     def test_a_home_that_is_unknown(self):
         self.refused("~nobody-of-this-name/run.csv", "cannot be read: Could not determine home")
 
@@ -66,9 +61,7 @@ class TestPaths:
             raise OSError(5, "Input/output error")
 
         monkeypatch.setattr("seakeep.formats.TEXT", Reader("text", fails))
-        self.refused(
-            path, r"cannot be read: Input/output error\. Copy the file again, or check the"
-        )
+        self.refused(path, r"cannot be read: Input/output error\. Correct the path")
 
     def test_a_file_that_may_not_be_read(self, tmp_path, monkeypatch):
         def refuses(*_, **__):

@@ -48,12 +48,13 @@ def sea_run(seed, samples=400):
 
 @dataclass(frozen=True)
 class Case:
-    """A model, arrays that it starts from, and what it forecasts."""
+    """A model, arrays that it starts from, what it forecasts, and the run."""
 
     model: HankelDMDcModel
     x_history: np.ndarray
     u: np.ndarray  # rows of the history of a host, then those of the steps
     expected: np.ndarray
+    run: xr.Dataset
 
     @property
     def rows(self):
@@ -68,7 +69,7 @@ def case_of(model, steps=60, start=200, run=None):
     now, end = start + 1, start + steps + model.lead_samples
     expected = model.forecast_arrays(x[:now], u[:now], u[now:end], steps)
     x_history, u_history = start_rows(model, run, start * DT)
-    return Case(model, x_history, np.concatenate([u_history, u[end - steps : end]]), expected)
+    return Case(model, x_history, np.concatenate([u_history, u[end - steps : end]]), expected, run)
 
 
 @pytest.fixture(scope="session")

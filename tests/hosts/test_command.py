@@ -58,10 +58,6 @@ def test_an_fmu_without_a_compiler_is_announced(run, monkeypatch, tmp_path):
         ((), "nothing to write. Give --c DIR"),
         (("--c", "library", "--steps", "5"), "--steps belongs to --onnx"),
         (("--fmu", "rom.fmu", "--estimator"), "--estimator belongs to --c"),
-        (
-            ("--c", "library", "--estimator"),
-            "an estimator in C takes models whose steps read waves",
-        ),
         (("--fmu", "rom.zip"), "rom.zip ends in '.zip'"),
         (("--c", "library", "--member", "0"), "--member is for ensembles"),
         (("--mat", "rom.zip"), "rom.zip ends in '.zip'"),

@@ -10,7 +10,7 @@ import xarray as xr
 import seakeep
 from seakeep.core.calibration import band_scores, conformal_margin
 from seakeep.errors import RequestError, SeakeepWarning
-from seakeep.models.calibration import found_margin, held_out
+from seakeep.models.calibration import held_out, learn_margin
 
 STATES, INPUTS, DT = ["heave", "pitch"], ["eta"], 0.1
 
@@ -90,7 +90,7 @@ def test_the_band_is_a_factor_times_the_spread_with_a_floor(calibrated, ensemble
     for k, name in enumerate(STATES):
         mean, std = (plain[name].sel(statistic=key).values for key in ("mean", "std"))
         assert 4 * found.floor[k] > 1.5  # the noise alone
-        half = found.found.margin[k] * np.sqrt(std**2 + found.floor[k] ** 2)
+        half = found.conformal.margin[k] * np.sqrt(std**2 + found.floor[k] ** 2)
         for key, bound in (("mean", mean), ("lower", mean - half), ("upper", mean + half)):
             np.testing.assert_allclose(wide[name].sel(statistic=key), bound, rtol=0, atol=1e-12)
     assert "calibrated factor times the root" in wide["statistic"].attrs["comment"]
@@ -100,7 +100,7 @@ def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(moved, ensemble,
     calibrated = moved
     plain = ensemble.forecast_summary(run, 120.0, 30)
     wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
-    margin = calibrated.calibration.found.margin
+    margin = calibrated.calibration.conformal.margin
     assert (margin > 0).all()
     for k, name in enumerate(STATES):
         for key, side in (("mean", 0), ("std", 0), ("lower", -1), ("upper", 1)):
@@ -148,7 +148,7 @@ def test_no_window_touches_what_a_member_has_read(ensemble, moved, run):
         ]
         scores.append(np.concatenate(columns, axis=1))
     expected = conformal_margin(np.stack(scores), 0.95)
-    np.testing.assert_allclose(calibrated.calibration.found.margin, expected.margin, rtol=1e-12)
+    np.testing.assert_allclose(calibrated.calibration.conformal.margin, expected.margin, rtol=1e-12)
 
 
 def test_progress_counts_members_over_the_runs(ensemble):
@@ -289,15 +289,15 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
         )[name]
         for name, run in runs.items()
     ]
-    expected, floor, _ = found_margin(judged, 0.95, "spread")
-    np.testing.assert_allclose(found.found.margin, expected.margin, rtol=1e-9)
+    expected, floor, _ = learn_margin(judged, 0.95, "spread")
+    np.testing.assert_allclose(found.conformal.margin, expected.margin, rtol=1e-9)
     np.testing.assert_allclose(found.floor, floor, rtol=1e-9)
     assert found.folds == "run"
     assert found.windows == dict.fromkeys(runs, (500 - ensemble.history_samples) // 40)
     # A run that none has read is forecast by all.
     other = {"other": sea(3, 500, "other")}
     one, two = (ensemble.calibrate(other, 40, folds=folds).calibration for folds in ("run", None))
-    np.testing.assert_array_equal(one.found.margin, two.found.margin)
+    np.testing.assert_array_equal(one.conformal.margin, two.conformal.margin)
 
 
 def test_members_that_learn_from_the_run_alone_do_not_forecast_it():

@@ -1,21 +1,19 @@
 """Models on disk: the same bits in another process, and what a wrong file is told."""
 
 import errno
-import hashlib
 import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 import xarray as xr
 from scipy import io
 
 from seakeep import DataError, HankelDMDc, RequestError, load_live, load_model
-from seakeep.files import FORMAT, SEAL, read_sealed, write_netcdf, write_sealed
+from seakeep.files import FORMAT, write_netcdf, write_sealed
 
 FORECAST_ELSEWHERE = """
 import sys
@@ -146,32 +144,6 @@ def test_another_format_is_refused_in_one_line(saved, number):
         f"{saved} has format {number}, written by seakeep 9.0, and this seakeep reads format "
         f"{FORMAT}. Make the file again with this version, or update seakeep."
     )
-
-
-@pytest.mark.parametrize("how", ["external storage", "external link", "virtual set"])
-def test_values_that_lie_in_other_files_are_not_read(saved, tmp_path, how):
-    """A checksum says that a file is whole, and anyone can make one: HDF5 must not follow it."""
-    secret = tmp_path / "secret.h5"
-    with h5py.File(secret, "w") as file:
-        file["A"] = np.zeros((4, 4))
-    content = read_sealed(saved)
-    with h5py.File(content, "r+") as file:
-        shape = file["coefficients"].shape
-        del file["coefficients"]
-        if how == "external storage":
-            file.create_dataset(
-                "coefficients", shape, "f8", external=[(str(secret), 0, h5py.h5f.UNLIMITED)]
-            )
-        elif how == "external link":
-            file["coefficients"] = h5py.ExternalLink(str(secret), "A")
-        else:
-            layout = h5py.VirtualLayout((4, 4), "f8")
-            layout[:] = h5py.VirtualSource(str(secret), "A", (4, 4))
-            file.create_virtual_dataset("coefficients", layout)
-    whole = content.getvalue()
-    saved.write_bytes(whole + SEAL + hashlib.sha256(whole).hexdigest().encode())
-    with pytest.raises(DataError, match=r"the values of coefficients lie in another file"):
-        load_model(saved)
 
 
 def test_a_channel_of_tiny_numbers_is_a_model_like_any_other(make_dataset, tmp_path):

@@ -104,7 +104,7 @@ class TestLags:
         stretched = np.interp(T * (1 - 1.2 / T[-1]), T, waves())
         frozen = np.where(np.arange(T.size) < 2600, stretched, stretched[2600])
         held = np.arange(T.size) >= 2600
-        found = compare_sensors(frozen, waves(), DT, held=held)
+        found = compare_sensors(frozen, waves(), DT, stuck_samples=held)
         assert found.growth == pytest.approx(
             1.2 * 2600 / T.size, abs=0.15
         )  # windows of 3 s at the ends

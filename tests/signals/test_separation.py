@@ -48,16 +48,16 @@ def test_right_positions_pass_and_one_wrong_by_the_paper_s_is_named(seed, condit
     assert misplaced_probes(records, PLACES, DT, DEPTH) == []
     wrong = {**PLACES, "fwd": 48.24}
     (found,) = misplaced_probes(records, wrong, DT, DEPTH)
-    assert (found.probe, found.sure) == ("fwd", True)
+    assert (found.probe, found.certain) == ("fwd", True)
     # The probe stands 0.18 m nearer to the other one than stated; reflections leave 2 cm.
-    assert found.found.separation - found.found.stated == pytest.approx(0.18, abs=0.03)
+    assert found.separation.separation - found.separation.stated == pytest.approx(0.18, abs=0.03)
     # 5 cm turn the mean wave, 4 m long, by 4 degrees: that does not matter.
     assert misplaced_probes(records, {**PLACES, "fwd": 48.37}, DT, DEPTH) == []
     swapped = {"fwd": PLACES["cog"], "mid": PLACES["mid"], "cog": PLACES["fwd"]}
     assert misplaced_probes(records, swapped, DT, DEPTH)
     two = {name: records[name] for name in ("fwd", "cog")}
     (either,) = misplaced_probes(two, wrong, DT, DEPTH)
-    assert not either.sure
+    assert not either.certain
 
 
 def test_what_says_nothing_of_positions_is_silent():

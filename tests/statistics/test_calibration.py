@@ -13,7 +13,7 @@ from seakeep.core.calibration import (
     wave_envelope,
 )
 from seakeep.errors import DataError, RequestError
-from seakeep.models.calibration import Judged, found_margin
+from seakeep.models.calibration import Judged, learn_margin
 from seakeep.statistics import band_scores, conformal_margin, coverage
 
 
@@ -154,7 +154,7 @@ def test_a_learnt_band_covers_by_simulation_and_is_narrower():
         ]
         mean, std, y, envelope, _ = new
         for row, scale in enumerate(("learnt", "spread")):
-            found, floor, law = found_margin(judged, 0.95, scale)
+            found, floor, law = learn_margin(judged, 0.95, scale)
             half = found.margin * band_scale(std, floor, law, envelope)
             inside[row, repeat] = (np.abs(y - mean) <= half).mean()
             widths[row, repeat] = half.mean()

@@ -50,7 +50,7 @@ def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder
         parts = {name: runs[name] for name in ("first", "second")}  # they train as a whole
         calibrated = ensemble.calibrate(parts, steps, scale=scale)
         alone = calibrated.calibration
-        np.testing.assert_allclose(kept["margin"][k], alone.found.margin, rtol=1e-9)
+        np.testing.assert_allclose(kept["margin"][k], alone.conformal.margin, rtol=1e-9)
         assert int(kept["windows"][k]) == sum(alone.windows.values()) > 0
         for window in plan.tests["unseen"]:
             run = runs[window.run]

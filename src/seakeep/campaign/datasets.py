@@ -11,8 +11,6 @@ from seakeep.arrays import Progress
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import expanded, make_folder, sha256_of
 
-__all__ = ["DATASETS", "PublicDataset", "data_folder", "fetch", "find_dataset", "state_of"]
-
 TIMEOUT = 60.0
 """Seconds without an answer after which a download is given up."""
 

@@ -30,9 +30,6 @@ from seakeep.signals import (
 from seakeep.signals.expressions import parse
 from seakeep.waves import GRAVITY
 
-__all__ = ["derive"]
-
-
 AXES = {"surge": 0, "sway": 1, "heave": 2, "x": 0, "y": 1, "z": 2}
 
 

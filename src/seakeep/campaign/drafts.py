@@ -32,8 +32,6 @@ from seakeep.formats import read_columns
 from seakeep.formats.columns import named_unit
 from seakeep.toml import validated
 
-__all__ = ["draft_campaign"]
-
 STEPS = 32
 """Samples per period that the paper takes, and a draft proposes."""
 

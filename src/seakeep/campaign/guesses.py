@@ -21,20 +21,6 @@ from seakeep.signals import encounter_period, repeated_waves, uniform_step, wave
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import energy_period, tapered_power
 
-__all__ = [
-    "File",
-    "Guess",
-    "Sea",
-    "arranged",
-    "dead_motions",
-    "guess_channels",
-    "is_trigger",
-    "is_wave",
-    "seas_of",
-    "suggest_channel",
-    "waves_of_name",
-]
-
 # What a column may be called: whole words, lower case.
 _MOTION = {"surge": {"surge", "x"}, "sway": {"sway", "y"}, "heave": {"heave", "z"},
            "roll": {"roll", "phi", "x"}, "pitch": {"pitch", "theta", "y"},

@@ -23,8 +23,6 @@ from seakeep.conventions import conversion
 from seakeep.errors import RequestError, SeakeepError, did_you_mean
 from seakeep.files import load_sealed, write_sealed_array
 
-__all__ = ["LiveChain"]
-
 STATE = "state of a live chain"
 """Kind of the files of :meth:`LiveChain.save`."""
 
@@ -119,8 +117,8 @@ class LiveChain:
             If the file cannot be written, or another one is there.
         """
         rows = [values for table in self._rows.values() for values in table.values()]
-        kept = [self._columns(), self._origin, self._given, [len(values) for values in rows]]
-        return write_sealed_array(np.concatenate(rows), {"kept": json.dumps(kept)}, path, STATE)
+        states = [self._columns(), self._origin, self._given, [len(values) for values in rows]]
+        return write_sealed_array(np.concatenate(rows), {"kept": json.dumps(states)}, path, STATE)
 
     def resume(self, path: str | Path) -> None:
         """Go on from a state that :meth:`save` wrote, as if the process had never stopped.
@@ -167,10 +165,10 @@ class LiveChain:
         if ready - self._given < self.every:
             empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
             return xr.Dataset(empty, coords={"time": np.empty(0)})
-        found = self._made(self._given, ready)
+        run = self._prepared(self._given, ready)
         self._given = ready
         self._trim()
-        return found
+        return run
 
     def _checked(self, key: str, table: Mapping[str, npt.ArrayLike]) -> dict[str, FloatArray]:
         if key not in self._rows:
@@ -220,7 +218,7 @@ class LiveChain:
                 "Send rows of it up to the others' instants, NaN in its columns."
             )
 
-    def _made(self, first: int, stop: int) -> xr.Dataset:
+    def _prepared(self, first: int, stop: int) -> xr.Dataset:
         """Model samples of these numbers, by the chain over the whole window."""
         dt, origin = self.dt, self._origin
         assert origin is not None

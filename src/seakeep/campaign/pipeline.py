@@ -80,10 +80,7 @@ from seakeep.signals import (
 )
 from seakeep.signals.synchronisation import ASSUMED
 from seakeep.signals.time_axis import instant_text, span_text, stretches
-from seakeep.sizes import LONG_NUMBERS, check_numbers
 from seakeep.toml import Length, number
-
-__all__ = ["Run", "checked", "cleaned", "cropped", "derived", "mapped", "read", "resampled", "sync"]
 
 Reader = Callable[[Path, Options], Columns]
 COMMON = "the common step"
@@ -197,15 +194,15 @@ def sync(run: Run, clocks: Mapping[str, Clock] | None = None) -> Run:
     if clocks is not None:
         return replace(run, clocks=clocks)
     reference, *others = run.loggers.values()
-    found = {reference.name: Clock()}
+    by_reference = {reference.name: Clock()}
     instruments = run.settings.instruments
     for each in others:
         try:
-            found[each.name] = _clock(each, reference, instruments[each.name], instruments)
+            by_reference[each.name] = _clock(each, reference, instruments[each.name], instruments)
         except SeakeepError as error:
             place = f"run '{run.name}', clock of '{each.name}' ({each.path})"
             raise type(error)(f"{place}: {error}") from None
-    return replace(run, clocks=found)
+    return replace(run, clocks=by_reference)
 
 
 def _clock(
@@ -269,7 +266,7 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
     """Logger that holds each channel."""
     if len(run.loggers) == 1:
         return dict.fromkeys(channels, next(iter(run.loggers)))
-    found = {}
+    homes = {}
     for name, each in channels.items():
         if each.instrument is not None:
             if each.instrument not in run.loggers:
@@ -278,7 +275,7 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
                     f"channels.{name}.instrument: run '{run.name}' has no file of "
                     f"'{each.instrument}'.{near} Its files: {', '.join(run.loggers)}."
                 )
-            found[name] = each.instrument
+            homes[name] = each.instrument
             continue
         column, tables = each.column or name, [one.columns for one in run.loggers.values()]
         having = [key for key, one in run.loggers.items() if one.columns.find(column) is not None]
@@ -294,19 +291,19 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
                 f"run '{run.name}': the column '{column}' of channel '{name}' stands in the files "
                 f"of {' and '.join(having)}. State instrument = '{having[0]}' in [channels.{name}]."
             )
-        found[name] = having[0]
-    return found
+        homes[name] = having[0]
+    return homes
 
 
 def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings]) -> xr.Dataset:
     """Channels of one logger, gaps and jitter as they are."""
     time = run.clocks[logger.name].reference(logger.time)
-    kept = _recorded(time, run, logger)
+    records = _recorded(time, run, logger)
     variables = {}
     for name, each in channels.items():
         values, attributes = _converted(name, each, run, logger)
-        variables[name] = ("time", values[kept], attributes)
-    coordinate = ("time", time[kept], {"units": "s", "long_name": "time"})
+        variables[name] = ("time", values[records], attributes)
+    coordinate = ("time", time[records], {"units": "s", "long_name": "time"})
     return xr.Dataset(variables, {"time": coordinate})
 
 
@@ -473,13 +470,13 @@ def flag_samples(data: xr.Dataset, replaced: bool) -> xr.Dataset:
         there = (flags & (MISSING | BRIDGED)) == 0
         if np.isfinite(step := reading_step(x)):
             data[name].attrs["reading_step"] = step
-        held = find_held(x, dt) & there
-        for start, end in stretches(held):  # what stands before a gap that was filled
-            held[start:end] = end - start > 2
-        outlier, edge = find_outliers(x) & there & ~held, saturated(x, held)
+        stuck = find_held(x, dt) & there
+        for start, end in stretches(stuck):  # what stands before a gap that was filled
+            stuck[start:end] = end - start > 2
+        outlier, edge = find_outliers(x) & there & ~stuck, saturated(x, stuck)
         flags[outlier] |= OUTLIER
         flags[edge] |= SATURATED
-        flags[held & ~edge] |= STUCK
+        flags[stuck & ~edge] |= STUCK
         if replaced and outlier.any():
             filled = bridge(np.where(outlier, np.nan, x), dt, np.inf).values
             data[name] = data[name].copy(data=filled)
@@ -511,8 +508,8 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
             continue
         data = groups[home[name]]
         step = uniform_step(data["time"].to_numpy(), f"run '{run.name}'")
-        made = derive(data.variables, name, settings, step, run.name)
-        groups[home[name]] = data.assign({name: made.pop(name)}).assign_coords(made)
+        variable = derive(data.variables, name, settings, step, run.name)
+        groups[home[name]] = data.assign({name: variable.pop(name)}).assign_coords(variable)
     return replace(run, groups=groups, late=tuple(late))
 
 
@@ -553,25 +550,13 @@ def _axis(run: Run, dt: float) -> FloatArray:
             "reference's clock). Check the files of the run and the clocks."
         )
     origin = float(run.reference_time[0])
-    stated = run.settings.preparation
-    keys = ("sampling_rate", "dt", "steps_per_period")
-    key = next((key for key in keys if getattr(stated, key) is not None), "dt")
-    asked = f"preparation.{key} = {getattr(stated, key) or dt:g}"
-    channels = len(run.settings.channel_names)
     first = np.ceil((begin - origin) / dt - 1e-6)
     last = np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6)
-    samples = float(last - first)
-    if samples < 1:
+    if last <= first:
         raise RequestError(
             f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. Correct "
-            f"{asked}."
+            "sampling_rate, dt or steps_per_period in [preparation]."
         )
-    check_numbers(
-        f"{asked}: {samples:.15g} samples of run '{run.name}' in {channels} channels take",
-        samples * channels,
-        f"Take a larger step, or a part of the run (record in [runs.{run.name}]).",
-        LONG_NUMBERS,
-    )
     instants: FloatArray = origin + dt * np.arange(first, last + 1)
     return instants
 
@@ -790,9 +775,9 @@ def attributes_of(
         if span is None and settings.serves == use:
             span = whole
         if span is not None:
-            kept = time[inside(time, span, dt)]
-            if kept.size:
-                attributes[f"{use}_span"] = (float(kept[0]), float(kept[-1]))
+            used = time[inside(time, span, dt)]
+            if used.size:
+                attributes[f"{use}_span"] = (float(used[0]), float(used[-1]))
     for logger, clock in list(clocks.items())[1:]:
         attributes |= {
             f"clock_{logger}": clock.describe(),
@@ -814,10 +799,10 @@ def celerity_of(run: xr.Dataset, dt: float, campaign: CampaignSettings) -> float
     apart = campaign.rig.positions[channels[1]] - campaign.rig.positions[channels[0]]
     try:
         first, last = (run[name].to_numpy() for name in channels)
-        found = effective_celerity(first, last, dt, apart, depth)
+        celerity = effective_celerity(first, last, dt, apart, depth)
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
         return None
-    return found.celerity
+    return celerity.celerity
 
 
 def version() -> str:

@@ -39,8 +39,6 @@ from seakeep.signals import Clock, uniform_step
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length
 
-__all__ = ["Campaign", "Progress", "read_campaign"]
-
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
 
@@ -238,18 +236,18 @@ class Campaign:
             If the file is damaged, has gaps, or its times are not uniform.
         """
         reader = ReadOnce()
-        found, settings, _, _ = self._whole([name], None, reader, steps=False)
-        run = self._channels(name, found, settings, reader)
+        surveyed, settings, _, _ = self._whole([name], None, reader, steps=False)
+        run = self._channels(name, surveyed, settings, reader)
         dt = uniform_step(run.reference_time, f"run '{name}'")
         data = resampled(run, dt).data
         assert data is not None
-        return data.assign_attrs(self._attributes(name, data, dt, found, settings))
+        return data.assign_attrs(self._attributes(name, data, dt, surveyed, settings))
 
     def _channels(
-        self, name: str, found: Survey, settings: CampaignSettings, reader: ReadOnce
+        self, name: str, surveyed: Survey, settings: CampaignSettings, reader: ReadOnce
     ) -> Run:
         """Steps 1 to 5: the channels of a run by logger, at their own rates."""
-        run = sync(read(name, settings, self.files_of(name), reader), found.clocks[name])
+        run = sync(read(name, settings, self.files_of(name), reader), surveyed.clocks[name])
         return derived(cleaned(mapped(run)))
 
     def clocks(self, names: Iterable[str] | None = None) -> dict[str, dict[str, Clock]]:
@@ -273,8 +271,8 @@ class Campaign:
             read are left out of the pooled drifts, with a warning.
         """
         wanted = list(self.runs if names is None else names)
-        found = self._survey(wanted, False)
-        return {name: dict(found.clocks[name]) for name in wanted}
+        surveyed = self._survey(wanted, False)
+        return {name: dict(surveyed.clocks[name]) for name in wanted}
 
     def _survey(
         self,
@@ -362,10 +360,10 @@ class Campaign:
             raise RequestError(f"received '{stated}', a frequency. Give a length such as '15 T'.")
         return length.at(self.encounter_period())
 
-    def _mean_period(self, found: Survey) -> float:
-        if not found.periods:
+    def _mean_period(self, surveyed: Survey) -> float:
+        if not surveyed.periods:
             raise RequestError(f"{self.path} has no run in use. Give a run another role.")
-        return float(np.mean(list(found.periods.values())))
+        return float(np.mean(list(surveyed.periods.values())))
 
     def prepare(
         self, names: Iterable[str] | None = None, progress: Progress | None = None
@@ -426,14 +424,14 @@ class Campaign:
         """
         wanted = list(self.runs if names is None else names)
         reader = ReadOnce()
-        found, settings, period, dt = self._whole(wanted, progress, reader, failures=failures)
+        surveyed, settings, period, dt = self._whole(wanted, progress, reader, failures=failures)
         stated, first = dt is not None, ""
-        told = {(str(settings.wave_channel), "PERIOD")}  # the survey has warned of it
+        reported = {(str(settings.wave_channel), "PERIOD")}  # the survey has warned of it
         for done, name in enumerate(wanted, 1):
             try:
                 if failures is not None and name in failures:
                     raise failures[name]
-                run = self._channels(name, found, settings, reader)
+                run = self._channels(name, surveyed, settings, reader)
                 own = uniform_step(run.reference_time, f"run '{name}'")
                 dt, first = own if dt is None else dt, first or name
                 if not stated and strays(own, run.reference_time.size, dt):
@@ -441,14 +439,14 @@ class Campaign:
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
-                run = checked(resampled(run, dt), found.doubts.get(name), found.left_out)
-                warn_of(run.findings, told)
+                run = checked(resampled(run, dt), surveyed.doubts.get(name), surveyed.left_out)
+                warn_of(run.findings, reported)
                 data = cropped(run).data
                 assert data is not None
                 data.attrs["quality"] = as_json(run.findings)
                 for channel in data.data_vars.values():
                     channel.attrs["noise_std"] = noise_floor(channel.to_numpy())
-                data.attrs.update(self._attributes(name, data, dt, found, settings))
+                data.attrs.update(self._attributes(name, data, dt, surveyed, settings))
             except SeakeepError as error:
                 is_named = f"'{name}'" in str(error)
                 spare(failures, name, error if is_named else type(error)(f"run '{name}': {error}"))
@@ -497,9 +495,9 @@ class Campaign:
             If a file of the run cannot be read.
         """
         reader = ReadOnce()
-        found, settings, _, dt = self._whole([run], None, reader)
+        surveyed, settings, _, dt = self._whole([run], None, reader)
         if dt is None:
-            dt = uniform_step(self._channels(run, found, settings, reader).reference_time, run)
+            dt = uniform_step(self._channels(run, surveyed, settings, reader).reference_time, run)
         late, length = self.seconds(delay), self.seconds(window)
         if not 0 <= 4 * late <= length:
             raise RequestError(
@@ -512,7 +510,7 @@ class Campaign:
             masked = settings.preparation.model_copy(update={"gaps": "mask"})
             changed["preparation"] = masked
         settings = settings.model_copy(update=changed)
-        source = sync(read(run, settings, self.files_of(run), reader), found.clocks[run])
+        source = sync(read(run, settings, self.files_of(run), reader), surveyed.clocks[run])
         return LiveChain(source, dt, late, length, whole_number(every, "every"))
 
     def _whole(
@@ -527,18 +525,18 @@ class Campaign:
         preparation, period = self.settings.preparation, self.settings.campaign.encounter_period
         counting = steps and preparation.steps_per_period is not None
         needed = counting or self._counts_in_periods
-        found = self._survey(wanted, needed and period is None, reader, progress, failures)
+        surveyed = self._survey(wanted, needed and period is None, reader, progress, failures)
         if needed and period is None:
-            period = self._mean_period(found)
+            period = self._mean_period(surveyed)
         dt = preparation.dt
         if preparation.steps_per_period is not None and period is not None:
             dt = period / preparation.steps_per_period
         elif preparation.sampling_rate is not None:
             dt = 1.0 / preparation.sampling_rate
-        return found, self._in_seconds(period), period, dt
+        return surveyed, self._in_seconds(period), period, dt
 
     def _attributes(
-        self, name: str, run: xr.Dataset, dt: float, found: Survey, settings: CampaignSettings
+        self, name: str, run: xr.Dataset, dt: float, surveyed: Survey, settings: CampaignSettings
     ) -> dict[str, Any]:
         own = {
             "campaign": self.name,
@@ -546,7 +544,7 @@ class Campaign:
             "file_sha256": self.checksum_of(name),
             "basis_sha256": self.basis_of(name),
         }
-        return {**own, **attributes_of(name, run, dt, found.clocks[name], settings)}
+        return {**own, **attributes_of(name, run, dt, surveyed.clocks[name], settings)}
 
 
 def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:

@@ -20,8 +20,6 @@ from seakeep.formats import Columns, is_recording_folder, read_columns
 from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
 from seakeep.signals.time_axis import check_order, instant_text
 
-__all__ = ["expand", "read_table"]
-
 _TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "sec", "seconds",
           "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
 COUNTED = 64
@@ -51,12 +49,12 @@ def expand(file: str, folder: Path) -> Path:
     """
 
     def value(match: re.Match[str]) -> str:
-        if not (found := os.environ.get(match[1])):
+        if not (setting := os.environ.get(match[1])):
             raise RequestError(
                 f"the file {file!r} needs the environment variable {match[1]}, which is not set. "
                 f"Set it to the folder of the data: export {match[1]}=/path/to/data"
             )
-        return found
+        return setting
 
     return folder / expanded(_VARIABLE.sub(value, file))
 

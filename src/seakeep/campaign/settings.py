@@ -35,21 +35,6 @@ from seakeep.toml import (
     parse_length,
 )
 
-__all__ = [
-    "CampaignSettings",
-    "ChannelSettings",
-    "DerivedSettings",
-    "FileSettings",
-    "GeneralSettings",
-    "InstrumentSettings",
-    "InstrumentsSettings",
-    "ModelSettings",
-    "PreparationSettings",
-    "RedundantSettings",
-    "RigSettings",
-    "RunSettings",
-]
-
 
 class GeneralSettings(Table):
     """``[campaign]``: what the campaign is called, its scale and its encounter period."""

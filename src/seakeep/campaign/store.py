@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.campaign.pipeline import version
-from seakeep.campaign.prepare import Campaign, Progress
+from seakeep.campaign.prepare import Campaign
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, warn
 from seakeep.files import check_output, load_sealed, make_folder, write_sealed
-
-__all__ = ["load_prepared", "prepared_folder", "write_prepared"]
 
 PREPARED = "prepared run"
 """Kind of these files, which sets them apart from measurements."""
@@ -70,11 +69,11 @@ def write_prepared(
     missing = [name for name in wanted if name not in steps]
     done = len(steps)
 
-    def told(count: int, _: int, name: str) -> None:
+    def report(count: int, _: int, name: str) -> None:
         if progress is not None:
             progress(done + count, len(wanted), name)
 
-    for name, run in campaign.each_prepared(missing, told, failed):
+    for name, run in campaign.each_prepared(missing, report, failed):
         write_sealed(run, files[name], PREPARED)
         steps[name] = run.attrs["dt"]
     if len(set(steps.values())) > 1:  # that of fresh runs was another, which only all runs show

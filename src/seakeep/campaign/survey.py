@@ -27,8 +27,6 @@ from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, w
 from seakeep.signals.synchronisation import without_doubtful_drift
 from seakeep.signals.waves import energy_period
 
-__all__ = ["Failures", "ReadOnce", "Survey", "as_one", "spare", "survey"]
-
 Failures = dict[str, SeakeepError]
 """Errors by run: a run that cannot be read must not stop the others."""
 
@@ -97,16 +95,16 @@ class ReadOnce:
     """
 
     keep: bool = False
-    kept: dict[tuple[Path, Options], Columns] = field(default_factory=dict)
+    columns: dict[tuple[Path, Options], Columns] = field(default_factory=dict)
 
     def __call__(self, path: Path, options: Options) -> Columns:
         """Columns of a file."""
-        if (known := self.kept.pop((path, options), None)) is not None:
+        if (known := self.columns.pop((path, options), None)) is not None:
             return known
         columns = read_columns(path, options)
-        held = sum(x.nbytes for each in self.kept.values() for x in each.values.values())
-        if self.keep and held < KEPT:
-            self.kept[path, options] = columns
+        size = sum(x.nbytes for each in self.columns.values() for x in each.values.values())
+        if self.keep and size < KEPT:
+            self.columns[path, options] = columns
         return columns
 
 
@@ -128,7 +126,7 @@ def survey(
     clock_runs, period_runs = _surveyed(settings, asked, channel)
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks: dict[str, dict[str, Clock]] = {}
-    found: dict[str, tuple[float, float]] = {}
+    spans: dict[str, tuple[float, float]] = {}
     bad: Failures = {}
     for count, name in enumerate(runs, 1):
         if progress is not None:
@@ -138,14 +136,14 @@ def survey(
             run = sync(read(name, settings, files_of(name), reader))
             clocks[name] = dict(run.clocks)
             if channel is not None and name in period_runs:
-                found[name] = _period(run, channel)
+                spans[name] = _period(run, channel)
         except SeakeepError as error:
             if name in asked:
                 spare(failures, name, error)
             bad[name] = error
     reader.keep = False
-    periods = {name: counted for name, (counted, _) in found.items()}
-    doubts = {name: pair for name, pair in found.items() if not 1 / LED <= pair[1] / pair[0] <= LED}
+    periods = {name: counted for name, (counted, _) in spans.items()}
+    doubts = {name: pair for name, pair in spans.items() if not 1 / LED <= pair[1] / pair[0] <= LED}
     if bad and (not clocks or (period_runs and not periods)):
         raise as_one(bad)
     left_out = {
@@ -201,8 +199,8 @@ def _period(run: Run, channel: str) -> tuple[float, float]:
         assert waves is not None
     time, series = waves["time"].to_numpy(), waves[channel].to_numpy()
     step = uniform_step(time, f"run '{run.name}'")
-    kept = inside(time, used_span(run.own), step)
-    series = series[kept] if kept.sum() > 2 else series
+    used = inside(time, used_span(run.own), step)
+    series = series[used] if used.sum() > 2 else series
     try:
         counted = encounter_period(series, step, run.settings.campaign.period_hysteresis)
     except DataError as error:

@@ -12,13 +12,6 @@ from seakeep.errors import RequestError, did_you_mean
 from seakeep.signals.expressions import parse
 from seakeep.toml import Mistake, lengths, read_toml, validated
 
-__all__ = [
-    "derivation_order",
-    "needed_channels",
-    "read_settings",
-    "sources_of",
-]
-
 
 def read_settings(path: Path) -> CampaignSettings:
     """Read and validate a campaign file."""

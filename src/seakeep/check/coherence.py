@@ -125,7 +125,7 @@ def coherence(
         for k, each in enumerate(still)
     ])  # fmt: skip
     unjudged = still | (slow > segment * model.dt / 3)
-    found: dict[str, Any] = {
+    variables: dict[str, Any] = {
         "ordinary": (("state", "input", "frequency"), spectra.ordinary()[..., :size].T),
         "spectrum": (over, spectra.outputs[:, :size].T),
         "nrmse": ("state", np.where(still, np.nan, pooled_nrmse(own))),
@@ -139,11 +139,11 @@ def coherence(
     for bound, (multiple, of_all, count) in bounds.items():
         ends, alike = _bound(of_all, spreads, size, count)
         for key, values in zip(("", "_lower", "_upper"), ends, strict=True):
-            found[f"{bound}{key}"] = ("state", np.where(unjudged, np.nan, values))
+            variables[f"{bound}{key}"] = ("state", np.where(unjudged, np.nan, values))
         least = np.maximum(alike, least)
-        found[multiple] = (over, least)
+        variables[multiple] = (over, least)
     return xr.Dataset(
-        found,
+        variables,
         coords={
             "state": model.states,
             "input": model.inputs,

@@ -58,7 +58,7 @@ class Checked:
 
     Parameters
     ----------
-    found : dict of str to Dataset
+    results : dict of str to Dataset
         Result of each check that could judge; where runs test, also ``training_coherence`` and
         ``training_residuals``, the same of what trains.
     refused : dict of str to str
@@ -69,7 +69,7 @@ class Checked:
         Tests whose input repeats training input, in words.
     """
 
-    found: dict[str, xr.Dataset]
+    results: dict[str, xr.Dataset]
     refused: dict[str, str]
     notes: dict[str, tuple[str, ...]]
     repeats: dict[str, str] = field(default_factory=dict)
@@ -105,7 +105,7 @@ def check_model(
     """
     for name, run in runs.items():
         check_channels(run, [*model.states, *model.inputs], name)
-    found: dict[str, xr.Dataset] = {}
+    results: dict[str, xr.Dataset] = {}
     refused, notes = {}, {}
     shared: dict[str, Any] = {"free": {}, "baselines": baselines}
     for number, (name, check) in enumerate(CHECKS.items()):
@@ -115,11 +115,11 @@ def check_model(
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                found[name] = check(model, runs, **how)
+                results[name] = check(model, runs, **how)
             except SeakeepError as error:
                 refused[name] = str(error)
         if name == "measured_response":
-            shared["measured"] = found.get(name)
+            shared["measured"] = results.get(name)
         ours = [str(each.message) for each in caught if issubclass(each.category, SeakeepWarning)]
         notes[name] = tuple(dict.fromkeys(ours))
     trained = of_part(runs, "train")
@@ -128,5 +128,5 @@ def check_model(
         for name in ("coherence", "residuals"):
             with warnings.catch_warnings(), suppress(SeakeepError):
                 warnings.simplefilter("ignore", SeakeepWarning)
-                found[f"training_{name}"] = CHECKS[name](model, trained, free=free)
-    return Checked(found, refused, notes)
+                results[f"training_{name}"] = CHECKS[name](model, trained, free=free)
+    return Checked(results, refused, notes)

@@ -70,13 +70,13 @@ def is_regular(run: xr.Dataset) -> bool:
 
 def irregular(runs: Mapping[str, xr.Dataset], what: str) -> dict[str, xr.Dataset]:
     """Runs that are not regular; an error says what cannot be had without them."""
-    found = {name: run for name, run in runs.items() if not is_regular(run)}
-    if not found:
+    skipped = {name: run for name, run in runs.items() if not is_regular(run)}
+    if not skipped:
         raise DataError(
             f"all runs ({', '.join(runs)}) are in regular waves, which hold one frequency each: "
             f"{what} takes a run in irregular waves."
         )
-    return found
+    return skipped
 
 
 def of_part(runs: Mapping[str, xr.Dataset], part: str) -> dict[str, xr.Dataset]:
@@ -85,12 +85,12 @@ def of_part(runs: Mapping[str, xr.Dataset], part: str) -> dict[str, xr.Dataset]:
     A run that states neither span tests as a whole.
     """
     wanted, other = f"{part}_span", {"train": "test_span", "test": "train_span"}[part]
-    found = {}
+    parts = {}
     for name, run in runs.items():
         if wanted in run.attrs or (part == "test" and other not in run.attrs):
-            found[name] = run.copy(deep=False)
-            found[name].attrs.pop(other, None)
-    return found
+            parts[name] = run.copy(deep=False)
+            parts[name].attrs.pop(other, None)
+    return parts
 
 
 def judged(runs: Mapping[str, xr.Dataset]) -> tuple[dict[str, xr.Dataset], str]:
@@ -101,7 +101,7 @@ def judged(runs: Mapping[str, xr.Dataset]) -> tuple[dict[str, xr.Dataset], str]:
 
 def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
     """Parts of runs that train or test; a run that cannot be used warns."""
-    found = {}
+    parts = {}
     for name, run in runs.items():
         check_step(run, name, model.dt)
         time = np.asarray(run["time"].values, dtype=float)
@@ -122,8 +122,8 @@ def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
             warn(f"{name} is left out: no sample of it has all channels of the model.")
             continue
         first, stop = max(pieces, key=lambda piece: piece[1] - piece[0])
-        found[name] = Part(run, time[first:stop], states[first:stop], inputs[first:stop])
-    return found
+        parts[name] = Part(run, time[first:stop], states[first:stop], inputs[first:stop])
+    return parts
 
 
 def free_runs(
@@ -164,17 +164,17 @@ def gathered(
     DataError
         If all fail, with the reason of each.
     """
-    found, reasons = {}, []
+    results, reasons = {}, []
     for name in names:
         try:
-            found[name] = make(name)
+            results[name] = make(name)
         except SeakeepError as error:
             reasons.append(f"{name}: {error}")
-    if not found:
+    if not results:
         raise DataError(" ".join([none, *reasons]))
     for reason in reasons:
         warn(f"{left_out} {reason}")
-    return found
+    return results
 
 
 def ratio(values: FloatArray, per: FloatArray) -> FloatArray:
@@ -214,15 +214,15 @@ def beside(
     free: Known | None,
 ) -> dict[str, dict[str, FreeRun]]:
     """Free runs of baselines over those of a model; one that lacks a run is left out."""
-    found = {}
+    others = {}
     for label, each in (baselines or {}).items():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeakeepWarning)
             try:
-                found[label] = free_runs(each, runs, free, label, own)
+                others[label] = free_runs(each, runs, free, label, own)
             except DataError:
                 continue
-    return {label: of for label, of in found.items() if of.keys() == own.keys()}
+    return {label: of for label, of in others.items() if of.keys() == own.keys()}
 
 
 def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
@@ -271,18 +271,18 @@ def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) ->
         like = FreeRun(float(time[at]), time[at + 1 : last + 1], empty, measured)
     steps = len(like.time)
     if is_ensemble(model):
-        found = model.forecast_summary(run, like.start, steps).sel(statistic="mean")
+        forecast = model.forecast_summary(run, like.start, steps).sel(statistic="mean")
     else:
-        found = model.forecast(run, like.start, steps)
-    return like._replace(forecast=channel_matrix(found, model.states, name))
+        forecast = model.forecast(run, like.start, steps)
+    return like._replace(forecast=channel_matrix(forecast, model.states, name))
 
 
 def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) -> FloatArray:
     """Free runs from several starts, (window, steps, N); for an ensemble the members' mean."""
-    found = model.forecast_windows(run, starts.tolist(), steps)
-    if "member" in found.dims:
-        found = found[model.states].mean("member", skipna=False)
-    values: FloatArray = np.stack([found[name].values for name in model.states], axis=-1)
+    forecasts = model.forecast_windows(run, starts.tolist(), steps)
+    if "member" in forecasts.dims:
+        forecasts = forecasts[model.states].mean("member", skipna=False)
+    values: FloatArray = np.stack([forecasts[name].values for name in model.states], axis=-1)
     return values
 
 

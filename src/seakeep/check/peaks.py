@@ -84,7 +84,7 @@ def statistics(
 def _densities(free: list[FreeRun], states: int) -> tuple[FloatArray, FloatArray]:
     """Densities of the deviations from the mean of each run, on a grid for each state."""
     grids = np.empty((states, PLACES))
-    found = np.full((states, len(KINDS), PLACES), np.nan)
+    densities = np.full((states, len(KINDS), PLACES), np.nan)
     both = np.concatenate(
         [np.stack([(x := getattr(e, kind)) - x.mean(axis=0) for kind in KINDS]) for e in free],
         axis=1,
@@ -97,8 +97,8 @@ def _densities(free: list[FreeRun], states: int) -> tuple[FloatArray, FloatArray
             if values.size and np.ptp(values) > 0:
                 density = kernel_density(values, grids[state])
                 if density.sum() * 2 * reach / PLACES > 0.5:  # else the grid is too coarse for it
-                    found[state, side] = density
-    return grids, found
+                    densities[state, side] = density
+    return grids, densities
 
 
 def _divergence(measured: FloatArray, forecast: FloatArray) -> float:

@@ -93,7 +93,7 @@ def residuals(
     statistic, probability = ljung_box(correlation, count)
     spread = np.sqrt(np.mean(np.concatenate([m - m.mean(axis=0) for *_, m in steps]) ** 2, axis=0))
     whole = np.concatenate([error for error, _ in errors])
-    found = {
+    variables = {
         "autocorrelation": (("state", "lag"), correlation.T),
         "limit": ((), 1.96 / np.sqrt(count)),
         "ljung_box": ("state", statistic),
@@ -104,11 +104,11 @@ def residuals(
     }
     if model.inputs:
         past, limit = input_correlation(errors, lags)
-        found["input_correlation"] = (("state", "input", "lag"), past.transpose(1, 2, 0))
-        found["input_limit"] = (("state", "input"), limit)
+        variables["input_correlation"] = (("state", "input", "lag"), past.transpose(1, 2, 0))
+        variables["input_limit"] = (("state", "input"), limit)
     lag = model.dt * np.arange(lags + 1)
     return xr.Dataset(
-        found,
+        variables,
         coords={
             "state": model.states,
             "input": model.inputs,
@@ -125,14 +125,14 @@ def _one_step(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Errors of one step over the test part, inputs and measured states at the same instants."""
     first, last = window_of(model, run)
-    made = free_windows(model, run, run["time"].values[first:last], 1)[:, 0]
+    forecasts = free_windows(model, run, run["time"].values[first:last], 1)[:, 0]
     after = slice(first + 1, last + 1)
     measured = channel_matrix(run, model.states, name, after)
     inputs = channel_matrix(run, model.inputs, name, after)
-    sound = np.isfinite(made).all(axis=1) & np.isfinite(measured).all(axis=1)
+    sound = np.isfinite(forecasts).all(axis=1) & np.isfinite(measured).all(axis=1)
     if sound.sum() < 2:
         raise DataError("the model diverges, or nothing is measured.")
-    return (made - measured)[sound], inputs[sound], measured[sound]
+    return (forecasts - measured)[sound], inputs[sound], measured[sound]
 
 
 def _aged(model: Model, run: xr.Dataset, name: str, lags: int) -> FloatArray:
@@ -141,11 +141,11 @@ def _aged(model: Model, run: xr.Dataset, name: str, lags: int) -> FloatArray:
     time = np.asarray(run["time"].values, dtype=float)
     count = min(AGES * lags, last - first)
     starts = np.arange(first, last - count + 1, lags)
-    made = free_windows(model, run, time[starts], count)
+    forecasts = free_windows(model, run, time[starts], count)
     measured = channel_matrix(run, model.states, name)
     rows = starts[:, None] + np.arange(1, count + 1)
     squares = np.full((len(starts), AGES * lags, len(model.states)), np.nan)
-    squares[:, :count] = (made - measured[rows]) ** 2
+    squares[:, :count] = (forecasts - measured[rows]) ** 2
     return squares
 
 
@@ -162,9 +162,9 @@ def _of_free_runs(model: Model, free: Mapping[str, FreeRun], period: float) -> d
         raise DataError(
             f"free runs hold for {segment} instants at most: there is no spectrum of their error."
         )
-    found = cross_spectra(pieces, model.dt, segment)
-    error, power = found.input_power, found.outputs
-    cycles = found.frequency * period
+    spectra = cross_spectra(pieces, model.dt, segment)
+    error, power = spectra.input_power, spectra.outputs
+    cycles = spectra.frequency * period
     total = power.sum(axis=0)
     bands = [
         np.sqrt(ratio(error[(cycles >= low) & (cycles < high)].sum(axis=0), total))
@@ -173,6 +173,6 @@ def _of_free_runs(model: Model, free: Mapping[str, FreeRun], period: float) -> d
     return {
         "error_spectrum": (("state", "frequency"), error.T),
         "measured_spectrum": (("state", "frequency"), power.T),
-        "frequency": ("frequency", found.frequency, {"units": "Hz", "long_name": "frequency"}),
+        "frequency": ("frequency", spectra.frequency, {"units": "Hz", "long_name": "frequency"}),
         "band_nrmse": (("state", "band"), np.stack(bands, axis=1)),
     }

@@ -114,7 +114,7 @@ def response(
 def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> ComplexArray:
     """Transfer functions of a member from all regressors, physical units, (frequency, N, n + m)."""
     rows, driven = dynamics.matrices
-    found = frequency_response(
+    gain = frequency_response(
         rows,
         driven,
         2 * np.pi * frequency * model.dt,
@@ -125,7 +125,7 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
     scale = np.concatenate([dynamics.input_scale.std, dynamics.direct_scale.std])
     early = np.exp(2j * np.pi * frequency * model.dt * _lead(model))
     early = np.where(np.arange(scale.size) < len(model.inputs), early[:, None], 1.0)
-    result: ComplexArray = found * dynamics.state_scale.std[:, None] / scale * early[:, None]
+    result: ComplexArray = gain * dynamics.state_scale.std[:, None] / scale * early[:, None]
     return result
 
 
@@ -264,13 +264,13 @@ def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Datase
             return _regular_point(model, name, parts[name], reference)
         return _irregular_points(model, pieces, reference, mean_period(runs, model.inputs))
 
-    found = gathered(
+    estimates = gathered(
         [*names, *["irregular waves"] * bool(pieces)],
         points,
         "no run gives a measured response.",
         "no measured response from",
     )
-    out = xr.concat([*found.values()], dim="point", coords="minimal", join="outer")
+    out = xr.concat([*estimates.values()], dim="point", coords="minimal", join="outer")
     out["phase"].attrs = {"units": "deg", "long_name": "phase before the wave"}
     return out.assign_attrs(reference=model.inputs[reference])
 
@@ -284,14 +284,14 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
     accuracy = [_accuracy(part.run, each) for each in [model.inputs[reference], *model.states]]
     ratio = answer / amplitude
     type_b = np.hypot(accuracy[1:], ratio * accuracy[0]) / amplitude
-    found = estimate(harmonics[:, 1:] / harmonics[:, :1], type_b)
+    estimated = estimate(harmonics[:, 1:] / harmonics[:, :1], type_b)
     offset = means[:, 1:] - model.signature.state_scale.centre
-    sure = estimate(offset.astype(complex), np.array(accuracy[1:]))
+    mean = estimate(offset.astype(complex), np.array(accuracy[1:]))
     return _points(
         model,
         {"run": name, "kind": "regular", "frequency": frequency, "wave_amplitude": amplitude},
-        *(found.ratio, found.amplitude, found.phase),
-        {"offset": sure.ratio.real, "offset_uncertainty": sure.amplitude},
+        *(estimated.ratio, estimated.amplitude, estimated.phase),
+        {"offset": mean.ratio.real, "offset_uncertainty": mean.amplitude},
     )
 
 
@@ -401,14 +401,14 @@ def validation(
             f"{', '.join(map(str, measured.data_vars)) or 'nothing'}."
         )
     frequency, place = np.unique(measured["frequency"].values, return_inverse=True)
-    found = response(model, frequency, runs)
-    if WAVE not in found["input"] and elevations(model).sum() > 1:
+    result = response(model, frequency, runs)
+    if WAVE not in result["input"] and elevations(model).sum() > 1:
         raise DataError(
             "the model answers several probes, of which no run states the positions and the water "
             "depth: its answer to one of them is not its answer to a wave that passes all. State "
             "both in [rig] of the campaign file."
         )
-    own = found.sel(input=WAVE if WAVE in found["input"] else found.attrs["reference"])
+    own = result.sel(input=WAVE if WAVE in result["input"] else result.attrs["reference"])
     amplitude = own["amplitude"].values[:, place].T
     spread = np.zeros_like(amplitude)
     if "amplitude_lower" in own:

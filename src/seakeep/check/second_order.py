@@ -84,22 +84,22 @@ def drift(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     differences: FloatArray = step * np.arange(DIFFERENCES + 1, dtype=float)
     slow = transfer(model, single.dynamics, differences)
     still = _columns(single, np.zeros((samples, len(single.inputs))))
-    found = np.empty((len(single.states), DIFFERENCES + 1, bins.size), dtype=complex)
+    forces = np.empty((len(single.states), DIFFERENCES + 1, bins.size), dtype=complex)
     for number, first in enumerate(bins):
         for apart in range(DIFFERENCES + 1):
             waves = [first] if apart == 0 else [first, first + apart]
             elevation = sum(_wave(samples, each, turns[each], amplitude) for each in waves)
             rows = _columns(single, np.asarray(elevation)) - still
             parts = np.fft.fft(rows, axis=0)[apart] / samples * (1 if apart == 0 else 2)
-            found[:, apart, number] = slow[apart] @ parts / (amplitude**2 * (2 if apart else 1))
-    found[read_off(model)] = np.nan
-    slow_response = np.abs(found)
-    slow_response[:, 0] = found[:, 0].real  # the mean has a sign
+            forces[:, apart, number] = slow[apart] @ parts / (amplitude**2 * (2 if apart else 1))
+    forces[read_off(model)] = np.nan
+    slow_response = np.abs(forces)
+    slow_response[:, 0] = forces[:, 0].real  # the mean has a sign
     dims = ("state", "difference", "frequency")
     return xr.Dataset(
         {
             "slow_response": (dims, slow_response),
-            "phase": (dims, np.degrees(np.angle(found)), {"units": "deg"}),
+            "phase": (dims, np.degrees(np.angle(forces)), {"units": "deg"}),
             **_offsets(single, runs, slow[0], still),
         },
         coords={

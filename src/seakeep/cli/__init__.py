@@ -86,7 +86,7 @@ for _verb in (
 app.add_typer(campaigns.datasets, name="datasets")
 
 
-def _kept(leaving: BaseException) -> str:
+def _saved_words(leaving: BaseException) -> str:
     """Message after Ctrl-C about what is kept."""
     error: BaseException | None = leaving
     while error is not None:
@@ -140,7 +140,7 @@ def main(arguments: list[str] | None = None) -> int:
     except SystemExit as leaving:
         status = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
         if status == INTERRUPTED:
-            say(f"Interrupted. {_kept(leaving)}", style="red")
+            say(f"Interrupted. {_saved_words(leaving)}", style="red")
         return status
     except SeakeepError as error:
         if debug:

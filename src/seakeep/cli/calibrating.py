@@ -126,7 +126,7 @@ def calibrate(
     show(f"Calibrated on {', '.join(used)}: judge it on other instants.")
     calibrated.save(out)
     whole = sum(calibrated.calibration.windows.values())
-    if whole / (whole + 1) < calibrated.calibration.found.level:
+    if whole / (whole + 1) < calibrated.calibration.conformal.level:
         say(
             "Note: errors that last for a whole window are seen only once in each. Counted as "
             f"such, {counted(whole, 'window')} would support {100 * whole / (whole + 1):.0f} %; "

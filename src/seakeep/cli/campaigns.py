@@ -151,17 +151,17 @@ def _print_findings(runs: Mapping[str, xr.Dataset]) -> None:
     """Print what the checks found and no warning said: one line per channel and kind."""
     from seakeep.quality import Finding, findings_of
 
-    found: dict[tuple[str, str], list[Finding]] = {}
+    groups: dict[tuple[str, str], list[Finding]] = {}
     for run in runs.values():
         for each in findings_of(run):
             if not each.kind.remedy:
-                found.setdefault((each.channel, each.kind.name), []).append(each)
-    for same in list(found.values())[:SHOWN]:
+                groups.setdefault((each.channel, each.kind.name), []).append(each)
+    for same in list(groups.values())[:SHOWN]:
         others = len({each.run for each in same}) - 1
         alike = f" (and in {others} more run{'s' * (others > 1)})" if others else ""
         say(f"Found in {same[0].run}: {same[0].channel}: {same[0].text}{alike}")
-    if len(found) > SHOWN:
-        say(f"Found {len(found) - SHOWN} more: the sheet lists them.")
+    if len(groups) > SHOWN:
+        say(f"Found {len(groups) - SHOWN} more: the sheet lists them.")
 
 
 datasets = typer.Typer(

@@ -69,16 +69,16 @@ def progress_bar(what: str) -> Iterator[Progress]:
     """Show progress: a bar on a terminal, else a line every few seconds, on standard error."""
     console = messages()
     if not console.is_terminal:
-        told, began = -math.inf, (time.monotonic(), 0)
+        last, began = -math.inf, (time.monotonic(), 0)
 
         def line(done: int, total: int, name: str) -> None:
-            nonlocal told, began
+            nonlocal last, began
             now = time.monotonic()
             if done < began[1]:  # a new count
                 began = (now, done)
-            if now - told < SECONDS_BETWEEN_LINES and done < total:
+            if now - last < SECONDS_BETWEEN_LINES and done < total:
                 return
-            told = now
+            last = now
             left = (now - began[0]) / max(done - began[1], 1) * (total - done)
             words = f" (about {left:.0f} s left)" if done > began[1] and left >= 1 else ""
             console.print(f"{what} {done}/{total}: {name}{words}")
@@ -110,7 +110,7 @@ def progress_bar(what: str) -> Iterator[Progress]:
 @contextmanager
 def tell_warnings() -> Iterator[None]:
     """Print warnings of seakeep as one line each, and leave the others to Python."""
-    told, seen = warnings.showwarning, set[str]()
+    default_show, seen = warnings.showwarning, set[str]()
 
     def once(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
         if issubclass(category, SeakeepWarning):
@@ -119,7 +119,7 @@ def tell_warnings() -> Iterator[None]:
             seen.add(str(message))
             say(f"Note: {message}", style="yellow")
         else:
-            told(message, category, *where, **more)
+            default_show(message, category, *where, **more)
 
     with warnings.catch_warnings():
         warnings.simplefilter("always", SeakeepWarning)

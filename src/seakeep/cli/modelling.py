@@ -284,7 +284,7 @@ def compare(
         _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
         return
     with member_executor(workers, scheduler) as executor, progress_bar("Comparing") as progress:
-        found = compare_models(
+        comparisons = compare_models(
             fitted,
             read,
             run or (),
@@ -296,19 +296,21 @@ def compare(
             executor=executor,
         )
     scale = _scale(read) if full_scale else None
-    found = {n: [_displayed(each, scale, degrees) for each in of] for n, of in found.items()}
-    tables = {name: comparison_table(of) for name, of in found.items()}
+    comparisons = {
+        n: [_displayed(each, scale, degrees) for each in of] for n, of in comparisons.items()
+    }
+    tables = {name: comparison_table(of) for name, of in comparisons.items()}
     _print_comparison(tables, {name: each.kind for name, each in fitted.items()})
     written = [write_comparison(tables, out / TABLE)]
     differences = None
-    if len(found) > 1:
-        differences = difference_table(found)
+    if len(comparisons) > 1:
+        differences = difference_table(comparisons)
         for block in difference_blocks(differences):
             print_table(block)
         written.append(write_differences(differences, out / DIFFERENCES))
-    written += _draw({name: found[name] for name in names}, figures, differences)
+    written += _draw({name: comparisons[name] for name in names}, figures, differences)
     say("Wrote " + ", ".join(map(str, written)))
-    if not all(each.complete for name in names for each in found[name]):
+    if not all(each.complete for name in names for each in comparisons[name]):
         raise typer.Exit(1)
 
 
@@ -339,12 +341,12 @@ def _nowcast(
     table = out / "nowcast.csv"
     check_output(table, "table", used, HEADER)
     with progress_bar("Playing") as progress:
-        found = nowcasts(models, campaign, runs, steps, level=level, progress=progress)
-    for block in nowcast_blocks(found):
+        results = nowcasts(models, campaign, runs, steps, level=level, progress=progress)
+    for block in nowcast_blocks(results):
         print_table(block)
-    written = [write_nowcasts(found, table)]
+    written = [write_nowcasts(results, table)]
     for name, path in figures.items():
-        written.append(save_figure(nowcast_figure(found, name.removeprefix(NOWCAST)), path))
+        written.append(save_figure(nowcast_figure(results, name.removeprefix(NOWCAST)), path))
     say("Wrote " + ", ".join(map(str, written)))
 
 
@@ -374,9 +376,9 @@ def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str
     first = next(iter(fitted.values()))
     channels = max((each.inputs for each in fitted.values()), key=len)
     with progress_bar("Baselines") as progress:
-        found = fit_baselines(campaign, first.states, channels, progress, beside=first)
-    names = {kind: kind if kind not in fitted else f"{kind} (baseline)" for kind in found}
-    return {**fitted, **{names[kind]: each for kind, each in found.items()}}
+        baselines = fit_baselines(campaign, first.states, channels, progress, beside=first)
+    names = {kind: kind if kind not in fitted else f"{kind} (baseline)" for kind in baselines}
+    return {**fitted, **{names[kind]: each for kind, each in baselines.items()}}
 
 
 def _print_comparison(tables: Mapping[str, xr.Dataset], kinds: Mapping[str, str]) -> None:
@@ -394,7 +396,7 @@ def _print_comparison(tables: Mapping[str, xr.Dataset], kinds: Mapping[str, str]
 
 
 def _draw(
-    found: Mapping[str, list[Comparison]],
+    comparisons: Mapping[str, list[Comparison]],
     figures: Mapping[str, Path],
     differences: xr.Dataset | None,
 ) -> list[Path]:
@@ -405,8 +407,8 @@ def _draw(
     from seakeep.report.style import save_figure
 
     written = []
-    for of_run in zip(*found.values(), strict=True):
-        figure = overlay_figure(dict(zip(found, of_run, strict=True)))
+    for of_run in zip(*comparisons.values(), strict=True):
+        figure = overlay_figure(dict(zip(comparisons, of_run, strict=True)))
         written.append(save_figure(figure, figures[of_run[0].run]))
     if differences is not None:
         written.append(save_figure(error_figure(differences), figures[ERRORS]))
@@ -447,12 +449,16 @@ def _band(
     if members:
         del given["--members"]
         _refuse(given, NO_BAND)
-    kept = [each.calibration for each in ensembles if each.calibration is not None]
-    if kept and band is None and not members:
+    calibrations = [each.calibration for each in ensembles if each.calibration is not None]
+    if calibrations and band is None and not members:
         say(
             "Note: the ensemble is calibrated, and the band shown is that of its members. "
             "--band calibrated shows the calibrated one."
         )
     if level is None:
-        level = kept[0].found.level if kept and band == "calibrated" else DEFAULT_LEVEL
+        level = (
+            calibrations[0].conformal.level
+            if calibrations and band == "calibrated"
+            else DEFAULT_LEVEL
+        )
     return {"level": level, "band": band or "members"}

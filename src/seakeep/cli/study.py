@@ -52,19 +52,19 @@ def study(
     folder = out or study_file.parent / f"{study_file.stem}-results"
     with _working(folder, workers, scheduler) as executor:
         with progress_bar("Study") as tell:
-            found = run_study(asked, folder, executor=executor, progress=tell)
-        page = _write_study(found)
-    print_table(overview_table(found), note=False)
-    for text in findings(found):
+            result = run_study(asked, folder, executor=executor, progress=tell)
+        page = _write_study(result)
+    print_table(overview_table(result), note=False)
+    for text in findings(result):
         show(text)
     show(f"\nReport: {page}")
 
 
-def _write_study(found: StudyResult) -> Path:
+def _write_study(result: StudyResult) -> Path:
     from seakeep.report.sections import write_report
 
     with progress_bar("Report") as tell:
-        return write_report(found, tell)
+        return write_report(result, tell)
 
 
 def reproduce(
@@ -106,10 +106,10 @@ def reproduce(
                 reproduce_study, out, preset, size=size, seed=seed, executor=executor, progress=tell
             )
             if (near := on_this_machine(executor)) is None:
-                found = play()
+                results = play()
             else:
                 with submitting(_write_act, None, near) as submit:  # while the next act runs
-                    found = play(
+                    results = play(
                         finished=lambda act, result: pages.append(
                             submit([(result, act.name == pictured)])
                         )
@@ -117,10 +117,10 @@ def reproduce(
                     for done, each in enumerate(pages):
                         tell(done, len(pages), "drawing the pages of the acts")
                         each.result()
-        page = _write_reproduction(out, found, executor)
-    print_table(short_table(found))
-    show(finding(found))
-    for act in (act for act in ACTS if act.name in found):
+        page = _write_reproduction(out, results, executor)
+    print_table(short_table(results))
+    show(finding(results))
+    for act in (act for act in ACTS if act.name in results):
         show(f"{act.title}: {act.sentence}")
     show(f"\nReport: {page}")
 
@@ -145,18 +145,18 @@ def report(
 
 
 def _write_reproduction(
-    folder: Path, found: dict[str, StudyResult], executor: Executor | None = None
+    folder: Path, results: dict[str, StudyResult], executor: Executor | None = None
 ) -> Path:
     """Write the page over all acts, and those of the acts where no worker has drawn them."""
     from seakeep.models.executor import on_this_machine
     from seakeep.report.acts import write_reproduction
     from seakeep.report.sections import write_report
 
-    for name, each in found.items() if on_this_machine(executor) is None else ():
+    for name, each in results.items() if on_this_machine(executor) is None else ():
         with progress_bar(f"Report of {each.attrs['study']}") as tell:
-            write_report(each, tell, pictures=name == _pictured(found))
+            write_report(each, tell, pictures=name == _pictured(results))
     with progress_bar("Report") as tell:
-        return write_reproduction(folder, found, tell)
+        return write_reproduction(folder, results, tell)
 
 
 def _pictured(acts: Iterable[str]) -> str:

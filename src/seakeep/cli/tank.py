@@ -65,16 +65,16 @@ def tank(
     from seakeep.tank.realised import realise_runs
     from seakeep.tank.settings import default_settings, read_tank, with_waves
 
-    made = default_settings() if settings is None else read_tank(settings)
-    made = with_waves(made, seed, spacing)
-    names = run or list(made.runs)
+    chosen = default_settings() if settings is None else read_tank(settings)
+    chosen = with_waves(chosen, seed, spacing)
+    names = run or list(chosen.runs)
     if out is not None and figures:
         _check_figures(out / "figures", names)
-    rig = check_settings(made, names)
+    rig = check_settings(chosen, names)
     if out is not None:
         with progress_bar("Playing") as progress:
             files = play(
-                made, out, kind=kind, one_logger=one_logger, names=names, videos=video or (),
+                chosen, out, kind=kind, one_logger=one_logger, names=names, videos=video or (),
                 progress=progress,
             )  # fmt: skip
         count = sum(map(len, files.values()))
@@ -82,14 +82,14 @@ def tank(
     if not (statistics or figures):
         return
     with progress_bar("Measuring") as progress:
-        measured = realise_runs(made, rig, names, progress)
+        measured = realise_runs(chosen, rig, names, progress)
     if statistics:
-        for table in realised_tables(made, measured):
+        for table in realised_tables(chosen, measured):
             print_table(table)
     if figures and out is not None:
         from seakeep.report.tank import write_tank_figures
 
-        for path in write_tank_figures(made, rig, measured, make_folder(out / "figures")):
+        for path in write_tank_figures(chosen, rig, measured, make_folder(out / "figures")):
             say(f"Wrote {path}")
 
 

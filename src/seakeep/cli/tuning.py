@@ -84,7 +84,7 @@ def tune(
     chosen = spec.select or Select(period=period)
     varied = {*(vary or ["observables"]), *(["observables"] if chosen.observables else [])}
     with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
-        found = search(
+        search_result = search(
             replace(spec, select=chosen),
             runs,
             list(settings.states),
@@ -97,20 +97,22 @@ def tune(
             progress=progress,
             resume=scores,
         )
-    typer.echo(found.describe())
+    typer.echo(search_result.describe())
     samples = None if period is None else period / labelled.common_step(runs)
     before = campaign.read_text(encoding="utf-8")
     with replacing(target) as place:
-        text = tuned_campaign(before, model, found.spec, varied, preset_of(settings), samples)
+        text = tuned_campaign(
+            before, model, search_result.spec, varied, preset_of(settings), samples
+        )
         place.write_text(text, encoding="utf-8")
     scores.unlink(missing_ok=True)
     say(f"Wrote {target}. Fit it with: seakeep fit {target} -o model.nc")
-    if not found.table.sizes["trial"]:
+    if not search_result.table.sizes["trial"]:
         return
     with replacing(tried) as place:
-        plain_cells(found.table.to_dataframe()).to_csv(place, index=False)
+        plain_cells(search_result.table.to_dataframe()).to_csv(place, index=False)
     say(f"Wrote {tried}: all that was tried.")
     if find_spec("matplotlib"):
         from seakeep.report.style import save_figure
 
-        say(f"Wrote {save_figure(found.figure(), picture)}.")
+        say(f"Wrote {save_figure(search_result.figure(), picture)}.")

@@ -12,8 +12,6 @@ from seakeep.arrays import FloatArray, as_real, number, time_step
 from seakeep.core.metrics import over_channels, paired
 from seakeep.errors import RequestError
 
-__all__ = ["BandErrors", "band_error_over_time", "split_bands"]
-
 LEAST_SPLIT = 1e-6
 """Split frequency over the sampling rate: below it the filter's coefficients are rounding."""
 ORDER = 4

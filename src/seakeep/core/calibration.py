@@ -16,18 +16,6 @@ import numpy.typing as npt
 from seakeep.arrays import FloatArray, as_real, finite, fraction
 from seakeep.errors import DataError, RequestError
 
-__all__ = [
-    "ConformalMargin",
-    "band_scale",
-    "band_scores",
-    "calibrated_bounds",
-    "conformal_margin",
-    "learn_scale",
-    "scaled_scores",
-    "spread_floor",
-    "wave_envelope",
-]
-
 FLOOR = 0.25
 """Part of the root mean square error below which the scale of a band never falls."""
 CALM = 0.05
@@ -88,8 +76,8 @@ def band_scores(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayL
             f"lower has shape {low.shape}, upper {high.shape} and measured {y.shape}; all must be "
             "of the same shape (…, time, channel)."
         )
-    found: FloatArray = np.maximum(low - finite(y, "measured"), y - high)
-    return np.where(np.isnan(found), np.inf, found)
+    scores: FloatArray = np.maximum(low - finite(y, "measured"), y - high)
+    return np.where(np.isnan(scores), np.inf, scores)
 
 
 def spread_floor(mean: FloatArray, measured: FloatArray) -> FloatArray:
@@ -169,9 +157,9 @@ def learn_scale(
     They make errors that are normal with this scale most likely; that is a convex problem, which
     Newton's method solves. A small ridge keeps what the windows do not vary in at zero.
     """
-    kept = ~np.isnan(mean).any(axis=(1, 2))
-    x = _features(std[kept], envelope[kept], floor)
-    ratio = ((measured - mean)[kept] / np.where(floor > 0, floor / FLOOR, 1.0)) ** 2
+    complete = ~np.isnan(mean).any(axis=(1, 2))
+    x = _features(std[complete], envelope[complete], floor)
+    ratio = ((measured - mean)[complete] / np.where(floor > 0, floor / FLOOR, 1.0)) ** 2
     law = np.zeros((4, x.shape[2]))
     for channel in range(x.shape[2]):
         rows = x[:, :, channel].reshape(-1, 4)
@@ -240,8 +228,8 @@ def scaled_scores(mean: FloatArray, scale: FloatArray, measured: FloatArray) -> 
     Zero where error and scale both are.
     """
     error = np.abs(measured - mean)
-    found = np.divide(error, scale, out=np.zeros_like(error), where=scale != 0)
-    return np.where(np.isnan(found), np.inf, found)
+    scores = np.divide(error, scale, out=np.zeros_like(error), where=scale != 0)
+    return np.where(np.isnan(scores), np.inf, scores)
 
 
 def calibrated_bounds(

@@ -11,17 +11,6 @@ from scipy import special
 from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction, number
 from seakeep.errors import DataError, RequestError
 
-__all__ = [
-    "BandCoverage",
-    "BoxStatistics",
-    "CoverageTable",
-    "band_crps",
-    "box_statistics",
-    "coverage",
-    "coverage_table",
-    "winkler_score",
-]
-
 WAVE_PARTS = ("lowest waves", "middle waves", "highest waves")
 HORIZON_PARTS = ("first third", "middle third", "last third")
 """Parts of a coverage table, after "all"."""
@@ -99,8 +88,8 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
     spread = np.where(np.ptp(m, axis=-2) > 0, m.std(axis=-2, ddof=1), np.nan)
     inside = ((m >= low) & (m <= high)).mean(axis=-2)
     results = (inside, below, above, width, width / spread)
-    kept = [np.where(lost, np.nan, item) for item in results]
-    return BandCoverage(*[item[..., 0] if plain else item for item in kept])
+    masked = [np.where(lost, np.nan, item) for item in results]
+    return BandCoverage(*[item[..., 0] if plain else item for item in masked])
 
 
 @dataclass(frozen=True)
@@ -163,8 +152,8 @@ def winkler_score(
     """
     low, high, y = _triple(lower, upper, measured)
     outside = np.maximum(np.maximum(low - y, y - high), 0.0)
-    found: FloatArray = high - low + 2.0 / (1.0 - fraction(level, "level")) * outside
-    return found
+    score: FloatArray = high - low + 2.0 / (1.0 - fraction(level, "level")) * outside
+    return score
 
 
 def band_crps(
@@ -202,8 +191,8 @@ def band_crps(
         z = np.divide(error, spread, out=np.zeros_like(error), where=spread > 0)
         density = np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi)
         score = spread * (z * special.erf(z / np.sqrt(2.0)) + 2.0 * density - 1.0 / np.sqrt(np.pi))
-    found = np.where(spread > 0, score, error)
-    return np.where(np.isinf(spread), np.inf, found)
+    crps = np.where(spread > 0, score, error)
+    return np.where(np.isinf(spread), np.inf, crps)
 
 
 def _triple(
@@ -297,7 +286,7 @@ def coverage_table(
         "winkler": winkler_score(low, high, y, level),
         "crps": band_crps(low, high, y, level),
     }
-    found = {
+    variables = {
         key: np.stack([each[place].mean(axis=0) for place in places.values()])
         for key, each in scores.items()
     }
@@ -306,8 +295,8 @@ def coverage_table(
     return CoverageTable(
         parts=tuple(places),
         instants=np.array([np.count_nonzero(place) for place in places.values()]),
-        relative_width=found["width"] / spread,
-        **found,
+        relative_width=variables["width"] / spread,
+        **variables,
     )
 
 

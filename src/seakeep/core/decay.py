@@ -73,16 +73,16 @@ def free_decay(series: FloatArray, dt: float) -> Decay:
     first = int(np.argmax(ranges))  # other modes die out before
     instants, ranges = instants[first:], ranges[first:]
     above = ranges >= SMALLEST * ranges.max()
-    kept = int(np.argmin(np.append(above, False)))
-    ranges = ranges[:kept]
-    if kept < 2:
+    length = int(np.argmin(np.append(above, False)))
+    ranges = ranges[:length]
+    if length < 2:
         return nothing
     decrements = 2 * np.log(ranges[:-1] / ranges[1:])
     amplitudes = np.sqrt(ranges[:-1] * ranges[1:])
     p, q = float(decrements.mean()), np.nan
     if decrements.size >= 3:
         q, p = map(float, np.polyfit(amplitudes, decrements, 1))
-    period = 2 * dt * float(np.diff(instants[: kept + 1]).mean())
+    period = 2 * dt * float(np.diff(instants[: length + 1]).mean())
     ratio = float(p / np.hypot(2 * np.pi, p))
     return Decay(period, ratio, p, q, decrements.size, amplitudes, decrements)
 

@@ -25,7 +25,9 @@ from seakeep.arrays import (
 )
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
-from seakeep.sizes import MOST_BINS
+
+MOST_BINS = 2**21
+"""Bins of a density, which fit into 16 MB; finer ones are summed directly."""
 
 Bandwidth = Literal["paper", "silverman"] | float
 

@@ -77,11 +77,11 @@ def dominant_frequency(series: FloatArray, dt: float) -> float:
         return float(np.linalg.lstsq(basis, x, rcond=None)[1].sum())
 
     low = max(coarse - 0.5 * width, 0.1 * width)
-    found = optimize.minimize_scalar(
+    peak = optimize.minimize_scalar(
         unexplained, bounds=(low, coarse + 0.5 * width), method="bounded",
         options={"xatol": 1e-7 * coarse},
     )  # fmt: skip
-    return float(found.x)
+    return float(peak.x)
 
 
 def harmonic_fits(
@@ -122,9 +122,9 @@ def harmonic_fits(
     for window in range(count):
         inside = slice(round(window * length), round((window + 1) * length))
         time: FloatArray = dt * np.arange(inside.start, inside.stop, dtype=float)
-        found = np.linalg.lstsq(_basis(time, frequency), values[inside], rcond=None)[0]
-        harmonics.append(found[2] - 1j * found[3])
-        means.append(found[0])
+        coefficients = np.linalg.lstsq(_basis(time, frequency), values[inside], rcond=None)[0]
+        harmonics.append(coefficients[2] - 1j * coefficients[3])
+        means.append(coefficients[0])
     return np.array(harmonics), np.array(means)
 
 

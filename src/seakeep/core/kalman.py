@@ -44,18 +44,18 @@ class DelayFilter:
         """
         before, after = self.covariance, self._next
         count, size = self.a.shape
-        kept = size - count
-        after[:kept, :kept] = before[count:, count:]
+        older = size - count
+        after[:older, :older] = before[count:, count:]
         if newest is None:
             top = self.a @ before
-            after[kept:, :kept] = top[:, count:]
+            after[older:, :older] = top[:, count:]
             # Exactly symmetric: an antisymmetric error of rounding would grow.
             block = top @ self.a.T + self.process
-            after[kept:, kept:] = 0.5 * (block + block.T)
+            after[older:, older:] = 0.5 * (block + block.T)
         else:
-            after[kept:, :kept] = 0.0
-            after[kept:, kept:] = newest
-        after[:kept, kept:] = after[kept:, :kept].T
+            after[older:, :older] = 0.0
+            after[older:, older:] = newest
+        after[:older, older:] = after[older:, :older].T
         self.covariance, self._next = after, before
 
     def limit(self, variances: FloatArray, *, exactly: bool = False) -> None:
@@ -64,8 +64,8 @@ class DelayFilter:
         Correlations stay as they are.
         """
         newest = slice(len(self.covariance) - len(variances), None)
-        found = np.diagonal(self.covariance)[newest]
-        factor = np.sqrt(variances / np.maximum(found, np.finfo(float).tiny))
+        variance = np.diagonal(self.covariance)[newest]
+        factor = np.sqrt(variances / np.maximum(variance, np.finfo(float).tiny))
         if not exactly:
             factor = np.minimum(factor, 1.0)
         rows = self.covariance[newest] * factor[:, None]
@@ -98,14 +98,14 @@ class DelayFilter:
         cross = self.covariance[:, places]
         innovation = cross[places] + np.diag(self.noise[rows])
         factor = linalg.cholesky(innovation, lower=True)
-        found = linalg.cho_solve((factor, True), cross.T).T
-        self.covariance -= found @ cross.T
+        weights = linalg.cho_solve((factor, True), cross.T).T
+        self.covariance -= weights @ cross.T
         self.covariance += self.covariance.T.copy()
         self.covariance *= 0.5
         exact = places[self.noise[rows] == 0.0]
         self.covariance[exact] = 0.0
         self.covariance[:, exact] = 0.0
-        gain[:, rows] = found
+        gain[:, rows] = weights
         whitening[np.ix_(rows, rows)] = linalg.solve_triangular(
             factor, np.eye(rows.size), lower=True
         )
@@ -116,8 +116,8 @@ class DelayFilter:
         count = len(self.a)
         out = np.empty((steps, count))
         values, vectors = linalg.eigh(self.covariance)
-        kept = values > 1e-14 * max(float(values[-1]), np.finfo(float).tiny)
-        root = vectors[:, kept] * np.sqrt(values[kept])
+        significant = values > 1e-14 * max(float(values[-1]), np.finfo(float).tiny)
+        root = vectors[:, significant] * np.sqrt(values[significant])
         for row in out:
             newest = self.a @ root
             root = np.concatenate([root[count:], newest])

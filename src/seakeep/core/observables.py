@@ -13,8 +13,6 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 
-__all__ = ["derivative", "slow_kernel", "slow_squares"]
-
 
 def slow_kernel(cutoff: float, half: int) -> FloatArray:
     """Low-pass filter of finite length: a sinc under a Hann window, with unit gain at rest.

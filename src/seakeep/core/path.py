@@ -13,8 +13,6 @@ from scipy import linalg
 
 from seakeep.arrays import FloatArray
 
-__all__ = ["ridge_path", "truncated_path"]
-
 
 def ridge_path(gram: FloatArray, right: FloatArray, ridges: Sequence[float]) -> FloatArray:
     """Coefficients of ridge regressions of one problem at several λ.
@@ -32,13 +30,13 @@ def ridge_path(gram: FloatArray, right: FloatArray, ridges: Sequence[float]) -> 
     -------
     ndarray, shape (len(ridges), N, p)
     """
-    found, least = np.empty((len(ridges), *right.shape)), _rounding(gram, gram.diagonal().max())
-    for out, ridge in zip(found, ridges, strict=True):
+    path, least = np.empty((len(ridges), *right.shape)), _rounding(gram, gram.diagonal().max())
+    for out, ridge in zip(path, ridges, strict=True):
         shifted = gram.copy()
         shifted[np.diag_indices_from(shifted)] += max(ridge, least)
         factor = linalg.cho_factor(shifted, overwrite_a=True, check_finite=False)
         out[:] = linalg.cho_solve(factor, right.T, check_finite=False).T
-    return found
+    return path
 
 
 def truncated_path(gram: FloatArray, right: FloatArray, ranks: Sequence[int]) -> FloatArray:
@@ -62,8 +60,8 @@ def truncated_path(gram: FloatArray, right: FloatArray, ranks: Sequence[int]) ->
     values, vectors = values[::-1], vectors[:, ::-1]
     sound = int(np.count_nonzero(values > _rounding(gram, values[0])))
     turned = (right @ vectors[:, :sound]) / values[:sound]
-    kept = [min(rank, sound) for rank in ranks]
-    return np.stack([turned[:, :rank] @ vectors[:, :rank].T for rank in kept])
+    orders = [min(rank, sound) for rank in ranks]
+    return np.stack([turned[:, :rank] @ vectors[:, :rank].T for rank in orders])
 
 
 def _rounding(gram: FloatArray, largest: float) -> float:

@@ -14,8 +14,6 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 
-__all__ = ["LinearHinges", "fit_hinges", "floor_of", "hinges", "knots_of", "resting"]
-
 KNOTS = 6
 """Knots per state: quantiles from 0.05 to 0.95. Four to ten gave the same within 2 %."""
 FLOOR = 0.002

@@ -19,8 +19,6 @@ import numpy as np
 
 from seakeep.arrays import FloatArray, IntArray
 
-__all__ = ["Place", "Recursion", "read_table", "recursion"]
-
 
 @dataclass(frozen=True, eq=False)
 class Place:
@@ -52,8 +50,8 @@ class Place:
 
     def of(self, surge: FloatArray) -> FloatArray:
         """Places of the samples from the P-th on, of a surge of shape (time,)."""
-        found: FloatArray = np.convolve(surge, self.taps, "valid")
-        result: FloatArray = np.clip(found, self.lowest, self.grid[-1])
+        position: FloatArray = np.convolve(surge, self.taps, "valid")
+        result: FloatArray = np.clip(position, self.lowest, self.grid[-1])
         return result
 
 
@@ -172,13 +170,13 @@ def recursion(
             # A run that is lost keeps a place; its states stay lost.
             here = np.fmin(np.fmax(here, place.lowest), highest)
             u[..., to : to + n] = read_table(place, table, starts + step, here)
-            found = x[..., at : at + size] @ a
-            found += u[..., to : to + width] @ b
+            computed = x[..., at : at + size] @ a
+            computed += u[..., to : to + width] @ b
             here -= place.centre
             here *= here
-            found += d * here[..., None]
-            found += v[..., step, :]
-            x[..., at - N : at] = found
+            computed += d * here[..., None]
+            computed += v[..., step, :]
+            x[..., at - N : at] = computed
     out = states[..., : steps * N].reshape(count, windows, steps, N)
     driving = inputs[..., : steps * n].reshape(count, windows, steps, n)
     return out[:, :, ::-1], driving[:, :, ::-1]

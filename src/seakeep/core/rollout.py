@@ -333,10 +333,10 @@ def _run(propagator: _Propagator, start: FloatArray, inputs: Arrays, steps: int)
     # In pieces of whole blocks of K steps; the state is handed on.
     windows, size = start.shape
     K, width = propagator.steps, len(propagator.output_state)
-    held = width + sum(each.shape[1] for each in propagator.output_input)
-    held += 0 if propagator.state is None else 2 * size
+    row_width = width + sum(each.shape[1] for each in propagator.output_input)
+    row_width += 0 if propagator.state is None else 2 * size
     blocks = -(-steps // K)
-    most = max(1, PIECE // (held * windows))
+    most = max(1, PIECE // (row_width * windows))
     advance = _run_shifting if propagator.state is None else _run_square
     out = np.empty((windows, blocks * K, width // K))
     state = start

@@ -286,15 +286,15 @@ class _Delayed:
             return _all_rows(system, _factor(system.gram, ridge), ridge)
         system = primal_system(self.pieces, self.delays)
         factor = _factor(system.gram, ridge)
-        found = _solved(factor, system.right)
+        solution = _solved(factor, system.right)
         if ridge >= GRAM_LIMIT * self.trace:
-            return found
+            return solution
         # λ is small: residuals of the data correct what the Gram matrix lost.
         regressors, targets = self.matrices()
         for _ in range(CORRECTIONS):
-            right = (targets - found @ regressors) @ regressors.T - ridge * found
-            found += _solved(factor, right)
-        return found
+            right = (targets - solution @ regressors) @ regressors.T - ridge * solution
+            solution += _solved(factor, right)
+        return solution
 
     def dual(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`K = \hat Y^T \hat Y`.
@@ -376,13 +376,13 @@ def _by_singular_values(
     left, values, right = linalg.svd(regressors, full_matrices=False, check_finite=False)
     # Below this, a singular value is rounding (the rule of numpy.linalg.matrix_rank).
     floor = np.finfo(float).eps * max(regressors.shape) * (values[0] if values.size else 0.0)
-    kept = int(np.count_nonzero(values > floor))
+    count = int(np.count_nonzero(values > floor))
     if rank is not None:
-        kept = min(kept, rank)
-    values = values[:kept]
+        count = min(count, rank)
+    values = values[:count]
     weights = values / (values**2 + ridge)
-    coefficients = ((targets @ right[:kept].T) * weights) @ left[:, :kept].T
-    return Solution(coefficients, "svd", ridge, kept)
+    coefficients = ((targets @ right[:count].T) * weights) @ left[:, :count].T
+    return Solution(coefficients, "svd", ridge, count)
 
 
 def _all_rows(system: PrimalSystem, factor: FloatArray, ridge: float) -> FloatArray:

@@ -188,9 +188,9 @@ def cross_spectra(
     for inputs, outputs in long_enough:
         both = np.concatenate([inputs, outputs], axis=1)
         series = (both - both.mean(axis=0)).T
-        frequency, found = signal.csd(series[:size, None], series[None], **how)
+        frequency, density = signal.csd(series[:size, None], series[None], **how)
         count = (len(inputs) - segment // 2) // (segment - segment // 2)
-        driven = driven + count * found
+        driven = driven + count * density
         power = power + count * signal.welch(series[size:], **how)[1]
         weight += count
         averages += count / (1 + 2 * OVERLAP_CORRELATION * (count - 1) / count)

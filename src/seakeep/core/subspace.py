@@ -144,8 +144,8 @@ def identify_subspace(
         [past[:, : each.shape[1]] for past, each in zip(pasts, ahead, strict=True)], axis=1
     )
     regressors = np.concatenate([known, seen])
-    found = solve(regressors, targets, ridge * regressors.shape[1]).coefficients
-    decided = found[:, : len(known)]
+    coefficients = solve(regressors, targets, ridge * regressors.shape[1]).coefficients
+    decided = coefficients[:, : len(known)]
     values, vectors = np.linalg.eigh(decided @ (known @ known.T) @ decided.T)
     leading = np.sqrt(np.maximum(values[::-1][:order], 0.0))
     if len(leading) < order or leading[-1] <= 1e-7 * leading[0]:  # rounding of a Gram matrix

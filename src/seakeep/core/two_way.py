@@ -88,16 +88,18 @@ def two_way_interval(
         positions.append(drawn.reshape(count, -1)[:, :size])
     rows, columns = positions
     step = max(1, AT_ONCE // max(each.size for each in tables))
-    found = []
+    bounds = []
     for first in range(0, count, step):
         drawn = rows[first : first + step, :, None], columns[first : first + step, None, :]
-        found.append(np.asarray(statistic(*(each[drawn] for each in tables)), dtype=float))
-    values = np.concatenate(found)
-    held = min((n / block for n, block in zip(shape, blocks, strict=True) if n > 1), default=0.0)
-    if held < FEWEST or np.isnan(values).all():
+        bounds.append(np.asarray(statistic(*(each[drawn] for each in tables)), dtype=float))
+    values = np.concatenate(bounds)
+    smallest = min(
+        (n / block for n, block in zip(shape, blocks, strict=True) if n > 1), default=0.0
+    )
+    if smallest < FEWEST or np.isnan(values).all():
         return np.full(values.shape[1:], np.nan), np.full(values.shape[1:], np.nan)
     value = np.asarray(statistic(*(each[None] for each in tables)), dtype=float)[0]
-    return student_interval(value, values, held, part)
+    return student_interval(value, values, smallest, part)
 
 
 def overlap_block(spans: Sequence[tuple[str, float, float]]) -> int:

@@ -98,6 +98,6 @@ def _products(x: FloatArray, past: FloatArray, lags: int) -> FloatArray:
     size = len(x)
     out = np.zeros((lags + 1, x.shape[1]))
     for column, (a, b) in enumerate(zip(x.T, past.T, strict=True)):
-        found = signal.correlate(a, b, method="fft")[size - 1 : size + lags]
-        out[: len(found), column] = found
+        products = signal.correlate(a, b, method="fft")[size - 1 : size + lags]
+        out[: len(products), column] = products
     return out

@@ -12,17 +12,6 @@ from seakeep.arrays import FloatArray
 from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, RequestError, did_you_mean
 
-__all__ = [
-    "Columns",
-    "check_lengths",
-    "is_unit",
-    "meant_column",
-    "named_unit",
-    "same_unit",
-    "split_unit",
-    "unique_names",
-]
-
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*\Z")
 _PARENTHESES = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*\Z")
 

@@ -17,8 +17,6 @@ from seakeep.formats.reader import Options, decoding
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["read_matlab"]
-
 _NAME_KEYS = ("names", "channels", "labels", "channel_names", "name")
 _UNIT_KEYS = ("units", "unit")
 _RATE_KEYS = ("fs", "Fs", "FS", "sampling_rate", "sample_rate")
@@ -32,9 +30,9 @@ def read_matlab(path: Path, options: Options) -> Columns:
 
     Units are taken from ``units``: a struct of texts, or a list beside the names.
     """
-    found = _unwrapped({k: v for k, v in _loaded(path).items() if not k.startswith(("__", "#"))})
-    units = _units(found)
-    vectors = _named_matrix(path, found) or _vectors(path, found)
+    content = _unwrapped({k: v for k, v in _loaded(path).items() if not k.startswith(("__", "#"))})
+    units = _units(content)
+    vectors = _named_matrix(path, content) or _vectors(path, content)
     check_lengths(path, vectors)
     names, in_headers = unique_names(vectors)
     for name, unit in zip(names, in_headers, strict=True):
@@ -45,7 +43,7 @@ def read_matlab(path: Path, options: Options) -> Columns:
         values=values,
         units={name: unit for name, unit in units.items() if name in values},
         headers=dict(zip(names, vectors, strict=True)),
-        sampling_rate=_rate(found),
+        sampling_rate=_rate(content),
     )
 
 
@@ -88,68 +86,70 @@ def _opaque(path: Path) -> dict[str, str]:
     """Variables and fields that only MATLAB can read (table, string, sparse …), with their kind."""
     import h5py
 
-    found: dict[str, str] = {}
+    opaque: dict[str, str] = {}
 
     def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
         if name.startswith("#"):
             return
         if "MATLAB_sparse" in item.attrs:
-            found[name] = "sparse"
+            opaque[name] = "sparse"
         elif "MATLAB_object_decode" in item.attrs:
-            found[name] = bytes(item.attrs.get("MATLAB_class", b"object")).decode(
+            opaque[name] = bytes(item.attrs.get("MATLAB_class", b"object")).decode(
                 "ascii", "replace"
             )
 
     with h5py.File(path, "r") as file:
         file.visititems(look)
-    return found
+    return opaque
 
 
-def _unwrapped(found: dict[str, Any]) -> dict[str, Any]:
+def _unwrapped(content: dict[str, Any]) -> dict[str, Any]:
     """What the only struct of a file holds, with the numbers and texts that stand beside it."""
     while True:
-        structs = [key for key, value in found.items() if isinstance(value, dict)]
-        beside = {key: value for key, value in found.items() if not isinstance(value, dict)}
+        structs = [key for key, value in content.items() if isinstance(value, dict)]
+        beside = {key: value for key, value in content.items() if not isinstance(value, dict)}
         plain = all(isinstance(value, str) or np.size(value) == 1 for value in beside.values())
         if len(structs) != 1 or structs[0] in _UNIT_KEYS or not plain:
-            return found
-        found = {**beside, **found[structs[0]]}
+            return content
+        content = {**beside, **content[structs[0]]}
 
 
-def _rate(found: Mapping[str, Any]) -> float | None:
+def _rate(content: Mapping[str, Any]) -> float | None:
     for keys, inverse in ((_RATE_KEYS, False), (_STEP_KEYS, True)):
         for key in keys:
-            value = found.get(key)
+            value = content.get(key)
             if isinstance(value, int | float | np.number) and value > 0:
                 return 1.0 / float(value) if inverse else float(value)
     return None
 
 
-def _first(found: Mapping[str, Any], keys: tuple[str, ...]) -> Any:
-    return next((found[key] for key in keys if key in found), None)
+def _first(content: Mapping[str, Any], keys: tuple[str, ...]) -> Any:
+    return next((content[key] for key in keys if key in content), None)
 
 
-def _texts(found: Mapping[str, Any], keys: tuple[str, ...]) -> list[str]:
+def _texts(content: Mapping[str, Any], keys: tuple[str, ...]) -> list[str]:
     """Texts of a list under one of the keys; none where it holds others."""
-    value = _first(found, keys)
+    value = _first(content, keys)
     cells = [] if isinstance(value, str) else list(np.atleast_1d(np.asarray(value, dtype=object)))
     return [cell.strip() for cell in cells] if all(isinstance(c, str) for c in cells) else []
 
 
-def _units(found: Mapping[str, Any]) -> dict[str, str]:
-    units = _first(found, _UNIT_KEYS)
+def _units(content: Mapping[str, Any]) -> dict[str, str]:
+    units = _first(content, _UNIT_KEYS)
     if isinstance(units, dict):
         return {name: unit for name, unit in units.items() if isinstance(unit, str)}
-    names, listed = _texts(found, _NAME_KEYS), _texts(found, _UNIT_KEYS)
+    names, listed = _texts(content, _NAME_KEYS), _texts(content, _UNIT_KEYS)
     return dict(zip(names, listed, strict=True)) if len(names) == len(listed) else {}
 
 
-def _named_matrix(path: Path, found: Mapping[str, Any]) -> dict[str, FloatArray]:
+def _named_matrix(path: Path, content: Mapping[str, Any]) -> dict[str, FloatArray]:
     """Columns of a matrix beside which their names stand; empty if there is none."""
-    names = _texts(found, _NAME_KEYS)
+    names = _texts(content, _NAME_KEYS)
     if not names:
         return {}
-    arrays = {k: v for k, v in found.items() if isinstance(v, np.ndarray) and v.dtype.kind in "fiu"}
+    arrays = {
+        k: v for k, v in content.items() if isinstance(v, np.ndarray) and v.dtype.kind in "fiu"
+    }
     matrices = {key: array for key, array in arrays.items() if array.ndim == 2}
     for key, matrix in matrices.items():
         rows, columns = matrix.shape
@@ -172,9 +172,9 @@ def _transposed(path: Path, key: str, shape: tuple[int, ...]) -> DataError:
     )
 
 
-def _vectors(path: Path, found: Mapping[str, Any]) -> dict[str, FloatArray]:
+def _vectors(path: Path, content: Mapping[str, Any]) -> dict[str, FloatArray]:
     vectors, matrices = {}, {}
-    for name, value in found.items():
+    for name, value in content.items():
         array = np.asarray(value)
         if array.dtype.kind not in "fiub" or array.ndim > 2 or array.size < 2:
             continue
@@ -192,6 +192,6 @@ def _vectors(path: Path, found: Mapping[str, Any]) -> dict[str, FloatArray]:
             "array 'names' beside it, or one vector per channel."
         )
     raise DataError(
-        f"{path} holds no channels; found {', '.join(found) or 'nothing'}. Save one vector per "
+        f"{path} holds no channels; found {', '.join(content) or 'nothing'}. Save one vector per "
         "channel, a struct of vectors, or a matrix (time, channel) with a cell array 'names'."
     )

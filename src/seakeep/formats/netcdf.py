@@ -17,8 +17,6 @@ from seakeep.formats.reader import Options, decoding
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["opened_netcdf", "read_netcdf"]
-
 WIDEST = 64
 """Columns of a two-dimensional set beyond which it is a picture or a field, not channels."""
 

@@ -14,8 +14,6 @@ from seakeep.errors import DataError, SeakeepError
 from seakeep.formats.columns import Columns
 from seakeep.toml import Table, optional
 
-__all__ = ["Options", "Reader", "decoding"]
-
 
 class Options(Table):
     """What is known about a file; what is left out is recognised."""

@@ -18,8 +18,6 @@ from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.formats.columns import Columns
 from seakeep.formats.reader import Options, decoding
 
-__all__ = ["read_recording"]
-
 _STANDARD = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
 _UNITS = {
     "angular_velocity": "rad/s", "linear_acceleration": "m/s^2", "force": "N", "torque": "N m",
@@ -109,24 +107,24 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> _Rows:
 
 def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
     """The one topic whose messages hold numbers; an error that lists them if there are more."""
-    found: dict[str, str] = {}
+    types: dict[str, str] = {}
     for connection in connections:
         first = next(iter(reader.messages([connection])), None)
         if first is None:
             continue
         message = reader.deserialize(first[2], connection.msgtype)
         if next(iter(_flat(message, "")), None) is not None:
-            found[connection.topic] = f"{connection.msgtype}, {connection.msgcount}"
-    if not found:
+            types[connection.topic] = f"{connection.msgtype}, {connection.msgcount}"
+    if not types:
         topics = ", ".join(sorted({connection.topic for connection in connections})) or "none"
         raise DataError(f"{path} holds no messages with numbers (topics: {topics}). Record again.")
-    if len(found) > 1:
-        listed = ", ".join(f"'{topic}' ({what} messages)" for topic, what in sorted(found.items()))
+    if len(types) > 1:
+        listed = ", ".join(f"'{topic}' ({what} messages)" for topic, what in sorted(types.items()))
         raise RequestError(
             f"{path} holds several topics, each with times of its own: {listed}. State which one "
             "with group = 'TOPIC' in [files]."
         )
-    return next(iter(found))
+    return next(iter(types))
 
 
 def _stamp(message: Any) -> int | None:

@@ -20,8 +20,6 @@ from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.formats.columns import Columns, check_lengths
 from seakeep.formats.reader import Options, decoding
 
-__all__ = ["read_tdms"]
-
 LEAD_IN = 28
 _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
 

@@ -21,8 +21,6 @@ from seakeep.errors import DataError, warn
 from seakeep.formats.columns import Columns, is_unit, same_unit, unique_names
 from seakeep.formats.reader import Options
 
-__all__ = ["read_text"]
-
 HEAD = 40
 """Lines that may stand above a header, and from which the layout is recognised."""
 
@@ -219,8 +217,8 @@ def _remarks(
     bare = [line.lstrip("".join(marks)).strip() for line in comments]
     for mark in dict.fromkeys((delimiter, "\t", ";", ",")):
         cells = [_cells(line, mark) for line in bare if not _RULE.match(line)]
-        if found := [each for each in cells if len(each) == width and not _numeric(each)]:
-            return found
+        if remarks := [each for each in cells if len(each) == width and not _numeric(each)]:
+            return remarks
     return []
 
 

@@ -24,8 +24,6 @@ from seakeep.signals.expressions import Text
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-__all__ = ["content_of", "identifier", "rendered", "sources", "write_c", "write_sources"]
-
 KIND = "C source"
 
 
@@ -72,8 +70,8 @@ def write_sources(texts: Mapping[str, str], folder: str | Path) -> list[Path]:
 
 def identifier(name: str) -> str:
     """Name for C made of that of a file."""
-    made = re.sub(r"\W", "_", name, flags=re.ASCII)
-    return made if made[:1].isalpha() else f"m_{made}"
+    text = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return text if text[:1].isalpha() else f"m_{text}"
 
 
 def sources(model: HankelDMDcModel, name: str) -> dict[str, str]:
@@ -99,31 +97,11 @@ def content_of(model: HankelDMDcModel, name: str) -> dict[str, Any]:
                 group += _columns(term, u, observed.limits, kernels)
         limited = zip(direct, observed.tops, observed.slopes, strict=True)
         direct = [f"rising({text}, {_number(top)}, {_number(by)})" for text, top, by in limited]
-    scales = (signature.state_scale, signature.input_scale, signature.direct_scale)
     return {
         "name": name,
-        "upper": name.upper(),
         "mark": f"{MARK}: {KIND}, written by seakeep {metadata.version('seakeep')}:",
-        "following": follows,
-        "banks": () if follows is None else follows.banks(None),
-        "x_rows": signature.state_samples,
-        "dt": signature.dt,
-        "N": len(signature.states),
-        "Q": len(signature.inputs),
-        "s": signature.state_delays,
-        "z": signature.input_delays,
-        "n": signature.input_scale.mean.size,
-        "m": signature.direct_scale.mean.size,
-        "rows": len(model.coefficients),
-        "coefficients": model.coefficients,
-        "scales": dict(zip(("state", "delayed", "direct"), scales, strict=True)),
-        "lead": input_map.lead,
-        "lead_samples": signature.lead_samples,
-        "history": input_map.history(signature.input_delays),
-        "window": back + 1 + signature.lead_samples,
+        "model": model,
         "now": back,
-        "state_labels": signature.state_labels,
-        "input_labels": signature.input_labels,
         "delayed": delayed,
         "direct": direct,
         "kernels": kernels,
@@ -146,7 +124,7 @@ def rendered(template: str, **content: Any) -> str:
 def _environment() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-    made = Environment(
+    environment = Environment(
         loader=PackageLoader("seakeep.hosts"),
         autoescape=select_autoescape(["xml"]),
         undefined=StrictUndefined,
@@ -154,8 +132,8 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters |= {"hex": _number, "numbers": _numbers, "text": _text}
-    return made
+    environment.filters |= {"hex": _number, "numbers": _numbers, "text": _text}
+    return environment
 
 
 def _number(value: float) -> str:
@@ -171,7 +149,7 @@ def _numbers(values: FloatArray) -> str:
 
 def _text(value: str) -> str:
     """Literal of C for any text."""
-    escaped = re.sub(rb"[^\w /^.-]", lambda found: b"\\%03o" % ord(found[0]), value.encode())
+    escaped = re.sub(rb"[^\w /^.-]", lambda match: b"\\%03o" % ord(match[0]), value.encode())
     return f'"{escaped.decode()}"'
 
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from seakeep.errors import RequestError
 from seakeep.hosts.c import content_of, identifier, rendered, sources, write_sources
 from seakeep.hosts.program import exportable
 from seakeep.models import Model
 from seakeep.signals.prediction import MEMORY
-
-__all__ = ["write_estimator"]
 
 
 def write_estimator(
@@ -22,7 +19,7 @@ def write_estimator(
     Parameters
     ----------
     model : Model
-        As for :func:`seakeep.hosts.write_c`, without look-ahead, observables and carried waves.
+        As for :func:`seakeep.hosts.write_c`.
     folder, name
         As for :func:`seakeep.hosts.write_c`.
     noise : mapping of str to float, optional
@@ -38,17 +35,9 @@ def write_estimator(
     RequestError
         If the model cannot be exported, or a file is there that seakeep did not write.
     """
-    linear = exportable(model)
-    signature = linear.signature
-    if not signature.input_map.is_identity:
-        raise RequestError(
-            "an estimator in C takes models whose steps read waves as they are measured, and this "
-            "one has a look-ahead, observables or carried waves. Run model.live() in Python, or "
-            "fit it without them."
-        )
-    name = identifier(name)
+    linear, name = exportable(model), identifier(name)
     content = content_of(linear, name) | linear.live(noise=noise).equations
-    content |= {"begins": signature.history_samples, "memory": MEMORY}
+    content |= {"begins": linear.history_samples, "memory": MEMORY}
     files = ("estimator.h", "estimator.c")
     more = {f"{name}_{file}": rendered(file, **content) for file in files}
     return write_sources(sources(linear, name) | more, folder)

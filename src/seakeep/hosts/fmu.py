@@ -21,8 +21,6 @@ from seakeep.hosts.c import identifier, rendered, sources
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
 
-__all__ = ["compiler", "write_fmu"]
-
 KIND = "functional mock-up unit"
 PLATFORMS = {
     ("Linux", "x86_64"): ("linux64", ".so"),
@@ -82,10 +80,10 @@ def write_fmu(model: Model, path: str | Path) -> Path:
         for file, text in files.items():
             Path(folder, file).write_text(text, encoding="utf-8")
             archive.writestr(f"sources/{file}", text)
-        if (found := compiler()) is not None:
+        if (cc := compiler()) is not None:
             place, suffix = PLATFORMS[platform.system(), platform.machine()]
-            made = _compiled(found, Path(folder), name, suffix)
-            archive.write(made, f"binaries/{place}/{made.name}")
+            library = _compiled(cc, Path(folder), name, suffix)
+            archive.write(library, f"binaries/{place}/{library.name}")
     return target
 
 
@@ -98,14 +96,14 @@ def compiler() -> list[str] | None:
         return None
     if named := shlex.split(os.environ.get("CC", "")):
         return named
-    found = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-    return None if found is None else [found]
+    path = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    return None if path is None else [path]
 
 
 def _compiled(compiler: list[str], folder: Path, name: str, suffix: str) -> Path:
-    made = folder / f"{name}{suffix}"
+    library = folder / f"{name}{suffix}"
     flags = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden"]
-    command = [*compiler, *flags, "-o", made.name, f"{name}.c", "fmi2.c", "-lm"]
+    command = [*compiler, *flags, "-o", library.name, f"{name}.c", "fmi2.c", "-lm"]
     try:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         said, failed = done.stderr, done.returncode
@@ -116,7 +114,7 @@ def _compiled(compiler: list[str], folder: Path, name: str, suffix: str) -> Path
             f"the C compiler failed: {shlex.join(command)}\n{said.strip()[:500]}\nMend it, name "
             "another one in the environment variable CC, or write the sources alone (--c)."
         )
-    return made
+    return library
 
 
 def _described(model: HankelDMDcModel) -> dict[str, Any]:

@@ -21,8 +21,6 @@ from seakeep.models.observables import Observed, SlowSquare, Term
 if TYPE_CHECKING:
     import onnx
 
-__all__ = ["write_onnx"]
-
 KIND = "graph for ONNX"
 OPSET, IR = 17, 8
 """Versions of the operators and of the file: those of ONNX 1.12, of 2022."""
@@ -88,10 +86,10 @@ def write_onnx(model: Model, path: str | Path, steps: int = 1) -> Path:
     target = Path(path)
     check_output(target, KIND)
     count = whole_number(steps, "steps")
-    made = _model(exportable(model), int(count))
-    onnx.checker.check_model(made, full_check=True)
+    proto = _model(exportable(model), int(count))
+    onnx.checker.check_model(proto, full_check=True)
     with replacing(target) as temporary:
-        temporary.write_bytes(made.SerializeToString())
+        temporary.write_bytes(proto.SerializeToString())
     return target
 
 
@@ -120,9 +118,9 @@ class _Graph:
                 each = _Array(self, f"{self.prefix}constant_{len(self.constants)}")
                 self.constants.append(numpy_helper.from_array(constant, each.name))
             names.append(each.name)
-        made = into or f"{self.prefix}value_{len(self.nodes)}"
-        self.nodes.append(helper.make_node(operator, names, [made], **attributes))
-        return _Array(self, made)
+        output = into or f"{self.prefix}value_{len(self.nodes)}"
+        self.nodes.append(helper.make_node(operator, names, [output], **attributes))
+        return _Array(self, output)
 
 
 class _Array(NDArrayOperatorsMixin):
@@ -227,7 +225,7 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
     if signature.inputs:
         length = signature.input_map.history(signature.input_delays)
         given.append(value("u", length + signature.lead_samples + steps, len(signature.inputs)))
-    made = helper.make_graph(
+    graph_proto = helper.make_graph(
         graph.nodes,
         "forecast",
         given,
@@ -235,7 +233,7 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
         graph.constants,
     )
     whole = helper.make_model(
-        made,
+        graph_proto,
         doc_string=f"{MARK}: {KIND}. {timing(model)}",
         producer_name="seakeep",
         producer_version=metadata.version("seakeep"),

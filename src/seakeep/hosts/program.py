@@ -13,8 +13,6 @@ from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDcModel, Model, is_ensemble, labelled
 
-__all__ = ["exportable", "start_rows", "timing"]
-
 
 def exportable(model: Model) -> HankelDMDcModel:
     """A model that hosts can run.

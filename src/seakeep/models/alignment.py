@@ -40,8 +40,6 @@ from seakeep.signals.propagation import (
 )
 from seakeep.waves import group_speed
 
-__all__ = ["FittedAlignment", "ProbeAlignment", "depth_of"]
-
 Mode = Literal["effective", "dispersion"]
 Surge = Literal["measured", "predicted", "none"]
 
@@ -346,8 +344,8 @@ class FittedAlignment:
 
     def positions_in(self, run: xr.Dataset) -> tuple[float | None, ...]:
         """Position of each input's probe in a run, m; that in training where it states none."""
-        found = [_position(run, channel) for channel in self.inputs]
-        pairs = zip(found, self.positions, strict=True)
+        positions = [_position(run, channel) for channel in self.inputs]
+        pairs = zip(positions, self.positions, strict=True)
         return tuple(trained if here is None else here for here, trained in pairs)
 
     def carry(self, run: xr.Dataset, spans: Sequence[Span]) -> FloatArray:
@@ -376,19 +374,19 @@ class FittedAlignment:
             reach = float(np.min(np.concatenate(every))), float(np.max(np.concatenate(every)))
         elevations, offsets = np.flatnonzero(self.carried), self.offsets(run)
         gaps = np.flatnonzero(~np.all(np.isfinite(values), axis=1))
-        found: dict[tuple[int, int], list[CarriedElevation]] = {}
+        by_pair: dict[tuple[int, int], list[CarriedElevation]] = {}
         out = values.copy()
         out[:, elevations] = np.nan
         for first, stop in _merged(spans):
             begin = int(max(gaps[gaps < first], default=-1)) + 1
             end = int(min(gaps[gaps >= stop], default=len(values)))
-            if (begin, end) not in found:
-                found[begin, end] = [
+            if (begin, end) not in by_pair:
+                by_pair[begin, end] = [
                     self._carrier(run, values[begin:end, column], dt, reach, offsets[column])
                     for column in elevations
                 ]
             inside = slice(first - begin, stop - begin)
-            for column, carrier in zip(elevations, found[begin, end], strict=True):
+            for column, carrier in zip(elevations, by_pair[begin, end], strict=True):
                 at = surge[first:stop] + offsets[column]
                 out[first:stop, column] = carrier.at(at, inside)[:, 0]
         return out
@@ -497,12 +495,12 @@ def _celerity(
         apart = placed[last] - placed[first]
         values = _sound(run, name, [first, last])
         try:
-            found = effective_celerity(
+            celerity = effective_celerity(
                 values[:, 0], values[:, 1], labelled.run_step(run, name), apart, depth
             )
         except DataError as error:
             raise DataError(f"{name}, '{first}' and '{last}': {error}") from None
-        slowness.append(found.lag / apart)
+        slowness.append(celerity.lag / apart)
     speeds = 1.0 / np.array(slowness)
     spread = float(speeds.std(ddof=1)) if len(slowness) > 1 else None
     return float(1.0 / np.mean(slowness)), spread

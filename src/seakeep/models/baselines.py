@@ -30,8 +30,6 @@ from seakeep.models.store import content, numbers
 from seakeep.models.training import Training, TrainingData, gather
 from seakeep.models.validity import Coverage
 
-__all__ = ["ARX", "FIR", "Constant", "HoldLast", "LinearSpec", "Mean", "Subspace"]
-
 
 @dataclass(frozen=True)
 class Constant:
@@ -240,9 +238,11 @@ class FIR(LinearSpec):
             raise RequestError(
                 "a FIR model is a filter of its inputs and has none; name at least one input."
             )
-        found = data.regress(self, None)
-        size = len(found.coefficients)
-        return replace(found, coefficients=np.hstack([np.zeros((size, size)), found.coefficients]))
+        system = data.regress(self, None)
+        size = len(system.coefficients)
+        return replace(
+            system, coefficients=np.hstack([np.zeros((size, size)), system.coefficients])
+        )
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple, Protocol, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, fraction, whole_number
+from seakeep.arrays import FloatArray, Progress, fraction, whole_number
 from seakeep.core.calibration import (
     ConformalMargin,
     band_scale,
@@ -28,23 +28,9 @@ from seakeep.models import labelled
 from seakeep.models.checks import Json, check_choice
 from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series, read_windows
-from seakeep.models.executor import Progress
 from seakeep.models.interface import Signature
 from seakeep.models.summaries import reduce_members
 from seakeep.models.training import TrainingArrays
-
-__all__ = [
-    "Band",
-    "BandScale",
-    "Calibration",
-    "Judged",
-    "calibrate",
-    "check_band",
-    "envelope_of",
-    "found_margin",
-    "held_out",
-    "widened",
-]
 
 Band = Literal["members", "calibrated"]
 BandScale = Literal["spread", "constant", "learnt"]
@@ -76,12 +62,15 @@ class Ensemble(FreeRuns, Protocol):
     """Members of an ensemble that a calibration uses."""
 
     @property
-    def arrays(self) -> TrainingArrays: ...
+    def arrays(self) -> TrainingArrays:
+        """What the members were trained on."""
+
     @property
-    def read_spans(self) -> dict[str, tuple[float, float]]: ...
+    def read_spans(self) -> dict[str, tuple[float, float]]:
+        """First and last instant that members have read, of each run, s."""
+
     def without(self, run: str) -> Ensemble:
         """Members as they learn from the other runs."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +79,7 @@ class Calibration:
 
     Parameters
     ----------
-    found : ConformalMargin
+    conformal : ConformalMargin
         Margins of the states, or factors of their scale.
     floor : ndarray of shape (N,), or None
         Least scale of each state, a quarter of its root mean square error; None where the margin
@@ -107,7 +96,7 @@ class Calibration:
         Whether members forecast the runs that trained them as they learn from the others.
     """
 
-    found: ConformalMargin
+    conformal: ConformalMargin
     floor: FloatArray | None
     law: FloatArray | None
     windows: dict[str, int]
@@ -125,7 +114,7 @@ class Calibration:
     @property
     def bounds(self) -> str:
         """What the bounds of the band are, in words."""
-        level = self.found.level
+        level = self.conformal.level
         if self.law is not None:
             return (
                 "the mean minus and plus a calibrated factor times a scale learnt from the "
@@ -141,10 +130,10 @@ class Calibration:
 
     def to_json(self) -> str:
         """As text; a margin that is infinite is kept as such."""
-        arrays: Json = {key: getattr(self.found, key).tolist() for key in NUMBERS}
+        arrays: Json = {key: getattr(self.conformal, key).tolist() for key in NUMBERS}
         floor = None if self.floor is None else self.floor.tolist()
         law = None if self.law is None else self.law.tolist()
-        words = {"level": self.found.level, "windows": self.windows, "steps": self.steps}
+        words = {"level": self.conformal.level, "windows": self.windows, "steps": self.steps}
         return json.dumps(
             arrays | words | {"spans": self.spans, "floor": floor, "law": law, "folds": self.folds}
         )
@@ -159,9 +148,11 @@ class Calibration:
             for key in (*NUMBERS, "floor", "law")
         }
         floor, law = arrays.pop("floor"), arrays.pop("law")
-        found = ConformalMargin(**arrays, level=content["level"])
+        margin = ConformalMargin(**arrays, level=content["level"])
         spans = {run: (first, last) for run, (first, last) in content["spans"].items()}
-        return cls(found, floor, law, content["windows"], content["steps"], spans, content["folds"])
+        return cls(
+            margin, floor, law, content["windows"], content["steps"], spans, content["folds"]
+        )
 
 
 def calibrate(
@@ -198,14 +189,14 @@ def calibrate(
             "or runs that do not train; or let each run that trains be forecast by what the "
             "others teach (folds = 'run')."
         )
-    found, floor, law = found_margin(judged.values(), level, scale)
+    margin, floor, law = learn_margin(judged.values(), level, scale)
     windows = {name: len(each.starts) for name, each in judged.items()}
     length = steps * ensemble.signature.dt
     spans = {name: (each.starts[0], each.starts[-1] + length) for name, each in judged.items()}
-    return Calibration(found, floor, law, windows, steps, spans, folds)
+    return Calibration(margin, floor, law, windows, steps, spans, folds)
 
 
-def found_margin(
+def learn_margin(
     judged: Iterable[Judged], level: float, scale: BandScale
 ) -> tuple[ConformalMargin, FloatArray | None, FloatArray | None]:
     """Margins of bands in windows that no member has read, the floor of their scale, and its law.
@@ -222,8 +213,8 @@ def found_margin(
         return conformal_margin(band_scores(lower, upper, measured), level), None, None
     floor = spread_floor(mean, measured)
     if scale == "spread":
-        found = scaled_scores(mean, band_scale(std, floor), measured)
-        return conformal_margin(found, level), floor, None
+        errors = scaled_scores(mean, band_scale(std, floor), measured)
+        return conformal_margin(errors, level), floor, None
     groups = np.repeat(np.arange(len(parts)), [len(each.measured) for each in parts])
     if len(parts) == 1:
         groups = np.arange(len(measured)) % 2
@@ -284,7 +275,7 @@ def _judged(
     """Forecasts of the free windows of each run; a step of progress is a member in one run."""
     free = {name: _free_samples(sources[name], name, run, steps) for name, run in runs.items()}
     free = {name: places for name, places in free.items() if places}
-    found: dict[str, Judged] = {}
+    judged: dict[str, Judged] = {}
     done, total = 0, sum(sources[name].n_members for name in free)
     for name, places in free.items():
         ensemble, signature, run = sources[name], sources[name].signature, runs[name]
@@ -297,8 +288,8 @@ def _judged(
             values = reduce_members(series, lost, level)
         states = labelled.channel_matrix(run, signature.states, name)
         measured = np.stack([states[at + 1 : at + 1 + steps] for at in places])
-        found[name] = Judged(values, measured, envelope_of(signature, windows), starts)
-    return found
+        judged[name] = Judged(values, measured, envelope_of(signature, windows), starts)
+    return judged
 
 
 def envelope_of(signature: Signature, windows: Windows) -> FloatArray:
@@ -364,8 +355,8 @@ def _holds(
     if count < 1:
         return False
     here = slice(first, first + count)
-    held = labelled.channel_matrix(run, ensemble.signature.states, name, here)
-    return bool(np.array_equal(held, states[skipped : skipped + count]))
+    values = labelled.channel_matrix(run, ensemble.signature.states, name, here)
+    return bool(np.array_equal(values, states[skipped : skipped + count]))
 
 
 def check_band(calibration: Calibration | None, level: float, band: Band) -> None:
@@ -393,7 +384,7 @@ def check_band(calibration: Calibration | None, level: float, band: Band) -> Non
             "the ensemble is not calibrated. Call ensemble.calibrate(runs, steps), or seakeep "
             "calibrate, with runs that its members did not learn from, and use the result."
         )
-    known = calibration.found.level
+    known = calibration.conformal.level
     if abs(known - level) > 1e-12:
         raise RequestError(
             f"the band was calibrated for level = {known:g}, and {level:g} was asked for. "
@@ -425,5 +416,5 @@ def widened(
     if calibration.floor is not None:
         envelope = envelope_of(signature, windows)
         scale = band_scale(std, calibration.floor, calibration.law, envelope)
-    bounds = calibrated_bounds(mean, lower, upper, calibration.found.margin, scale)
+    bounds = calibrated_bounds(mean, lower, upper, calibration.conformal.margin, scale)
     return np.stack([mean, std, *bounds], axis=1)

@@ -13,20 +13,6 @@ from pydantic import TypeAdapter
 
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 
-__all__ = [
-    "TINY",
-    "Json",
-    "check_choice",
-    "check_flag",
-    "check_integer",
-    "check_keys",
-    "check_number",
-    "names_of",
-    "of_json",
-    "plain",
-    "settings_of",
-]
-
 Json = dict[str, Any]
 """Settings as JSON values."""
 TINY = float(np.finfo(float).tiny)
@@ -174,8 +160,8 @@ def check_keys(kind: type, table: Mapping[str, object], what: str = "") -> None:
 
 def of_json(kind: type[Made], content: Mapping[str, Any]) -> Made:
     """Rebuild a dataclass from its fields as JSON values, those of dataclasses in it included."""
-    made: Made = _adapter(kind).validate_python(content)  # type: ignore[arg-type]
-    return made
+    value: Made = _adapter(kind).validate_python(content)  # type: ignore[arg-type]
+    return value
 
 
 @functools.cache

@@ -25,21 +25,11 @@ import scipy
 import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.core.embedding import History
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.models.inputs import InputMap
 from seakeep.models.priors import unit_of
-from seakeep.models.settings import HankelSettings, History
-
-__all__ = [
-    "DRAWN",
-    "Draw",
-    "Sampling",
-    "TrainOn",
-    "child",
-    "draw_members",
-    "draws_dataset",
-    "draws_of",
-]
+from seakeep.models.settings import HankelSettings
 
 Sampling = Literal["monte_carlo", "sobol"]
 TrainOn = Literal["all", "runs", "windows", "auto"]
@@ -102,16 +92,29 @@ class Drawn(Protocol):
     """Priors, seed and rules that make the draws; see :class:`seakeep.BayesianHankelDMDc`."""
 
     @property
-    def n_members(self) -> int: ...
+    def n_members(self) -> int:
+        """Number of draws."""
+
     @property
-    def sampling(self) -> Sampling: ...
+    def sampling(self) -> Sampling:
+        """How priors are drawn from."""
+
     @property
-    def train_on(self) -> TrainOn: ...
+    def train_on(self) -> TrainOn:
+        """Runs that a member learns from."""
+
     @property
-    def seed_sequence(self) -> np.random.SeedSequence: ...
-    def at(self, name: str, q: float) -> float | None: ...
-    def samples(self, name: str, value: float, dt: float) -> int: ...
-    def shared(self, dt: float) -> HankelSettings: ...
+    def seed_sequence(self) -> np.random.SeedSequence:
+        """Source of all random numbers."""
+
+    def at(self, name: str, q: float) -> float | None:
+        """Quantile of a prior."""
+
+    def samples(self, name: str, value: float, dt: float) -> int:
+        """A drawn length in samples."""
+
+    def shared(self, dt: float) -> HankelSettings:
+        """Settings that all members have."""
 
 
 def child(seed: np.random.SeedSequence, member: int) -> np.random.Generator:

@@ -21,13 +21,13 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, whole_number
+from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress, whole_number
 from seakeep.core.recursion import Recursion, read_table, recursion
 from seakeep.core.rollout import rollouts
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
-from seakeep.models.executor import Progress, in_order
+from seakeep.models.executor import in_order
 from seakeep.models.following import Following
 from seakeep.models.inputs import Drive
 from seakeep.models.interface import Scale, Signature
@@ -35,21 +35,6 @@ from seakeep.models.labelled import Span
 from seakeep.models.readouts import FittedReadOut, read_out
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import instant_text
-
-__all__ = [
-    "Dynamics",
-    "Windows",
-    "array_windows",
-    "cut_lost",
-    "first_lost",
-    "group_series",
-    "linear_runs",
-    "member_series",
-    "model_runs",
-    "read_groups",
-    "read_windows",
-    "run_members",
-]
 
 GROWTH = 10.0
 """A free run is lost where a state is this many times as far from the training mean as training,
@@ -148,9 +133,17 @@ class Runs(Protocol):
     """An object that makes free runs: a model, an ensemble, or members that are held."""
 
     @property
-    def signature(self) -> Signature: ...
+    def signature(self) -> Signature:
+        """Channels, delays, input map and scales."""
+
     @property
-    def n_members(self) -> int: ...
+    def n_members(self) -> int:
+        """Number of members; one for a single model."""
+
+    @property
+    def is_centred(self) -> bool:
+        """Whether one more run, numbered `n_members`, is what the members' mean is moved to."""
+
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs of members over groups of windows, each (member, window, steps, N).
 
@@ -260,10 +253,10 @@ def _regressors(
     table, steps = np.concatenate(tables), spans[0].stop - spans[0].known
     at = np.array([starts[drive] + span.known for drive, span in pairs])
     here = np.array([drive.places(span.known, span.known + 1) for drive, span in pairs])
-    held = read_table(place, table, at[:, None] + np.arange(steps), here.repeat(steps, axis=1))
+    measured = read_table(place, table, at[:, None] + np.arange(steps), here.repeat(steps, axis=1))
     before = np.stack([drive.rows(span.first, span.known).delayed for drive, span in pairs])
     direct = np.stack([drive.direct(span.known, span.stop) for drive, span in pairs])
-    return np.concatenate([before, held], axis=1), direct, table, at
+    return np.concatenate([before, measured], axis=1), direct, table, at
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,16 +284,16 @@ class _Opened:
         at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
         needed, lead = signature.history_samples, 0 if predicts else signature.lead_samples
 
-        def told(instant: float) -> str:
+        def shown(instant: float) -> str:
             return instant_text(instant, dt)
 
         if at + 1 < needed:
             near = abs(float(start) - time[at]) <= 1e-6 * dt
-            snapped = "" if near else f" (nearest sample {told(time[at])} s)"
+            snapped = "" if near else f" (nearest sample {shown(time[at])} s)"
             raise RequestError(
-                f"start = {told(float(start))} s{snapped} leaves {at + 1} samples of history in "
+                f"start = {shown(float(start))} s{snapped} leaves {at + 1} samples of history in "
                 f"{name} and the model needs {needed} (the start included): {needed - at - 1} are "
-                f"missing. Start at {told(time[0] + (needed - 1) * dt)} s or later."
+                f"missing. Start at {shown(time[0] + (needed - 1) * dt)} s or later."
             )
         available = time.size - 1 - at
         # The last input needed is the one an instant before the last state, and the lead after it.
@@ -312,9 +305,9 @@ class _Opened:
         if most is not None and count > most:
             ahead = f", of which the model's lead takes {lead}" if lead else ""
             raise RequestError(
-                f"{count} steps from {told(time[at])} s need the input up to "
-                f"{told(time[at] + (count - 1 + lead) * dt)} s and {name} ends at "
-                f"{told(time[-1])} s{ahead}. At most {max(most, 0)} steps can be forecast from "
+                f"{count} steps from {shown(time[at])} s need the input up to "
+                f"{shown(time[at] + (count - 1 + lead) * dt)} s and {name} ends at "
+                f"{shown(time[-1])} s{ahead}. At most {max(most, 0)} steps can be forecast from "
                 "there; ahead = 'predict' continues the input by linear prediction."
             )
         return Span(at - signature.input_delays, at, at + count)
@@ -327,8 +320,8 @@ class _Opened:
         # Only the future is predicted: missing samples before a start are refused.
         sound = {}
         for name, column in zip(signature.inputs, values.T, strict=True):
-            if start < (found := _last_stretch(column)).stop < stop:
-                sound[name] = column[found], found.stop
+            if start < (stretch := _last_stretch(column)).stop < stop:
+                sound[name] = column[stretch], stretch.stop
         if not sound:
             return self
         if signature.input_map.reads_surge:
@@ -458,13 +451,11 @@ def linear_runs(
 
     Read-outs see each member's series when its run is done.
     """
-    found = [model_runs(each, each.coefficients[None], groups) for each in members]
-    for values in itertools.chain.from_iterable(found):
+    runs = [model_runs(each, each.coefficients[None], groups) for each in members]
+    for values in itertools.chain.from_iterable(runs):
         read_out(readouts, values)
     # One member needs no copy.
-    return [
-        each[0] if len(each) == 1 else np.concatenate(each) for each in zip(*found, strict=True)
-    ]
+    return [each[0] if len(each) == 1 else np.concatenate(each) for each in zip(*runs, strict=True)]
 
 
 def model_runs(
@@ -488,8 +479,8 @@ def model_runs(
     """
     if any(windows.table is not None for windows in groups):
         return [_followed_runs(scales, coefficients, windows) for windows in groups]
-    found = [_open_runs(replace(scales, coefficients=each), groups) for each in coefficients]
-    return [np.stack(each) if len(each) > 1 else each[0][None] for each in zip(*found, strict=True)]
+    runs = [_open_runs(replace(scales, coefficients=each), groups) for each in coefficients]
+    return [np.stack(each) if len(each) > 1 else each[0][None] for each in zip(*runs, strict=True)]
 
 
 def _followed_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows) -> FloatArray:
@@ -517,15 +508,15 @@ def _followed_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows)
     )
     known = windows.delayed.shape[1] - windows.steps
     delayed = windows.delayed[:, known - z : known]
-    found, used = recursion(
+    computed, used = recursion(
         models, follows.place, x.deviations(windows.histories), delayed,
         windows.table, windows.starts, forcing,
     )  # fmt: skip
     with np.errstate(over="ignore", invalid="ignore"):  # a run that is lost is cut just below
-        for values, each in zip(found, used, strict=True):
+        for values, each in zip(computed, used, strict=True):
             driving = np.concatenate([delayed, each], axis=1)
             cut_lost(x.physical(values, out=values), scales, replace(windows, delayed=driving))
-    return found
+    return computed
 
 
 def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
@@ -540,11 +531,11 @@ def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
         direct = member.direct_scale.deviations(windows.direct) if windows.direct.shape[2] else None
         batches.append((history, member.input_scale.deviations(driving), direct))
     a, b = member.matrices
-    found = rollouts(a, b, batches, n_states=len(member.state_scale.mean))
+    computed = rollouts(a, b, batches, n_states=len(member.state_scale.mean))
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
-        for windows, values in zip(groups, found, strict=True):
+        for windows, values in zip(groups, computed, strict=True):
             cut_lost(member.state_scale.physical(values, out=values), member, windows)
-    return found
+    return computed
 
 
 def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
@@ -564,11 +555,11 @@ def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
             (scales.direct_scale, windows.direct),
         )
     )
-    found: FloatArray = np.maximum(delayed[:, z:], direct)
+    excess: FloatArray = np.maximum(delayed[:, z:], direct)
     last, fade = delayed[:, :z].max(axis=1, initial=1.0), fading(scales)
-    for now in found.T:
+    for now in excess.T:
         last = now[:] = np.maximum(now, 1.0 + fade * (last - 1.0))
-    return found
+    return excess
 
 
 def fading(scales: Dynamics | Signature) -> float:
@@ -602,8 +593,12 @@ def run_members(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Iterator[list[FloatArray]]:
-    """Free runs member by member: of each group an array of shape (window, steps, N)."""
-    return in_order(_run_member, (model, groups), range(model.n_members), executor, progress)
+    """Free runs member by member, then those that they are centred on, where they are.
+
+    Of each group an array of shape (window, steps, N).
+    """
+    numbers = range(model.n_members + model.is_centred)
+    return in_order(_run_member, (model, groups), numbers, executor, progress)
 
 
 def _run_member(data: tuple[Runs, Sequence[Windows]], member: int) -> list[FloatArray]:
@@ -644,8 +639,8 @@ def member_series(
     RequestError
         If the temporary folder has no room.
     """
-    with group_series(model, [windows], executor, progress) as found:
-        yield found[0]
+    with group_series(model, [windows], executor, progress) as series:
+        yield series[0]
 
 
 @contextmanager
@@ -658,7 +653,7 @@ def group_series(
     """:func:`member_series` of several groups of windows; each member is identified once."""
     count, channels = model.n_members, len(model.signature.states)
     with ExitStack() as stack:
-        found: list[Series] = [
+        runs: list[Series] = [
             (
                 stack.enter_context(_room((count, len(each), each.steps, channels))),
                 np.empty((count, len(each)), dtype=np.int64),
@@ -666,10 +661,27 @@ def group_series(
             for each in groups
         ]
         for number, values in enumerate(run_members(model, groups, executor, progress)):
-            for (series, lost), each in zip(found, values, strict=True):
-                series[number] = each
-                lost[number] = first_lost(each)
-        yield found
+            for (series, lost), each in zip(runs, values, strict=True):
+                if number == count:
+                    _centre(series, lost, each)
+                else:
+                    series[number] = each
+                    lost[number] = first_lost(each)
+        yield runs
+
+
+def _centre(series: FloatArray, lost: npt.NDArray[np.int64], runs: FloatArray) -> None:
+    """Move members, shape (member, window, steps, N), so that their mean is a single model's run.
+
+    Members that are lost in a window count in none of it. Where the single model is lost, the
+    members stay where they are.
+    """
+    complete, mean = lost < 0, np.zeros(runs.shape)
+    for own, here in zip(series, complete, strict=True):
+        mean[here] += own[here]
+    shift = runs - mean / np.maximum(np.count_nonzero(complete, axis=0), 1)[:, None, None]
+    shift[~np.isfinite(shift).all(axis=(1, 2))] = 0.0
+    series += shift
 
 
 @contextmanager

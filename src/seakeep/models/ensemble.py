@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, fraction
+from seakeep.arrays import FloatArray, Progress, fraction
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import store
@@ -28,8 +28,8 @@ from seakeep.models.calibration import (
 )
 from seakeep.models.checks import Json
 from seakeep.models.draws import Draw, draws_dataset, draws_of
-from seakeep.models.engine import Dynamics, Windows, first_lost, linear_runs, member_series
-from seakeep.models.executor import Progress, in_order, one_blas_thread
+from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
+from seakeep.models.executor import in_order
 from seakeep.models.forecasts import (
     Forecaster,
     check_arrays,
@@ -50,16 +50,10 @@ from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live
 from seakeep.models.settings import HankelSettings
-from seakeep.models.summaries import (
-    reduce_members,
-    statistic_coordinate,
-    statistics_of,
-)
+from seakeep.models.summaries import reduce_members, statistic_coordinate
 from seakeep.models.training import TrainingArrays, TrainingData
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
-
-__all__ = ["BandForecast", "HankelEnsemble", "spectral_radius"]
 
 SAMPLING = {"monte_carlo": "Monte Carlo", "sobol": "Sobol"}
 TRAIN_ON = {
@@ -113,8 +107,10 @@ class HankelEnsemble(Forecaster, store.Saved):
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
     identified : tuple of Dynamics
-        All members with their matrices, where :meth:`hold` keeps them; empty where each call
-        identifies them anew.
+        All members with their matrices, where :meth:`hold` keeps them, and what they are centred
+        on; empty where each call identifies them anew.
+    centre : Draw, optional
+        The single model of all runs that the members' mean is moved to.
     """
 
     kind: ClassVar[str] = "bayesian_hankel_dmdc"
@@ -127,6 +123,7 @@ class HankelEnsemble(Forecaster, store.Saved):
     calibration: Calibration | None = None
     selection: str = ""
     identified: tuple[Dynamics, ...] = field(default=(), repr=False)
+    centre: Draw | None = None
 
     def __repr__(self) -> str:
         return (
@@ -142,6 +139,16 @@ class HankelEnsemble(Forecaster, store.Saved):
     def n_members(self) -> int:
         """Number of members."""
         return len(self.members)
+
+    @property
+    def is_centred(self) -> bool:
+        """Whether the mean of the members is the forecast of a single model of all runs."""
+        return self.centre is not None
+
+    @property
+    def _taught(self) -> tuple[Draw, ...]:
+        """The members, and what they are centred on."""
+        return self.members if self.centre is None else (*self.members, self.centre)
 
     @property
     def nbytes(self) -> int:
@@ -166,7 +173,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         for run, name in enumerate(self.arrays.names):
             ends = [
                 self.arrays.span(run, draw.settings, draw.last, self.dt)
-                for draw in self.members
+                for draw in self._taught
                 if draw.run in (None, run)
             ]
             if ends:
@@ -190,15 +197,15 @@ class HankelEnsemble(Forecaster, store.Saved):
 
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
-        found = [self.dynamics(number) for number in members]
-        return linear_runs(found, groups, self.signature.readouts)
+        runs = [self.dynamics(number) for number in members]
+        return linear_runs(runs, groups, self.signature.readouts)
 
     def system_matrices(self) -> Iterator[FloatArray]:
         """Â of each member."""
         return (self.member(number).A for number in range(self.n_members))
 
     def dynamics(self, number: int) -> Dynamics:
-        """What a free run of a member needs."""
+        """What a free run of a member needs, or of what they are centred on: number n_members."""
         if self.identified:
             return self.identified[number]
         settings, data, solution = self._identified(number)
@@ -225,6 +232,11 @@ class HankelEnsemble(Forecaster, store.Saved):
         RequestError
             If there is no such member.
         """
+        if not 0 <= number < self.n_members:
+            raise RequestError(
+                f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
+                f"0 to {self.n_members - 1}."
+            )
         settings, data, solution = self._identified(number)
         return HankelDMDcModel(
             settings=settings,
@@ -236,12 +248,7 @@ class HankelEnsemble(Forecaster, store.Saved):
 
     def _identified(self, number: int) -> tuple[HankelSettings, TrainingData, Solution]:
         """Settings, training data and regression of a member."""
-        if not 0 <= number < self.n_members:
-            raise RequestError(
-                f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
-                f"0 to {self.n_members - 1}."
-            )
-        draw = self.members[number]
+        draw = self._taught[number]
         settings = draw.settings
         data = self.arrays.data(settings, draw.run, draw.last, self.signature)
         all_rows = settings.delay_rows == "ridge"
@@ -269,8 +276,8 @@ class HankelEnsemble(Forecaster, store.Saved):
             When they are found, if one or more are not below one.
         """
         if not self._radii:
-            found = in_order(_spectral_radius, self, range(self.n_members), executor, progress)
-            radii = np.array(list(found))
+            values = in_order(_spectral_radius, self, range(self.n_members), executor, progress)
+            radii = np.array(list(values))
             radii.flags.writeable = False
             self._radii.append(radii)
             _warn_of_unstable(radii)
@@ -315,20 +322,22 @@ class HankelEnsemble(Forecaster, store.Saved):
         lines += [
             f"    {name}: {span_text(*span, self.dt)}" for name, span in self.training_spans.items()
         ]
+        if self.is_centred:
+            lines.append("  centre        the mean is the single model of all runs")
         if self.selection:
             lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
         if (calibration := self.calibration) is not None:
-            found, count_of = calibration.found, sum(calibration.windows.values())
+            margin, count_of = calibration.conformal, sum(calibration.windows.values())
             line = (
-                f"  band          calibrated for {found.level:g} on "
+                f"  band          calibrated for {margin.level:g} on "
                 f"{counted(count_of, 'window')} of {calibration.steps} steps: "
             )
             if calibration.floor is None:
-                line += f"wider by {_range(found.margin / self.state_spread, '.2g')} "
+                line += f"wider by {_range(margin.margin / self.state_spread, '.2g')} "
             else:
                 what = "a learnt scale" if calibration.scale == "learnt" else "spread"
                 line += (
-                    f"{_range(found.margin, '.2g')} times {what} and a floor of "
+                    f"{_range(margin.margin, '.2g')} times {what} and a floor of "
                     f"{_range(calibration.floor / self.state_spread, '.2g')} "
                 )
             lines.append(line + "training SD either way")
@@ -584,7 +593,7 @@ class HankelEnsemble(Forecaster, store.Saved):
             The same, with members :attr:`identified`: N(N(s+1) + Q(z+1)) numbers per member with
             exact delay rows, and s + 1 times as many with regressed ones.
         """
-        numbers = range(self.n_members)
+        numbers = range(len(self._taught))
         return replace(
             self, identified=tuple(in_order(_dynamics, self, numbers, executor, progress))
         )
@@ -634,30 +643,33 @@ class HankelEnsemble(Forecaster, store.Saved):
         level = fraction(level, "level")
         check_band(self.calibration, level, band)
         windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
-        with one_blas_thread():
-            out = self.free_runs([windows], range(self.n_members))[0][:, 0]
-        kept = out[first_lost(out) < 0]
-        values = statistics_of(kept, level)[None]
+        with member_series(self, windows) as (series, lost):
+            values = reduce_members(series, lost, level)
         values = widened(self.calibration, values, band, self.signature, windows)
         mean, std, lower, upper = values[0]
-        return BandForecast(mean, std, lower, upper, len(out) - len(kept))
+        return BandForecast(mean, std, lower, upper, int(np.count_nonzero(lost >= 0)))
 
     def live(
         self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
     ) -> Live:
         """Put the members into service; arguments and errors as :meth:`HankelDMDcModel.live`.
 
-        The filter predicts with the mean of the members, whose errors on what they learnt from
-        are found here; a forecast runs all of them.
+        The filter predicts with the mean of the members, or with what they are centred on, whose
+        errors on what they learnt from are found here; a forecast runs all of them.
         """
-        kept = self if self.identified else self.hold()
-        return Live(kept, kept.identified, kept.errors, like=like, noise=noise)
+        members = self if self.identified else self.hold()
+        return Live(members, members._means, members.errors, like=like, noise=noise)
+
+    @property
+    def _means(self) -> list[Dynamics]:
+        """What the mean of the members is made of: all of them, or what they are centred on."""
+        first = self.n_members if self.is_centred else 0
+        return [self.dynamics(number) for number in range(first, len(self._taught))]
 
     @cached_property
     def errors(self) -> LeadErrors:
         """Errors of the members' mean on what they learnt from."""
-        signature, arrays = self.signature, self.arrays
-        members = [self.dynamics(number) for number in range(self.n_members)]
+        signature, arrays, members = self.signature, self.arrays, self._means
         stretches = [
             Stretch(x, u, v, signature.history_samples - 1, min(len(x) - 1, len(u)))
             for x, u, v in zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
@@ -729,8 +741,8 @@ class HankelEnsemble(Forecaster, store.Saved):
         DataError
             If a run cannot be used.
         """
-        found = calibrate(self, runs, steps, level, scale, folds, executor, progress)
-        return replace(self, calibration=found)
+        calibration = calibrate(self, runs, steps, level, scale, folds, executor, progress)
+        return replace(self, calibration=calibration)
 
     def without(self, run: str) -> HankelEnsemble:
         """The same draws as they learn from the other runs, to forecast a run that trained.
@@ -798,7 +810,12 @@ class HankelEnsemble(Forecaster, store.Saved):
 
     @classmethod
     def from_dataset(
-        cls, dataset: xr.Dataset, signature: Signature, settings: HankelSettings, origin: Json
+        cls,
+        dataset: xr.Dataset,
+        signature: Signature,
+        settings: HankelSettings,
+        origin: Json,
+        centre: Draw | None,
     ) -> HankelEnsemble:
         """Rebuild an ensemble from :meth:`to_dataset`; its members are equal to the last bit."""
         place = store.content(dataset, "runs")
@@ -818,6 +835,7 @@ class HankelEnsemble(Forecaster, store.Saved):
             coverage=Coverage.from_dataset(dataset, signature),
             calibration=Calibration.from_json(store.content(dataset, "calibration")),
             selection=str(dataset.attrs["selection"]),
+            centre=centre,
         )
 
 

@@ -31,18 +31,6 @@ import threadpoolctl
 from seakeep.arrays import Progress
 from seakeep.errors import RequestError, SeakeepError
 
-__all__ = [
-    "Progress",
-    "WorkerLostError",
-    "as_finished",
-    "in_order",
-    "make_executor",
-    "on_this_machine",
-    "one_blas_thread",
-    "processes",
-    "submitting",
-]
-
 Data = TypeVar("Data")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -72,8 +60,8 @@ def in_order(
     what: str = "member",
 ) -> Iterator[Result]:
     """Yield ``function(data, item)`` for each item, in the order of the items."""
-    found = _in_order(function, data, items, executor)
-    for done, result in enumerate(found, start=1):
+    results = _in_order(function, data, items, executor)
+    for done, result in enumerate(results, start=1):
         if progress is not None:
             progress(done, len(items), f"{what} {done}")
         yield result
@@ -362,11 +350,11 @@ def _work(
 
 def _check_versions(expected: Mapping[str, str]) -> None:
     """Refuse to work with other versions: the arrays would not be those of the caller."""
-    found = versions()
+    installed = versions()
     other = [
-        f"{name} {found[name]} (here {version})"
+        f"{name} {installed[name]} (here {version})"
         for name, version in expected.items()
-        if found.get(name) != version
+        if installed.get(name) != version
     ]
     if other:
         raise RequestError(

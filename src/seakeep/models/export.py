@@ -19,8 +19,6 @@ from seakeep.signals.expressions import Text
 if TYPE_CHECKING:
     import control
 
-__all__ = ["check_linear", "initial_state", "matrices", "to_control", "to_mat"]
-
 SYSTEM = "state-space system"
 """What a MATLAB file holds, as its head states it."""
 
@@ -132,7 +130,11 @@ def observables(signature: Signature) -> dict[str, Any]:
         "Delayed": len(delayed),
         "Top": np.array(observed.tops)[:, None],
         "Slope": observed.slopes[:, None],
-        **{f"{name}{part}": each for name, made in filters.items() for part, each in made.items()},
+        **{
+            f"{name}{part}": each
+            for name, filter_parts in filters.items()
+            for part, each in filter_parts.items()
+        },
         "Regressors": REGRESSORS,
     }
 

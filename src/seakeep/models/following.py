@@ -23,10 +23,7 @@ from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, depth_of
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals.carriers import carriers, mean_spectrum, position_taps
-from seakeep.sizes import MOST_CARRIED, check_size
 from seakeep.waves import wavenumber
-
-__all__ = ["SQUARED", "Bank", "Following"]
 
 SQUARED = ChannelLabel("slow_surge_squared", "m^2", "slow surge about its mean, squared")
 BACK = 3.0
@@ -137,8 +134,6 @@ class Following:
         peak = wavenumber(omega[[np.argmax(power)]], alignment.water_depth)[0]
         spacing = 2 * np.pi / float(peak) / PER_WAVE
         places = int(np.ceil((high - low + 2 * margin) / spacing)) + 2
-        check_size("the surge spans so many waves that waves are read at", places, MOST_CARRIED,
-                   "places", "Check the units of the surge (m).")  # fmt: skip
         return cls(
             alignment=alignment,
             column=list(states).index(alignment.settings.surge_channel),
@@ -166,8 +161,8 @@ class Following:
             If the probes of the run stand beyond the reach of the carriers.
         """
         rig = self._rig(run)
-        found = _banks(self, rig)
-        for bank in found:
+        computed = _banks(self, rig)
+        for bank in computed:
             if bank.errors[self._known].min() > REACH:
                 raise RequestError(
                     f"the probe of '{self.alignment.inputs[bank.column]}' stands "
@@ -175,7 +170,7 @@ class Following:
                     f"for carriers of {(self.back + self.ahead) * self.dt:.3g} s. Correct its "
                     "position, or fit with alignment surge = 'measured' or 'none'."
                 )
-        return found
+        return computed
 
     def foresight(self, run: xr.Dataset | None, count: int) -> tuple[FloatArray, tuple[int, ...]]:
         """Filters that predict placed elevations from all of them, in the rig of a run.
@@ -256,22 +251,22 @@ class Rig(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def _banks(made: Following, rig: Rig) -> tuple[Bank, ...]:
+def _banks(following: Following, rig: Rig) -> tuple[Bank, ...]:
     """Carriers of each elevation in a rig; a model keeps those of some rigs."""
-    out, aligned = [], made.alignment
+    out, aligned = [], following.alignment
     for column in np.flatnonzero(aligned.carried).tolist():
         own = rig.positions[column]
         columns = [column] if own is None else list(aligned.placed)
         places = [rig.positions[c] or 0.0 for c in columns]
         taps, errors = carriers(
-            *made._waves,
+            *following._waves,
             rig.depth,
-            made.dt,
-            targets=made.place.grid + rig.offsets[column] + (own or 0.0),
+            following.dt,
+            targets=following.place.grid + rig.offsets[column] + (own or 0.0),
             probes=places,
-            back=made.back,
-            ahead=made.ahead,
-            leads=np.full(made.place.count, made.lead),
+            back=following.back,
+            ahead=following.ahead,
+            leads=np.full(following.place.count, following.lead),
         )
         out.append(Bank(column, tuple(columns), taps, errors))
     return tuple(out)

@@ -10,34 +10,17 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray, as_real, whole_number
+from seakeep.arrays import FloatArray, IntArray, Progress, as_real, whole_number
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine
 from seakeep.models.checks import check_choice
 from seakeep.models.engine import Windows, first_lost
-from seakeep.models.executor import Progress
 from seakeep.models.html import text_html
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import ChannelLabel, run_name
 from seakeep.models.training import Training
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import instant_text, span_text
-
-__all__ = [
-    "Forecaster",
-    "SingleModel",
-    "check_arrays",
-    "counted",
-    "label_channels",
-    "lost_instants",
-    "one_run",
-    "rows_by_name",
-    "status_text",
-    "statuses",
-    "verdict",
-    "window_coords",
-    "with_units",
-]
 
 
 class Forecaster:
@@ -110,6 +93,7 @@ class SingleModel(Forecaster):
     """Methods of every model with one member; it adds a signature and ``free_runs``."""
 
     n_members: ClassVar[int] = 1
+    is_centred: ClassVar[bool] = False
     settings: Any
     training: Training
 
@@ -336,9 +320,11 @@ def window_coords(windows: Windows, dt: float) -> dict[str, xr.Variable]:
         "lead": xr.Variable(("lead",), lead, {"units": "s", "long_name": "time after start"}),
     }
     if any(at >= 0 for at in windows.predicted):
-        found = [outcome(windows, each).get("input_predicted_from") for each in range(len(windows))]
+        instants = [
+            outcome(windows, each).get("input_predicted_from") for each in range(len(windows))
+        ]
         words = {"units": "s", "long_name": "first instant that depends on predicted input"}
-        values = np.array(found, dtype=float)  # None becomes NaN
+        values = np.array(instants, dtype=float)  # None becomes NaN
         coords["input_predicted_from"] = xr.Variable(("window",), values, words)
     return coords
 
@@ -372,8 +358,8 @@ def status_text(facts: Mapping[str, Any], dt: float) -> str:
 
 def statuses(lost: IntArray, windows: Windows, window: int, dt: float) -> npt.NDArray[np.str_]:
     """Status of each member in a window from its first lost instant, or −1."""
-    found = [status_text(outcome(windows, window, int(at)), dt) for at in lost]
-    return np.array(found, dtype=str)
+    texts = [status_text(outcome(windows, window, int(at)), dt) for at in lost]
+    return np.array(texts, dtype=str)
 
 
 def lost_instants(lost: IntArray, windows: Windows) -> xr.Variable:

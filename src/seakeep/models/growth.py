@@ -18,8 +18,6 @@ from seakeep.models.interface import Signature
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.training import TrainingData
 
-__all__ = ["WINDOWS", "LeadErrors", "Stretch", "lead_errors", "training_errors"]
-
 WINDOWS = 48
 """Free runs that the errors are averaged over; a root mean square is known to a tenth then."""
 STEPS = 1024
@@ -57,8 +55,8 @@ class LeadErrors:
     def at(self, leads: npt.ArrayLike) -> FloatArray:
         """RMS errors at leads (samples from 1 on), shape (…, N); held after the last."""
         places = np.minimum(np.asarray(leads, dtype=int), len(self.rms)) - 1
-        found: FloatArray = self.rms[places]
-        return found
+        errors: FloatArray = self.rms[places]
+        return errors
 
     def to_variables(self) -> dict[str, tuple[tuple[str, ...], FloatArray]]:
         """Variables of a file."""
@@ -179,8 +177,8 @@ def _places(stretches: Sequence[Stretch], steps: int, most: int) -> list[tuple[S
     for each, count in zip(stretches, room, strict=True):
         number = min(count, -(-most * count // max(sum(room), 1)))
         if number:
-            found = np.linspace(each.first, each.last - steps, number).astype(int)
-            out.append((each, [int(start) for start in found]))
+            places = np.linspace(each.first, each.last - steps, number).astype(int)
+            out.append((each, [int(start) for start in places]))
     return out
 
 
@@ -195,10 +193,8 @@ def _errors(
 ) -> FloatArray:
     """Forecast minus measurement, shape (window, steps, N)."""
     windows = stretch.windows(starts, s, z, steps)
-    found = linear_runs(members, [windows], readouts)[0].mean(axis=0)
-    errors: FloatArray = found - np.stack(
-        [stretch.states[at + 1 : at + steps + 1] for at in starts]
-    )
+    mean = linear_runs(members, [windows], readouts)[0].mean(axis=0)
+    errors: FloatArray = mean - np.stack([stretch.states[at + 1 : at + steps + 1] for at in starts])
     return errors
 
 

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
-__all__ = ["settings_html", "text_html"]
-
 
 def text_html(text: str) -> str:
     """Text as it stands: what ``_repr_html_`` of a model gives."""

@@ -26,8 +26,6 @@ from seakeep.models.labelled import ChannelLabel, Span
 from seakeep.models.observables import Observed
 from seakeep.signals.carriers import carried
 
-__all__ = ["Drive", "InputMap", "Regressors"]
-
 
 class Regressors(NamedTuple):
     """What drives the step from each of several samples, in physical units.
@@ -190,7 +188,7 @@ class InputMap:
     def to_json(self) -> Json:
         """All that was fitted, as JSON values."""
         follows = None if self.follows is None else asdict(self.follows)
-        made: Json = plain(
+        content: Json = plain(
             {
                 "alignment": None if self.alignment is None else asdict(self.alignment),
                 "lead": self.lead,
@@ -198,7 +196,7 @@ class InputMap:
                 "follows": follows and {k: v for k, v in follows.items() if k != "alignment"},
             }
         )
-        return made
+        return content
 
     @classmethod
     def from_json(cls, content: Json) -> Self:
@@ -235,7 +233,7 @@ class Drive:
         Carriers in the rig of the run, of a model that follows its surge.
     """
 
-    made: InputMap
+    input_map: InputMap
     values: FloatArray
     first: int
     surge: FloatArray | None = None
@@ -247,16 +245,16 @@ class Drive:
         Rows are NaN where they need inputs that are not there. Waves of a model that follows its
         surge are those at the measured one; without one, of a vessel at rest in the mean place.
         """
-        made, direct = self.made, self.direct(first, stop)
-        if made.follows is None:
-            begin, end = (each + made.lead - self.first for each in (first, stop))
-            back, _, ahead = made._around
+        input_map, direct = self.input_map, self.direct(first, stop)
+        if input_map.follows is None:
+            begin, end = (each + input_map.lead - self.first for each in (first, stop))
+            back, _, ahead = input_map._around
             low = max(begin - back, 0)
-            values = self.values[low : end + ahead - made.lead]
-            if made.observed is not None:
-                values = made.observed.with_delayed(values)
+            values = self.values[low : end + ahead - input_map.lead]
+            if input_map.observed is not None:
+                values = input_map.observed.with_delayed(values)
             return Regressors(values[begin - low : end - low], direct)
-        place, here = made.follows.place, self.places(first, stop)
+        place, here = input_map.follows.place, self.places(first, stop)
         table = self.table(first, stop)
         delayed = read_table(place, table, np.arange(stop - first), here)
         squared = (here - place.centre) ** 2
@@ -264,16 +262,16 @@ class Drive:
 
     def direct(self, first: int, stop: int) -> FloatArray:
         """Columns without delays that no state drives."""
-        if self.made.observed is None:
+        if self.input_map.observed is None:
             return np.empty((stop - first, 0))
-        _, before, after = self.made._around
+        _, before, after = self.input_map._around
         begin = max(first - before, self.first)
         values = self.values[begin - self.first : stop + after - self.first]
-        return self.made.observed.direct(values)[first - begin : stop - begin]
+        return self.input_map.observed.direct(values)[first - begin : stop - begin]
 
     def table(self, first: int, stop: int) -> FloatArray:
         """Delayed regressors of samples at all places, shape (time, place, n)."""
-        made, follows = self.made, self.made.follows
+        input_map, follows = self.input_map, self.input_map.follows
         assert follows is not None
         back, count = follows.back, follows.place.count
         values = self.values[first - back - self.first : stop + follows.ahead - self.first]
@@ -281,15 +279,15 @@ class Drive:
         out[:] = values[back : back + stop - first, None]
         for bank in self.banks:
             out[:, :, bank.column] = carried(bank.taps, values[:, bank.columns])
-        if made.observed is None:
+        if input_map.observed is None:
             return out
-        flat = made.observed.with_delayed(out.reshape(-1, out.shape[2]))
+        flat = input_map.observed.with_delayed(out.reshape(-1, out.shape[2]))
         return flat.reshape(stop - first, count, -1)
 
     def places(self, first: int, stop: int) -> FloatArray:
         """Place of the vessel by its measured surge; at rest in the mean without one."""
-        assert self.made.follows is not None
-        place = self.made.follows.place
+        assert self.input_map.follows is not None
+        place = self.input_map.follows.place
         if self.surge is None:
             return np.full(stop - first, place.centre)
         return place.of(self.surge[first - self.first - place.taps.size + 1 : stop - self.first])

@@ -21,8 +21,6 @@ from seakeep.models.inputs import InputMap
 from seakeep.models.labelled import ChannelLabel, Runs, Stop
 from seakeep.models.readouts import FittedReadOut
 
-__all__ = ["Model", "Needs", "Role", "Scale", "Signature", "Spec"]
-
 
 @dataclass(frozen=True, eq=False)
 class Scale:

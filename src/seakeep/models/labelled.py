@@ -17,8 +17,6 @@ from seakeep.signals import uniform_step
 from seakeep.signals.time_axis import instant_text, span_text
 from seakeep.signals.waves import encounter_period
 
-__all__ = ["ChannelLabel", "Span", "as_runs", "channel_labels", "channel_matrix", "nearest_sample"]
-
 Runs = xr.Dataset | Sequence[xr.Dataset] | Mapping[str, xr.Dataset]
 Stop = float | Sequence[float] | Mapping[str, float] | Mapping[str, float | None] | None
 """Last instant of the training window, s: one for all runs, or one per run."""
@@ -368,21 +366,23 @@ def mean_period(runs: Mapping[str, xr.Dataset], inputs: Sequence[str]) -> float:
     """
     steps = {name: run_step(run, name) for name, run in runs.items()}
     key = "encounter_period"
-    found = [float(run.attrs[key]) / steps[name] for name, run in runs.items() if key in run.attrs]
-    if found:
-        return float(np.mean(found))
+    periods = [
+        float(run.attrs[key]) / steps[name] for name, run in runs.items() if key in run.attrs
+    ]
+    if periods:
+        return float(np.mean(periods))
     reason = f"no input ({', '.join(inputs) or 'none'}) is a wave elevation, eta_…."
     for name, run in runs.items():
         if (wave := wave_channel(run, inputs, name)) is None:
             continue
         series = channel_matrix(run, [wave], name)[:, 0]
         try:
-            found.append(encounter_period(series[np.isfinite(series)], steps[name]) / steps[name])
+            periods.append(encounter_period(series[np.isfinite(series)], steps[name]) / steps[name])
         except (DataError, RequestError) as error:
             reason = f"{name}, channel '{wave}': {error}"
-    if not found:
+    if not periods:
         raise DataError(
             f"the encounter period is not known: no run states it, and {reason} Set "
             "run.attrs['encounter_period'] (s)."
         )
-    return float(np.mean(found))
+    return float(np.mean(periods))

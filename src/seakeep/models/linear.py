@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     import control
     from scipy import signal
 
-__all__ = ["HankelDMDcModel", "modes"]
-
 
 @dataclass(frozen=True, eq=False)
 class HankelDMDcModel(SingleModel, store.Saved):
@@ -475,9 +473,9 @@ class HankelDMDcModel(SingleModel, store.Saved):
     def to_dataset(self) -> xr.Dataset:
         """The model as a Dataset: what :meth:`save` writes."""
         label = {"long_name": "regressed rows of [A B] on standardised deviations", "units": "1"}
-        found = packed(self).assign(coefficients=(("row", "regressor"), self.coefficients, label))
+        dataset = packed(self).assign(coefficients=(("row", "regressor"), self.coefficients, label))
         errors = {} if self.errors is None else self.errors.to_variables()
-        return found.assign(errors).assign_attrs(selection=self.selection)
+        return dataset.assign(errors).assign_attrs(selection=self.selection)
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset, settings: Any) -> Self:
@@ -516,9 +514,9 @@ def unpacked(dataset: xr.Dataset) -> dict[str, Any]:
 
 def modes(eigenvalues: ComplexArray, dt: float) -> xr.Dataset:
     """Modes of a discrete system from its eigenvalues; see ``HankelDMDcModel.modes``."""
-    kept = eigenvalues[eigenvalues.imag >= 0]
+    upper = eigenvalues[eigenvalues.imag >= 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        poles = np.log(kept.astype(complex)) / dt
+        poles = np.log(upper.astype(complex)) / dt
         natural = np.abs(poles)
         frequency = np.abs(poles.imag) / (2 * np.pi)
         # An eigenvalue of zero is gone after a step: overdamped, not undefined.
@@ -527,8 +525,8 @@ def modes(eigenvalues: ComplexArray, dt: float) -> xr.Dataset:
         decay = np.where(poles.real < 0, -1.0 / poles.real, np.inf)
         period = np.where(frequency > 0, 1.0 / frequency, np.inf)
     table = {
-        "eigenvalue": (kept, "1", "eigenvalue of the discrete system"),
-        "modulus": (np.abs(kept), "1", "modulus of the eigenvalue"),
+        "eigenvalue": (upper, "1", "eigenvalue of the discrete system"),
+        "modulus": (np.abs(upper), "1", "modulus of the eigenvalue"),
         "frequency": (frequency, "Hz", "damped frequency"),
         "natural_frequency": (natural / (2 * np.pi), "Hz", "natural frequency"),
         "period": (period, "s", "damped period"),

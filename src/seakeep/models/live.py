@@ -47,8 +47,6 @@ from seakeep.models.labelled import Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
-__all__ = ["Live", "load_live"]
-
 STATE = "live state"
 """Kind of the files of :meth:`Live.save`."""
 PAIRS = 8
@@ -190,6 +188,7 @@ class Live:
         # Of a model that follows its own surge: the map with its carriers in this rig, and filters
         # that predict the probes from one another; rows at all places of the samples to come.
         self._table = (0, np.empty(0))
+        self._foresight: tuple[FloatArray, tuple[int, ...]] | None = None
         if self._follows is not None:
             self._banks = self._follows.banks(self._rig)
             self._foresight = self._follows.foresight(self._rig, max(self._ahead, 1))
@@ -201,7 +200,7 @@ class Live:
         widths = {"u": len(signature.inputs), "x": count, "y": count}
         widths |= {"delayed": delayed, "direct": direct}
         self._first, room = 0, 2 * self._record
-        self._kept = {name: np.full((room, width), np.nan) for name, width in widths.items()}
+        self._recent = {name: np.full((room, width), np.nan) for name, width in widths.items()}
         self._count = _Counts()
         self._updates: deque[_Update] = deque(maxlen=self._ahead + 2)
         self._history = np.tile(signature.state_scale.centre, (s + 1, 1))
@@ -272,24 +271,27 @@ class Live:
 
     def _mean_squares(self) -> FloatArray:
         with np.errstate(invalid="ignore"):  # 0/0 before the first
-            found: FloatArray = self._squares[0] / self._squares[1]
-        return found
+            squares: FloatArray = self._squares[0] / self._squares[1]
+        return squares
 
     @property
     def equations(self) -> dict[str, Any]:
-        """What the filter computes with, for hosts: x' = offset + a x̂ + b û, blocks oldest first.
+        """What the filter computes with, for hosts: x' = offset + a x̂ + b û + d v, oldest first.
 
         Variances of process and measurement noise, mean and spread of the states, errors of free
-        runs by lead, and the samples of input that waves to come are predicted from.
+        runs by lead, and what inputs are predicted from: samples of their records, means, and
+        filters of a model that follows its own surge.
         """
         scale, noises = self.signature.state_scale, {"process": self._filter.process}
         noises |= {"noise": self._filter.noise, "errors": self.errors.rms}
         moments = {"centre": scale.centre, "spread": scale.spread, "record": self._record}
-        return {"a": self._a, "b": self._b, "offset": self._offset} | noises | moments
+        inputs = {"means": self.signature.input_scale.mean, "foresight": self._foresight}
+        parts = {"a": self._a, "b": self._b, "d": self._d, "offset": self._offset}
+        return parts | noises | moments | inputs
 
     def _rows(self, name: str, first: int, stop: int) -> FloatArray:
         """A view of some samples, by their numbers."""
-        return self._kept[name][first - self._first : stop - self._first]
+        return self._recent[name][first - self._first : stop - self._first]
 
     @one_blas_thread()
     def step(
@@ -327,13 +329,13 @@ class Live:
         instant = self._instant(time)
         states, inputs = _sample("y", y, signature.states), self._inputs(u)
         if at - self._first == 2 * self._record:  # all room is used up
-            for values in self._kept.values():
+            for values in self._recent.values():
                 values[: self._record] = values[self._record :]
             self._first += self._record
         self._rows("u", at, at + 1)[:] = inputs
         self._rows("y", at, at + 1)[:] = states
         # Held until it is estimated: an alignment reads where the vessel is.
-        last = self._kept["x"][at - 1 - self._first]
+        last = self._recent["x"][at - 1 - self._first]
         self._rows("x", at, at + 1)[:] = np.where(np.isfinite(states), states, last)
         self._count.taken += 1
         self._time = instant
@@ -381,7 +383,7 @@ class Live:
 
     def _expected(self, known: FloatArray, count: int) -> FloatArray:
         """Inputs of the next samples: in waves as those of training, or from each record."""
-        if self._follows is None or not self.ready:
+        if self._foresight is None or not self.ready:
             return predict_waves(known, count)
         taps, placed = self._foresight
         means = self.signature.input_scale.mean[: known.shape[1]]
@@ -460,6 +462,7 @@ class Live:
             update, measured = self._update_of(at), self._rows("y", at, at + 1)[0]
             predicted = self.signature.state_scale.centre
             if at >= self.signature.history_samples:
+                self._place(at - 1)
                 predicted = self._predicted(history, at - 1)
             innovation = measured - predicted
             history[:-1] = history[1:]
@@ -476,16 +479,21 @@ class Live:
             if is_final:
                 self._judge(at, update, innovation)
 
+    def _place(self, at: int) -> None:
+        """Read the waves of the sample `at` where the estimates up to it place the vessel."""
+        if self._follows is None:
+            return
+        place, (first, table) = self._follows.place, self._table
+        surge = self._rows("x", at + 1 - place.taps.size, at + 1)[:, self._follows.column]
+        here = place.of(surge)
+        read = read_table(place, table, np.array([at - first]), here)
+        self._rows("delayed", at, at + 1)[:] = read
+        self._rows("direct", at, at + 1)[0, -1] = (here[0] - place.centre) ** 2
+
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""
         delayed = self._rows("delayed", at - self.signature.input_delays, at + 1)
         direct = self._rows("direct", at, at + 1)[0]
-        if self._follows is not None:
-            place, column = self._follows.place, self._follows.column
-            first, table = self._table
-            here = place.of(self._rows("x", at + 1 - place.taps.size, at + 1)[:, column])
-            delayed[-1] = read_table(place, table, np.array([at - first]), here)[0]
-            direct[-1] = (here[0] - place.centre) ** 2
         out = self._a @ history.ravel()
         out += self._offset
         out += self._b @ delayed.ravel()
@@ -595,12 +603,14 @@ class Live:
             )
         futures, known = self._futures(count, future)
         windows = self._windows(count, futures)
-        values = self.model.free_runs([windows], range(self.model.n_members))[0]
-        kept = values[engine.first_lost(values).max(axis=1) < 0].reshape(-1, *values.shape[2:])
+        with engine.member_series(self.model, windows) as (values, lost):
+            complete = values[lost.max(axis=1) < 0].reshape(-1, *values.shape[2:])
         table = np.full((4, count, len(signature.states)), np.nan)
-        if len(kept):
-            spread = kept.var(axis=0, ddof=1) if len(kept) > 1 else np.zeros(table.shape[1:])
-            table[0] = kept.mean(axis=0) if len(kept) > 1 else kept[0]
+        if len(complete):
+            spread = (
+                complete.var(axis=0, ddof=1) if len(complete) > 1 else np.zeros(table.shape[1:])
+            )
+            table[0] = complete.mean(axis=0) if len(complete) > 1 else complete[0]
             table[1] = np.sqrt(spread + self._error_variances(count))
             half = _quantile(level, spread, table[1] ** 2, len(futures) > 1) * table[1]
             table[2:] = table[0] - half, table[0] + half
@@ -611,7 +621,7 @@ class Live:
         words = "the mean minus and plus a quantile times std"
         time = self._time + signature.dt * np.arange(1, count + 1)
         attrs = {"start": self._time, "level": level, "share": share, "known_input": known}
-        attrs |= {"diverged": len(values) - len(kept) // values.shape[1]}
+        attrs |= {"diverged": len(values) - len(complete) // values.shape[1]}
         attrs |= {"predictable": self._predictable()}
         return xr.Dataset(
             variables,
@@ -712,13 +722,13 @@ class Live:
         taps = 0 if self._follows is None else self._follows.place.taps.size
         longest = max(signature.state_delays, signature.input_delays, taps)
         tail = max(taken - (self._ahead + longest + 4), 0)
-        kept = [self._rows(each, tail, taken) for each in self._kept if each != "u"]
+        rows = [self._rows(each, tail, taken) for each in self._recent if each != "u"]
         updates = [update for update in self._pending() if update is not self._as_it_is]
         state = [self._history, self._free, self._innovation, self._squares]
         state.append(self._filter.covariance)
         return [
             self._known_inputs(),
-            *kept,
+            *rows,
             *(each for update in updates for each in update),
             *state,
         ]
@@ -726,17 +736,17 @@ class Live:
     @cached_property
     def _identity(self) -> str:
         """Identity of the model."""
-        found = hashlib.sha256(store.as_json(store.signature_json(self.signature)).encode())
+        digest = hashlib.sha256(store.as_json(store.signature_json(self.signature)).encode())
         for each in (self._a, self._b, self._d, self._offset):
-            found.update(np.ascontiguousarray(each).tobytes())
-        return found.hexdigest()
+            digest.update(np.ascontiguousarray(each).tobytes())
+        return digest.hexdigest()
 
-    def _restore(self, kept: Mapping[str, Any], values: FloatArray) -> None:
+    def _restore(self, content: Mapping[str, Any], values: FloatArray) -> None:
         """Restore what :meth:`save` wrote."""
-        self._count, self._time = _Counts(**kept["counts"]), kept["time"]
+        self._count, self._time = _Counts(**content["counts"]), content["time"]
         self._first = max(self._count.taken - self._record, 0)
         shapes = [each.shape for each in self._as_it_is]
-        for as_it_is in kept["as_it_is"]:
+        for as_it_is in content["as_it_is"]:
             self._updates.append(self._as_it_is if as_it_is else _Update(*map(np.empty, shapes)))
         at = 0
         for part in self._parts():
@@ -767,8 +777,11 @@ def load_live(model: Servable, path: str | Path) -> Live:
         If it is damaged.
     """
     dataset = load_sealed(path, STATE)
-    kept = store.content(dataset, "settings")
-    (attrs, probes), noise = kept["rig"], zip(model.signature.states, kept["noise"], strict=False)
+    content = store.content(dataset, "settings")
+    (attrs, probes), noise = (
+        content["rig"],
+        zip(model.signature.states, content["noise"], strict=False),
+    )
     like = xr.Dataset({name: ((), 0.0, each) for name, each in probes.items()}, attrs=attrs)
     live = model.live(like=like, noise={name: each for name, each in noise if each})
     if dataset.attrs["model"] != live._identity:
@@ -776,15 +789,15 @@ def load_live(model: Servable, path: str | Path) -> Live:
             f"{path} is the state of another model. Load the model that was in service, or start "
             "anew with model.live()."
         )
-    live._restore(kept, dataset["values"].values)
+    live._restore(content, dataset["values"].values)
     return live
 
 
 def held_samples(inside: BoolArray) -> npt.NDArray[np.intp]:
     """Leads that are all `inside` from the first on: how many of (steps, N), shape (N,)."""
     ended = np.concatenate([inside, np.zeros((1, inside.shape[1]), bool)])
-    found: npt.NDArray[np.intp] = np.argmin(ended, axis=0)
-    return found
+    samples: npt.NDArray[np.intp] = np.argmin(ended, axis=0)
+    return samples
 
 
 def _quantile(level: float, spread: FloatArray, variance: FloatArray, drawn: bool) -> FloatArray:
@@ -795,8 +808,8 @@ def _quantile(level: float, spread: FloatArray, variance: FloatArray, drawn: boo
     """
     share = spread / np.maximum(variance, np.finfo(float).tiny)
     doubt = (1.0 - share) ** 2 / WINDOWS + (share**2 / PAIRS if drawn else 0.0)
-    found: FloatArray = special.stdtrit(1.0 / np.maximum(doubt, 1e-6), 0.5 + 0.5 * level)
-    return found
+    quantile: FloatArray = special.stdtrit(1.0 / np.maximum(doubt, 1e-6), 0.5 + 0.5 * level)
+    return quantile
 
 
 def _mean_predictor(
@@ -856,8 +869,8 @@ def _places(
         return np.full(len(signature.inputs), math.nan), math.nan
     if alignment is not None:
         return np.array(alignment.positions_in(rig), dtype=float), depth
-    found = [rig[name].attrs.get("x_position") for name in signature.inputs]
-    return np.array(found, dtype=float), depth  # None becomes NaN
+    places = [rig[name].attrs.get("x_position") for name in signature.inputs]
+    return np.array(places, dtype=float), depth  # None becomes NaN
 
 
 def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArray:

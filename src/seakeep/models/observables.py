@@ -24,21 +24,6 @@ from seakeep.models.checks import TINY, check_choice, check_flag, check_keys, ch
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals import expressions
 
-__all__ = [
-    "OBSERVABLES",
-    "Bound",
-    "Expression",
-    "Formula",
-    "Observable",
-    "Observed",
-    "Power",
-    "Powers",
-    "Product",
-    "SlowSquare",
-    "SlowSquares",
-    "Term",
-]
-
 HALF_WIDTH = 0.5
 """Half of the length of the low-pass filter of :class:`SlowSquares`, in periods of its cutoff.
 
@@ -451,9 +436,9 @@ def from_json(table: Mapping[str, Any]) -> Observable:
         raise RequestError(
             f"{error} A kind of another module is known once that is imported."
         ) from None
-    made = OBSERVABLES[str(kind)]
-    check_keys(made, settings, f"observables: {kind}: ")
-    return made(**settings)
+    observable = OBSERVABLES[str(kind)]
+    check_keys(observable, settings, f"observables: {kind}: ")
+    return observable(**settings)
 
 
 def observables_of(value: object) -> tuple[Observable, ...]:
@@ -463,13 +448,13 @@ def observables_of(value: object) -> tuple[Observable, ...]:
             f"observables must be a list; received {value!r:.{SHOWN}}. Write "
             "observables=[seakeep.SlowSquares('eta_cog')]."
         )
-    made = [from_json(each) if isinstance(each, Mapping) else each for each in value]
-    if strange := [each for each in made if not hasattr(each, "bind")]:
+    observables = [from_json(each) if isinstance(each, Mapping) else each for each in value]
+    if strange := [each for each in observables if not hasattr(each, "bind")]:
         raise RequestError(
             f"observables must hold observables, such as seakeep.SlowSquares; received "
             f"{strange[0]!r:.{SHOWN}}."
         )
-    return tuple(made)
+    return tuple(observables)
 
 
 @dataclass(frozen=True)
@@ -516,17 +501,17 @@ class Observed:
         records = [labelled.channel_matrix(run, inputs, name)[last] for name, run in runs.items()]
         spreads = np.nanstd(np.concatenate(records), axis=0)
         dt = labelled.run_step(first, name)
-        made = cls(observables, labels, dt, period, tuple(spreads.tolist()))
-        direct = np.concatenate([made.direct(each) for each in records])
+        observed = cls(observables, labels, dt, period, tuple(spreads.tolist()))
+        direct = np.concatenate([observed.direct(each) for each in records])
         tops = np.fmax.reduce(direct, axis=0, initial=0.0)
-        names = [label.name for group in (labels, *made.labels) for label in group]
+        names = [label.name for group in (labels, *observed.labels) for label in group]
         for each in names:
             if names.count(each) > 1:
                 raise RequestError(
                     f"two inputs or observables make a column '{each}'. Give an expression "
                     "another name, or leave one of the observables out."
                 )
-        return replace(made, tops=tuple(tops.tolist()))
+        return replace(observed, tops=tuple(tops.tolist()))
 
     def __getstate__(self) -> dict[str, Any]:
         """Fields alone: what is bound are functions, which a worker makes anew."""
@@ -574,10 +559,10 @@ class Observed:
     def direct(self, inputs: FloatArray) -> FloatArray:
         """Columns that stand as they are, of inputs of shape (time, Q)."""
         parts = [bound.of(inputs, self.limits) for bound in self.bound if not bound.delayed]
-        found = np.concatenate([np.empty((len(inputs), 0)), *parts], axis=1)
+        columns = np.concatenate([np.empty((len(inputs), 0)), *parts], axis=1)
         if self.tops:
-            found -= (1.0 - self.slopes) * np.maximum(found - self.tops, 0.0)
-        return found
+            columns -= (1.0 - self.slopes) * np.maximum(columns - self.tops, 0.0)
+        return columns
 
     def describe(self, dt: float, lead: int) -> list[str]:
         """One line per observable; `lead` is the look-ahead of the inputs."""

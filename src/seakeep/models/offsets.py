@@ -14,9 +14,6 @@ from seakeep.models.linear import HankelDMDcModel
 from seakeep.signals import encounter_period
 from seakeep.waves import phase_speed
 
-__all__ = ["ProbeOffset", "estimate_probe_offset"]
-
-
 COARSE = 20  # distances on either side of zero
 FINE = 24  # distances on either side of the best, a sixth as far apart
 BLOCKS = 10
@@ -118,11 +115,11 @@ def estimate_probe_offset(
     rng = np.random.default_rng(whole_number(seed, "seed", least=0))
     blocks = np.stack([block.mean(axis=1) for block in np.array_split(errors, BLOCKS, axis=1)])
     drawn = rng.integers(0, BLOCKS, (RESAMPLES, BLOCKS))
-    found = np.array([_least(fine, blocks[rows].mean(axis=0))[0] for rows in drawn])
-    interval = (float(np.quantile(found, 0.025)), float(np.quantile(found, 0.975)))
+    offsets = np.array([_least(fine, blocks[rows].mean(axis=0))[0] for rows in drawn])
+    interval = (float(np.quantile(offsets, 0.025)), float(np.quantile(offsets, 0.975)))
     return ProbeOffset(
         offset=offset,
-        spread=float(found.std(ddof=1)),
+        spread=float(offsets.std(ddof=1)),
         interval=interval,
         nrmse=float(np.sqrt(errors[at].mean())),
         nrmse_uncorrected=float(np.sqrt(_errors(model, part, 0.0).mean())),

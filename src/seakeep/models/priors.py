@@ -18,17 +18,6 @@ import numpy as np
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.toml import Length, parse_length
 
-__all__ = [
-    "Distribution",
-    "Fixed",
-    "LogUniform",
-    "Prior",
-    "Uniform",
-    "prior_json",
-    "prior_of",
-    "unit_of",
-]
-
 Bound = float | str | Length
 """Number, or a length such as ``"10 T"``."""
 
@@ -204,8 +193,8 @@ class Distribution:
         from scipy import stats
 
         kinds = stats.rv_continuous | stats.rv_discrete
-        found = getattr(stats, self.distribution, None)
-        if not isinstance(found, kinds):
+        law = getattr(stats, self.distribution, None)
+        if not isinstance(law, kinds):
             known = [name for name in dir(stats) if isinstance(getattr(stats, name), kinds)]
             raise RequestError(
                 f"scipy.stats has no distribution '{self.distribution}'."
@@ -213,18 +202,16 @@ class Distribution:
             )
         if self.unit not in ("", "s", "T"):
             raise RequestError(f"the unit of a prior is 'T' or 's'; received {self.unit!r}.")
-        shapes = f"{found.shapes}, loc, scale" if found.shapes else "loc, scale"
+        shapes = f"{law.shapes}, loc, scale" if law.shapes else "loc, scale"
         try:
             median = float(self.ppf(0.5))
         except TypeError:
             raise RequestError(
-                f"'parameters' of '{found.name}' are {shapes}, of which loc and scale may be left "
+                f"'parameters' of '{law.name}' are {shapes}, of which loc and scale may be left "
                 f"out; received {', '.join(self.parameters) or 'none'}."
             ) from None
         if not math.isfinite(median):
-            raise RequestError(
-                f"'{found.name}' with these 'parameters' has no median; correct them."
-            )
+            raise RequestError(f"'{law.name}' with these 'parameters' has no median; correct them.")
 
     def ppf(self, q: float) -> float:
         """Quantile function."""
@@ -264,8 +251,8 @@ def prior_of(name: str, value: object) -> Prior | None:
         if "distribution" in value:
             return Distribution(**value)
         ((key, given),) = value.items()
-        made: Prior = _OWN[key](*(given if isinstance(given, list | tuple) else (given,)))
-        return made
+        prior: Prior = _OWN[key](*(given if isinstance(given, list | tuple) else (given,)))
+        return prior
     except RequestError as error:
         raise RequestError(f"{name}: {error}") from None
     except (TypeError, ValueError, KeyError):

@@ -15,17 +15,6 @@ from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models.checks import Json, check_choice, check_keys, names_of, plain
 from seakeep.models.labelled import ChannelLabel
 
-__all__ = [
-    "FittedReadOut",
-    "ReadOut",
-    "ReadOutKind",
-    "ReadOuts",
-    "read_out",
-    "readouts_asked",
-    "readouts_json",
-    "readouts_of",
-]
-
 ReadOutKind = Literal["none", "hinge", "stacked"]
 Asked = Literal["hinge", "stacked", "auto"]
 
@@ -134,8 +123,8 @@ class FittedReadOut:
 
     def to_json(self) -> Json:
         """As JSON values; numbers keep all their digits."""
-        made: Json = plain(asdict(self))
-        return made
+        content: Json = plain(asdict(self))
+        return content
 
     @classmethod
     def from_json(cls, content: Json) -> Self:
@@ -149,8 +138,10 @@ class FittedReadOut:
 
 def read_out(readouts: Sequence[FittedReadOut], values: FloatArray) -> FloatArray:
     """Free runs, shape (…, N), physical units, with the channels that are read off them."""
-    found = [(each.column, each.function(values)) for each in readouts if each.function is not None]
-    for column, channel in found:
+    computed = [
+        (each.column, each.function(values)) for each in readouts if each.function is not None
+    ]
+    for column, channel in computed:
         values[..., column] = channel
     return values
 
@@ -166,9 +157,9 @@ def readouts_of(value: object) -> ReadOuts:
             f"readouts must be a list or 'auto'; received {value!r:.{SHOWN}}. Write "
             "readouts=[seakeep.ReadOut('mooring_stern', of=('surge', 'heave', 'pitch'))]."
         )
-    made = tuple(_of_table(each) if isinstance(each, Mapping) else each for each in value)
+    readouts = tuple(_of_table(each) if isinstance(each, Mapping) else each for each in value)
     names = []
-    for each in made:
+    for each in readouts:
         if not isinstance(each, ReadOut):
             raise RequestError(f"readouts must hold seakeep.ReadOut; received {each!r:.{SHOWN}}.")
         names.append(each.channel)
@@ -176,7 +167,7 @@ def readouts_of(value: object) -> ReadOuts:
         raise RequestError(
             f"readouts names {sorted(double)[0]} more than once. Name each channel once."
         )
-    return made
+    return readouts
 
 
 def _of_table(table: Mapping[str, Any]) -> ReadOut:

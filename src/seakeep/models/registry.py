@@ -12,8 +12,6 @@ from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.interface import Model, Spec
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 
-__all__ = ["KINDS", "is_ensemble", "load_model"]
-
 KINDS: dict[str, type[Spec]] = {
     each.kind: each for each in (HankelDMDc, BayesianHankelDMDc, HoldLast, Mean, FIR, ARX, Subspace)
 }

@@ -18,7 +18,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray
+from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.gram import Piece, primal_system
@@ -28,7 +28,7 @@ from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.engine import Dynamics, model_runs, read_windows
 from seakeep.models.ensemble import spectral_radius
-from seakeep.models.executor import Progress, in_order
+from seakeep.models.executor import in_order
 from seakeep.models.following import LEAD
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.observables import Observable, Powers, SlowSquares, named
@@ -37,19 +37,6 @@ from seakeep.models.settings import Folds, HankelSettings, Select
 from seakeep.models.stacking import PERIODS, Held, fit_readouts
 from seakeep.models.training import TrainingData, gather, scales_of
 from seakeep.signals import repeated_waves
-
-__all__ = [
-    "RIDGES",
-    "VARIED",
-    "Problem",
-    "Selected",
-    "Trial",
-    "default_observables",
-    "groups_of",
-    "readouts_for",
-    "select",
-    "settle",
-]
 
 RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-10, -1))
 """λ per snapshot pair that are tried, half a decade apart.
@@ -162,12 +149,12 @@ class Problem:
     @property
     def reader(self) -> Signature:
         """What windows are read for; units were compared when the runs were gathered."""
-        found = self.data.signature(self.widest)
+        signature = self.data.signature(self.widest)
         states, inputs = (
             tuple(replace(label, units="") for label in labels)
-            for labels in (found.state_labels, found.input_labels)
+            for labels in (signature.state_labels, signature.input_labels)
         )
-        return replace(found, state_labels=states, input_labels=inputs)
+        return replace(signature, state_labels=states, input_labels=inputs)
 
     def parts(self, candidate: HankelSettings) -> tuple[BoolArray, BoolArray, BoolArray]:
         """Which states (all), delayed and direct regressors a candidate has."""
@@ -233,13 +220,13 @@ class Problem:
         )
         if candidate.rank is not None:
             ranks = [int(level) for level in levels]
-            found = truncated_path(system.gram, system.right, ranks)
+            path = truncated_path(system.gram, system.right, ranks)
         else:
             pairs = sum(window.columns for window in windows)
             factor = pairs if candidate.ridge_scale == "per_snapshot" else 1
-            found = ridge_path(system.gram, system.right, [factor * level for level in levels])
+            path = ridge_path(system.gram, system.right, [factor * level for level in levels])
         x, u, w = scales
-        return Dynamics(found[0], *delays[:2], x, u, w, data.input_map.follows), found
+        return Dynamics(path[0], *delays[:2], x, u, w, data.input_map.follows), path
 
     def grows(self, candidate: HankelSettings, level: float) -> bool:
         """Whether the model that a candidate gives of all runs grows."""
@@ -300,7 +287,7 @@ class Problem:
         weights = np.repeat(1.0 / np.maximum(counts, 1) / max(len(scores) - 1, 1), counts)
         return np.concatenate(scores, axis=1), weights
 
-    def held(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
+    def held_out(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
         """Free runs, end to end, on each run by the model of the others, standardised."""
         deviations = self.data.state_scale.deviations
         for run in range(len(self.groups)) if len(self.groups) > 1 else ():
@@ -379,9 +366,9 @@ def _judge(
 
     keys = {unit: _key(*unit) for unit in itertools.product(new, folds)}
     units = [unit for unit, key in keys.items() if key not in known]
-    found = in_order(_unit, problems, units, executor, tell, "candidate and fold")
-    for unit, made in zip(units, found, strict=True):
-        known[keys[unit]] = [part.tolist() for part in made]
+    outcomes = in_order(_unit, problems, units, executor, tell, "candidate and fold")
+    for unit, outcome in zip(units, outcomes, strict=True):
+        known[keys[unit]] = [part.tolist() for part in outcome]
     for candidate in new:
         parts = [map(np.array, known[keys[candidate, fold]]) for fold in folds]
         scores, weights = zip(*parts, strict=True)
@@ -486,7 +473,7 @@ def settle(
         )
     asked = chosen or Select()
     vary = ["observables"] * asked.observables + ["readouts"] * (settings.readouts == "auto")
-    found = select(
+    selected = select(
         settings,
         runs,
         states,
@@ -499,7 +486,7 @@ def settle(
         executor=executor,
         progress=progress,
     )
-    return replace(found, note="; ".join(filter(None, (found.note, without))))
+    return replace(selected, note="; ".join(filter(None, (selected.note, without))))
 
 
 def select(
@@ -642,14 +629,14 @@ def _problems(
         name: [change[name] for changes in steps[:-1] for change in changes if name in change]
         for name in ("state_delays", "input_delays", "lead")
     }
-    found = {}
+    problems = {}
     for variant in steps[-1]:
         start = replace(base, **variant)
         lengths = tried | ({"lead": []} if "lead" in variant else {})
         problem = _problem(start, given, folds, ridges, horizons, lengths)
         if problem is not None and problem.folds():
-            found[_columns_of(start)] = problem
-    return found
+            problems[_columns_of(start)] = problem
+    return problems
 
 
 def _best(
@@ -748,7 +735,7 @@ def _learnt(
     if not readouts:
         return ()
     if problem is not None:
-        return fit_readouts(readouts, problem.data, list(problem.held(candidate, level, steps)))
+        return fit_readouts(readouts, problem.data, list(problem.held_out(candidate, level, steps)))
     settings = replace(candidate, ridge=1.0, standardize=True)
     return fit_readouts(readouts, gather(*given, None, settings), ())
 
@@ -893,24 +880,24 @@ def _alignments(
     """
     base = replace(stated or ProbeAlignment(), optional=False)
     carried = replace(base, mode="dispersion", celerity=None)
-    found: list[ProbeAlignment | None] = []
-    for made in (
+    alignments: list[ProbeAlignment | None] = []
+    for alignment in (
         replace(carried, surge="predicted"),
         replace(carried, surge="none"),
         replace(base, mode="effective", surge="none", highest_frequency=None),
     ):
         try:
-            fitted = made.fit(*given, None)
+            fitted = alignment.fit(*given, None)
         except (RequestError, DataError):
             continue  # no depth, no positions, or no surge among the states
         assert isinstance(fitted, FittedAlignment)
-        if made.surge == "predicted" or any(
+        if alignment.surge == "predicted" or any(
             np.any(fitted.offsets(run)) for run in given[0].values()
         ):
-            found.append(made)
-    found.append(None)
+            alignments.append(alignment)
+    alignments.append(None)
     first = None if stated is None else base
-    return sorted(found, key=lambda each: each != first)
+    return sorted(alignments, key=lambda each: each != first)
 
 
 def groups_of(

@@ -33,22 +33,7 @@ from seakeep.models.observables import Observable, Observed, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
-from seakeep.sizes import LEAST_PERIODS, MOST_PERIODS
 from seakeep.toml import Length, parse_length
-
-__all__ = [
-    "DelayRows",
-    "HankelSettings",
-    "History",
-    "RidgeScale",
-    "Select",
-    "as_length",
-    "check_integer",
-    "check_ridge",
-    "check_seconds",
-    "in_samples",
-    "periods_to_samples",
-]
 
 DelayRows = Literal["ridge", "exact"]
 RidgeScale = Literal["absolute", "per_snapshot"]
@@ -207,7 +192,7 @@ class Select:
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
             what = "select: horizon (encounter periods) and period (s)"
-            check_number(what, value, "between 1e-6 and 1e6", LEAST_PERIODS, MOST_PERIODS)
+            check_number(what, value, "between 1e-6 and 1e6", 1e-6, 1e6)
         if not given:
             raise RequestError("select: horizon is empty. Write horizon=(15, 45).")
         object.__setattr__(self, "horizon", tuple(float(each) for each in given))
@@ -299,12 +284,12 @@ class HankelSettings:
             If a length counts in encounter periods and there is none.
         """
         stated = {name: getattr(self, name) for name in self.lengths}
-        made: dict[str, Any] = {
+        values: dict[str, Any] = {
             name: in_samples(value, dt, encounter_period)
             for name, value in stated.items()
             if isinstance(value, Length)
         }
-        return replace(self, **made) if made else self
+        return replace(self, **values) if values else self
 
     def resolved_in(self, runs: dict[str, xr.Dataset], inputs: Sequence[str]) -> Self:
         """Settings whose lengths are samples of some runs, with the period that these have."""
@@ -417,8 +402,8 @@ class HankelSettings:
             "readouts": readouts_json(self.readouts),
             "select": None if select is None else asdict(select),
         }
-        made: Json = plain({key: maps.get(key, _written(each)) for key, each in content.items()})
-        return made
+        written: Json = plain({key: maps.get(key, _written(each)) for key, each in content.items()})
+        return written
 
     @classmethod
     def from_json(cls, content: Json) -> Self:

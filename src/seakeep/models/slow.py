@@ -12,8 +12,6 @@ from seakeep.core.bands import split_bands
 from seakeep.errors import warn
 from seakeep.models import labelled
 
-__all__ = ["FEWEST", "SlowMotion", "slow_motions", "warn_of_slow_motions"]
-
 FEWEST = 5
 """Slow periods below which the moments of a training window are those of single cycles (row 23 of
 what the paper leaves open)."""

@@ -10,13 +10,13 @@ from typing import Any, ClassVar, Literal, Self, get_args
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.checks import Json, check_choice
-from seakeep.models.draws import PRIORS, Sampling, TrainOn, draw_members
+from seakeep.models.checks import Json, check_choice, check_flag, check_integer
+from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble, spectral_radius
-from seakeep.models.executor import Progress
 from seakeep.models.interface import Needs, Role, Signature, Spec
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
@@ -27,7 +27,6 @@ from seakeep.models.selection import Selected, default_observables, readouts_for
 from seakeep.models.settings import (
     HankelSettings,
     Select,
-    check_integer,
     in_samples,
     periods_to_samples,
 )
@@ -40,8 +39,6 @@ from seakeep.models.training import (
 )
 from seakeep.models.validity import Coverage
 from seakeep.toml import Length
-
-__all__ = ["BayesianHankelDMDc", "HankelDMDc"]
 
 PAPER_RIDGE = 100.0
 STATE_PERIODS, INPUT_PERIODS, LEAD_PERIODS = 1.0, 3.0, 0.75
@@ -268,8 +265,8 @@ class HankelDMDc(HankelSettings):
         named = until(as_runs(runs), stop)
         channels = list(states), list(inputs)
         spec = self.resolved_in(named, inputs)
-        found = settle(spec, self.select, named, *channels, executor=executor, progress=progress)
-        return replace(found, settings=replace(found.settings, select=None))
+        choice = settle(spec, self.select, named, *channels, executor=executor, progress=progress)
+        return replace(choice, settings=replace(choice.settings, select=None))
 
     def fit(
         self,
@@ -317,12 +314,12 @@ class HankelDMDc(HankelSettings):
         """
         named = as_runs(runs)
         if left_open(self):
-            found = selected or self.settled(
+            choice = selected or self.settled(
                 named, states, inputs, stop, executor=executor, progress=progress
             )
-            model = found.settings._fitted(named, states, inputs, stop, found.readouts)
+            model = choice.settings._fitted(named, states, inputs, stop, choice.readouts)
             _check_growth(model)
-            return replace(model, selection=found.describe())
+            return replace(model, selection=choice.describe())
         spec = self.resolved_in(named, inputs)
         readouts: tuple[FittedReadOut, ...] = ()
         if self.readouts:
@@ -382,7 +379,7 @@ class BayesianHankelDMDc(HankelSettings):
         As in :class:`HankelDMDc`, such as ``Uniform("0.5 T", "1.5 T")``.
     ridge : prior, float or "rollout"
         λ. "rollout" chooses one by free runs, as :class:`HankelDMDc` does at the medians of the
-        delays, and draws log-uniformly over 0.3 to 3 times that.
+        delays, and draws log-uniformly over a third to three times that.
     window : prior, int or str, optional
         Length of the training window; None takes all of a run up to ``stop``.
     encounter_period : float, optional
@@ -398,6 +395,10 @@ class BayesianHankelDMDc(HankelSettings):
         in one run, drawn for each member; or a window that ends anywhere up to ``stop`` in one run.
         "auto" takes windows of 60 to 120 encounter periods where there are several runs, each lasts
         120, and none is of regular waves (``attrs["waves"]``), and all runs otherwise.
+    centred : bool, optional
+        Whether the members are moved so that their mean is the forecast of the single model at the
+        medians of the priors, of all of the runs up to ``stop``; their spread stays. Members that
+        learn from windows have a mean that is worse than that model.
     dt : float, optional
         Time step the runs must have, s; None takes theirs.
     lead, history, delay_rows, ridge_scale, rank, standardize, observables, stable, select
@@ -433,6 +434,7 @@ class BayesianHankelDMDc(HankelSettings):
     seed: int | str | np.random.SeedSequence | np.random.Generator = 0
     sampling: Sampling = "monte_carlo"
     train_on: TrainOn = "all"
+    centred: bool = False
     dt: float | None = None
     select: Select | None = None
 
@@ -444,6 +446,7 @@ class BayesianHankelDMDc(HankelSettings):
             periods_to_samples(1, period, self.dt or 0.5 * period)
         check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
         check_choice("train_on", self.train_on, get_args(TrainOn))
+        check_flag("centred", self.centred)
         object.__setattr__(self, "select", Select.of(self.select))
         if isinstance(seed := self.seed, np.random.Generator):
             object.__setattr__(self, "seed", int(seed.integers(2**63)))
@@ -480,16 +483,23 @@ class BayesianHankelDMDc(HankelSettings):
         """The single model at the medians of the priors."""
         return self._single(0.5, dt)
 
+    def centre(self, dt: float) -> Draw | None:
+        """The single model of all runs that members are centred on, if they are."""
+        if not self.centred:
+            return None
+        whole = replace(self.central(dt), window=None, select=None)
+        return Draw(whole, (np.nan, whole.state_delays, whole.input_delays))
+
     def _single(self, q: float, dt: float) -> HankelDMDc:
         """The single model at a quantile of the window and delays, with the median of λ."""
-        made: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for name in PRIORS[:3]:
             value = self.at(name, q)
             if value is not None and not np.isfinite(value):
                 value = self.at(name, 1.0 - 1e-6)  # of a prior without an upper end
-            made[name] = None if value is None else self.samples(name, value, dt)
-        made["ridge"] = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
-        return replace(self.shared(dt), **made, select=self.select)
+            values[name] = None if value is None else self.samples(name, value, dt)
+        values["ridge"] = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
+        return replace(self.shared(dt), **values, select=self.select)
 
     def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that its largest draw asks of its runs: the upper ends of the priors count."""
@@ -508,7 +518,7 @@ class BayesianHankelDMDc(HankelSettings):
         spec = cls.from_json(store.content(dataset, "ensemble"))
         signature = store.unpack_signature(dataset)
         return HankelEnsemble.from_dataset(
-            dataset, signature, spec.shared(signature.dt), spec.to_json()
+            dataset, signature, spec.shared(dt := signature.dt), spec.to_json(), spec.centre(dt)
         )
 
     @classmethod
@@ -569,8 +579,9 @@ class BayesianHankelDMDc(HankelSettings):
         -------
         BayesianHankelDMDc
             As there, with half to one and a half times the delay of the states, two to four
-            periods of the inputs, 0.3 to 3 times the λ that free runs choose, and members that
-            learn from windows of long runs (``train_on = "auto"``).
+            periods of the inputs, a third to three times the λ that free runs choose, and members
+            that learn from windows of long runs (``train_on = "auto"``), centred on the single
+            model.
         """
         return cls(
             encounter_period=encounter_period,
@@ -586,6 +597,7 @@ class BayesianHankelDMDc(HankelSettings):
             lead=Length(LEAD_PERIODS),  # type: ignore[arg-type]
             readouts="auto",
             train_on="auto",
+            centred=True,
             select=Select(observables=True, period=encounter_period),
         )
 
@@ -622,21 +634,21 @@ class BayesianHankelDMDc(HankelSettings):
             central.settled(runs, states, inputs, stop, executor=executor, progress=progress)
         )
 
-    def _adopt(self, found: Selected[HankelDMDc]) -> Selected[BayesianHankelDMDc]:
+    def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[BayesianHankelDMDc]:
         """Priors around what :meth:`central` found."""
         ridge, scale = self.ridge, self.ridge_scale
         if isinstance(ridge, str):
-            best = float(found.settings.ridge)
-            ridge, scale = LogUniform(0.3 * best, 3.0 * best), "per_snapshot"
+            best = float(choice.settings.ridge)
+            ridge, scale = LogUniform(best / 3.0, best * 3.0), "per_snapshot"
         spec = replace(
             self,
             ridge=ridge,
             ridge_scale=scale,
-            observables=found.settings.observables,
-            readouts=found.settings.readouts,
+            observables=choice.settings.observables,
+            readouts=choice.settings.readouts,
             select=None,
         )
-        return Selected(spec, found.rows, found.note, found.readouts)
+        return Selected(spec, choice.rows, choice.note, choice.readouts)
 
     def fit(
         self,
@@ -674,13 +686,13 @@ class BayesianHankelDMDc(HankelSettings):
         check_names(states, inputs)
         spec = self.resolved_in(named, inputs)
         if left_open(spec):
-            found = (
+            choice = (
                 spec.settled(named, states, inputs, stop, executor=executor, progress=progress)
                 if selected is None
                 else spec._adopt(selected)
             )
-            ensemble = found.settings._drawn(named, states, inputs, stop, found.readouts)
-            return replace(ensemble, selection=found.describe())
+            ensemble = choice.settings._drawn(named, states, inputs, stop, choice.readouts)
+            return replace(ensemble, selection=choice.describe())
         readouts: tuple[FittedReadOut, ...] = ()
         if spec.readouts:
             central = spec.central(labelled.common_step(named))
@@ -722,9 +734,10 @@ class BayesianHankelDMDc(HankelSettings):
         input_map = shared.input_map(named, states, inputs, None)
         samples = [run.sizes["time"] for run in named.values()]
         spec = self._taught_by(named.values(), min(samples) * dt)
-        members = draw_members(spec, dt, samples, input_map)
+        members, centre = draw_members(spec, dt, samples, input_map), spec.centre(dt)
+        every = members if centre is None else [*members, centre]
         reads = [
-            (min(draw.first(run, count, input_map) for draw in members), count)
+            (min(draw.first(run, count, input_map) for draw in every), count)
             for run, count in enumerate(samples)
         ]
         arrays = TrainingArrays.read(named, states, inputs, reads, input_map)
@@ -748,8 +761,8 @@ class BayesianHankelDMDc(HankelSettings):
             dt=dt,
             state_labels=labels[0],
             input_labels=labels[1],
-            state_delays=max(draw.settings.state_delays for draw in members),
-            input_delays=max(draw.settings.input_delays for draw in members),
+            state_delays=max(draw.settings.state_delays for draw in every),
+            input_delays=max(draw.settings.input_delays for draw in every),
             input_map=input_map,
             state_scale=scales[0],
             input_scale=scales[1],
@@ -763,6 +776,7 @@ class BayesianHankelDMDc(HankelSettings):
             arrays=arrays,
             signature=signature,
             coverage=Coverage.of(inputs, trained, dt),
+            centre=centre,
         )
 
 

@@ -14,8 +14,6 @@ from seakeep.errors import DataError
 from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOutKind
 from seakeep.models.training import TrainingData
 
-__all__ = ["PERIODS", "Held", "fit_readouts"]
-
 PERIODS = 15.0
 """Length of the free runs that a stacked read-out learns from, encounter periods."""
 RIDGE = 1e-2
@@ -47,7 +45,7 @@ class Held:
 
 
 def fit_readouts(
-    readouts: Sequence[ReadOut], data: TrainingData, held: Sequence[Held]
+    readouts: Sequence[ReadOut], data: TrainingData, judged: Sequence[Held]
 ) -> tuple[FittedReadOut, ...]:
     """Fit read-outs.
 
@@ -57,7 +55,7 @@ def fit_readouts(
         What is wanted.
     data : TrainingData
         Measured states of the training windows, standardised.
-    held : sequence of Held
+    judged : sequence of Held
         Cross-fitted forecasts; may be empty where no read-out is stacked.
 
     Returns
@@ -74,12 +72,12 @@ def fit_readouts(
         values[window.samples] for values, window in zip(data.states, data.windows, strict=True)
     ]
     reach = LOST * np.abs(np.concatenate(measured)).max(axis=0)
-    kept = []
-    for each in held:
+    fitted = []
+    for each in judged:
         sound = np.all(np.abs(each.predicted) <= reach, axis=(1, 2))
         if np.any(sound):
-            kept.append(Held(each.run, each.predicted[sound], each.measured[sound]))
-    return tuple(_fitted(each, data, names, measured, kept) for each in readouts)
+            fitted.append(Held(each.run, each.predicted[sound], each.measured[sound]))
+    return tuple(_fitted(each, data, names, measured, fitted) for each in readouts)
 
 
 def _fitted(
@@ -87,14 +85,14 @@ def _fitted(
     data: TrainingData,
     names: list[str],
     measured: list[FloatArray],
-    held: list[Held],
+    judged: list[Held],
 ) -> FittedReadOut:
     target, columns = names.index(readout.channel), [names.index(name) for name in readout.of]
     if readout.kind == "auto":
-        kind, scores = _chosen(target, columns, measured, held)
+        kind, scores = _chosen(target, columns, measured, judged)
     else:
         kind, scores = readout.kind, {}
-    if kind == "stacked" and not held:
+    if kind == "stacked" and not judged:
         raise DataError(
             f"readouts: {readout.channel}: a stacked read-out learns from free runs of "
             f"{PERIODS:g} encounter periods on training runs that are held out, and none fits. "
@@ -102,8 +100,8 @@ def _fitted(
         )
     seen, scale = np.concatenate(measured), data.state_scale
     floor = floor_of(seen, seen[:, target], columns)
-    found = _learnt(kind, target, columns, seen, floor, held)
-    function = None if found is None else found.rescaled(scale.mean, scale.std, target)
+    learnt = _learnt(kind, target, columns, seen, floor, judged)
+    function = None if learnt is None else learnt.rescaled(scale.mean, scale.std, target)
     units = data.state_labels[target].units
     return FittedReadOut(readout.channel, readout.of, kind, target, units, scores, function)
 
@@ -114,7 +112,7 @@ def _learnt(
     columns: list[int],
     seen: FloatArray,
     floor: float,
-    held: list[Held],
+    judged: list[Held],
 ) -> LinearHinges | None:
     """Read-out of standardised states; None where the forecast stays as it is."""
     if kind == "none":
@@ -122,21 +120,21 @@ def _learnt(
     states, channel, linear = seen, seen[:, target], columns
     if kind == "stacked":
         linear = list(range(seen.shape[1]))
-        states = np.concatenate([each.predicted.reshape(-1, len(linear)) for each in held])
-        channel = np.concatenate([each.measured[..., target].ravel() for each in held])
+        states = np.concatenate([each.predicted.reshape(-1, len(linear)) for each in judged])
+        channel = np.concatenate([each.measured[..., target].ravel() for each in judged])
     knots = knots_of(states, columns)
     return fit_hinges(states, channel, linear, columns, knots, RIDGE, floor)
 
 
 def _chosen(
-    target: int, columns: list[int], measured: list[FloatArray], held: list[Held]
+    target: int, columns: list[int], measured: list[FloatArray], windows: list[Held]
 ) -> tuple[ReadOutKind, dict[str, float]]:
     """The kind that is best on each run in turn, as the other runs teach it, and the scores."""
-    found: dict[str, list[FloatArray]] = {kind: [] for kind in ORDER}
-    for each in held if len(held) > 1 else ():
+    errors: dict[str, list[FloatArray]] = {kind: [] for kind in ORDER}
+    for each in windows if len(windows) > 1 else ():
         others = np.concatenate([x for run, x in enumerate(measured) if run != each.run])
         floor = floor_of(others, others[:, target], columns)
-        taught = [other for other in held if other.run != each.run]
+        taught = [other for other in windows if other.run != each.run]
         for kind in ORDER:
             read = _learnt(kind, target, columns, others, floor, taught)
             predicted = each.predicted[..., target] if read is None else read(each.predicted)
@@ -145,8 +143,8 @@ def _chosen(
                 measured=each.measured[..., [target]],
                 training_std=np.ones(1),
             )
-            found[kind].append(np.minimum(error[:, 0], WORST))
-    scores = {kind: np.concatenate(each) for kind, each in found.items() if each}
+            errors[kind].append(np.minimum(error[:, 0], WORST))
+    scores = {kind: np.concatenate(each) for kind, each in errors.items() if each}
     judged = {kind: each[np.isfinite(each)] for kind, each in scores.items()}
     if not judged or not len(judged["none"]):
         return "none", {}

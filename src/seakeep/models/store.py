@@ -19,17 +19,6 @@ from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.readouts import FittedReadOut
 
-__all__ = [
-    "Saved",
-    "as_json",
-    "content",
-    "numbers",
-    "pack_signature",
-    "read",
-    "signature_json",
-    "unpack_signature",
-]
-
 MODEL = "model"
 """Kind of these files."""
 SCALES = ("state", "input", "direct")
@@ -89,23 +78,23 @@ def signature_json(signature: Signature) -> Json:
 
 def unpack_signature(dataset: xr.Dataset) -> Signature:
     """Rebuild a signature from :func:`pack_signature` and :func:`signature_json`."""
-    kept = content(dataset, "signature")
+    values = content(dataset, "signature")
     labels = {
-        key: tuple(ChannelLabel(**each) for each in kept[key]) for key in ("states", "inputs")
+        key: tuple(ChannelLabel(**each) for each in values[key]) for key in ("states", "inputs")
     }
     scales = (Scale(*(numbers(dataset, f"{group}_{each}") for each in MOMENTS)) for group in SCALES)
     state_scale, input_scale, direct_scale = scales
     return Signature(
-        dt=kept["dt"],
+        dt=values["dt"],
         state_labels=labels["states"],
         input_labels=labels["inputs"],
-        state_delays=kept["state_delays"],
-        input_delays=kept["input_delays"],
-        input_map=InputMap.from_json(kept["input_map"]),
+        state_delays=values["state_delays"],
+        input_delays=values["input_delays"],
+        input_map=InputMap.from_json(values["input_map"]),
         state_scale=state_scale,
         input_scale=input_scale,
         direct_scale=direct_scale,
-        readouts=tuple(FittedReadOut.from_json(each) for each in kept["readouts"]),
+        readouts=tuple(FittedReadOut.from_json(each) for each in values["readouts"]),
     )
 
 

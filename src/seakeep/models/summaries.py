@@ -11,9 +11,6 @@ import xarray as xr
 from seakeep.arrays import FloatArray, fraction
 from seakeep.errors import RequestError
 
-__all__ = ["STATISTICS", "reduce_members", "summarize"]
-
-
 STATISTICS = ("mean", "std", "lower", "upper")
 CHUNK = 8 * 2**20
 """Bytes of all members that are reduced at a time."""
@@ -102,10 +99,12 @@ def reduce_members(series: FloatArray, lost: npt.NDArray[np.int64], level: float
     out = np.empty((windows, 4, steps, channels))
     length = max(1, CHUNK // (8 * members * channels))
     for window in range(windows):
-        kept = np.flatnonzero(lost[:, window] < 0)
+        complete = np.flatnonzero(lost[:, window] < 0)
         for first in range(0, steps, length):
             piece = slice(first, first + length)
-            out[window, :, piece] = statistics_of(np.asarray(series[kept, window, piece]), level)
+            out[window, :, piece] = statistics_of(
+                np.asarray(series[complete, window, piece]), level
+            )
     return out
 
 

@@ -20,20 +20,6 @@ from seakeep.models.inputs import InputMap, Regressors
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import ChannelLabel, Span, Stop
 from seakeep.models.settings import HankelSettings
-from seakeep.sizes import LONG_MATRIX, check_numbers
-
-__all__ = [
-    "Training",
-    "TrainingArrays",
-    "TrainingData",
-    "check_names",
-    "gather",
-    "is_constant",
-    "moments",
-    "run_regressors",
-    "scales_of",
-    "until",
-]
 
 
 @dataclass(frozen=True)
@@ -201,13 +187,6 @@ def gather(
     states, inputs = list(states), list(inputs)  # arrays of names are welcome too
     window, history = settings.window, settings.history
     state_delays, input_delays = settings.state_delays, settings.input_delays
-    rows = len(states) * (state_delays + 1)
-    check_numbers(
-        f"state_delays = {state_delays} of {len(states)} states: a matrix of {rows} rows takes",
-        rows**2,
-        "Take fewer delays, or a larger step.",
-        LONG_MATRIX,
-    )
     dt = labelled.common_step(runs)
     runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
@@ -223,9 +202,9 @@ def gather(
         labelled.check_finite(here[needed - begin :], states, name, needed, time)
         needed = min(place.first, place.first_column - input_delays)
         span = Span(begin, place.last, place.last + 1 - input_map.lead_samples)
-        found = run_regressors(input_map, run, states, inputs, name, span, needed)
+        regressors = run_regressors(input_map, run, states, inputs, name, span, needed)
         instants = time[place.first], time[place.last]
-        pieces.append(Piece(name, (here, *found), shifted, instants))
+        pieces.append(Piece(name, (here, *regressors), shifted, instants))
         read.append(labelled.channel_matrix(run, inputs, name, place.samples))
     data = _standardised(pieces, dt, labels, input_map, settings.standardize)
     if len(pieces) > 1:
@@ -400,10 +379,10 @@ def run_regressors(
     surge = None
     if (follows := input_map.follows) is not None:
         surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]
-    found = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
+    rows = input_map.drive(values, [span], run=run, surge=surge).rows(span.first, span.stop)
     if not missing:
-        return found
-    return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in found))
+        return rows
+    return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in rows))
 
 
 def _lengthened(values: FloatArray, length: int) -> FloatArray:
@@ -564,16 +543,16 @@ def scales_of(
     later = windows
     if channels[2]:
         later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
-    found = [
+    scales = [
         moments(values, spans, names, standardize)
         for values, spans, names in zip(series, (windows, windows, later), channels, strict=True)
     ]
     if stretch is None or not standardize:
-        return found
+        return scales
     more = [
-        replace(scale, std=scale.std * by) for scale, by in zip(found[1:], stretch, strict=True)
+        replace(scale, std=scale.std * by) for scale, by in zip(scales[1:], stretch, strict=True)
     ]
-    return [found[0], *more]
+    return [scales[0], *more]
 
 
 def moments(

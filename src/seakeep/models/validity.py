@@ -17,8 +17,6 @@ from seakeep.models import labelled, store
 from seakeep.models.interface import Model, Signature
 from seakeep.waves import GRAVITY
 
-__all__ = ["Coverage", "outside_training"]
-
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
@@ -82,10 +80,10 @@ class Coverage:
         or more of a `duration` in s; empty where it was trained. The height of n irregular waves
         scatters by about 0.85/√n (one SD): two of that, and a tenth, are no reason.
         """
-        found = _shares(band_energy(inputs, dt, self.first, self.shares.shape[1]))
+        shares = _shares(band_energy(inputs, dt, self.first, self.shares.shape[1]))
         edges = band_edges(self.first, self.shares.shape[1])
         periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])
-        rows = zip(self.channels, units, self.shares, found, strict=True)
+        rows = zip(self.channels, units, self.shares, shares, strict=True)
         measures = zip(*_heights(inputs, dt), self.heights, self.steepnesses, strict=True)
         for (channel, unit, taught, own), numbers in zip(rows, measures, strict=True):
             trained, known = np.flatnonzero(taught >= TRAINED), _with_neighbours(taught >= TRAINED)
@@ -169,7 +167,7 @@ def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) ->
         return []
     duration, units = steps * model.dt, [label.units for label in model.signature.input_labels]
     waves = list(coverage.compare(values, model.dt, duration, units))
-    told = ["; ".join(filter(None, of)) for of in zip(*waves, strict=True)]
+    texts = ["; ".join(filter(None, of)) for of in zip(*waves, strict=True)]
     if waves and "surge" in model.states and "surge" in run:
         surge = run["surge"].values[(time > start) & (time <= start + duration + 1e-6)]
         scale, at = model.signature.state_scale, model.states.index("surge")
@@ -177,10 +175,10 @@ def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) ->
         mean = float(np.mean(surge[np.isfinite(surge)])) if np.isfinite(surge).any() else low
         if not low <= mean <= high:
             side = "downstream" if mean > high else "upstream"
-            told.append(
+            texts.append(
                 f"a mean surge of {mean:.3g} m, {side} of the trained {low:.3g} to {high:.3g} m"
             )
-    return [each for each in told if each]
+    return [each for each in texts if each]
 
 
 def _with_neighbours(is_trained: BoolArray) -> BoolArray:

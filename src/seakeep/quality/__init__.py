@@ -63,6 +63,6 @@ def warn_of_runs(runs: Iterable[xr.Dataset], channels: Collection[str]) -> None:
     SeakeepWarning
         One per channel and kind of finding; gaps that were bridged do no harm.
     """
-    found = (each for run in runs for each in findings_of(run))
-    harmful = (each for each in found if each.kind is not samples.SamplesKind.BRIDGED)
+    findings = (each for run in runs for each in findings_of(run))
+    harmful = (each for each in findings if each.kind is not samples.SamplesKind.BRIDGED)
     warn_of(harmful, set(), channels)

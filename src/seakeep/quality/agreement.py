@@ -91,7 +91,7 @@ def compare_sensors(
     trusted: npt.ArrayLike,
     dt: float,
     window: float | None = None,
-    held: npt.ArrayLike | None = None,
+    stuck_samples: npt.ArrayLike | None = None,
     step: float = float("nan"),
 ) -> Agreement:
     """Compare a sensor with a trusted one of the same motion, window by window.
@@ -104,7 +104,7 @@ def compare_sensors(
         Time step, s.
     window : float, optional
         Length of the windows, s; by default four periods.
-    held : array_like of bool, shape (time,), optional
+    stuck_samples : array_like of bool, shape (time,), optional
         Samples at which the sensor is known to be stuck; a lag of what stands still means nothing.
     step : float, optional
         Step in which the sensor reads, as :func:`seakeep.quality.faults.reading_step` finds it
@@ -132,16 +132,20 @@ def compare_sensors(
     length = 4 * period if window is None else window
     if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
         return nothing
-    stuck = np.zeros(x.size, dtype=bool) if held is None else np.asarray(held, dtype=bool)
-    found, motion, gain = _windows(x, y, dt, length, period, stuck)
-    if not found.lag.size:
+    stuck = (
+        np.zeros(x.size, dtype=bool)
+        if stuck_samples is None
+        else np.asarray(stuck_samples, dtype=bool)
+    )
+    windows, motion, gain = _windows(x, y, dt, length, period, stuck)
+    if not windows.lag.size:
         return nothing
     spans = [
         slice(max(round((c - 0.5 * length) / dt), 0), round((c + 0.5 * length) / dt))
-        for c in found.centre
+        for c in windows.centre
     ]
     error, moved = ([np.std(z[span]) ** 2 for span in spans] for z in (x - y, y))
-    lags = found.lag[_together(found)]
+    lags = windows.lag[_together(windows)]
     short = _windows(x, y, dt, 0.5 * length, period, stuck)[0]
     straight = np.unwrap(short.lag[_together(short)], period=period)
     middle = float(np.median(lags))
@@ -152,11 +156,11 @@ def compare_sensors(
         lag=middle,
         lag_spread=float(1.4826 * np.median(np.abs(lags - middle))),
         growth=float(straight[-2:].mean() - straight[:2].mean()) if straight.size > 3 else 0.0,
-        correlation=float(np.median(found.correlation)),
+        correlation=float(np.median(windows.correlation)),
         nrmse=float(np.sqrt(np.mean(error) / np.mean(moved))),
         gain=gain,
-        centre=found.centre,
-        lags=found.lag,
+        centre=windows.centre,
+        lags=windows.lag,
     )
 
 
@@ -164,23 +168,25 @@ def _windows(
     x: FloatArray, y: FloatArray, dt: float, length: float, period: float, stuck: BoolArray
 ) -> tuple[Lags, float, float]:
     """Lags in windows with enough motion; the trusted SD and the gain in them."""
-    found = windowed_lags(x, y, dt, length, 0.5 * period)
-    begin = np.clip(((found.centre - 0.5 * length) / dt).astype(int), 0, None)
-    end = ((found.centre + 0.5 * length) / dt).astype(int)
+    lags = windowed_lags(x, y, dt, length, 0.5 * period)
+    begin = np.clip(((lags.centre - 0.5 * length) / dt).astype(int), 0, None)
+    end = ((lags.centre + 0.5 * length) / dt).astype(int)
     motion, own = (
         np.array([z[i:j].std() for i, j in zip(begin, end, strict=True)]) for z in (y, x)
     )
     free = np.array([not stuck[i : j + 1].any() for i, j in zip(begin, end, strict=True)])
-    kept = (motion > 0.3 * motion.max()) & np.isfinite(found.lag)
-    kept &= free | ~np.any(kept & free)  # a sensor that sticks all the time is judged all the same
-    clear = Lags(found.centre[kept], found.lag[kept], found.correlation[kept])
-    if not kept.any():
+    moving = (motion > 0.3 * motion.max()) & np.isfinite(lags.lag)
+    moving &= free | ~np.any(
+        moving & free
+    )  # a sensor that sticks all the time is judged all the same
+    clear = Lags(lags.centre[moving], lags.lag[moving], lags.correlation[moving])
+    if not moving.any():
         return clear, float("nan"), float("nan")
-    mean = float(np.sqrt(np.mean(motion[kept] ** 2)))
-    return clear, mean, float(np.median(own[kept] / motion[kept]))
+    mean = float(np.sqrt(np.mean(motion[moving] ** 2)))
+    return clear, mean, float(np.median(own[moving] / motion[moving]))
 
 
-def _together(found: Lags) -> BoolArray:
+def _together(lags: Lags) -> BoolArray:
     """Windows in which the two go together: elsewhere a lag says nothing."""
-    alike: BoolArray = found.correlation >= 0.6
+    alike: BoolArray = lags.correlation >= 0.6
     return alike if alike.sum() > 3 else np.ones(alike.size, dtype=bool)

@@ -117,8 +117,8 @@ def clocks(record: Record) -> Iterator[Finding]:
         if (rate := record.rates.get(name)) is not None:
             aside = float(group.attrs.get("time_column_step", 1 / rate.stated))
             if abs(aside * rate.stated - 1) > RATE_TOLERANCE:
-                kind, found = ClocksKind.TIMES_ASIDE, 1 / aside
-                yield Finding(kind, run, label, found, rate.stated, "Hz")
+                kind, number = ClocksKind.TIMES_ASIDE, 1 / aside
+                yield Finding(kind, run, label, number, rate.stated, "Hz")
             elif abs(step * rate.stated - 1) > RATE_TOLERANCE:
                 yield Finding(ClocksKind.OTHER_RATE, run, label, 1 / step, rate.stated, "Hz")
         if clock.method == ASSUMED:

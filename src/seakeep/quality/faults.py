@@ -118,13 +118,13 @@ def find_outliers(series: npt.ArrayLike) -> BoolArray:
     # Second differences of white noise have six times its variance, and know no slope.
     noise = 1.4826 * float(np.median(np.abs(np.diff(x, 2)))) / float(np.sqrt(6.0))
     # Where a signal sticks and slips, a sample is far from the middle and belongs to one side.
-    found = (away > max(ALONE * noise, LEAST * spread)) & (away > np.abs(left - right))
+    outliers = (away > max(ALONE * noise, LEAST * spread)) & (away > np.abs(left - right))
     jumps = np.abs(np.diff(x, prepend=np.inf, append=np.inf))
-    for begin, end in stretches(found):
+    for begin, end in stretches(outliers):
         near = np.median(away[max(begin - AROUND, 0) : end + AROUND])
         apart = min(jumps[begin] / away[begin], jumps[end] / away[end - 1])
-        found[begin:end] = away[begin:end].max() > ALONE * 1.4826 * near and apart > ABRUPT
-    return np.asarray(found | (np.abs(x - middle) > FAR * spread) & (spread > 0))
+        outliers[begin:end] = away[begin:end].max() > ALONE * 1.4826 * near and apart > ABRUPT
+    return np.asarray(outliers | (np.abs(x - middle) > FAR * spread) & (spread > 0))
 
 
 def _starts(x: FloatArray) -> npt.NDArray[np.intp]:
@@ -267,7 +267,7 @@ def _stay(
     return wave / float(np.pi) * float(np.arccos(max(1 - smallest / amplitude, -1.0)))
 
 
-def saturated(series: FloatArray, held: BoolArray) -> BoolArray:
+def saturated(series: FloatArray, stuck: BoolArray) -> BoolArray:
     """Held samples at the end of the sensor's range: at the highest or lowest reading, repeatedly.
 
     Examples
@@ -279,7 +279,7 @@ def saturated(series: FloatArray, held: BoolArray) -> BoolArray:
     """
     out = np.zeros(series.size, dtype=bool)
     for edge in (series.max(), series.min()):
-        plateaus = held & (series == edge)
+        plateaus = stuck & (series == edge)
         if len(stretches(plateaus)) > 1:
             out |= plateaus
     return out

@@ -130,7 +130,9 @@ def findings_of(run: xr.Dataset) -> list[Finding]:
 
 
 def warn_of(
-    findings: Iterable[Finding], told: set[tuple[str, str]], channels: Collection[str] | None = None
+    findings: Iterable[Finding],
+    reported: set[tuple[str, str]],
+    channels: Collection[str] | None = None,
 ) -> None:
     """Warn of findings, of each channel and kind once.
 
@@ -138,7 +140,7 @@ def warn_of(
     ----------
     findings : iterable of Finding
         What was found. Without `channels`, only kinds with a remedy are warned of.
-    told : set of (str, str)
+    reported : set of (str, str)
         Channels and kinds that were warned of already; grows.
     channels : collection of str, optional
         Channels of which every finding is warned of, such as those of a model.
@@ -151,10 +153,10 @@ def warn_of(
     every = list(findings)
     for each in every:
         wanted = bool(each.kind.remedy) if channels is None else each.channel in channels
-        if not wanted or (each.channel, each.kind.name) in told:
+        if not wanted or (each.channel, each.kind.name) in reported:
             continue
         alike = [e for e in every if each.kind.together and e.kind is each.kind]
-        told |= {(other.channel, each.kind.name) for other in (each, *alike)}
+        reported |= {(other.channel, each.kind.name) for other in (each, *alike)}
         names = dict.fromkeys(name for e in alike for name in (e.run, e.channel))
         more = [name for name in names if name not in (each.run, each.channel)]
         others = f" ({', '.join(more)} likewise)" if more else ""

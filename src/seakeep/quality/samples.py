@@ -121,10 +121,10 @@ def levels(record: Record) -> Iterator[Finding]:
         x = sound(record.whole, name)
         if x.size < 16 or not np.ptp(x):
             continue
-        change, sure = level_drift(x, dt, dominant_period(x, dt))
+        change, ratio = level_drift(x, dt, dominant_period(x, dt))
         # A level that moves by half the waves' spread shifts means and standardisation visibly.
         limit = 0.5 * float(x.std())
-        if abs(change) > limit and sure > 5:
+        if abs(change) > limit and ratio > 5:
             unit = str(channel.attrs["units"])
             yield Finding(SamplesKind.DRIFT, record.run, name, change, limit, unit)
 
@@ -194,5 +194,5 @@ def level_drift(x: FloatArray, dt: float, period: float) -> tuple[float, float]:
         return 0.0, 0.0
     means = x[: windows * length].reshape(windows, length).mean(axis=1)
     line = scipy.stats.linregress(np.arange(windows), means)
-    sure = abs(line.slope) / line.stderr if line.stderr > 0 else 0.0
-    return float(line.slope * x.size / length), float(sure)
+    ratio = abs(line.slope) / line.stderr if line.stderr > 0 else 0.0
+    return float(line.slope * x.size / length), float(ratio)

@@ -85,48 +85,48 @@ def compared(run: xr.Dataset, pairs: Iterable[Redundant]) -> dict[tuple[str, str
 def redundant(record: Record) -> Iterator[Finding]:
     """Redundant sensors that disagree by more than a model may err, or hold still alone."""
     run = record.whole
-    for (name, other), found in compared(run, record.redundant).items():
+    for (name, other), agreement in compared(run, record.redundant).items():
         unit = str(run[name].attrs["units"])
-        for kind, value, limit, its_unit in _faults(found, unit):
+        for kind, value, limit, its_unit in _faults(agreement, unit):
             details = {
                 "other": other,
-                "correlation": found.correlation,
-                "spread": found.lag_spread,
-                "spanned": found.spanned,
-                "so": f"so that the NRMSE between the two is {found.nrmse:.2f}",
+                "correlation": agreement.correlation,
+                "spread": agreement.lag_spread,
+                "spanned": agreement.spanned,
+                "so": f"so that the NRMSE between the two is {agreement.nrmse:.2f}",
             }
             yield Finding(kind, record.run, name, value, limit, its_unit, details=details)
         x, dt = filled(run[name]), step_of(run)
         stuck = find_held(x, dt, filled(run[other]))
-        if stuck.any() and np.isfinite(found.period):
+        if stuck.any() and np.isfinite(agreement.period):
             start, length = float(run["time"][int(np.argmax(stuck))]), float(stuck.sum()) * dt
             yield Finding(
-                SensorsKind.HELD, record.run, name, length, found.period, "s", start,
+                SensorsKind.HELD, record.run, name, length, agreement.period, "s", start,
                 {"other": other},
             )  # fmt: skip
 
 
-def _faults(found: Agreement, unit: str) -> Iterator[tuple[SensorsKind, float, float, str]]:
+def _faults(agreement: Agreement, unit: str) -> Iterator[tuple[SensorsKind, float, float, str]]:
     """Evidence against a sensor: kind, value, limit, unit."""
-    if not np.isfinite(found.correlation):
-        kind = SensorsKind.STILL if found.gain == 0 else SensorsKind.UNSEEN
-        yield kind, found.gain, np.nan, "1"
+    if not np.isfinite(agreement.correlation):
+        kind = SensorsKind.STILL if agreement.gain == 0 else SensorsKind.UNSEEN
+        yield kind, agreement.gain, np.nan, "1"
         return
-    if found.spanned < FEWEST_STEPS:
-        yield SensorsKind.RESOLUTION, found.step, found.motion, unit
-    scaled = not 1 / LARGEST_GAIN <= found.gain <= LARGEST_GAIN
-    if found.correlation >= LEAST_CORRELATION and scaled:
-        yield SensorsKind.SCALE, found.gain, LARGEST_GAIN, "1"
-    if scaled or found.nrmse > LARGEST_NRMSE:
-        growth, late = RUN_AWAY * found.period, LATE * found.period
-        if found.correlation < LEAST_CORRELATION:
-            yield SensorsKind.AGREEMENT, found.nrmse, LARGEST_NRMSE, "1"
-        elif abs(found.growth) > growth:
-            yield SensorsKind.LAG_GROWS, found.growth, growth, "s"
-        elif abs(found.lag) > late:
-            yield SensorsKind.LAG, found.lag, late, "s"
+    if agreement.spanned < FEWEST_STEPS:
+        yield SensorsKind.RESOLUTION, agreement.step, agreement.motion, unit
+    scaled = not 1 / LARGEST_GAIN <= agreement.gain <= LARGEST_GAIN
+    if agreement.correlation >= LEAST_CORRELATION and scaled:
+        yield SensorsKind.SCALE, agreement.gain, LARGEST_GAIN, "1"
+    if scaled or agreement.nrmse > LARGEST_NRMSE:
+        growth, late = RUN_AWAY * agreement.period, LATE * agreement.period
+        if agreement.correlation < LEAST_CORRELATION:
+            yield SensorsKind.AGREEMENT, agreement.nrmse, LARGEST_NRMSE, "1"
+        elif abs(agreement.growth) > growth:
+            yield SensorsKind.LAG_GROWS, agreement.growth, growth, "s"
+        elif abs(agreement.lag) > late:
+            yield SensorsKind.LAG, agreement.lag, late, "s"
         elif not scaled:
-            yield SensorsKind.DIFFERENCE, found.nrmse, LARGEST_NRMSE, "1"
+            yield SensorsKind.DIFFERENCE, agreement.nrmse, LARGEST_NRMSE, "1"
 
 
 def positions(record: Record) -> Iterator[Finding]:
@@ -144,14 +144,14 @@ def positions(record: Record) -> Iterator[Finding]:
         return
     series = {name: filled(run[name]) for name in places}
     for each in misplaced_probes(series, places, step_of(run), depth):
-        found = each.found
+        separation = each.separation
         details = {
             "other": each.other,
-            "spread": found.spread,
-            "error": found.input_error,
-            "unsure": "" if each.sure else ", or the other probe is misplaced",
+            "spread": separation.spread,
+            "error": separation.input_error,
+            "unsure": "" if each.certain else ", or the other probe is misplaced",
         }
         yield Finding(
-            SensorsKind.POSITION, record.run, each.probe, found.separation, found.stated, "m",
-            details=details,
+            SensorsKind.POSITION, record.run, each.probe, separation.separation,
+            separation.stated, "m",            details=details,
         )  # fmt: skip

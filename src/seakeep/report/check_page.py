@@ -44,39 +44,39 @@ USES = {
 """What the limit of the error allows."""
 
 
-def worth_section(found: xr.Dataset, checked: Checked) -> Section:
+def worth_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the error over the tests beside that of baselines, the look-ahead and the verdict."""
-    points = [*_verdicts(found, checked.repeats)]
-    if (ahead := float(found["look_ahead"].max())) > 0:
+    points = [*_verdicts(result, checked.repeats)]
+    if (ahead := float(result["look_ahead"].max())) > 0:
         points.append(
             f"Look-ahead: the model reads the waves up to {ahead:.3g} s after the instant that it "
             "forecasts. They must be measured up-wave, or predicted."
         )
     else:
         points.append("Look-ahead: none. No wave after the instant of the forecast is read.")
-    if state := found.attrs["conditional_on"]:
+    if state := result.attrs["conditional_on"]:
         points.append(
             f"All errors are conditional on measured {state}, which is read after the start."
         )
-    if lost := found.attrs["lost"]:
+    if lost := result.attrs["lost"]:
         points.append(f"Baselines that do not count in all verdicts: {lost}.")
-    if (validity := checked.found.get("validity")) is not None:
+    if (validity := checked.results.get("validity")) is not None:
         points += [
             f"{run}: outside what trained the model ({why})." for run, why in _outside(validity)
         ]
-    one = str(found.attrs["of"]).removesuffix("s")
-    tables = [_by_run(found, one), _by_state(found), _of_runs(found)]
-    return section("worth", {"one": one, "runs": found.sizes["run"]}, points=points, tables=tables)
+    one = str(result.attrs["of"]).removesuffix("s")
+    tables = [_by_run(result, one), _by_state(result), _of_runs(result)]
+    return section("worth", {"one": one, "runs": result.sizes["run"]}, points=points, tables=tables)
 
 
-def _verdicts(found: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
+def _verdicts(result: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
     """One sentence on all states in each kind of waves, and one per group of alike states."""
-    training = found.attrs["of"] == "training"
+    training = result.attrs["of"] == "training"
     if training:
         yield "No run tests the model. All errors are those of training: memory, not skill."
-    for kind in found["waves"].values:
-        own = found.sel(waves=kind)
-        names = [str(run) for run in found["run"].values[found["kind"].values == kind]]
+    for kind in result["waves"].values:
+        own = result.sel(waves=kind)
+        names = [str(run) for run in result["run"].values[result["kind"].values == kind]]
         known = ", ".join(run for run in names if run in repeats)
         memory = f" (memory, not skill: {known} repeat training input)" * bool(known)
         tests = "training" if training else f"test{'s' * (len(names) > 1)}"
@@ -91,7 +91,7 @@ def _verdicts(found: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
         error = number(every["nrmse"]) + f" ({bounds})" * (bounds != MISSING)
         yield f"{len(names)} {tests} in {kind} waves: ANRMSE {error}{beside}."
         groups: dict[tuple[float, str], list[str]] = {}
-        for state in found["state"].values[1:]:
+        for state in result["state"].values[1:]:
             groups.setdefault(_verdict(own.sel(state=state)), []).append(str(state))
         for (_, use), alike in sorted(groups.items(), key=lambda each: (not each[0][0], each[0])):
             yield f"{kind.capitalize()} waves, {', '.join(alike)}: {use}{memory}."
@@ -117,14 +117,14 @@ def _change(one: xr.Dataset, baseline: str) -> Number:
     return change(1 + at["change_lower"], 1 + at["change_upper"])
 
 
-def _by_run(found: xr.Dataset, one: str) -> Table:
+def _by_run(result: xr.Dataset, one: str) -> Table:
     """ANRMSE of each test, of the model with its interval and of the baselines."""
-    rows, averages, models = [], [], [str(name) for name in found["model"].values]
-    for kind in found["waves"].values:
-        for run in found["run"].values[found["kind"].values == kind]:
-            rows.append((str(run), *_cells(found.sel(run=run), "anrmse")))
+    rows, averages, models = [], [], [str(name) for name in result["model"].values]
+    for kind in result["waves"].values:
+        for run in result["run"].values[result["kind"].values == kind]:
+            rows.append((str(run), *_cells(result.sel(run=run), "anrmse")))
         averages.append(len(rows))
-        rows.append((f"mean, {kind} waves", *_cells(found.sel(waves=kind, state="all"), "nrmse")))
+        rows.append((f"mean, {kind} waves", *_cells(result.sel(waves=kind, state="all"), "nrmse")))
     note = (
         "Baselines are fitted to the training runs with their recommended settings, and read no "
         "wave after the instant that they forecast and no measured state after the start."
@@ -139,12 +139,12 @@ def _cells(at: xr.Dataset, key: str) -> list[Number]:
     return [first, interval(at.sel(model="model"), key), *others]
 
 
-def _by_state(found: xr.Dataset) -> Table:
+def _by_state(result: xr.Dataset) -> Table:
     """Mean error of each state, the best baseline, and the verdict."""
     rows = []
-    for kind in found["waves"].values:
-        for state in found["state"].values[1:]:
-            one = found.sel(waves=kind, state=state)
+    for kind in result["waves"].values:
+        for state in result["state"].values[1:]:
+            one = result.sel(waves=kind, state=state)
             beside: tuple[str, ...] = (MISSING, MISSING, MISSING)
             if best := str(one["best"].values):
                 beside = (best, number(one["nrmse"].sel(model=best)), _change(one, best))
@@ -153,9 +153,9 @@ def _by_state(found: xr.Dataset) -> Table:
     return table("verdicts", rows)
 
 
-def _of_runs(found: xr.Dataset) -> Table:
+def _of_runs(result: xr.Dataset) -> Table:
     """Error of each state in each run, which no mean hides."""
-    errors = found["run_nrmse"]
+    errors = result["run_nrmse"]
     heads = ("state", *map(str, errors["run"].values))
     rows = [(str(row["channel"].values), *numbers(row)) for row in errors]
     return table("worth_of_runs", rows, columns=heads)
@@ -167,17 +167,19 @@ def _outside(validity: xr.Dataset) -> list[tuple[str, str]]:
     return [(str(run), str(why)) for run, why in pairs if why]
 
 
-def response_section(found: xr.Dataset, checked: Checked) -> Section:
+def response_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return amplitude and phase against frequency, with the judgement by V&V 20."""
-    measured, reference = checked.found.get("measured_response"), found.attrs["reference"]
+    measured, reference = checked.results.get("measured_response"), result.attrs["reference"]
     if "validation" in checked.refused:  # points beside the answer to something else
         measured = None
     per = reference
-    if "wave" in found["input"]:
+    if "wave" in result["input"]:
         per = f"a wave that passes all probes, counted from {reference}"
     words = []
-    unknown = found["amplitude"].isnull().all([d for d in found["amplitude"].dims if d != "state"])
-    if read := ", ".join(map(str, found["state"].values[unknown])):
+    unknown = (
+        result["amplitude"].isnull().all([d for d in result["amplitude"].dims if d != "state"])
+    )
+    if read := ", ".join(map(str, result["state"].values[unknown])):
         words.append(f"{read}: read off other states, so that no linear response stands for it.")
     kinds = set() if measured is None else set(measured["kind"].values)
     if "irregular" in kinds:
@@ -185,19 +187,19 @@ def response_section(found: xr.Dataset, checked: Checked) -> Section:
             "Points of irregular waves are of all runs, training included. Their bars hold chance, "
             "and the change from segments half as long, by which leakage is judged."
         )
-    figure = drawing("response", partial(checks.response, found, measured))
+    figure = drawing("response", partial(checks.response, result, measured))
     tables = []
     if measured is not None and "regular" in kinds:
-        tables.append(_points_table(measured, found))
-    if "validation" in checked.found:
-        tables.append(_validation_table(checked.found["validation"]))
+        tables.append(_points_table(measured, result))
+    if "validation" in checked.results:
+        tables.append(_validation_table(checked.results["validation"]))
     return section("response", {"per": per}, words, figures=[figure], tables=tables)
 
 
-def _points_table(measured: xr.Dataset, found: xr.Dataset) -> Table:
+def _points_table(measured: xr.Dataset, result: xr.Dataset) -> Table:
     """Measured response in regular waves; irregular ones stand in the figure."""
     at = measured.isel(point=np.flatnonzero(measured["kind"].values == "regular"))
-    at = at.assign_coords(units=("state", found["units"].isel(input=-1).values))
+    at = at.assign_coords(units=("state", result["units"].isel(input=-1).values))
     rows = [
         (
             str(own["run"].values),
@@ -213,17 +215,17 @@ def _points_table(measured: xr.Dataset, found: xr.Dataset) -> Table:
     return table("measured_response", rows)
 
 
-def _states(found: xr.Dataset) -> Iterator[tuple[xr.Dataset, float, str]]:
+def _states(result: xr.Dataset) -> Iterator[tuple[xr.Dataset, float, str]]:
     """Results of each state, the factor to the unit that is shown, and its name with that unit."""
-    for state, unit in zip(found["state"].values, found["units"].values, strict=True):
+    for state, unit in zip(result["state"].values, result["units"].values, strict=True):
         factor, shown = displayed(str(unit))
-        yield found.sel(state=state), factor, f"{state} [{shown_unit(shown)}]"
+        yield result.sel(state=state), factor, f"{state} [{shown_unit(shown)}]"
 
 
-def _validation_table(found: xr.Dataset) -> Table:
+def _validation_table(result: xr.Dataset) -> Table:
     """E and u_val of each state: over the regular runs one by one, irregular points together."""
     rows = []
-    for own, factor, state in _states(found):
+    for own, factor, state in _states(result):
         for kind in ("regular", "irregular"):
             known = (own["kind"].values == kind) & np.isfinite(own["error"].values)
             if not known.any():
@@ -245,16 +247,16 @@ def _validation_table(found: xr.Dataset) -> Table:
     return table("validation", rows)
 
 
-def possible_section(found: xr.Dataset, checked: Checked) -> Section:
+def possible_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return coherence, and the least error of a linear map beside the model's."""
-    rows, trained = [], checked.found.get("training_coherence")
+    rows, trained = [], checked.results.get("training_coherence")
     advice: dict[str, list[str]] = {}
     unjudged: dict[str, list[str]] = {}
-    worth, segment = checked.found.get("worth"), found.attrs["segment"]
+    worth, segment = checked.results.get("worth"), result.attrs["segment"]
     ahead = worth is not None and bool((worth["look_ahead"] > 0).any())
-    for state in map(str, found["state"].values):
-        own = found.sel(state=state)
-        rows += [_bounds(each.sel(state=state)) for each in (found, trained) if each is not None]
+    for state in map(str, result["state"].values):
+        own = result.sel(state=state)
+        rows += [_bounds(each.sel(state=state)) for each in (result, trained) if each is not None]
         if bool(own["still"]):
             unjudged.setdefault("it stands still in these runs", []).append(state)
         elif float(own["period"]) > segment / 3:
@@ -278,9 +280,9 @@ def possible_section(found: xr.Dataset, checked: Checked) -> Section:
         )
     return section(
         "coherence",
-        found.attrs,
+        result.attrs,
         points=points,
-        figures=[drawing("coherence", partial(checks.coherence, found))],
+        figures=[drawing("coherence", partial(checks.coherence, result))],
         tables=[table("possible", rows)],
     )
 
@@ -316,17 +318,17 @@ def _advice(model: float, linear: float, more: float, ahead: bool) -> str:
 def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
     """Return free decay, beside measured ones, and the modes."""
     figures, tables, words, points = [], [], [], []
-    if (found := checked.found.get("decay")) is not None:
-        tables.append(_decay_table(found, checked.found.get("measured_decay")))
-        figures.append(drawing("decay", partial(checks.decay, found)))
-        most = np.abs(found["displacement"].values).max(axis=1)
+    if (result := checked.results.get("decay")) is not None:
+        tables.append(_decay_table(result, checked.results.get("measured_decay")))
+        figures.append(drawing("decay", partial(checks.decay, result)))
+        most = np.abs(result["displacement"].values).max(axis=1)
         # None swings farther than it was moved in still water.
         points = [
             f"{motion}: after its release the model swings to {reach:.2g} times the offset, "
             "where a vessel in still water swings back by less than it was moved. Read no period "
             "and no damping off it: the state of this model follows the waves, or its delays fit "
             "noise."
-            for motion, reach in zip(found["motion"].values, most, strict=True)
+            for motion, reach in zip(result["motion"].values, most, strict=True)
             if reach > OVERSHOOT
         ]
         words.append(
@@ -340,10 +342,10 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
     return section("modes", more=words, points=points, figures=figures, tables=tables)
 
 
-def _decay_table(found: xr.Dataset, measured: xr.Dataset | None) -> Table:
+def _decay_table(result: xr.Dataset, measured: xr.Dataset | None) -> Table:
     """Period and damping of each motion of the model, and of each measured decay."""
     keys = ("period", "damping_ratio", "p")
-    cases = [(found.sel(motion=each), Number("0"), "model") for each in found["motion"].values]
+    cases = [(result.sel(motion=each), Number("0"), "model") for each in result["motion"].values]
     if measured is not None:
         each_run = (measured.sel(run=run) for run in measured["run"].values)
         cases += [(own, number(own["q"]), str(own["run"].values)) for own in each_run]
@@ -354,34 +356,34 @@ def _decay_table(found: xr.Dataset, measured: xr.Dataset | None) -> Table:
     return table("decay", rows)
 
 
-def _modes_table(found: xr.Dataset) -> Table:
+def _modes_table(result: xr.Dataset) -> Table:
     rows, keys = [], ("period", "damping_ratio", "decay_time", "modulus")
-    for k in range(found.sizes["mode"]):
-        own = found.isel(mode=k)
+    for k in range(result.sizes["mode"]):
+        own = result.isel(mode=k)
         parts = own["participation"].to_series().sort_values(ascending=False, kind="stable")[:2]
         taking = ", ".join(f"{state} {part:.2f}" for state, part in parts.items())
         rows.append((*(number(own[key], 4) for key in keys), taking))
-    return table("modes", rows, {"modes": found.sizes["mode"]})
+    return table("modes", rows, {"modes": result.sizes["mode"]})
 
 
-def residuals_section(found: xr.Dataset, checked: Checked) -> Section:
+def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return whiteness, past inputs, bands and age of the errors."""
-    lag, period = found["lag"].values, float(found.attrs["encounter_period"])
-    trained = checked.found.get("training_residuals")
-    shown = [found] if trained is None else [found, trained]
+    lag, period = result["lag"].values, float(result.attrs["encounter_period"])
+    trained = checked.results.get("training_residuals")
+    shown = [result] if trained is None else [result, trained]
     rows = [
-        _residuals_row(each.sel(state=state)) for state in found["state"].values for each in shown
+        _residuals_row(each.sel(state=state)) for state in result["state"].values for each in shown
     ]
     words = {
-        "oldest": found.sizes["age"] * (lag[1] - lag[0]) / period,
+        "oldest": result.sizes["age"] * (lag[1] - lag[0]) / period,
         "lag": lag[-1],
         "lags": lag.size - 1,
-        "instants": found.attrs["instants"],
+        "instants": result.attrs["instants"],
         "period": period,
     }
-    figure = drawing("residuals", partial(checks.residuals, found))
+    figure = drawing("residuals", partial(checks.residuals, result))
     return section(
-        "residuals", found.attrs, figures=[figure], tables=[table("residuals", rows, words)]
+        "residuals", result.attrs, figures=[figure], tables=[table("residuals", rows, words)]
     )
 
 
@@ -402,11 +404,11 @@ def _residuals_row(own: xr.Dataset) -> tuple[str, ...]:
     )
 
 
-def statistics_section(found: xr.Dataset, checked: Checked) -> Section:
+def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the statistics of responses that designers read."""
     rows = []
-    for of_state, factor, state in _states(found):
-        for kind in found["kind"].values:
+    for of_state, factor, state in _states(result):
+        for kind in result["kind"].values:
             own = of_state.sel(kind=kind)
             bounds = [factor * float(own[f"extreme_{each}"]) for each in ("lower", "upper")]
             known = bool(np.isfinite(bounds[0]))
@@ -423,42 +425,42 @@ def statistics_section(found: xr.Dataset, checked: Checked) -> Section:
                     number(own["divergence"], 4) if kind == "forecast" else MISSING,
                 )
             )
-    hours = float(found.attrs["duration"]) / 3600
+    hours = float(result.attrs["duration"]) / 3600
     figures = [
-        drawing("exceedance", partial(checks.exceedance, found)),
-        drawing("density", partial(checks.density, found)),
+        drawing("exceedance", partial(checks.exceedance, result)),
+        drawing("density", partial(checks.density, result)),
     ]
-    tables = [table("statistics", rows, {"of": found.attrs["of"], "hours": hours})]
+    tables = [table("statistics", rows, {"of": result.attrs["of"], "hours": hours})]
     return section("statistics", figures=figures, tables=tables)
 
 
-def validity_section(found: xr.Dataset, checked: Checked) -> Section:
+def validity_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return where each test lies against the training."""
     digits = {"height": 3, "period": 2, "steepness": 4, "drift": 3}
     rows = [
         (str(run), str(part), str(at["waves"].values),
          *(number(at[key], places) for key, places in digits.items()))
-        for run in found["run"].values
-        for part in found["part"].values
-        for at in [found.sel(run=run, part=part)]
+        for run in result["run"].values
+        for part in result["part"].values
+        for at in [result.sel(run=run, part=part)]
         if np.isfinite(at["height"])
     ]  # fmt: skip
     points = [
         f"{run}: {why}. What the model says there is an extrapolation."
-        for run, why in _outside(found)
+        for run, why in _outside(result)
     ] or ["All tests lie inside the waves that trained the model."]
     points += [
         f"{text[0].upper()}{text[1:]} This test shows memory, not skill."
         for text in checked.repeats.values()
     ]
-    figure = drawing("validity", partial(checks.validity, found))
+    figure = drawing("validity", partial(checks.validity, result))
     return section("validity", points=points, figures=[figure], tables=[table("validity", rows)])
 
 
-def drift_section(found: xr.Dataset, checked: Checked) -> Section:
+def drift_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the second order: mean drift and slow response per amplitude squared."""
     rows = []
-    for own, factor, state in _states(found):
+    for own, factor, state in _states(result):
         if "offset" not in own or not np.isfinite(own["slow_response"]).any():
             continue
         mean, points = factor * own["slow_response"][0], own["point_frequency"].values
@@ -467,9 +469,9 @@ def drift_section(found: xr.Dataset, checked: Checked) -> Section:
             offset = (factor * own[key][k] for key in ("offset", "offset_uncertainty"))
             run = str(own["run"].values[k])
             rows.append((state, run, number(f), number(value, 4), uncertain(*offset)))
-    figure = drawing("drift", partial(checks.drift, found))
+    figure = drawing("drift", partial(checks.drift, result))
     tables = [table("drift", rows)] if rows else []
-    return section("drift", found.attrs, figures=[figure], tables=tables)
+    return section("drift", result.attrs, figures=[figure], tables=tables)
 
 
 CHECK_SECTIONS: dict[Callable[[xr.Dataset, Checked], Section], Sequence[str]] = {
@@ -489,13 +491,13 @@ def check_sections(checked: Checked) -> list[Section]:
     """Sections of the page; each says what could not be judged, and why."""
     out = []
     for make, needed in CHECK_SECTIONS.items():
-        found = checked.found.get(needed[0])
+        result = checked.results.get(needed[0])
         title = words()["sections"][needed[0]]["title"]
-        made = Section(needed[0], title) if found is None else make(found, checked)
+        built = Section(needed[0], title) if result is None else make(result, checked)
         refused = [checked.refused[name] for name in needed if name in checked.refused]
-        told = [f"Cannot be judged: {text}" for text in dict.fromkeys(refused)]
-        told += dict.fromkeys(note for name in needed for note in checked.notes.get(name, ()))
-        out.append(replace(made, notices=tuple(told)))
+        texts = [f"Cannot be judged: {text}" for text in dict.fromkeys(refused)]
+        texts += dict.fromkeys(note for name in needed for note in checked.notes.get(name, ()))
+        out.append(replace(built, notices=tuple(texts)))
     return out
 
 

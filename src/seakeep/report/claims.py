@@ -169,14 +169,14 @@ def _robust(results: Results) -> Judged:
 
 
 def _trend(results: Results) -> Judged:
-    values, kept = (
+    values, names = (
         results[act]
         .groups["statistics/trend"]["p_value"]
         .sel(test="irregular", band="all", model=[SINGLE, ENSEMBLE])
         .values
         for act in ("paper", "raw")
     )
-    both = (" and ".join(map(probability, each)) for each in (values, kept))
+    both = (" and ".join(map(probability, each)) for each in (values, names))
     return "p = {}; act (b): {}".format(*both), False if values.min() < 0.05 else None
 
 
@@ -242,21 +242,22 @@ def _against_single(
 
 
 def _better(results: Results, statistic: Statistic) -> Judged:
-    found = _against_single(results["paper"], SEA, statistic)
-    words = ", ".join(f"{words} {each.change()}" for words, each in found.items())
-    return words, all_of(each.below(1.0) for each in found.values())
+    differences = _against_single(results["paper"], SEA, statistic)
+    words = ", ".join(f"{words} {each.change()}" for words, each in differences.items())
+    return words, all_of(each.below(1.0) for each in differences.values())
 
 
 def _always_better(results: Results) -> Judged:
     result = results["paper"]
-    found = [
+    differences = [
         each.below(1.0)
         for test in result.tests
         for each in _against_single(result, (test,)).values()
     ]
-    better, worse, unknown = (found.count(each) for each in (True, False, None))
-    return f"better in {better}, worse in {worse}, undecided in {unknown} of {len(found)}", all_of(
-        found
+    better, worse, unknown = (differences.count(each) for each in (True, False, None))
+    return (
+        f"better in {better}, worse in {worse}, undecided in {unknown} of {len(differences)}",
+        all_of(differences),
     )
 
 
@@ -295,12 +296,12 @@ def _slow_loads(results: Results) -> Judged:
         for values in (test["measured"].values, test["mean"].sel(model=ENSEMBLE).values[order])
     )
     errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
-    found = {
+    by_statistic = {
         name.removeprefix("mooring_"): _interval(result, SEA, _median, errors[..., [k]])
         for k, name in enumerate(LOADS)
     }
-    words = ", ".join(f"{name} {each.text()}" for name, each in found.items())
-    return f"act (b): {words}", all_of(each.below(1.0) for each in found.values())
+    words = ", ".join(f"{name} {each.text()}" for name, each in by_statistic.items())
+    return f"act (b): {words}", all_of(each.below(1.0) for each in by_statistic.values())
 
 
 def _peaks(results: Results) -> Judged:
@@ -332,12 +333,14 @@ def _against_irregular(results: Results) -> Judged:
         ours, sea = (median_of(np.where(part, averages, np.nan)) for part in (kind, ~kind))
         return ours / sea
 
-    found = {
+    differences = {
         words: _interval(result, tests, ratio, _cells(result, tests, key), labels)
         for key, words in MEASURES.items()
     }
-    words = ", ".join(f"{words} {each.change()}" for words, each in found.items())
-    return words, all_of([opposite(found["ANRMSE"].below(1.0)), found["NAMMAE"].below(1.0)])
+    words = ", ".join(f"{words} {each.change()}" for words, each in differences.items())
+    return words, all_of(
+        [opposite(differences["ANRMSE"].below(1.0)), differences["NAMMAE"].below(1.0)]
+    )
 
 
 def _phase(results: Results) -> Judged:

@@ -140,10 +140,10 @@ def model_blocks(
         ]
         status = {name: str(at["status"].values) for name, at in of_run.items()}
         ahead = {n: look_ahead_words(float(at["look_ahead"])) for n, at in of_run.items()}
-        told = [f"{name}: {words}" for name, words in status.items() if words != "ok"]
-        told += [f"{name} {words}" for name, words in ahead.items() if words]
+        texts = [f"{name}: {words}" for name, words in status.items() if words != "ok"]
+        texts += [f"{name} {words}" for name, words in ahead.items() if words]
         title = f"{run}: models against measurement"
-        yield Table(f"models_{run}", title, heads, rows, "; ".join(told))
+        yield Table(f"models_{run}", title, heads, rows, "; ".join(texts))
         yield from _skill(of_run, references, str(run))
         name, at = next(iter(of_run.items()))
         every = (("model", "channel"), [each["nrmse"].values for each in of_run.values()])
@@ -227,12 +227,12 @@ def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
     return _write(pd.concat(frames, ignore_index=True), front, path)
 
 
-def write_nowcasts(found: Mapping[str, xr.Dataset], path: Path) -> Path:
+def write_nowcasts(nowcasts: Mapping[str, xr.Dataset], path: Path) -> Path:
     """Write all errors as CSV, a row per model, run, channel and lead, full precision."""
     keys = HEADER.split(",")
     frames = [
         of_model[keys[4:]].to_dataframe().reset_index().assign(model=model)
-        for model, of_model in found.items()
+        for model, of_model in nowcasts.items()
     ]
     return _write(pd.concat(frames)[keys], keys, path)
 
@@ -250,9 +250,9 @@ def plain_cells(table: pd.DataFrame) -> pd.DataFrame:
     return table.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell)
 
 
-def nowcast_blocks(found: Mapping[str, xr.Dataset]) -> Iterator[Table]:
+def nowcast_blocks(nowcasts: Mapping[str, xr.Dataset]) -> Iterator[Table]:
     """Lead times and errors per channel in service, a table per model and run."""
-    for model, of_model in found.items():
+    for model, of_model in nowcasts.items():
         share, lead = float(of_model.attrs["share"]), of_model["lead"].values
         places = [max(round(len(lead) * part) - 1, 0) for part in (0.05, 0.2, 0.5, 1.0)]
         times = (f"at {number(each)} s" for each in lead[places])
@@ -265,11 +265,11 @@ def nowcast_blocks(found: Mapping[str, xr.Dataset]) -> Iterator[Table]:
             rows = []
             for name in of_model["channel"].values:
                 at = of_model.sel(run=run, channel=name)
-                held = number(at["lead_time"])
+                lead_time = number(at["lead_time"])
                 if float(at["lead_time"]) >= lead[-1] - 1e-9:
-                    held = Number(f"at least {number(lead[-1])}")
+                    lead_time = Number(f"at least {number(lead[-1])}")
                 inside = number(at["coverage"].mean(), 0)
-                rows.append((str(name), held, *numbers(at["error"][places]), inside))
+                rows.append((str(name), lead_time, *numbers(at["error"][places]), inside))
             yield Table(f"nowcast_{model}_{run}", f"{run}: {model} in service", columns, rows, note)
 
 
@@ -354,7 +354,7 @@ def forecast_words(forecast: xr.Dataset) -> str:
     """What a forecast of an ensemble holds, for a message; empty for a single model's."""
     if "statistic" in forecast.dims:
         attrs = {"band": "members", **forecast.attrs}
-        kept = int(attrs["members"]) - int(attrs["diverged"])
+        count = int(attrs["members"]) - int(attrs["diverged"])
         words = _band_words(xr.Dataset({key: attrs[key] for key in ("band", "level")}))
-        return f"mean, std and {words} of {kept} members at "
+        return f"mean, std and {words} of {count} members at "
     return f"{forecast.sizes['member']} members at " if "member" in forecast.dims else ""

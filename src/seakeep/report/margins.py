@@ -9,22 +9,20 @@ from seakeep.models import HankelEnsemble
 from seakeep.models.forecasts import counted
 from seakeep.report.tables import Table
 
-__all__ = ["margins_table"]
-
 
 def margins_table(ensemble: HankelEnsemble) -> Table:
     """Margins of the channels, or factors and floors of their scale, and what they rest on."""
     calibration = ensemble.calibration
     assert calibration is not None
-    found, windows, floor = calibration.found, calibration.windows, calibration.floor
-    made = {
+    margin, windows, floor = calibration.conformal, calibration.windows, calibration.floor
+    cells = {
         "constant": "Margin",
         "spread": "Factor k and floor f, ±k·√(σ² + f²),",
         "learnt": "Factor k of a learnt scale and its floor f",
     }[calibration.scale]
-    width = found.margin if floor is None else floor
+    width = margin.margin if floor is None else floor
     title = (
-        f"{made} of the {100 * found.level:g} % band, from "
+        f"{cells} of the {100 * margin.level:g} % band, from "
         f"{counted(sum(windows.values()), 'window')} of {calibration.steps} instants "
         f"({', '.join(windows)})"
     )
@@ -35,11 +33,11 @@ def margins_table(ensemble: HankelEnsemble) -> Table:
             (
                 label.name,
                 shown,
-                *([] if floor is None else [f"{found.margin[k]:.2f}"]),
+                *([] if floor is None else [f"{margin.margin[k]:.2f}"]),
                 f"{factor * width[k]:.4g}",
                 f"{width[k] / ensemble.state_spread[k]:.3f}",
-                f"{found.blocks[k]:.0f}",
-                f"{math.floor(1e4 * found.warranted[k] + 1e-6) / 100:g}",
+                f"{margin.blocks[k]:.0f}",
+                f"{math.floor(1e4 * margin.warranted[k] + 1e-6) / 100:g}",
             )
         )
     names = ("margin",) if floor is None else ("k", "f")

@@ -178,7 +178,7 @@ def rendered(template: str, **content: Any) -> str:
 def _environment() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    made = Environment(
+    environment = Environment(
         loader=PackageLoader("seakeep.report"),
         autoescape=True,
         undefined=StrictUndefined,
@@ -186,11 +186,11 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     folder = resources.files("seakeep.report").joinpath("templates")
-    made.globals["source"] = lambda name: Markup(folder.joinpath(name).read_text("utf-8"))
-    made.filters["shade"] = shade
-    made.filters["breakable"] = lambda text: escape(text).replace("_", Markup("_<wbr>"))
-    made.filters["minus"] = lambda text: re.sub(r"(?<![\w)])-(?=\d)", "−", text)
-    return made
+    environment.globals["source"] = lambda name: Markup(folder.joinpath(name).read_text("utf-8"))
+    environment.filters["shade"] = shade
+    environment.filters["breakable"] = lambda text: escape(text).replace("_", Markup("_<wbr>"))
+    environment.filters["minus"] = lambda text: re.sub(r"(?<![\w)])-(?=\d)", "−", text)
+    return environment
 
 
 def inline_picture(png: bytes, words: str) -> Markup:

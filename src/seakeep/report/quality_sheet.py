@@ -35,7 +35,7 @@ class ChannelRow:
     unit: str
     numbers: tuple[float, ...]
     flagged: str
-    found: tuple[str, ...]
+    findings: tuple[str, ...]
 
 
 def channel_rows(run: xr.Dataset) -> list[ChannelRow]:
@@ -54,11 +54,11 @@ def channel_rows(run: xr.Dataset) -> list[ChannelRow]:
             for word, bit in FLAGS.items()
             if (flags & bit).any()
         )
-        found = [each.text for each in findings if each.channel == name]
+        texts = [each.text for each in findings if each.channel == name]
         if channel.attrs.get("repaired"):
-            found.append(f"repaired: {channel.attrs['repaired']}")
+            texts.append(f"repaired: {channel.attrs['repaired']}")
         words = long_name_of(str(name), channel.attrs.get("long_name"))
-        row = ChannelRow(str(name), words, shown_unit(unit), numbers, flagged, tuple(found))
+        row = ChannelRow(str(name), words, shown_unit(unit), numbers, flagged, tuple(texts))
         rows.append(row)
     return rows
 
@@ -127,9 +127,9 @@ def write_quality_sheet(
 def run_row(name: str, run: xr.Dataset) -> tuple[str, Number, Number, str]:
     """Run, span, number of findings, and the channels that they concern."""
     span = f"{float(run['time'][0]):.2f} to {float(run['time'][-1]):.2f} s"
-    found = findings_of(run)
-    kinds = dict.fromkeys(f"{each.channel} ({each.kind.word})" for each in found)
-    return name, Number(span), number(len(found), 0), ", ".join(kinds)
+    findings = findings_of(run)
+    kinds = dict.fromkeys(f"{each.channel} ({each.kind.word})" for each in findings)
+    return name, Number(span), number(len(findings), 0), ", ".join(kinds)
 
 
 def other_findings(run: xr.Dataset) -> list[str]:
@@ -146,10 +146,10 @@ def _section(name: str, run: xr.Dataset) -> Section:
     ]
     channels = channel_rows(run)
     rows = [
-        (each.channel, each.unit, *map(short, each.numbers), each.flagged, "; ".join(each.found))
+        (each.channel, each.unit, *map(short, each.numbers), each.flagged, "; ".join(each.findings))
         for each in channels
     ]
-    marked = [k for k, each in enumerate(channels) if each.found]
+    marked = [k for k, each in enumerate(channels) if each.findings]
     shown = table("channels_of_run", rows, {"run": name}, name=f"channels_{name}", marked=marked)
     figure = drawing("quality", partial(quality_figure, run, {}), {"run": name}, f"quality_{name}")
     points = [*clocks, *other_findings(run)]

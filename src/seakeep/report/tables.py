@@ -388,7 +388,7 @@ def latex_text(text: str) -> str:
     '$-$0.12 [$-$0.3, 0.1] a-1'
     """
     text = re.sub(r"(?<![\w)])-(?=\d)", "−", text)
-    return _KNOWN.sub(lambda found: _LATEX[found[0]], text)
+    return _KNOWN.sub(lambda match: _LATEX[match[0]], text)
 
 
 def write_latex(table: Table, path: Path) -> Path:

@@ -16,17 +16,6 @@ from seakeep.files import MARK, replacing, write_netcdf
 from seakeep.signals import MotionAgreement, Track, compare_motion
 from seakeep.signals.tracking import FLAGS, LABELS
 
-__all__ = [
-    "CONTACT_SHEET",
-    "HEADER",
-    "TRACK",
-    "agreement_words",
-    "track_text",
-    "track_words",
-    "write_contact_sheet",
-    "write_track",
-]
-
 TRACK, CONTACT_SHEET = "track", "contact sheet"
 """Kinds of files, as their marks say it."""
 HEADER = r"time \[s\],surge \[m\],heave \[m\],pitch \[deg\],centroid_x \[pixel\],"
@@ -95,34 +84,37 @@ def agreement_words(
         other, unit = reference[name], LABELS[name][0]
         factor = conversion(str(other.attrs.get("units", unit)), unit, f"'{name}'")
         time = reference["time"].to_numpy()
-        found = compare_motion(track[name], track.time, factor * other.to_numpy(), time, max_lag)
+        agreement = compare_motion(
+            track[name], track.time, factor * other.to_numpy(), time, max_lag
+        )
         shown, unit = (1e3, "mm") if unit == "m" else displayed(unit)
         yield (
             (
-                f"{name} against the MRU: correlation {found.correlation:.4f}, video late by "
-                f"{found.lag:+.3f} s, RMS difference {shown * found.rms:.3g} {unit}, "
-                f"{found.samples} samples"
+                f"{name} against the MRU: correlation {agreement.correlation:.4f}, video late by "
+                f"{agreement.lag:+.3f} s, RMS difference {shown * agreement.rms:.3g} {unit}, "
+                f"{agreement.samples} samples"
             ),
             None,
         )
-        if doubt := _doubt(found):
+        if doubt := _doubt(agreement):
             yield f"Note: {name}: {doubt}", "yellow"
 
 
-def _doubt(found: MotionAgreement) -> str:
+def _doubt(agreement: MotionAgreement) -> str:
     """Why the lag may be wrong; empty if there is no reason."""
-    searched = f"the lags searched (within {found.max_lag:g} s)"
-    if found.at_limit:
+    searched = f"the lags searched (within {agreement.max_lag:g} s)"
+    if agreement.at_limit:
         return f"the lag is at the end of {searched}; the true one may be longer. Raise --max-lag."
-    if found.ambiguous:
+    if agreement.ambiguous:
         return (
-            f"at {found.rival_lag:+.3f} s the correlation is {found.rival_correlation:.4f}, nearly "
-            "as high: the lag is known only up to whole wave periods. Let a trigger that both "
-            "recorded decide (--lamp), or take an irregular run."
+            f"at {agreement.rival_lag:+.3f} s the correlation is "
+            f"{agreement.rival_correlation:.4f}, nearly as high: the lag is known only up to "
+            "whole wave periods. Let a trigger that both recorded decide (--lamp), or take an "
+            "irregular run."
         )
-    if not found.enclosed:
+    if not agreement.enclosed:
         return (
-            f"{searched} do not reach a wave period ({found.period:.3g} s) beyond this one, where "
-            "the two may fit better. Raise --max-lag."
+            f"{searched} do not reach a wave period ({agreement.period:.3g} s) beyond this one, "
+            "where the two may fit better. Raise --max-lag."
         )
     return ""

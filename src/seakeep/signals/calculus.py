@@ -105,8 +105,8 @@ def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
     The order is at most a third of the number of samples.
     """
     order = max(1, min(order, past.size // 3))
-    found = whitening(reflections(past, order))
-    result: FloatArray = continued(past, found[None], np.zeros((1, count)))[0]
+    filter_taps = whitening(reflections(past, order))
+    result: FloatArray = continued(past, filter_taps[None], np.zeros((1, count)))[0]
     return result
 
 

@@ -17,8 +17,6 @@ from scipy import linalg, signal
 from seakeep.arrays import FloatArray, IntArray
 from seakeep.waves import wavenumber
 
-__all__ = ["carried", "carriers", "mean_spectrum", "position_taps", "slow_position"]
-
 NOISE = 1e-2
 """Noise of the probes that carriers are designed for, per variance of the waves.
 
@@ -68,8 +66,8 @@ def mean_spectrum(
     power = np.zeros(LINES)
     for record in records:
         length = min(len(record), round(16 * period / dt))
-        known, found = signal.welch(record, 1.0 / dt, nperseg=length, axis=0)
-        power += np.interp(frequency, known, found.mean(axis=1))
+        known, density = signal.welch(record, 1.0 / dt, nperseg=length, axis=0)
+        power += np.interp(frequency, known, density.mean(axis=1))
     waves = (frequency >= 0.3 / period) & (frequency <= 3.0 / period)
     power += FLOOR * power.max() * waves
     return 2 * np.pi * frequency, power / power.sum()
@@ -118,8 +116,10 @@ def carriers(
 
     def waves(place: FloatArray, instant: FloatArray) -> FloatArray:
         phase = np.outer(place, k) - np.outer(instant, omega)
-        made: FloatArray = np.concatenate([np.cos(phase) * amplitude, np.sin(phase) * amplitude], 1)
-        return made
+        basis: FloatArray = np.concatenate(
+            [np.cos(phase) * amplitude, np.sin(phase) * amplitude], 1
+        )
+        return basis
 
     places = np.repeat(np.asarray(probes, dtype=float), lags.size)
     read = waves(places, np.tile(lags * dt, len(probes)))

@@ -14,7 +14,6 @@ from scipy import special
 from seakeep.arrays import FloatArray, as_series, fraction, number, positive, time_step
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import as_seconds, span_text, uniform_step
-from seakeep.sizes import MOST_TAPS, check_size
 
 
 def lowpass_taps(
@@ -40,8 +39,7 @@ def lowpass_taps(
     Raises
     ------
     RequestError
-        If the band edges are not in the stated order, or so close that the filter would have more
-        than 100 000 taps.
+        If the band edges are not in the stated order.
 
     Notes
     -----
@@ -57,14 +55,6 @@ def lowpass_taps(
             f"{sampling_rate / 2:g} Hz. Lower the edges, or filter before resampling."
         )
     edges = (passband / sampling_rate, stopband / sampling_rate)
-    check_size(
-        f"a transition from {passband:.10g} to {stopband:.10g} Hz at {sampling_rate:g} Hz with "
-        "this attenuation needs about",
-        attenuation / (14.36 * (edges[1] - edges[0])),
-        MOST_TAPS,
-        "taps",
-        "Move stopband away from passband, or lower the sampling rate first.",
-    )
     for extra in range(7):  # Kaiser's formula is a fit, some 3 dB short for short filters
         count, beta = scipy.signal.kaiserord(attenuation + extra, 2 * (edges[1] - edges[0]))
         count += 1 - count % 2
@@ -245,15 +235,7 @@ def _sinc_sums(
     """
     attenuation = max(positive(attenuation, "the attenuation", "dB"), 50.0)
     width = edges[1] - edges[0]
-    length = (attenuation - 7.95) / (4.57 * np.pi * width) + 1  # half of it, by Kaiser's formula
-    check_size(
-        "resampling by this factor and passband with this attenuation needs about",
-        2 * length,
-        MOST_TAPS,
-        "taps",
-        "Resample in two steps, or lower passband.",
-    )
-    half = int(np.ceil(length))
+    half = int(np.ceil((attenuation - 7.95) / (4.57 * np.pi * width) + 1))  # by Kaiser's formula
     bank = _kernels(half, 0.1102 * (attenuation - 8.7), sum(edges))
     base = np.floor(position).astype(int)
     place = (position - base) * PHASES

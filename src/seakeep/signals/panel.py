@@ -152,16 +152,16 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     cv2 = opencv()
     left, top, width, height = how.region or (0, 0, frame.shape[1], frame.shape[0])
     part = frame[top : top + height, left : left + width]
-    found = dict.fromkeys(FIELDS, np.nan) | {"area": 0.0, "cut": 0.0}
-    found["saturation"] = float(cv2.countNonZero(cv2.inRange(part, (SATURATED,) * 3, (255,) * 3)))
-    found["brightness"] = float(np.mean(cv2.mean(part)[:3]))
+    panel = dict.fromkeys(FIELDS, np.nan) | {"area": 0.0, "cut": 0.0}
+    panel["saturation"] = float(cv2.countNonZero(cv2.inRange(part, (SATURATED,) * 3, (255,) * 3)))
+    panel["brightness"] = float(np.mean(cv2.mean(part)[:3]))
     mask = cv2.inRange(part, how.lower[::-1], how.upper[::-1])
     for side, step in ((how.opening, cv2.MORPH_OPEN), (how.closing, cv2.MORPH_CLOSE)):
         if side > 1:
             mask = cv2.morphologyEx(mask, step, np.ones((side, side), np.uint8))
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
-        return found
+        return panel
     # A contour without what lies inside it is a component with its holes filled.
     outline = max(contours, key=cv2.contourArea)
     x, y, wide, high = cv2.boundingRect(outline)
@@ -171,7 +171,7 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     cv2.drawContours(filled, [outline], -1, 255, cv2.FILLED, offset=(-x0, -y0))
     area = float(cv2.countNonZero(filled))
     if area < SMALLEST:
-        return found
+        return panel
     weights = _weights(patch, filled) if how.refine else None
     moments = cv2.moments(filled if weights is None else weights, binaryImage=weights is None)
     mass = moments["m00"]
@@ -183,7 +183,7 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     _, sides, _ = cv2.minAreaRect(outline)  # runs through the centres of the outermost pixels
     seen = (filled > 0).astype(np.float32) if weights is None else weights
     cut = min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0]
-    return found | {
+    return panel | {
         "x": left + x0 + centre[0],
         "y": top + y0 + centre[1],
         "angle": angle,

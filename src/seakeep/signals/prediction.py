@@ -112,15 +112,15 @@ def draw_waves(
     def futures(values: FloatArray) -> FloatArray:
         deviations, size = values - values.mean(), values.size
         order = max(1, min(_memory(deviations), size // 3))
-        found = reflections(deviations, order)
-        own = whitening(found)
+        coefficients = reflections(deviations, order)
+        own = whitening(coefficients)
         expected = continued(deviations, own[None], np.zeros((1, number)))[0]
         left = scipy.signal.lfilter(own, [1.0], deviations)[order:]
         power = math.sqrt(size / (size - order)) * left.std()
         apart = rng.standard_normal((pairs, order)) / np.sqrt(
             np.maximum(size - 3 - np.arange(1, order + 1), 1)
         )
-        filters = whitening(np.tanh(np.arctanh(np.clip(found, -WHOLLY, WHOLLY)) + apart))
+        filters = whitening(np.tanh(np.arctanh(np.clip(coefficients, -WHOLLY, WHOLLY)) + apart))
         innovations = power * rng.standard_normal((pairs, number))
         errors = continued(deviations, filters, innovations) - expected
         middle = values.mean() + expected

@@ -34,7 +34,6 @@ from seakeep.signals.calculus import predicted_extension
 from seakeep.signals.lags import correlation_peak, peak_place
 from seakeep.signals.leakage import is_regular
 from seakeep.signals.waves import encounter_period, welch_segments
-from seakeep.sizes import MOST_PLACES, MOST_TERMS
 from seakeep.waves import group_speed, phase_speed, wavenumber
 
 EARLIEST = 1e-3
@@ -213,6 +212,9 @@ def effective_celerity(
     return EffectiveCelerity(apart / lag, lag, height, bounds)
 
 
+MOST_PLACES, MOST_TERMS = 100_000, 4000
+"""Distances tried for a pair of probes, and polynomials in the distance of a carried wave: beyond
+them positions are not in metres, or the record is sampled far finer than its waves."""
 GROUPS = 10
 """Groups of frequencies, each left out once for the spread."""
 NEIGHBOURS = 4
@@ -291,16 +293,16 @@ class Misplaced:
     ----------
     probe, other : str
         The probe, and the one that it was compared with.
-    found : ProbeSeparation
+    separation : ProbeSeparation
         From `other` to `probe`.
-    sure : bool
+    certain : bool
         Whether it is this probe: the other one agrees with a third, and this one with none.
     """
 
     probe: str
     other: str
-    found: ProbeSeparation
-    sure: bool
+    separation: ProbeSeparation
+    certain: bool
 
 
 def misplaced_probes(
@@ -358,20 +360,20 @@ def misplaced_probes(
     pairs = list(pairwise(names))
     if len(names) > 2:
         pairs.append((names[0], names[-1]))
-    found = {
+    separations = {
         (a, b): probe_separation(telling[a], telling[b], dt, depth, positions[b] - positions[a])
         for a, b in pairs
     }
-    against = [pair for pair, each in found.items() if each.disagrees]
-    backed = {end for pair, each in found.items() if each.known and pair not in against
+    against = [pair for pair, each in separations.items() if each.disagrees]
+    backed = {end for pair, each in separations.items() if each.known and pair not in against
               for end in pair}  # fmt: skip
     out: dict[tuple[str, ...], Misplaced] = {}
-    for a, b in sorted(against, key=lambda pair: found[pair].spread):
+    for a, b in sorted(against, key=lambda pair: separations[pair].spread):
         if a not in backed and b in backed:
-            out.setdefault((a,), Misplaced(a, b, found[a, b].reversed(), sure=True))
+            out.setdefault((a,), Misplaced(a, b, separations[a, b].reversed(), certain=True))
         else:
-            sure = b not in backed and a in backed
-            out.setdefault((b,) if sure else (a, b), Misplaced(b, a, found[a, b], sure))
+            certain = b not in backed and a in backed
+            out.setdefault((b,) if certain else (a, b), Misplaced(b, a, separations[a, b], certain))
     return list(out.values())
 
 
@@ -432,8 +434,8 @@ def probe_separation(
     >>> omega, phase = 2 * np.pi * np.linspace(0.3, 1.0, 80), rng.uniform(0, 6.28, 80)
     >>> t, k = np.arange(0, 200, 0.1), wavenumber(omega, 3.6)
     >>> waves = lambda x: np.cos(np.outer(t, omega) - k * x + phase).sum(axis=1)
-    >>> found = probe_separation(waves(0.0), waves(3.85), 0.1, 3.6, stated=3.67)
-    >>> round(found.separation, 2)
+    >>> result = probe_separation(waves(0.0), waves(3.85), 0.1, 3.6, stated=3.67)
+    >>> round(result.separation, 2)
     3.85
     """
     a, b = as_pair(first, second, minimum=64, moving=True)
@@ -454,16 +456,16 @@ def probe_separation(
     fine = best + step * np.arange(-2 * FINER, 2 * FINER + 1) / FINER
     scores = _scores(cross, power, k, fine)
     total = scores.sum(axis=0)
-    found, *without = (
+    separation, *without = (
         fine[0] + peak_place(values) * step / FINER for values in (total, *(total - scores))
     )
     left_out = np.array(without)
     count = GROUPS
     spread = np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean()) ** 2))
-    turned = np.abs(1.0 - np.exp(1j * k * (found - place))) ** 2
+    turned = np.abs(1.0 - np.exp(1j * k * (separation - place))) ** 2
     weight = np.abs(cross)
     return ProbeSeparation(
-        separation=float(found),
+        separation=float(separation),
         spread=float(spread),
         correlation=float(total.max()),
         stated=place,
@@ -481,8 +483,8 @@ def _spectra(
     cross = np.conj(first) * second
     norm = float(np.sqrt(np.sum(np.abs(first[1:]) ** 2) * np.sum(np.abs(second[1:]) ** 2)))
     smooth = np.convolve(np.abs(cross), np.ones(9) / 9, mode="same")
-    kept = (smooth > ENERGY * smooth[1:].max()) & (frequency > 0)
-    return cross[kept], norm, wavenumber(2 * np.pi * frequency[kept], depth)
+    energetic = (smooth > ENERGY * smooth[1:].max()) & (frequency > 0)
+    return cross[energetic], norm, wavenumber(2 * np.pi * frequency[energetic], depth)
 
 
 def _scores(cross: ComplexArray, norm: float, k: FloatArray, distances: FloatArray) -> FloatArray:
@@ -498,8 +500,8 @@ def _scores(cross: ComplexArray, norm: float, k: FloatArray, distances: FloatArr
     for each in range(GROUPS):
         own = group == each
         turned = cross[own] * np.exp(1j * np.outer(starts, k[own]))
-        found = turned @ np.exp(1j * np.outer(k[own], offsets))
-        out[each] = found.real.ravel()[: distances.size] / norm
+        scores = turned @ np.exp(1j * np.outer(k[own], offsets))
+        out[each] = scores.real.ravel()[: distances.size] / norm
     return out
 
 
@@ -748,13 +750,13 @@ def _carried(
 
 def _continued(deviations: FloatArray, delay: float, period: float) -> tuple[FloatArray, int]:
     """Lengthen at both ends by predicted waves that fade out once no delay reaches them."""
-    kept, fading = int(np.ceil(delay + period)), int(np.ceil(4.0 * period))
+    whole, fading = int(np.ceil(delay + period)), int(np.ceil(4.0 * period))
     order = min(int(np.ceil(2.0 * period)), 500)
-    padding = kept + fading
+    padding = whole + fading
     extended = predicted_extension(
         deviations, padding, fitted=max(8 * order, 64), order=order, fade=False
     )
     fade = 0.5 * (1.0 + np.cos(np.pi * np.arange(1, fading + 1) / (fading + 1)))
-    extended[padding + deviations.shape[0] + kept :] *= fade[:, None]
+    extended[padding + deviations.shape[0] + whole :] *= fade[:, None]
     extended[:fading] *= fade[::-1, None]
     return extended, padding

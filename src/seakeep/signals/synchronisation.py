@@ -84,11 +84,11 @@ class Clock:
         """One line for people: offset and drift with their errors, and where they come from."""
         if not self.known:
             return self.method
-        found = (
+        words = (
             f"{1e3 * self.offset:+z.2f}{_error(1e3 * self.offset_error, 2)} ms, "
             f"{1e6 * self.drift:+z.1f}{_error(1e6 * self.drift_error, 1)} ppm"
         )
-        return f"{found} ({self.method}, n = {self.count})"
+        return f"{words} ({self.method}, n = {self.count})"
 
 
 def _error(value: float, digits: int) -> str:
@@ -98,23 +98,23 @@ def _error(value: float, digits: int) -> str:
 
 def _line(own: FloatArray, reference: FloatArray, errors: FloatArray | None) -> Clock:
     """Straight line of one clock over another, outliers left out."""
-    kept = np.ones(own.size, dtype=bool)
+    inliers = np.ones(own.size, dtype=bool)
     for _ in range(5):
-        centre = float(reference[kept].mean())
-        x = reference[kept] - centre
-        y = own[kept] - reference[kept]
+        centre = float(reference[inliers].mean())
+        x = reference[inliers] - centre
+        y = own[inliers] - reference[inliers]
         spread = float(x @ x)
         drift = float(x @ y) / spread if x.size > 1 and spread > 0 else 0.0
         level = float(y.mean())
         residual = (own - reference) - level - drift * (reference - centre)
-        scale = 1.4826 * float(np.median(np.abs(residual[kept]))) + 1e-9
+        scale = 1.4826 * float(np.median(np.abs(residual[inliers]))) + 1e-9
         updated = np.abs(residual) <= 5.0 * scale
-        if kept.sum() < 5 or updated.sum() < 3 or np.array_equal(updated, kept):
+        if inliers.sum() < 5 or updated.sum() < 3 or np.array_equal(updated, inliers):
             break
-        kept = updated
-    count = int(kept.sum())
-    rms = float(np.sqrt(np.mean(residual[kept] ** 2)))
-    formal = 0.0 if errors is None else float(np.sqrt(np.mean(errors[kept] ** 2)))
+        inliers = updated
+    count = int(inliers.sum())
+    rms = float(np.sqrt(np.mean(residual[inliers] ** 2)))
+    formal = 0.0 if errors is None else float(np.sqrt(np.mean(errors[inliers] ** 2)))
     sigma = max(rms * np.sqrt(count / (count - 2)) if count > 2 else 0.0, formal)
     drift_error = sigma / np.sqrt(spread) if spread > 0 else float("nan")
     offset_error = float(np.hypot(sigma / np.sqrt(count), centre * drift_error))
@@ -173,11 +173,11 @@ def clock_from_pulses(
         record(reference_trigger, reference_time, "the reference"),
     )
     names = "the logger's trigger", "the reference's trigger"
-    found = [find_pulses(*side, name) for side, name in zip(sides, names, strict=True)]
-    *chosen, modulus = match_pulses(found[0][0], found[1][0], expected_offset)
-    matched = [centres[at] for (centres, _), at in zip(found, chosen, strict=True)]
+    pulses = [find_pulses(*side, name) for side, name in zip(sides, names, strict=True)]
+    *chosen, modulus = match_pulses(pulses[0][0], pulses[1][0], expected_offset)
+    matched = [centres[at] for (centres, _), at in zip(pulses, chosen, strict=True)]
     fast = int(np.median(np.diff(sides[1][1])) <= np.median(np.diff(sides[0][1])))
-    template = pulse_template(*sides[fast], found[fast][1], matched[fast])
+    template = pulse_template(*sides[fast], pulses[fast][1], matched[fast])
     timed = [time_pulses(*side, at, template) for side, at in zip(sides, matched, strict=True)]
     (own, own_error), (reference, reference_error) = timed
     errors = np.hypot(own_error, reference_error)

@@ -532,8 +532,8 @@ def wave_statistics(series: npt.ArrayLike, dt: float) -> WaveStatistics:
     """
     peak = peak_period(series, dt)
     frequency, density = wave_spectrum(series, dt)
-    kept = frequency <= 5.0 / peak  # beyond, noise times f² would rule the second moment
-    moments = [float(np.sum(frequency[kept] ** n * density[kept])) for n in (0, 2)]
+    below = frequency <= 5.0 / peak  # beyond, noise times f² would rule the second moment
+    moments = [float(np.sum(frequency[below] ** n * density[below])) for n in (0, 2)]
     return WaveStatistics(
         significant_height=significant_height(series),
         peak_period=peak,

@@ -13,8 +13,6 @@ from seakeep.signals.time_axis import instant_text, span_text
 from seakeep.study.comparison import instant_of
 from seakeep.study.plan import between
 
-__all__ = ["calibration_parts"]
-
 
 def calibration_parts(
     campaign: Campaign,
@@ -51,12 +49,12 @@ def calibration_parts(
     for option, stated in (("--start", start), ("--stop", stop)):
         if stated is None:
             continue
-        found = edges[option] = instant_of(stated, campaign, runs.values(), option)
-        inside = any(begin <= found <= end for begin, end in spans.values())
-        if not (inside or (option == "--stop" and found == math.inf)):
+        instant = edges[option] = instant_of(stated, campaign, runs.values(), option)
+        inside = any(begin <= instant <= end for begin, end in spans.values())
+        if not (inside or (option == "--stop" and instant == math.inf)):
             known = ", ".join(f"{name}: {span_text(*span, dt)}" for name, span in spans.items())
             raise RequestError(
-                f"{option} {stated} ({instant_text(found, dt)} s) lies in none of the runs "
+                f"{option} {stated} ({instant_text(instant, dt)} s) lies in none of the runs "
                 f"({known}). Name an instant inside, or leave {option} out."
             )
     if len(edges) == 2 and edges["--start"] >= edges["--stop"]:

@@ -12,9 +12,8 @@ import numpy as np
 import xarray as xr
 
 from seakeep import metrics, statistics
-from seakeep.arrays import whole_number
+from seakeep.arrays import Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
-from seakeep.campaign.prepare import Progress
 from seakeep.check.parts import samples_in
 from seakeep.conventions import displayed, is_elevation
 from seakeep.errors import DataError, RequestError, warn

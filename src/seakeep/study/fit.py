@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.campaign import Campaign, load_prepared
-from seakeep.campaign.prepare import Progress
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, Spec, outside_training
@@ -224,21 +224,21 @@ def fit_baselines(
         prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
     runs = training_runs(prepared)
     period, dt = campaign.encounter_period(), float(next(iter(runs.values())).attrs["dt"])
-    found: dict[str, Model] = {}
+    models: dict[str, Model] = {}
     for kind in (kind for kind, each in KINDS.items() if each.role == "reference"):
         recommended = getattr(KINDS[kind], "recommended", None)
         spec: Any = KINDS[kind]() if recommended is None else recommended(period, dt)
         try:
             if beside is not None:
                 spec = replace(spec, **_input_map(spec, beside.settings))
-            found[kind] = spec.fit(runs, states, inputs)
+            models[kind] = spec.fit(runs, states, inputs)
         except SeakeepError as error:
             warn(
                 f"baseline '{kind}' is left out: with its recommended settings, {error} To compare "
                 f"with one of other settings, state them in [models.{kind}], fit it with --model "
                 f"{kind}, and name its file beside the model's."
             )
-    return found
+    return models
 
 
 def _input_map(spec: Any, settings: Any) -> dict[str, Any]:
@@ -292,7 +292,7 @@ def repeats_of(
     missing = [name for name in spans if name not in tested]
     prepared = dict(tested) | (load_prepared(campaign, names=missing) if missing else {})
     pieces = {name: between(prepared[name], span) for name, span in spans.items()}
-    found: dict[str, Repeat] = {}
+    repeats: dict[str, Repeat] = {}
     for name, run in tested.items():
         part = run
         if "test_span" in run.attrs:
@@ -303,8 +303,8 @@ def repeats_of(
         enough = name not in spans or part.sizes["time"] >= model.history_samples
         if enough and known[name].waves != "regular":
             repeat = find_repeat(model.inputs, pieces, name, part, model.dt)
-            found |= {} if repeat is None else {name: repeat}
-    return found
+            repeats |= {} if repeat is None else {name: repeat}
+    return repeats
 
 
 def warn_of_repeats(model: Model, campaign: Campaign, tested: Mapping[str, xr.Dataset]) -> None:
@@ -362,16 +362,16 @@ def find_repeat(
         whole = all(np.all(np.isfinite(each)) for each in (*records.values(), test[channel].values))
         if not (records and whole) or min(test.sizes["time"], *map(len, records.values())) < 8:
             continue
-        if (found := find_leakage(list(records.values()), test[channel].values, dt)) is not None:
-            source = list(records)[found.training]
+        if (leakage := find_leakage(list(records.values()), test[channel].values, dt)) is not None:
+            source = list(records)[leakage.training]
             return Repeat(
                 run=name,
                 input=channel,
-                share=found.share,
-                start=float(test["time"][0]) + found.test_start,
+                share=leakage.share,
+                start=float(test["time"][0]) + leakage.test_start,
                 source=source,
-                source_start=float(pieces[source]["time"][0]) + found.training_start,
-                phase=found.phase,
-                correlation=found.correlation,
+                source_start=float(pieces[source]["time"][0]) + leakage.training_start,
+                phase=leakage.phase,
+                correlation=leakage.correlation,
             )
     return None

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import whole_number
+from seakeep.arrays import Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
-from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.labelled import channel_matrix

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.campaign import load_prepared
-from seakeep.campaign.prepare import Progress
 from seakeep.check.parts import whole_span
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Needs, Spec

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Progress
 from seakeep.campaign import read_campaign, write_prepared
-from seakeep.campaign.prepare import Progress
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, check_report, is_there, replacing
 from seakeep.models.executor import on_this_machine, submitting
@@ -190,11 +190,11 @@ def reproduce(
         text = campaigns[0].read_text(encoding="utf-8")
         _write(campaigns[1], detrended_text(text), CAMPAIGN_FILE)
     prepare_campaigns(campaigns, executor, progress)
-    found = {}
+    results = {}
     for act in acts:
         path = out / act.name / "study.toml"
         _write(path, study_text(act, counts, seed), STUDY_FILE)
-        found[act.name] = run_study(
+        results[act.name] = run_study(
             read_study(path),
             path.parent,
             executor=executor,
@@ -203,7 +203,7 @@ def reproduce(
             notes={"preparation_note": f"{act.sentence} {NOTE}", "waves_note": WAVES},
             finished=None if finished is None else partial(finished, act),
         )
-    return found
+    return results
 
 
 def read_reproduction(out: Path | str) -> dict[str, StudyResult]:
@@ -246,8 +246,8 @@ def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:
             "install 'seakeep[tank]'"
         ) from error
     settings = with_waves(default_settings(), seed, "equal")
-    made = json.dumps({"settings": settings.model_dump(mode="json"), "versions": versions()})
-    digest = hashlib.sha256(made.encode()).hexdigest()
+    content = json.dumps({"settings": settings.model_dump(mode="json"), "versions": versions()})
+    digest = hashlib.sha256(content.encode()).hexdigest()
     mark = folder / "played.txt"
     text = f"{MARK}: {PLAYED}\n{digest}\n"
     if not mark.exists() or mark.read_bytes() != text.encode():
@@ -309,13 +309,13 @@ def detrended_text(campaign: str) -> str:
         text = re.sub(
             rf'^(from|position) = "{name}"', rf'\1 = "{name}_with_drift"', text, flags=re.M
         )
-    made = [
+    texts = [
         f'[derived.{name}]\nfrom = "{name}_with_drift"\nstep = "band_pass"\n'
         f"band = [{HIGH_PASS:g}, {HIGHEST:g}]  # Hz\n"
         for name in SLOW
     ]
     head = f"# {MARK}: {CAMPAIGN_FILE}\n# campaign.toml without slow drift in three channels.\n"
-    return "\n".join([head + text, *made])
+    return "\n".join([head + text, *texts])
 
 
 STUDY = """\

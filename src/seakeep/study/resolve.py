@@ -199,7 +199,7 @@ def resolve_model(
         if "alignment" in known and (alignment or (not aligned and "alignment" not in stated)):
             filled = replace(cast("Any", filled), alignment=alignment)
     data = {"encounter_period": encounter_period, "dt": dt}
-    spec = _made(kind, filled, {**from_study, **stated}, data).resolved(dt, encounter_period)
+    spec = _spec_of(kind, filled, {**from_study, **stated}, data).resolved(dt, encounter_period)
     open_spec = left_open(spec)
     if open_spec and folds != "auto" and "folds" not in (stated.get("select") or {}):
         spec = replace(open_spec, select=replace(open_spec.select or Select(), folds=folds))
@@ -247,7 +247,7 @@ def _kind_of(settings: ModelSettings) -> type[Spec]:
     return KINDS[settings.kind]
 
 
-def _made(
+def _spec_of(
     kind: type[Spec], filled: Spec | None, given: dict[str, Any], data: Mapping[str, float | None]
 ) -> Spec:
     for name, table in TABLES.items():

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import xarray as xr
 
-from seakeep.campaign.prepare import Progress
+from seakeep.arrays import Progress
 from seakeep.errors import SeakeepError, warn
 from seakeep.models.executor import WorkerLostError, as_finished
-from seakeep.sizes import LONG_CELLS, MOST_CELLS, check_size
 from seakeep.study.describe import describe_study, words_of_repeats
 from seakeep.study.judge import judge, words_of_lost
 from seakeep.study.plan import Plan, make_plan, named, training_samples, warn_of_slow_study
@@ -178,16 +177,10 @@ def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
 
 
 def _taken(plan: Plan) -> str:
-    """Say how much will be forecast; refuse what ends in no week, and warn of hours."""
+    """Say how much will be forecast."""
     members = sum(each.n_members for each in plan.models.values())
     windows = [each for test in plan.tests.values() for each in test]
     judged = [each.steps for t in plan.training for each in windows if t.may_test(each.run)]
-    check_size(
-        f"{len(plan.models)} models of {members} members in all (models.NAME.n_members), "
-        f"{len(plan.training)} training sets (training.windows) and {len(windows)} windows "
-        "(tests.NAME.windows) make", members * len(judged), MOST_CELLS, "forecasts",
-        "Lower one of the keys in brackets.", LONG_CELLS,
-    )  # fmt: skip
     mebibytes = 8 * members * sum(judged) * len(plan.states) / 2**20
     return f"{members * len(judged)} forecasts of {mebibytes:.3g} MiB"
 

@@ -23,7 +23,7 @@ from seakeep.core import metrics
 from seakeep.errors import DataError, SeakeepError
 from seakeep.formats.netcdf import opened_netcdf
 from seakeep.models import Spec
-from seakeep.models.calibration import Judged, envelope_of, found_margin, held_out
+from seakeep.models.calibration import Judged, envelope_of, held_out, learn_margin
 from seakeep.models.engine import group_series, read_groups
 from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
@@ -277,7 +277,7 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
     floor: FloatArray | None = nothing
     law: FloatArray | None = np.tile(nothing, (4, 1))
     if judged:
-        margin, floor, law = found_margin(judged, statistics.level, statistics.scale)
+        margin, floor, law = learn_margin(judged, statistics.level, statistics.scale)
         out = {key: ("channel", getattr(margin, key)) for key in keys}
     out["windows"] = sum(len(each.measured) for each in judged)
     if statistics.scale != "constant":

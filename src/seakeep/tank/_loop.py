@@ -230,7 +230,7 @@ def integrate(
     v = np.zeros((dofs, steps + 1 + length))
     slow = np.zeros(steps + 1)
     q[:, 0], v[:, length] = start[0], start[1]
-    now, ahead, force, held = np.zeros(dofs), np.zeros(dofs), np.zeros(dofs), np.zeros(dofs)
+    now, ahead, force, previous = np.zeros(dofs), np.zeros(dofs), np.zeros(dofs), np.zeros(dofs)
     real, imag = np.zeros((3, count)), np.zeros((3, count))
     slopes, state = np.zeros((2, 4, dofs)), np.zeros((2, dofs))
     moved = np.zeros((2, count))
@@ -245,10 +245,10 @@ def integrate(
             state[0], state[1] = q[:, step], v[:, origin]
             if stage > 0:
                 state += fraction * dt * slopes[:, stage - 1]
-            held[:] = (1.0 - fraction) * now + fraction * ahead
+            previous[:] = (1.0 - fraction) * now + fraction * ahead
             for p in range(pairs.shape[0]):
-                held[pairs[p, 0]] += kernel[p, length] * state[1, pairs[p, 1]]
-            force[:] = -held
+                previous[pairs[p, 0]] += kernel[p, length] * state[1, pairs[p, 1]]
+            force[:] = -previous
             _body_forces(state[0], state[1], stiffness, linear, quadratic, pool, lines, force)
             reached = _wave_forces(
                 real[part], imag[part], state[0, 0], state[1, 0], place,
@@ -259,7 +259,7 @@ def integrate(
             for i in range(dofs):
                 slopes[1, stage, i] = np.sum(inverse_mass[i] * force)
             if stage == 0:
-                a[:, step], memory[:, step], slow[step] = slopes[1, 0], held, reached
+                a[:, step], memory[:, step], slow[step] = slopes[1, 0], previous, reached
                 if step == steps:
                     return q, v[:, length:], a, memory, slow, -1, -1
         place = slow[step]

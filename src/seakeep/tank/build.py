@@ -25,9 +25,6 @@ from seakeep.tank.hydrodynamics import CONVENTIONS, POOL_MODES, RIGID
 from seakeep.tank.settings import HullSettings, default_settings, read_tank
 from seakeep.waves import GRAVITY, group_speed, wavenumber
 
-__all__ = ["build_hydrodynamics", "default_frequencies"]
-
-
 DIRECTIONS = 96
 FAR_FIELD = ("omega", "part", "moment", "wave_or_motion", "wave_or_motion_too")
 

@@ -15,17 +15,6 @@ from seakeep.files import MARK, replacing, write_netcdf
 from seakeep.tank.settings import RunPlan, TankSettings
 from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, SIDE_VIEW
 
-__all__ = [
-    "CAMPAIGN",
-    "FIRST_LINE",
-    "RAW",
-    "TRUTH",
-    "campaign_text",
-    "write_dataset",
-    "write_record",
-    "write_text",
-]
-
 CAMPAIGN, RAW, TRUTH = "campaign", "raw file", "truth"
 """Kinds of files, as their marks say it."""
 

@@ -36,21 +36,6 @@ from seakeep.tank.seas import Sea
 from seakeep.tank.settings import DriftSettings, TankSettings
 from seakeep.waves import GRAVITY, wavenumber
 
-__all__ = [
-    "DivergenceError",
-    "Motion",
-    "Rig",
-    "assemble_rig",
-    "drift_coefficient",
-    "drift_envelopes",
-    "linear_response",
-    "mean_drift",
-    "sea_losses",
-    "simulate",
-    "tensions",
-]
-
-
 LIMITS = {"surge": 20.0, "heave": 2.0, "pitch": 1.2, "piston": 2.0, "slosh": 2.0}
 """Beyond these (m, rad) a simulation has left the physics it was made for."""
 
@@ -183,13 +168,13 @@ def assemble_rig(settings: TankSettings, hydro: Hydrodynamics | None = None) -> 
         step is too large.
     """
     coefficients = hydro or load_hydrodynamics(settings.vessel.hydrodynamics)
-    for name, wanted, made in (
+    for name, wanted, built in (
         ("water_depth", settings.facility.water_depth, coefficients.water_depth),
         ("density", settings.facility.density, coefficients.density),
     ):
-        if abs(wanted - made) > 1e-6 * made:
+        if abs(wanted - built) > 1e-6 * built:
             raise RequestError(
-                f"facility.{name} is {wanted:g} and the hydrodynamics file was made for {made:g}. "
+                f"facility.{name} is {wanted:g} and the hydrodynamics file was made for {built:g}. "
                 "Set facility to the file's value, or build a file for this one: "
                 "python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
             )
@@ -234,11 +219,11 @@ def sea_losses(rig: Rig, sea: Sea) -> FloatArray:
         power = 0.5 * np.abs(sea.omega * sea.amplitude * (flow @ motion.T)) ** 2
         total = power.sum(axis=1)
         steady = power.max(axis=1) > 0.5 * total
-        found = drag * np.where(steady, 8 * np.sqrt(2) / (3 * np.pi), np.sqrt(8 / np.pi))
-        found = found * np.sqrt(total)
-        if np.allclose(found, weights, rtol=1e-9, atol=1e-12):
+        damping = drag * np.where(steady, 8 * np.sqrt(2) / (3 * np.pi), np.sqrt(8 / np.pi))
+        damping = damping * np.sqrt(total)
+        if np.allclose(damping, weights, rtol=1e-9, atol=1e-12):
             break
-        weights = found
+        weights = damping
         losses = rig.linear_damping + (flow.T * weights) @ flow
     return losses
 
@@ -307,8 +292,8 @@ def drift_envelopes(rig: Rig, sea: Sea) -> tuple[FloatArray, ComplexArray]:
     first, second = np.hsplit(factor, 2)
     mixed = first @ second.conj().T
     values, vectors = np.linalg.eigh(0.5 * (mixed + mixed.conj().T))
-    kept = np.abs(values) > 1e-6 * np.abs(values).max()
-    return values[kept], (basis @ vectors[:, kept]).conj().T
+    significant = np.abs(values) > 1e-6 * np.abs(values).max()
+    return values[significant], (basis @ vectors[:, significant]).conj().T
 
 
 def linear_response(rig: Rig, omega: npt.ArrayLike) -> npt.NDArray[np.complex128]:

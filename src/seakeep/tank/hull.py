@@ -20,8 +20,6 @@ from seakeep.errors import RequestError
 from seakeep.tank.settings import HullSettings, PoolGeometry
 from seakeep.waves import GRAVITY
 
-__all__ = ["HullMesh", "Hydrostatics", "hull_mesh", "hydrostatics"]
-
 IntArray = npt.NDArray[np.int64]
 
 

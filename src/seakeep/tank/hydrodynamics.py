@@ -21,20 +21,6 @@ from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import reading
 
-__all__ = [
-    "CONVENTIONS",
-    "Hydrodynamics",
-    "Kernel",
-    "Pool",
-    "excitation_at",
-    "far_field_at",
-    "impedance",
-    "load_hydrodynamics",
-    "radiation_kernel",
-    "response",
-]
-
-
 CONVENTIONS = {
     "format": "seakeep-hydrodynamics 2",
     "time_convention": "exp(-i omega t)",
@@ -257,8 +243,8 @@ def _inside(hydro: Hydrodynamics, omega: npt.ArrayLike) -> FloatArray:
 def _between(hydro: Hydrodynamics, values: ComplexArray, omega: npt.ArrayLike) -> ComplexArray:
     """Values between the solver's frequencies, by cubic splines."""
     parts = np.stack([values.real, values.imag], axis=-1)
-    found = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(_inside(hydro, omega))
-    return np.asarray(found[..., 0] + 1j * found[..., 1], dtype=complex)
+    spline = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(_inside(hydro, omega))
+    return np.asarray(spline[..., 0] + 1j * spline[..., 1], dtype=complex)
 
 
 def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:

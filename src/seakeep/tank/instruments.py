@@ -20,8 +20,6 @@ from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
 from seakeep.tank.settings import ClockSettings, Logger, SlapSettings, TankSettings
 
-__all__ = ["Played", "clock_instants", "record_run", "slap_pulses", "trigger"]
-
 Columns = dict[str, tuple[str, FloatArray]]
 """Unit and values of each column of a raw file."""
 

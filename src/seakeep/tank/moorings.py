@@ -16,8 +16,6 @@ from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.toml import Finite, NotNegative, Positive, Table
 
-__all__ = ["KINDS", "LineSettings", "line_table", "mooring_stiffness"]
-
 Elasticity = tuple[float, float, float]
 """Coefficients of a tension that is a cubic in the stretch: N/m, N/m², N/m³."""
 Point = Annotated[tuple[Finite, Finite], Field(strict=False)]

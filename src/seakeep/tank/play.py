@@ -32,8 +32,6 @@ from seakeep.tank.seas import Sea, sea_of_run
 from seakeep.tank.settings import TankSettings
 from seakeep.tank.video import SIDE_VIEW, render_side_view
 
-__all__ = ["check_settings", "generator", "play", "play_run", "truth"]
-
 CAMPAIGN_FILE = "campaign.toml"
 LOGGERS = ("wave_probes", "mru", "loads", "video", "all")
 SINGLE_RATE = 100.0  # Hz, where all instruments share a logger
@@ -85,14 +83,14 @@ def play_run(settings: TankSettings, name: str, rig: Rig | None = None) -> Playe
 
     A rig from :func:`check_settings` saves its making for each run.
     """
-    made = assemble_rig(settings) if rig is None else rig
-    sea = _sea(settings, made, name)
+    assembled = assemble_rig(settings) if rig is None else rig
+    sea = _sea(settings, assembled, name)
     run = settings.runs[name]
     clocks = settings.instruments.clocks.values()
     beyond = max(abs(c.offset) + 1e-6 * abs(c.drift) * run.length for c in clocks) + MARGIN
-    margin = made.step * np.ceil(beyond / made.step)
-    motion = simulate(made, sea, run.length + 2 * margin, begin=-margin)
-    return Played(settings, made, sea, motion, run.length)
+    margin = assembled.step * np.ceil(beyond / assembled.step)
+    motion = simulate(assembled, sea, run.length + 2 * margin, begin=-margin)
+    return Played(settings, assembled, sea, motion, run.length)
 
 
 POOL_AND_DRIFT = {

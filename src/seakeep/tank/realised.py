@@ -27,16 +27,6 @@ from seakeep.tank.play import generator, play_run, truth
 from seakeep.tank.settings import TankSettings
 from seakeep.waves import group_speed, phase_speed, wavelength_to_frequency
 
-__all__ = [
-    "PAPER",
-    "Realised",
-    "comparison",
-    "matrix_rows",
-    "paper_peak",
-    "realise",
-    "realise_runs",
-]
-
 PAPER = {
     "significant height": (0.16, 0.01, "m"),
     "zero-up-crossing period": (1.64, 0.05, "s"),

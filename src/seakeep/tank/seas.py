@@ -16,17 +16,6 @@ from seakeep.errors import RequestError
 from seakeep.tank.settings import FacilitySettings, RunPlan, SpectrumSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
 
-__all__ = [
-    "Sea",
-    "irregular_sea",
-    "jonswap",
-    "pierson_moskowitz",
-    "regular_sea",
-    "sea_of_run",
-    "spectral_density",
-]
-
-
 BLOCK = 512  # instants evaluated at a time at a fixed place
 
 
@@ -163,8 +152,8 @@ def regular_sea(
     shift = rng.uniform(0.03, 0.06, 2)
     omega = centre * np.array([1.0, 1.0 - shift[0], 1.0 + shift[1]])
     amplitude = 0.5 * height * np.array([1.0, unsteadiness, unsteadiness])
-    kept = slice(0, 3 if unsteadiness > 0 else 1)
-    omega, amplitude, phase = omega[kept], amplitude[kept], phase[kept]
+    components = slice(0, 3 if unsteadiness > 0 else 1)
+    omega, amplitude, phase = omega[components], amplitude[components], phase[components]
     return Sea(omega, amplitude, phase, wavenumber(omega, depth))
 
 

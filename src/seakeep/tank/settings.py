@@ -19,25 +19,6 @@ from seakeep.files import read_bytes
 from seakeep.tank.moorings import LineSettings
 from seakeep.toml import Count, Finite, NotNegative, Pair, Positive, Table, read_toml, validated
 
-__all__ = [
-    "ClockSettings",
-    "DriftSettings",
-    "FacilitySettings",
-    "HullSettings",
-    "InstrumentPlan",
-    "LineSettings",
-    "PoolGeometry",
-    "RunPlan",
-    "SimulationSettings",
-    "SpectrumSettings",
-    "TankSettings",
-    "VesselSettings",
-    "default_settings",
-    "read_tank",
-    "validate_tank",
-    "with_waves",
-]
-
 
 def _rising(band: tuple[float, float]) -> tuple[float, float]:
     if band[0] >= band[1]:

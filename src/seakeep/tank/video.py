@@ -19,17 +19,6 @@ from seakeep.errors import SeakeepError
 from seakeep.signals.panel import opencv
 from seakeep.tank.instruments import Played, clock_instants, trigger
 
-__all__ = [
-    "METRES_PER_PIXEL",
-    "PANEL",
-    "PANEL_HEIGHT",
-    "SIDE_VIEW",
-    "frame_of",
-    "pixel_of",
-    "render_side_view",
-    "side_view",
-]
-
 Image = npt.NDArray[np.uint8]
 
 WIDTH, HEIGHT = 1280, 720

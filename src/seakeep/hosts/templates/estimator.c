@@ -1,3 +1,4 @@
+{% from "facts.jinja" import N, Q, z, past, upper, follows, late, fore, lead_samples, array with context %}
 /* {{ mark }} C source; see {{ name }}_estimator.h */
 #include "{{ name }}_estimator.h"
 
@@ -10,20 +11,22 @@ enum {
     Q = {{ upper }}_INPUTS,
     M = {{ upper }}_EXTENDED,
     OLD = M - N,                /* entries of the covariance before those of this instant */
+    DELAYED = {{ upper }}_DELAYED,
+    DIRECT = {{ upper }}_DIRECT,
     DELAYS = {{ z }},
+    ROWS = {{ late + z + 1 }},                  /* of delayed regressors */
+    X_ROWS = {{ upper }}_ESTIMATES,
+    LATE = {{ late }},                  /* samples whose estimates waves to come still move */
     RECORD = {{ upper }}_RECORD,
     BEGINS = {{ begins }},      /* samples before the first prediction */
-    LEADS = {{ errors | length }}
+    LEADS = {{ errors | length }},
+    FORE = {{ fore }}                   /* inputs that are predicted before each is from its own record */
 };
 
-{% macro array(name, values) %}
-static const double {{ name }}[] = {
-{{ values | numbers }}
-};
-{% endmacro %}
-/* x' = offset + on_states [x, oldest first] + on_inputs [u, oldest first] */
+/* x' = offset + on_states [x, oldest first] + on_inputs [v, oldest first] + on_direct [w] */
 {{ array("on_states", a) }}
-{{ array("on_inputs", b) }}
+{{ array("on_inputs", b) -}}
+{{ array("on_direct", d) }}
 {{ array("offset", offset) -}}
 {{ array("process", process) -}}
 {{ array("noise", noise) -}}
@@ -31,11 +34,19 @@ static const double {{ name }}[] = {
 {{ array("spread", spread) }}
 /* Errors of free runs in training, a row per sample after the start. */
 {{ array("errors", errors) }}
+{% if foresight %}
+/* Weights that predict placed probes from one another: row, probe, probe, sample, oldest first. */
+{{ array("foresight", foresight[0]) -}}
+{{ array("input_mean", means) }}
+static const int placed[] = { {{ foresight[1] | join(", ") }} };
+enum { PLACED = {{ foresight[1] | length }}, TAPS = {{ foresight[0].shape[3] }} };
+
+{% endif %}
 #define P(i, j) e->covariance[(i) * M + (j)]
 
 static const double *input(const {{ name }}_estimator *e, int back)
 {
-    return e->inputs + (e->newest - back + RECORD) % RECORD * Q;
+    return e->inputs + (RECORD - 1 - back) * Q;
 }
 
 /* One step in time; without a prediction the newest sample is independent of those before. */
@@ -90,7 +101,7 @@ static void limit({{ name }}_estimator *e, int blind)
 static void measure({{ name }}_estimator *e, const int *rows, int count)
 {
     double root[N * N];
-    double *gain = e->gain, *cross = e->cross;
+    double *gain = e->gains[e->slot], *cross = e->cross;
     for (int i = 0; i < M; i++)
         for (int c = 0; c < count; c++)
             cross[i * N + c] = P(i, OLD + rows[c]);
@@ -159,20 +170,21 @@ static double median_frequency(const double *series, int size)
     return 0.5;
 }
 
-/* Autoregressive model of the record of an input (Burg 1975), over its last four periods. */
-static void identify({{ name }}_estimator *e, int q)
+/* Autoregressive model of the record of an input (Burg 1975), and of rows after it, over its last
+ * four periods. */
+static void identify({{ name }}_estimator *e, int q, int rows)
 {
     double *forward = e->forward, *backward = e->backward, *filter = e->filter[q];
     double mean = 0.0, least = INFINITY, most = -INFINITY, square = 0.0;
-    int size = e->filled, order = 1;
+    int size = e->filled + rows, order = 1;
     for (int t = 0; t < size; t++) {
-        double value = input(e, size - 1 - t)[q];
+        double value = input(e, e->filled - 1 - t)[q];
         mean += value / size;
         least = fmin(least, value);
         most = fmax(most, value);
     }
     for (int t = 0; t < size; t++) {
-        backward[t] = input(e, size - 1 - t)[q] - mean;
+        backward[t] = input(e, e->filled - 1 - t)[q] - mean;
         square += backward[t] * backward[t];
     }
     if (most > least)
@@ -221,21 +233,125 @@ static double continued({{ name }}_estimator *e, int q)
     return e->mean[q] + next;
 }
 
-static void predict(const {{ name }}_estimator *e, double *next)
+/* Predict rows of inputs, FORE at most. */
+static void expect({{ name }}_estimator *e, int rows)
 {
-    for (int i = 0; i < N; i++) {
-        next[i] = offset[i];
-        for (int k = 0; k < M; k++)
-            next[i] += on_states[i * M + k] * e->x[k];
-        for (int k = 0; k < (DELAYS + 1) * Q; k++)
-            next[i] += on_inputs[i * (DELAYS + 1) * Q + k] * input(e, DELAYS - k / Q)[k % Q];
+    double *out = e->inputs + RECORD * Q;
+    for (int q = 0; q < Q; q++) {
+{% if foresight %}
+        int place = 0;
+        while (place < PLACED && placed[place] != q)
+            place++;
+        for (int row = 0; place < PLACED && e->taken >= BEGINS && row < rows; row++) {
+            const double *taps = foresight + (row * PLACED + place) * PLACED * TAPS;
+            double sum = input_mean[q];
+            for (int p = 0; p < PLACED; p++)
+                for (int i = 0; i < TAPS; i++)
+                    sum += *taps++ * (input(e, TAPS - 1 - i)[placed[p]] - input_mean[placed[p]]);
+            out[row * Q + q] = sum;
+        }
+        if (place < PLACED && e->taken >= BEGINS)
+            continue;
+{% endif %}
+        identify(e, q, 0);
+        for (int row = 0; row < rows; row++)
+            out[row * Q + q] = continued(e, q);
     }
+}
+
+/* Regressors of the step from a sample so many before the newest. */
+static void drive({{ name }}_estimator *e, int back, double *direct)
+{
+    double surge[{{ [past, 1] | max }}] = { 0.0 };
+{% if follows %}
+    for (int i = 0; i < {{ past }}; i++)
+        surge[i] = e->x[(X_ROWS - 1 - back - i) * N + {{ follows.column }}];
+{% endif %}
+    {{ name }}_regressors(input(e, back + {{ upper }}_NOW), surge, e->delayed + (ROWS - back) * DELAYED, direct);
+}
+
+/* Run the mean to a sample so many before the newest, with the gains that were found for it. */
+static void advance({{ name }}_estimator *e, double *x, int back, int is_final)
+{
+    double next[N], direct[DIRECT + 1];
+    int slot = (e->slot - back + LATE + 1) % (LATE + 1);
+    const double *y = e->y[slot];
+    memcpy(next, centre, sizeof next);
+    if (e->taken >= BEGINS) {
+        drive(e, back + 1, direct);
+        for (int i = 0; i < N; i++) {
+            next[i] = offset[i];
+            for (int k = 0; k < M; k++)
+                next[i] += on_states[i * M + k] * x[k];
+            for (int k = 0; k < (DELAYS + 1) * DELAYED; k++)
+                next[i] += on_inputs[i * (DELAYS + 1) * DELAYED + k]
+                           * e->delayed[(LATE - back) * DELAYED + k];
+            for (int k = 0; k < DIRECT; k++)
+                next[i] += on_direct[i * DIRECT + k] * direct[k];
+        }
+    }
+    memmove(x, x + N, OLD * sizeof(double));
+    memcpy(x + OLD, next, sizeof next);
+    for (int c = 0, column = 0; c < N; c++) {
+        if (!isnan(y[c])) {
+            for (int i = 0; !e->plain[slot] && i < M; i++)
+                x[i] += e->gains[slot][i * N + column] * (y[c] - next[c]);
+            column++;
+        }
+        if (is_final)
+            e->innovation[c] = y[c] - next[c];
+    }
+    for (int c = 0; c < N; c++)
+        if (!isnan(y[c]) && noise[c] == 0.0)
+            x[OLD + c] = y[c];
+    memcpy(e->x + (X_ROWS - 1 - back) * N - OLD, x, M * sizeof(double));
+}
+
+/* Regressors of the samples before the first prediction. */
+static void drive_before({{ name }}_estimator *e, int back)
+{
+    double direct[DIRECT + 1];
+    for (int i = DELAYS; i > 0; i--)
+        drive(e, back + i, direct);
+}
+
+/* Bring estimates up to the newest sample: final ones, then those that waves to come move. */
+static void settle({{ name }}_estimator *e)
+{
+    double *x = e->ahead;
+    int plain = 1;
+    if (e->taken < BEGINS) {
+        advance(e, e->history, 0, 1);
+        return;
+    }
+    e->pending++;
+    if (e->pending > LATE) {
+        if (!e->begun)
+            drive_before(e, e->pending);
+        e->begun = 1;
+        advance(e, e->history, LATE, 1);
+        e->pending = LATE;
+    }
+    for (int back = 0; back < e->pending; back++)
+        plain = plain && e->plain[(e->slot - back + LATE + 1) % (LATE + 1)];
+    if (plain) {
+        if (e->pending)
+            memcpy(e->x + (X_ROWS - 1) * N, e->y[e->slot], N * sizeof(double));
+        return;
+    }
+    if (Q > 0)
+        expect(e, {{ lead_samples }});
+    if (!e->begun)
+        drive_before(e, e->pending);
+    memcpy(x, e->history, sizeof e->history);
+    for (int back = e->pending - 1; back >= 0; back--)
+        advance(e, x, back, 0);
 }
 
 int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *y)
 {
-    double sample[{{ [Q, 1] | max }}], newest[N];
-    int rows[N], count = 0, exact = 1, plain;
+    double sample[Q + 1], *newest = e->x + (X_ROWS - 1) * N;
+    int rows[N], count = 0, exact = 1, lost = 0, plain;
     for (int i = 0; i < N; i++) {
         if (isinf(y[i]))
             return 1;
@@ -243,42 +359,38 @@ int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *
         if (!isnan(y[i]))
             rows[count++] = i;
     }
-    for (int q = 0; q < Q; q++)
+    for (int q = 0; q < Q; q++) {
         if (isinf(u[q]) || (isnan(u[q]) && e->filled < 4))
             return 1;
-    for (int q = 0; q < Q; q++) {
-        sample[q] = u[q];
-        if (isnan(u[q])) {
-            identify(e, q);
-            sample[q] = continued(e, q);
-        }
+        lost = lost || isnan(u[q]);
     }
+    if (lost)
+        expect(e, 1);
+    for (int q = 0; q < Q; q++)
+        sample[q] = isnan(u[q]) ? e->inputs[RECORD * Q + q] : u[q];
     if (e->taken == 0) {
         e->partly = 1;
         for (int i = 0; i < M; i++)
-            e->x[i] = centre[i % N];
+            e->history[i] = centre[i % N];
     }
+    e->slot = (e->slot + 1) % (LATE + 1);
+    memcpy(e->y[e->slot], y, N * sizeof(double));
+    memmove(e->inputs, e->inputs + Q, (RECORD - 1) * Q * sizeof(double));
+    memcpy(e->inputs + (RECORD - 1) * Q, sample, Q * sizeof(double));
+    e->filled += e->filled < RECORD;
+    memmove(e->delayed, e->delayed + DELAYED, (ROWS - 1) * DELAYED * sizeof(double));
+    memmove(e->x, e->x + N, (X_ROWS - 1) * N * sizeof(double));
+    for (int c = 0; c < count; c++)
+        newest[rows[c]] = y[rows[c]];
     exact = exact && count == N;
     plain = exact && e->since == 0 && e->taken >= BEGINS;
+    e->plain[e->slot] = plain;
     if (!plain) {
         shift(e, e->taken >= BEGINS);
         if (e->taken >= BEGINS)
             limit(e, !(e->partly || count));
         measure(e, rows, count);
     }
-    memcpy(newest, centre, sizeof newest);
-    if (e->taken >= BEGINS)
-        predict(e, newest);
-    memmove(e->x, e->x + N, OLD * sizeof(double));
-    memcpy(e->x + OLD, newest, sizeof newest);
-    for (int i = 0; i < N; i++)
-        e->innovation[i] = y[i] - newest[i];
-    for (int i = 0; !plain && i < M; i++)
-        for (int c = 0; c < count; c++)
-            e->x[i] += e->gain[i * N + c] * e->innovation[rows[c]];
-    for (int c = 0; c < count; c++)
-        if (noise[rows[c]] == 0.0)
-            e->x[OLD + rows[c]] = y[rows[c]];
     e->complete = exact ? (e->complete < M ? e->complete + 1 : M) : 0;
     if (e->complete * N > OLD) {
         e->since = e->partly = 0;
@@ -287,37 +399,53 @@ int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *
         e->since += e->since < LEADS;
         e->partly = e->partly || count;
     }
-    e->newest = (e->newest + 1) % RECORD;
-    memcpy(e->inputs + e->newest * Q, sample, Q * sizeof(double));
-    e->filled += e->filled < RECORD;
+    settle(e);
     e->taken += e->taken < BEGINS;
     return 0;
 }
 
-const double *{{ name }}_estimated(const {{ name }}_estimator *e) { return e->x + OLD; }
+const double *{{ name }}_estimated(const {{ name }}_estimator *e) { return e->x + (X_ROWS - 1) * N; }
 
 double {{ name }}_deviation(const {{ name }}_estimator *e, int state)
 {
     return sqrt(P(OLD + state, OLD + state));
 }
 
+/* Inputs of the instant so many after the first one to come. */
+static void coming({{ name }}_estimator *e, const double *future, int at, double *u)
+{
+    for (int q = 0; q < Q; q++)
+        u[q] = future      ? future[at * Q + q]
+               : at < FORE ? e->inputs[(RECORD + at) * Q + q]
+                           : continued(e, q);
+}
+
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x)
 {
-    double next[{{ [Q, 1] | max }}];
+    int begins = {{ upper }}_U_ROWS - {{ lead_samples }};
     if (e->taken < BEGINS)
         return 1;
-    for (int row = 0; row < {{ upper }}_U_ROWS; row++)
-        memcpy(e->u_history + row * Q, input(e, {{ upper }}_U_ROWS - row), Q * sizeof(double));
-    if ({{ name }}_start(&e->model, e->x, e->u_history))
+    if (!future)
+        expect(e, FORE);
+{% if foresight %}
+    for (int p = 0; !future && p < PLACED; p++)
+        identify(e, placed[p], FORE);
+{% endif %}
+    memcpy(e->u_history, input(e, begins), begins * Q * sizeof(double));
+    for (int at = 0; at < {{ lead_samples }}; at++) {
+        double *row = e->u_history + (begins + at) * Q;
+        if (at == 0)
+            memcpy(row, input(e, 0), Q * sizeof(double));
+        else
+            coming(e, future, at - 1, row);
+    }
+    if ({{ name }}_start(&e->model, e->x + (X_ROWS - {{ upper }}_X_ROWS) * N, e->u_history))
         return 1;
-    for (int q = 0; !future && q < Q; q++)
-        identify(e, q);
     for (int step = 0; step < n; step++) {
-        const double *u = step ? next : input(e, 0);
-        if (step && future)
-            u = future + (step - 1) * Q;
-        for (int q = 0; step && !future && q < Q; q++)
-            next[q] = continued(e, q);
+        double u[Q + 1];
+        memcpy(u, input(e, 0), Q * sizeof(double));
+        if (step + {{ lead_samples }} > 0)
+            coming(e, future, step + {{ lead_samples }} - 1, u);
         if ({{ name }}_step(&e->model, u))
             return 2;
         memcpy(x + step * N, e->model.x, sizeof e->model.x);

@@ -1,7 +1,8 @@
+{% from "facts.jinja" import N, Q, s, z, n, past, upper, x_rows, u_rows, late, fore with context %}
 /* {{ mark }} C header of an estimator
  *
  * Follows a vessel sample by sample, beside {{ name }}.c: a Kalman filter on the delayed states
- * fills what was not measured, and lost inputs are predicted from their own record. Plain C99, no
+ * fills what was not measured, and lost inputs are predicted. Plain C99, no
  * memory but the struct below. Set it to zero before the first sample:
  *
  *     static {{ name }}_estimator e;
@@ -23,24 +24,29 @@ extern "C" {
 enum {
     {{ upper }}_EXTENDED = {{ N * (s + 1) }},
     {{ upper }}_RECORD = {{ record }},
-    {{ upper }}_ORDER = {{ record // 3 }}
+    {{ upper }}_ORDER = {{ (record + fore) // 3 }},
+    {{ upper }}_ESTIMATES = {{ late + ([s + 1, x_rows, past + z + 1] | max) }}
 };
 
 /* All that an estimator remembers. To save and restore it, copy it as it is. */
 typedef struct {
-    double x[{{ upper }}_EXTENDED]; /* estimates, oldest row first; the last one is of this instant */
+    double x[{{ upper }}_ESTIMATES * {{ upper }}_STATES]; /* estimates, oldest row first; the last one is of this instant */
     double covariance[{{ upper }}_EXTENDED * {{ upper }}_EXTENDED]; /* of their errors */
     double innovation[{{ upper }}_STATES]; /* measurement less prediction, NaN without one */
-    double inputs[{{ [record * Q, 1] | max }}]; /* a ring */
-    int newest, filled, taken, since, partly, complete;
+    double inputs[({{ upper }}_RECORD + {{ fore }}) * {{ [Q, 1] | max }}]; /* measured, then predicted */
+    double history[{{ upper }}_EXTENDED]; /* estimates that no wave to come moves */
+    double delayed[{{ [n, 1] | max * (late + z + 1) }}];
+    /* Of the samples that waves to come move: */
+    double y[{{ late + 1 }}][{{ upper }}_STATES], gains[{{ late + 1 }}][{{ upper }}_EXTENDED * {{ upper }}_STATES];
+    int plain[{{ late + 1 }}], slot, pending, begun;
+    int filled, taken, since, partly, complete;
     /* What lies below is work space. */
-    double gain[{{ upper }}_EXTENDED * {{ upper }}_STATES];
-    double cross[{{ upper }}_EXTENDED * {{ upper }}_STATES];
-    double forward[{{ upper }}_RECORD], backward[{{ upper }}_RECORD];
+    double ahead[{{ upper }}_EXTENDED], cross[{{ upper }}_EXTENDED * {{ upper }}_STATES];
+    double forward[{{ record + fore }}], backward[{{ record + fore }}];
     double filter[{{ [Q, 1] | max }}][{{ upper }}_ORDER + 1], past[{{ [Q, 1] | max }}][{{ upper }}_ORDER];
     double mean[{{ [Q, 1] | max }}];
     int order[{{ [Q, 1] | max }}];
-    double u_history[{{ [history * Q, 1] | max }}];
+    double u_history[{{ [u_rows * Q, 1] | max }}];
     {{ name }}_model model;
 } {{ name }}_estimator;
 
@@ -56,7 +62,7 @@ const double *{{ name }}_estimated(const {{ name }}_estimator *e);
 double {{ name }}_deviation(const {{ name }}_estimator *e, int state);
 
 /* Forecast n instants after the last sample into x, a row for each. `future` holds the inputs of
- * the n - 1 instants after it, or is NULL: they are predicted from their own records then.
+ * the n - 1 + {{ upper }}_LEAD instants after it, or is NULL: they are predicted then.
  * Returns 0; 1 if there are fewer than {{ begins }} samples; 2 if the run is lost, as a step is. */
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x);
 

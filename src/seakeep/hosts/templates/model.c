@@ -1,3 +1,4 @@
+{% from "facts.jinja" import N, Q, s, z, past, upper, signature, follows, array with context %}
 /* {{ mark }} C source; see {{ name }}.h */
 #include "{{ name }}.h"
 
@@ -9,35 +10,30 @@ enum {
     N = {{ N }},               /* states */
     EXTENDED = {{ N * (s + 1) }},        /* states and their delays */
     Q = {{ Q }},               /* measured inputs */
-    DELAYED = {{ n }},         /* regressors with input delays, each newest first */
+    DELAYED = {{ upper }}_DELAYED,   /* regressors with input delays, each newest first */
     DELAYS = {{ z }},
-    DIRECT = {{ m }},          /* regressors without */
-{% if following %}
-    PLACES = {{ following.place.count }},          /* on the grid where waves are read */
-    PAST = {{ following.place.taps | length }},            /* surges that the place of the vessel is a sum of */
-    SURGE = {{ following.column }},
-    BACK = {{ following.back }},            /* samples that carriers read, before and after */
-    TAPS = {{ following.back + following.ahead + 1 }},
+    DIRECT = {{ upper }}_DIRECT,     /* regressors without */
+{% if follows %}
+    PLACES = {{ follows.place.count }},          /* on the grid where waves are read */
+    PAST = {{ past }},            /* surges that the place of the vessel is a sum of */
+    SURGE = {{ follows.column }},
+    BACK = {{ follows.back }},            /* samples that carriers read, before and after */
+    TAPS = {{ follows.back + follows.ahead + 1 }},
 {% endif %}
-    ROWS = {{ rows }},            /* rows of the coefficients: all, or those of the newest states */
+    ROWS = {{ model.coefficients | length }},            /* rows of the coefficients: all, or those of the newest states */
     COLUMNS = EXTENDED + DELAYED * (DELAYS + 1) + DIRECT,
-    WINDOW = {{ window }},          /* rows of inputs that are remembered */
-    NOW = {{ now }}               /* that of the instant which a step starts from */
+    WINDOW = {{ upper }}_WINDOW,
+    NOW = {{ upper }}_NOW
 };
 
-const char *const {{ name }}_state_names[] = { {{ state_labels | map(attribute="name") | map("text") | join(", ") }} };
-const char *const {{ name }}_state_units[] = { {{ state_labels | map(attribute="units") | map("text") | join(", ") }} };
-const char *const {{ name }}_input_names[] = { {{ (input_labels | map(attribute="name") | map("text") | list or ["0"]) | join(", ") }} };
-const char *const {{ name }}_input_units[] = { {{ (input_labels | map(attribute="units") | map("text") | list or ["0"]) | join(", ") }} };
+const char *const {{ name }}_state_names[] = { {{ signature.state_labels | map(attribute="name") | map("text") | join(", ") }} };
+const char *const {{ name }}_state_units[] = { {{ signature.state_labels | map(attribute="units") | map("text") | join(", ") }} };
+const char *const {{ name }}_input_names[] = { {{ (signature.input_labels | map(attribute="name") | map("text") | list or ["0"]) | join(", ") }} };
+const char *const {{ name }}_input_units[] = { {{ (signature.input_labels | map(attribute="units") | map("text") | list or ["0"]) | join(", ") }} };
 
-{% macro array(name, values, size="") %}
-static const double {{ name }}[{{ size }}] = {
-{{ values | numbers }}
-};
-{% endmacro %}
 /* Rows of [A B] on standardised deviations. */
-{{ array("coefficients", coefficients) }}
-{% for kind, scale in scales.items() %}
+{{ array("coefficients", model.coefficients) }}
+{% for kind, scale in (("state", signature.state_scale), ("delayed", signature.input_scale), ("direct", signature.direct_scale)) %}
 {{ array(kind ~ "_mean", scale.mean) -}}
 {{ array(kind ~ "_std", scale.std) -}}
 {{ array(kind ~ "_centre", scale.centre) -}}
@@ -70,9 +66,9 @@ static double rising(double value, double top, double slope)
 }
 
 {% endif %}
-{% if following %}
-{{ array("surge_taps", following.place.taps) }}
-{% for bank in banks %}
+{% if follows %}
+{{ array("surge_taps", follows.place.taps) }}
+{% for bank in follows.banks(none) %}
 {{ array("carriers_%d" % bank.column, bank.taps) }}
 {% endfor %}
 /* Elevation at a place of the grid; u is the first row that a carrier reads. */
@@ -96,6 +92,40 @@ static void observe(const double *u, double *v)
     (void)u, (void)v;
 }
 
+void {{ name }}_regressors(const double *inputs, const double *surge, double *v, double *direct)
+{
+    const double *u = inputs + NOW * Q;
+{% if follows %}
+    double here = 0.0, on_grid, sides[2][DELAYED];
+    for (int i = 0; i < PAST; i++)
+        here += surge_taps[i] * surge[i];
+    here = fmin(fmax(here, {{ follows.place.lowest | hex }}), {{ follows.place.grid[-1] | hex }});
+    on_grid = (here - {{ follows.place.lowest | hex }}) / {{ follows.place.spacing | hex }};
+    int below = (int)fmin(on_grid, PLACES - 2);
+    for (int side = 0; side < 2; side++) {
+        double at[Q];
+        memcpy(at, u, sizeof at);
+{% for bank in follows.banks(none) %}
+        static const int probes_{{ bank.column }}[] = { {{ bank.columns | join(", ") }} };
+        at[{{ bank.column }}] = carried(u - BACK * Q, carriers_{{ bank.column }}, below + side, {{ bank.columns | length }}, probes_{{ bank.column }});
+{% endfor %}
+        observe(at, sides[side]);
+    }
+    for (int i = 0; i < DELAYED; i++)
+        v[i] = sides[0][i] + (on_grid - below) * (sides[1][i] - sides[0][i]);
+{% else %}
+    observe(u + {{ signature.input_map.lead }} * Q, v);
+    (void)surge;
+{% endif %}
+{% for each in direct %}
+    direct[{{ loop.index0 }}] = {{ each }};
+{% endfor %}
+{% if follows %}
+    direct[DIRECT - 1] = pow(here - {{ follows.place.centre | hex }}, 2.0);
+{% endif %}
+    (void)u, (void)direct;
+}
+
 /* Take one more row of inputs, and make the regressors of the next step. */
 static void push({{ name }}_model *m, const double *u)
 {
@@ -105,37 +135,7 @@ static void push({{ name }}_model *m, const double *u)
     memmove(v + DELAYED, v, DELAYS * DELAYED * sizeof(double));
     for (int i = 0; i < Q; i++)
         newest[i] = u[i];
-{% if following %}
-    double here = 0.0, on_grid, sides[2][DELAYED];
-    for (int i = 0; i < PAST; i++)
-        here += surge_taps[i] * m->surge[i];
-    here = fmin(fmax(here, {{ following.place.lowest | hex }}), {{ following.place.grid[-1] | hex }});
-    on_grid = (here - {{ following.place.lowest | hex }}) / {{ following.place.spacing | hex }};
-    int below = (int)fmin(on_grid, PLACES - 2);
-    for (int side = 0; side < 2; side++) {
-        double at[Q];
-        memcpy(at, m->inputs + NOW * Q, sizeof at);
-        u = m->inputs + (NOW - BACK) * Q;
-{% for bank in banks %}
-        static const int probes_{{ bank.column }}[] = { {{ bank.columns | join(", ") }} };
-        at[{{ bank.column }}] = carried(u, carriers_{{ bank.column }}, below + side, {{ bank.columns | length }}, probes_{{ bank.column }});
-{% endfor %}
-        observe(at, sides[side]);
-    }
-    for (int i = 0; i < DELAYED; i++)
-        v[i] = sides[0][i] + (on_grid - below) * (sides[1][i] - sides[0][i]);
-{% else %}
-    observe(m->inputs + (NOW + {{ lead }}) * Q, v);
-{% endif %}
-{% if m %}
-    u = m->inputs + NOW * Q;
-{% endif %}
-{% for each in direct %}
-    direct[{{ loop.index0 }}] = {{ each }};
-{% endfor %}
-{% if following %}
-    direct[DIRECT - 1] = pow(here - {{ following.place.centre | hex }}, 2.0);
-{% endif %}
+    {{ name }}_regressors(m->inputs, {{ "m->surge" if follows else "0" }}, v, direct);
     for (int i = 0; i < DELAYED; i++)
         v[i] = (v[i] - delayed_mean[i]) / delayed_std[i];
     for (int i = 0; i < DIRECT; i++)
@@ -151,7 +151,7 @@ static void widen({{ name }}_model *m, int delays)
         double value = delayed_mean[c] + delayed_std[c] * v[i];
         m->excess = fmax(m->excess, fabs(value - delayed_centre[c]) / delayed_reach[c]);
     }
-    for (int i = 0; i < DIRECT{{ " - 1" if following }}; i++) {
+    for (int i = 0; i < DIRECT{{ " - 1" if follows }}; i++) {
         double value = direct_mean[i] + direct_std[i] * direct[i];
         m->excess = fmax(m->excess, fabs(value - direct_centre[i]) / direct_reach[i]);
     }
@@ -183,14 +183,14 @@ int {{ name }}_start({{ name }}_model *m, const double *x_history, const double 
         }
     }
     for (int row = 0; row < {{ upper }}_U_ROWS; row++) {
-{% if following %}
+{% if follows %}
         int before = {{ upper }}_U_ROWS - row;
         for (int i = 0; before <= DELAYS && i < PAST; i++)
             m->surge[i] = last[SURGE - (before + i) * N];
 {% endif %}
         push(m, u_history + row * Q);
     }
-{% if following %}
+{% if follows %}
     for (int i = 0; i < PAST; i++)
         m->surge[i] = last[SURGE - i * N];
 {% endif %}
@@ -221,7 +221,7 @@ int {{ name }}_step({{ name }}_model *m, const double *u)
         if (!(fabs(x[i] - state_centre[i]) <= {{ growth }} * m->limit[i] * m->excess))
             lost = 1;
     }
-{% if following %}
+{% if follows %}
     memmove(m->surge + 1, m->surge, (PAST - 1) * sizeof(double));
     m->surge[0] = x[SURGE];
 {% endif %}

@@ -1,3 +1,4 @@
+{% from "facts.jinja" import N, Q, s, z, n, m, dt, past, upper, follows, x_rows, u_rows, window, lead_samples with context %}
 /* {{ mark }} C header
  *
  * A seakeep model that runs one step at a time: plain C99, no memory but the struct below, no
@@ -10,7 +11,7 @@
  *
  * Instant k is that of the last row of x_history. The step from k to k + 1 takes the inputs of
  * instant k + {{ upper }}_LEAD: where the model looks ahead, its time is that much behind its input.
-{% if following %}
+{% if follows %}
  * Inputs are the probes as measured, where they stood in training: a step carries the waves to the
  * vessel by its own surge.
 {% endif %}
@@ -26,8 +27,13 @@ extern "C" {
 #define {{ upper }}_INPUTS {{ Q }}
 #define {{ upper }}_LEAD {{ lead_samples }}
 #define {{ upper }}_X_ROWS {{ x_rows }} /* of x_history: instants k - {{ x_rows - 1 }} to k */
-#define {{ upper }}_U_ROWS {{ history + lead_samples }} /* of u_history: instants k - {{ history }} to k - 1 + {{ upper }}_LEAD */
+#define {{ upper }}_U_ROWS {{ u_rows }} /* of u_history: instants k - {{ u_rows - lead_samples }} to k - 1 + {{ upper }}_LEAD */
 #define {{ upper }}_STEP {{ dt | hex }} /* s */
+
+#define {{ upper }}_WINDOW {{ window }} /* rows of inputs that a step reads */
+#define {{ upper }}_NOW {{ now }} /* of these, that of the instant which it starts from */
+#define {{ upper }}_DELAYED {{ n }} /* what these rows become: with input delays */
+#define {{ upper }}_DIRECT {{ m }} /* and without */
 
 extern const char *const {{ name }}_state_names[], *const {{ name }}_state_units[];
 extern const char *const {{ name }}_input_names[], *const {{ name }}_input_units[];
@@ -38,8 +44,8 @@ typedef struct {
     double regressors[{{ N * (s + 1) + n * (z + 1) + m }}];
     double inputs[{{ [1, window * Q] | max }}];
     double limit[{{ N }}];
-{% if following %}
-    double surge[{{ following.place.taps | length }}]; /* newest first */
+{% if follows %}
+    double surge[{{ past }}]; /* newest first */
 {% endif %}
     double excess;
 } {{ name }}_model;
@@ -52,6 +58,10 @@ int {{ name }}_start({{ name }}_model *m, const double *x_history, const double 
  * as it was; 2 if the run is lost: a state is ten times as far from its mean as it ever was in
  * training, in proportion to the waves of late. All states are NaN from then on. */
 int {{ name }}_step({{ name }}_model *m, const double *u);
+
+/* What drives the step from an instant, in physical units: of the {{ upper }}_WINDOW rows of inputs
+ * around it{{ ", and of the last " ~ past ~ " surges, newest first" if follows }}. */
+void {{ name }}_regressors(const double *inputs, const double *surge, double *delayed, double *direct);
 
 #ifdef __cplusplus
 }

@@ -46,7 +46,7 @@ MARKS: dict[str, dict[str, Any]] = {
 
 @figure_style()
 def by_state(
-    found: xr.Dataset,
+    result: xr.Dataset,
     states: Sequence[str] | None,
     axes: Places,
     size: tuple[float, float],
@@ -55,14 +55,14 @@ def by_state(
     most: int = 3,
 ) -> Figure:
     """Draw panels for each state: `draw` takes the results of one, and its Axes, `each` of them."""
-    known = [str(name) for name in found["state"].values]
+    known = [str(name) for name in result["state"].values]
     for name in states or ():
         if name not in known:
             raise RequestError(f"there is no state '{name}'. States: {', '.join(known)}.")
     chosen = known if states is None else states
     figure, places = panels(axes, each * len(chosen), most, size)
     for number, name in enumerate(chosen):
-        draw(found.sel(state=name), *places[each * number :][:each])
+        draw(result.sel(state=name), *places[each * number :][:each])
     if axes is None:
         side = "upper center" if each > 1 else "lower center"
         legend_outside(figure, *places[:each], side=side)
@@ -88,7 +88,7 @@ def _answering(values: xr.DataArray) -> list[str]:
 
 
 def response(
-    found: xr.Dataset,
+    result: xr.Dataset,
     measured: xr.Dataset | None = None,
     *,
     states: Sequence[str] | None = None,
@@ -98,7 +98,7 @@ def response(
 
     Parameters
     ----------
-    found : Dataset
+    result : Dataset
         From :func:`seakeep.check.response`.
     measured : Dataset, optional
         From :func:`seakeep.check.measured_response`.
@@ -111,7 +111,7 @@ def response(
     -------
     Figure
     """
-    states = _answering(found["amplitude"]) if states is None else states
+    states = _answering(result["amplitude"]) if states is None else states
 
     def draw(own: xr.Dataset, gain: Any, turn: Any) -> None:
         factor, units, label = _shown(own)
@@ -145,12 +145,12 @@ def response(
         turn.set(ylabel=f"phase of {label} [°]", ylim=(-190, 190), yticks=range(-180, 181, 90))
 
     most = 2 + 2 * (len(states) % 2 == 0)
-    entry = "wave" if "wave" in found["input"] else str(found.attrs["reference"])
-    return by_state(found.sel(input=entry), states, axes, (2.9, 1.75), draw, 2, most)
+    entry = "wave" if "wave" in result["input"] else str(result.attrs["reference"])
+    return by_state(result.sel(input=entry), states, axes, (2.9, 1.75), draw, 2, most)
 
 
 def coherence(
-    found: xr.Dataset,
+    result: xr.Dataset,
     *,
     states: Sequence[str] | None = None,
     axes: Places = None,
@@ -159,7 +159,7 @@ def coherence(
 
     Parameters
     ----------
-    found : Dataset
+    result : Dataset
         From :func:`seakeep.check.coherence`.
     states : sequence of str, optional
         States to draw; by default all.
@@ -170,7 +170,7 @@ def coherence(
     -------
     Figure
     """
-    top = _end(found["spectrum"])
+    top = _end(result["spectrum"])
 
     def draw(own: xr.Dataset, place: Any) -> None:
         frequency, power = own["frequency"].values, own["spectrum"].values
@@ -185,16 +185,16 @@ def coherence(
         place.set(xlim=(0, top), ylim=(0, 1.02), xlabel="frequency [Hz]")
         place.set_ylabel(f"coherence, {short_label(str(own['state'].values))} [1]")
 
-    return by_state(found, states, axes, (3.0, 1.9), draw)
+    return by_state(result, states, axes, (3.0, 1.9), draw)
 
 
 @figure_style()
-def modes(found: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
+def modes(result: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     """Draw the modes that decay slowest: which states take part, with period and damping.
 
     Parameters
     ----------
-    found : Dataset
+    result : Dataset
         From :func:`seakeep.check.modes`.
     most : int, optional
         Number of modes.
@@ -205,7 +205,7 @@ def modes(found: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     -------
     Figure
     """
-    at = found.isel(mode=slice(0, most))
+    at = result.isel(mode=slice(0, most))
     states, shares = [str(name) for name in at["state"].values], at["participation"].values
     words = [
         f"{period:.3g} s, {ratio:.3f}" if np.isfinite(period) else f"decays in {time:.3g} s"
@@ -228,12 +228,12 @@ def modes(found: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     return figure
 
 
-def decay(found: xr.Dataset, *, axes: Places = None) -> Figure:
+def decay(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw what is left of an offset after its release, motion by motion.
 
     Parameters
     ----------
-    found : Dataset
+    result : Dataset
         From :func:`seakeep.check.decay`.
     axes : Axes or sequence of Axes, optional
         One for each motion; by default those of a new figure.
@@ -252,11 +252,11 @@ def decay(found: xr.Dataset, *, axes: Places = None) -> Figure:
         place.set_xlabel("time after the release [s]")
         place.set_ylabel(f"{short_label(str(own['state'].values))} over offset [1]")
 
-    return by_state(found.rename(motion="state"), None, axes, (3.0, 1.8), draw)
+    return by_state(result.rename(motion="state"), None, axes, (3.0, 1.8), draw)
 
 
 def residuals(
-    found: xr.Dataset,
+    result: xr.Dataset,
     *,
     states: Sequence[str] | None = None,
     axes: Places = None,
@@ -265,7 +265,7 @@ def residuals(
 
     Parameters
     ----------
-    found : Dataset
+    result : Dataset
         From :func:`seakeep.check.residuals`.
     states : sequence of str, optional
         States to draw; by default all.
@@ -276,7 +276,7 @@ def residuals(
     -------
     Figure
     """
-    end = 1.5 * _end(found["measured_spectrum"])
+    end = 1.5 * _end(result["measured_spectrum"])
 
     def draw(own: xr.Dataset, white: Any, past: Any, spectrum: Any, age: Any) -> None:
         limit, title = float(own["limit"]), {"loc": "left", "fontsize": 8}
@@ -308,11 +308,11 @@ def residuals(
             for place in (past, spectrum):
                 place.legend(fontsize=6)
 
-    return by_state(found, states, axes, (2.6, 1.75), draw, 4, 4)
+    return by_state(result, states, axes, (2.6, 1.75), draw, 4, 4)
 
 
 def exceedance(
-    found: xr.Dataset,
+    result: xr.Dataset,
     *,
     states: Sequence[str] | None = None,
     axes: Places = None,
@@ -321,7 +321,7 @@ def exceedance(
 
     Parameters
     ----------
-    found : Dataset
+    result : Dataset
         From :func:`seakeep.check.statistics`.
     states : sequence of str, optional
         States to draw; by default all.
@@ -354,11 +354,11 @@ def exceedance(
         place.set_xlim(0, factor * level[-1])
         place.set(xlabel=f"peak of {label} [{unit}]", ylabel="exceeded by [1]")
 
-    return by_state(found, states, axes, (3.0, 2.0), draw)
+    return by_state(result, states, axes, (3.0, 2.0), draw)
 
 
 def density(
-    found: xr.Dataset,
+    result: xr.Dataset,
     *,
     states: Sequence[str] | None = None,
     axes: Places = None,
@@ -373,16 +373,16 @@ def density(
         place.set_ylim(bottom=0)
         place.set(xlabel=f"{label} from its mean [{unit}]", ylabel=f"density [1/{unit}]")
 
-    return by_state(found, states, axes, (3.0, 1.9), draw)
+    return by_state(result, states, axes, (3.0, 1.9), draw)
 
 
 @figure_style()
-def validity(found: xr.Dataset, *, axes: Places = None) -> Figure:
+def validity(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw height against period of the waves, and steepness against mean surge where it is known.
 
     Parameters
     ----------
-    found : Dataset
+    result : Dataset
         From :func:`seakeep.check.validity`.
     axes : Axes or sequence of Axes, optional
         One, or two with surge; by default those of a new figure.
@@ -392,10 +392,10 @@ def validity(found: xr.Dataset, *, axes: Places = None) -> Figure:
     Figure
     """
     maps = [("period", "mean zero-crossing period [s]", "height", "wave height [m]")]
-    if (found["drift"].notnull() & found["steepness"].notnull()).any():
+    if (result["drift"].notnull() & result["steepness"].notnull()).any():
         maps.append(("drift", "mean surge [m]", "steepness", "wave steepness [1]"))
-    outside = found["outside"].values != ""
-    train, test = (found.sel(part=each) for each in ("train", "test"))
+    outside = result["outside"].values != ""
+    train, test = (result.sel(part=each) for each in ("train", "test"))
     kinds = (
         (train, "trained", {"marker": "o", "markersize": 11, "color": PALETTE["pale"]}),
         (test.isel(run=~outside), "test, inside", {"marker": "s", "color": COLOURS["ensemble"]}),
@@ -412,14 +412,14 @@ def validity(found: xr.Dataset, *, axes: Places = None) -> Figure:
                 place.annotate(str(run), spot, (6, 4), textcoords="offset points", fontsize=7)
         place.set(xlabel=across, ylabel=up)
         place.margins(x=0.15)
-        place.set_ylim(0, 1.2 * float(found[y].max()))
+        place.set_ylim(0, 1.2 * float(result[y].max()))
     if axes is None:
         legend_outside(figure, places[0])
     return figure
 
 
 def drift(
-    found: xr.Dataset,
+    result: xr.Dataset,
     *,
     states: Sequence[str] | None = None,
     axes: Places = None,
@@ -428,7 +428,7 @@ def drift(
 
     Parameters
     ----------
-    found : Dataset
+    result : Dataset
         From :func:`seakeep.check.drift`.
     states : sequence of str, optional
         States to draw; by default those that have a response.
@@ -456,5 +456,5 @@ def drift(
             place.errorbar(own["point_frequency"], *offsets, **style)
         place.set(xlabel="frequency [Hz]", ylabel=f"{label} [{unit}]")
 
-    chosen = _answering(found["slow_response"]) if states is None else states
-    return by_state(found, chosen, axes, (3.0, 2.0), draw)
+    chosen = _answering(result["slow_response"]) if states is None else states
+    return by_state(result, chosen, axes, (3.0, 2.0), draw)

@@ -353,8 +353,8 @@ def error_figure(table: xr.Dataset) -> Figure:
     axes = figure.subplots()
     _draw_points(axes, table, "model", "anrmse", labels)
     axes.tick_params(axis="x", labelrotation=45 if len(labels) > 8 else 0)
-    found = table["anrmse"].values[np.isfinite(table["anrmse"].values)]
-    if found.size and 0.0 < 10.0 * found.min() < found.max():
+    finite = table["anrmse"].values[np.isfinite(table["anrmse"].values)]
+    if finite.size and 0.0 < 10.0 * finite.min() < finite.max():
         axes.set_yscale("log")
     else:
         axes.set_ylim(bottom=0.0)
@@ -376,13 +376,13 @@ def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Seque
 
 
 @figure_style()
-def nowcast_figure(found: Mapping[str, xr.Dataset], run: str) -> Figure:
+def nowcast_figure(nowcasts: Mapping[str, xr.Dataset], run: str) -> Figure:
     """Error, and the model's own estimate of it, against lead time, a panel per channel."""
-    first = next(iter(found.values()))
+    first = next(iter(nowcasts.values()))
     names, share = list(map(str, first["channel"].values)), float(first.attrs["share"])
     figure, places = panels(None, len(names), 4, (2.125, 1.7))
     for axes, name in zip(places, names, strict=True):
-        for number, (model, of_model) in enumerate(found.items()):
+        for number, (model, of_model) in enumerate(nowcasts.items()):
             at, style = of_model.sel(run=run, channel=name), SERIES[1 + number % (len(SERIES) - 1)]
             line = {"color": style["color"], "linestyle": style["linestyle"] if number else "-"}
             axes.plot(at["lead"], at["error"], **line, label=f"{model}: error")

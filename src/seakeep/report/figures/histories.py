@@ -387,10 +387,10 @@ def history_figure(
     figure = new_figure(7.5, 0.9 + (0.95 if len(names) > 1 else 1.4) * len(names))
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     cell = result.tests[test].isel(training=[training], window=[window])
-    found = result.groups.get("calibration")
-    found = found if found is None else found.isel(training=[training])
+    calibration = result.groups.get("calibration")
+    calibration = calibration if calibration is None else calibration.isel(training=[training])
     for each, name in zip(axes, names, strict=True):
-        _draw_channel(each, result, cell, name, found)
+        _draw_channel(each, result, cell, name, calibration)
     words = "deviation from the training mean, in training SD" if len(names) > 1 else "training SD"
     figure.supylabel(words, fontsize=8)
     axes[-1].set_xlabel("time after the last measured state, in encounter periods")

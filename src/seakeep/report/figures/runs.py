@@ -136,8 +136,8 @@ def spectrum_figure(result: StudyResult) -> Figure:
 
     def curves(kind: str, of: Iterable[str]) -> list[Curve]:
         """Frequency and density of runs, without the bins beyond their own."""
-        found = [spectra.sel(run=run, kind=kind).dropna("bin", subset=["density"]) for run in of]
-        return [(at["frequency"].values, at["density"].values) for at in found if at["bin"].size]
+        chosen = [spectra.sel(run=run, kind=kind).dropna("bin", subset=["density"]) for run in of]
+        return [(at["frequency"].values, at["density"].values) for at in chosen if at["bin"].size]
 
     words = {
         "paper": "measured, segments of 8.2 s (paper)",

@@ -129,8 +129,8 @@ def _quality_table(result: StudyResult, name: str) -> Table:
             slack = percent(at["slack"], 1) if np.isfinite(at["slack"]) else slack
         low, high, *others = map(short, each.numbers)
         row = (each.words, use, each.unit, *others, low, high, frozen, slack, each.flagged)
-        rows.append((*row, "; ".join(each.found)))
-    marked = [k for k, each in enumerate(channels) if each.found]
+        rows.append((*row, "; ".join(each.findings)))
+    marked = [k for k, each in enumerate(channels) if each.findings]
     return table("quality", rows, {"run": name}, name=f"quality_{name}", marked=marked)
 
 
@@ -146,8 +146,8 @@ UNITS = {
 
 def settings(result: StudyResult) -> Section:
     """Return settings, training sets and test windows."""
-    made = str(result.attrs.get("waves_note", ""))
-    waves = f"Waves of the virtual tank: {made}." if made else ""
+    note = str(result.attrs.get("waves_note", ""))
+    waves = f"Waves of the virtual tank: {note}." if note else ""
     words = (waves, training_overlap(result)[1], test_overlap(result))
     tables = (_model_table(result), _settings_table(result), _windows_table(result))
     return section("settings", more=words, tables=tables)
@@ -278,9 +278,13 @@ def _test_spans(result: StudyResult, test: str) -> Spans:
 
 
 def _trained_on(result: StudyResult) -> dict[str, Any]:
-    """Stated training length of each model that has one; None where it reads all."""
+    """Stated training length of each model that has one; None where it or its centre reads all."""
     every = {model: stated["settings"] for model, stated in result.model_settings.items()}
-    return {model: known["window"]["value"] for model, known in every.items() if "window" in known}
+    return {
+        model: None if known.get("centred", {}).get("value") else known["window"]["value"]
+        for model, known in every.items()
+        if "window" in known
+    }
 
 
 def whole_readers(result: StudyResult) -> list[str]:

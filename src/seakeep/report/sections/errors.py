@@ -201,10 +201,10 @@ def bands(result: StudyResult) -> Section | None:
     """Return coverage and scores of bands by wave height, horizon and channel."""
     if "statistics/bands" not in result.groups:
         return None
-    found, tables = result.groups["statistics/bands"], []
+    groups, tables = result.groups["statistics/bands"], []
     for model in filter(result.is_ensemble, result.models):
-        for band in (each for each in ("members", "calibrated") if each in found["band"].values):
-            at = found.sel(model=model, band=band)
+        for band in (each for each in ("members", "calibrated") if each in groups["band"].values):
+            at = groups.sel(model=model, band=band)
             parts = {
                 str(test): at.sel(test=test).dropna("part", how="all", subset=["inside"])
                 for test in at["test"].values
@@ -319,13 +319,13 @@ def coverage(result: StudyResult) -> Section | None:
 def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
     """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
     prefix = "calibrated_" * calibrated
-    found = result.groups["statistics/coverage"].sel(model=model)
-    true = "truth" in found["against"].values
+    shares = result.groups["statistics/coverage"].sel(model=model)
+    true = "truth" in shares["against"].values
     kinds, two = ("inside" + " [of the truth]" * true, "width [SD]"), partial(number, digits=2)
 
     def cells(name: str) -> Iterator[str]:
         for test in result.tests:
-            at = found.sel(test=test, channel=name)
+            at = shares.sel(test=test, channel=name)
             inside, width = (at[f"{prefix}{key}"] for key in ("inside", "relative_width"))
             yield beside(*inside, form=two) if true else two(*inside)
             yield two(width.sel(against="measured"))
@@ -352,21 +352,21 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
 
 def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
     """How the calibrated band is made, what it rests on, and where it is of no use."""
-    found = result.groups["calibration"].sel(ensemble=model)
-    made = "these quantiles, moved outwards by a margin found"
-    if "floor" in found:
-        learnt = "law" in found
+    group = result.groups["calibration"].sel(ensemble=model)
+    words = "these quantiles, moved outwards by a margin found"
+    if "floor" in group:
+        learnt = "law" in group
         scale = (
             "a scale learnt from spread, horizon and waves"
             if learnt
             else "the spread of the members"
         )
-        made = (
+        words = (
             f"the mean, and a factor times {scale} (with a "
             "floor of a quarter of the root mean square error) to either side, found"
         )
     said = (
-        f" Calibrated: {made} on training data that the members had not read, in windows as long "
+        f" Calibrated: {words} on training data that the members had not read, in windows as long "
         "as the first test set's. "
     )
     lengths = {test: float(each["length"]) for test, each in result.settings["tests"].items()}
@@ -374,18 +374,18 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
     others = [f"{result.label_of(k)} ({n:g} T̂)" for k, n in lengths.items() if n != first]
     if others:
         said += f"Those are {first:g} T̂ long; the margin is not made for {', '.join(others)}. "
-    if not found["windows"].all():
+    if not group["windows"].all():
         said += "Some training sets hold no such window. "
     else:
         windows, blocks = (
             " to ".join(dict.fromkeys(f"{each:.0f}" for each in (values.min(), values.max())))
-            for values in (found["windows"].values, found["blocks"].values)
+            for values in (group["windows"].values, group["blocks"].values)
         )
         said += (
             f"A training set had {windows} of them; allowing for their dependence, their "
             f"scores are worth {blocks} independent ones. "
         )
-        if (warranted := float(found["warranted"].min())) < level:
+        if (warranted := float(group["warranted"].min())) < level:
             said += f"Of some channels that is too few: {warranted:.2f} is guaranteed there. "
     return said + "The margin guarantees nothing in another kind of sea."
 
@@ -454,13 +454,13 @@ def members(result: StudyResult) -> Section | None:
 def service(result: StudyResult) -> Section | None:
     """Return errors against lead time of models that were judged in service."""
     groups = {model: result.groups.get(f"nowcast/{model}") for model in result.models}
-    found = {model: each for model, each in groups.items() if each is not None}
-    if not found:
+    services = {model: each for model, each in groups.items() if each is not None}
+    if not services:
         return None
-    first = next(iter(found.values()))
+    first = next(iter(services.values()))
     figures = []
     for run in map(str, first["run"].values):
         words = {"run": run, "starts": int(first.attrs["starts"])}
-        draw = partial(nowcast_figure, found, run)
+        draw = partial(nowcast_figure, services, run)
         figures.append(drawing("nowcast", draw, words, f"nowcast_{run}"))
-    return section("service", figures=figures, tables=[*nowcast_blocks(found)])
+    return section("service", figures=figures, tables=[*nowcast_blocks(services)])

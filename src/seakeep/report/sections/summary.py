@@ -182,9 +182,9 @@ def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure
     change, *bounds = (100 * float(at[key]) for key in ("change", "lower", "upper"))
     if not np.isfinite(change):
         return ""
-    found = verdict(*bounds)
-    words = f"the ensemble's mean is {found}"
-    if found == "cannot tell":
+    outcome = verdict(*bounds)
+    words = f"the ensemble's mean is {outcome}"
+    if outcome == "cannot tell":
         words = "cannot tell whether the ensemble's mean is better"
     interval = f"[{', '.join(map(signed, bounds))}]"
     interval = interval if np.isfinite(bounds[0]) else "with too few cells"
