@@ -134,9 +134,8 @@ def test_errors_are_those_of_data_that_were_not_trained_on(make_dataset):
     """Of p coefficients from n rows, the residual holds σ²(1 − p/n), a new error σ²(1 + p/n)."""
     found, rng = [], np.random.default_rng(0)
     for _ in range(100):
-        noise = make_dataset(
-            np.arange(105.0), **dict(zip(("heave", "eta_fwd"), rng.standard_normal((2, 105))))
-        )
+        heave, wave = rng.standard_normal((2, 105))
+        noise = make_dataset(np.arange(105.0), heave=heave, eta_fwd=wave)
         found.append(HankelDMDc(4, 4, 1e-9).fit(noise, ["heave"], ["eta_fwd"]).errors.residual)
     # 100 rows of 10 coefficients; 100 repetitions tell a variance to 1.4 %.
     assert np.mean(found) == pytest.approx(1.1, rel=0.05)

@@ -9,7 +9,7 @@ from seakeep.tank.moorings import KINDS, LineSettings, line_table, mooring_stiff
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
-from seakeep.tank._loop import line_tension  # noqa: E402
+from seakeep.tank._loop import line_tension
 
 
 def test_unstretched_lengths_of_the_page(rig):
