@@ -144,6 +144,7 @@ class LinearSpec(HankelSettings):
     rank: int | None = field(default=None, init=False, repr=False)
     readouts: ReadOuts = field(default=(), init=False, repr=False)
     stable: bool | float = field(default=False, init=False, repr=False)
+    memory: int = field(default=0, init=False, repr=False)
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
@@ -275,6 +276,7 @@ class Subspace(HankelSettings):
     rank: int | None = field(default=None, init=False, repr=False)
     readouts: ReadOuts = field(default=(), init=False, repr=False)
     stable: bool | float = field(default=False, init=False, repr=False)
+    memory: int = field(default=0, init=False, repr=False)
     order: int = field(kw_only=True)
     future: int | None = None
 

@@ -209,7 +209,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         if self.identified:
             return self.identified[number]
         settings, data, solution = self._identified(number)
-        delays = settings.state_delays, settings.input_delays
+        delays = settings.state_reach, settings.input_delays
         scales = data.state_scale, data.input_scale, data.direct_scale
         return Dynamics(solution.coefficients, *delays, *scales, data.input_map.follows)
 
