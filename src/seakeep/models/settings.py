@@ -307,6 +307,11 @@ class HankelSettings:
             dt, labelled.mean_period(runs, inputs) * dt if self.in_periods else None
         )
 
+    def ridge_text(self, ridge: float) -> str:
+        """A λ of these settings in words, with what it counts by."""
+        per = " per snapshot pair" if self.ridge_scale == "per_snapshot" else ""
+        return f"ridge {ridge:g}{per}"
+
     @property
     def in_periods(self) -> bool:
         """Whether a length, or a prior of one, counts in encounter periods."""

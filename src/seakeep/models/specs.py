@@ -349,11 +349,11 @@ class HankelDMDc(HankelSettings):
 
 def _check_growth(model: HankelDMDcModel) -> None:
     """Refuse a model that was chosen and grows."""
-    radius = spectral_radius(model.dynamics)
+    radius, settings = spectral_radius(model.dynamics), model.settings
     if radius >= 1.0:
         raise DataError(
-            f"the model that was chosen grows: its spectral radius is {radius:.6f} at ridge = "
-            f"{model.settings.ridge:g} per snapshot pair. Look for transients at the ends of the "
+            f"the model that was chosen grows: its spectral radius is {radius:.6f} at "
+            f"{settings.ridge_text(float(settings.ridge))}. Look for transients at the ends of the "
             "training runs, use fewer state delays, clip eigenvalues (stable=True), or state the "
             "ridge to have it as it is."
         )
