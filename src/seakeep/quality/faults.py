@@ -6,6 +6,8 @@ of the series' own spread, steps and period, not of any one data set.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import numpy.typing as npt
 import scipy
@@ -140,7 +142,7 @@ def _bursts(x: FloatArray) -> BoolArray:
         return out
     wild = np.abs(steps) > WILD * np.percentile(np.abs(steps[steps != 0]), 80)
     turns = 1 + np.flatnonzero(wild[1:] & wild[:-1] & (steps[1:] * steps[:-1] < 0))
-    for begin, end in zip(turns, turns[1:], strict=False):
+    for begin, end in pairwise(turns):
         out[begin : end + 1] |= end - begin <= NEAR
     return out
 
