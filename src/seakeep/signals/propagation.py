@@ -23,7 +23,6 @@ from seakeep.arrays import (
     ComplexArray,
     FloatArray,
     as_pair,
-    as_real,
     as_series,
     number,
     positive,
@@ -594,113 +593,6 @@ def carry_by_celerity(
     return _carried(
         as_series(series, minimum=4, channels=True), dt, distances, lambda omega: omega / speed
     )
-
-
-def delay_by_dispersion(
-    series: npt.ArrayLike,
-    dt: float,
-    distance: npt.ArrayLike,
-    depth: float,
-    highest_frequency: float | None = None,
-) -> FloatArray:
-    """Carry an elevation to a place at a distance, fixed or moving, by linear dispersion.
-
-    Parameters
-    ----------
-    series : array_like, shape (time,) or (time, channel)
-        Elevation, uniformly sampled, without gaps.
-    dt : float
-        Time step, s.
-    distance : array_like, scalar or shape (time,)
-        Distance of the place from the probe at each sample, m, positive downstream.
-    depth : float
-        Water depth, m; ``numpy.inf`` for deep water.
-    highest_frequency : float, optional
-        As in :func:`carry_by_dispersion`.
-
-    Returns
-    -------
-    ndarray
-        Elevation at the place, same shape and unit.
-
-    Raises
-    ------
-    RequestError
-        If an argument is out of range, or the distance has gaps.
-    DataError
-        If the series is constant or has gaps.
-
-    Notes
-    -----
-    The record is continued by linear prediction at either end. What was at the probe before the
-    record started reaches a place downstream later: the first d/c_g seconds are a guess there, and
-    the last ones upstream.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> t = np.arange(0, 60, 0.05)
-    >>> omega, k = 3.0, 3.0**2 / 9.81
-    >>> carried = delay_by_dispersion(np.cos(omega * t), 0.05, 2.0, depth=np.inf)
-    >>> bool(np.max(np.abs(carried - np.cos(omega * t - 2.0 * k))) < 3e-3)
-    True
-    """
-    return _delayed(
-        series,
-        distance,
-        lambda array, span: carry_by_dispersion(array, dt, span, depth, highest_frequency),
-    )
-
-
-def delay_by_celerity(
-    series: npt.ArrayLike, dt: float, distance: npt.ArrayLike, celerity: float
-) -> FloatArray:
-    r"""Delay an elevation by the time waves of one celerity take, :math:`\eta(t - d(t)/c)`.
-
-    Parameters
-    ----------
-    series : array_like, shape (time,) or (time, channel)
-        Elevation, uniformly sampled, without gaps.
-    dt : float
-        Time step, s.
-    distance : array_like, scalar or shape (time,)
-        Distance of the place from the probe at each sample, m, positive downstream.
-    celerity : float
-        Speed of the waves, m/s.
-
-    Returns
-    -------
-    ndarray
-        Elevation at the place, same shape and unit; band-limited between samples.
-
-    Raises
-    ------
-    RequestError
-        As :func:`delay_by_dispersion`.
-    """
-    return _delayed(
-        series, distance, lambda array, span: carry_by_celerity(array, dt, span, celerity)
-    )
-
-
-def _delayed(
-    series: npt.ArrayLike,
-    distance: npt.ArrayLike,
-    carry: Callable[[FloatArray, tuple[float, float]], CarriedElevation],
-) -> FloatArray:
-    """A record read at a distance, after `carry` prepared it for a range of them."""
-    array, places = as_series(series, minimum=4, channels=True), as_real(distance, "the distance")
-    if places.shape not in ((), array.shape[:1]):
-        raise RequestError(
-            f"the distance has shape {places.shape}; expected one number, or one per sample: "
-            f"({len(array)},)."
-        )
-    if not np.all(np.isfinite(places)):
-        raise RequestError(
-            f"the distance holds {int(np.sum(~np.isfinite(places)))} values that are not finite. "
-            "Fill the gap in the position first."
-        )
-    return carry(array, (float(places.min()), float(places.max()))).at(places).reshape(array.shape)
 
 
 def _carried(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,6 +14,7 @@ from seakeep.errors import RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.labelled import channel_matrix
 from seakeep.models.live import Servable, held_samples
+from seakeep.models.registry import is_linear
 from seakeep.quality import warn_of_runs
 from seakeep.study.comparison import samples_of
 
@@ -160,8 +160,8 @@ def nowcast(
     )
 
 
-def served(model: Any) -> Servable | None:
+def served(model: Model) -> Servable | None:
     """What follows a run sample by sample: the model, or its members held; None without states."""
     if is_ensemble(model):
         return model.hold()
-    return model if hasattr(model, "live") else None
+    return model if is_linear(model) else None
