@@ -13,6 +13,7 @@ from seakeep import (
     DataError,
     Fixed,
     HankelDMDc,
+    LogUniform,
     ProbeAlignment,
     RequestError,
     SeakeepWarning,
@@ -117,6 +118,58 @@ def test_several_runs_are_pooled_as_in_the_deterministic_model(run):
     model = alone(ensemble, 2).fit(both, STATES, INPUTS, stop={"one": 60.0, "two": 70.0})
     np.testing.assert_allclose(ensemble.member(2).A, model.A, atol=1e-10)
     assert ensemble.member(2).training.runs == ("one", "two")
+
+
+def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays(tmp_path):
+    runs, unseen = {name: wave_run(seed) for seed, name in enumerate("abc")}, wave_run(7)
+    spec = small(train_on="windows", ridge=LogUniform(1, 100), delay_rows="exact", lead=4)
+    settings = spec.central(DT)
+    single = dataclasses.replace(settings, window=None).fit(runs, STATES, INPUTS)
+    apart = spec.fit(runs, STATES, INPUTS)
+    centred = dataclasses.replace(spec, centred=True).fit(runs, STATES, INPUTS)
+    expected, tolerance = single.forecast(unseen, 65.0, 120), 1e-12  # rounding of the sums
+    ways = {
+        "anew": centred.forecast_summary(unseen, 65.0, 120),
+        "held": centred.hold().forecast_summary(unseen, 65.0, 120),
+        "file": seakeep.load_model(centred.save(tmp_path / "c.nc")).forecast_summary(
+            unseen, 65.0, 120
+        ),
+        "members": seakeep.summarize(centred.forecast(unseen, 65.0, 120)),
+        "windows": centred.summarize_windows(unseen, [60.0, 65.0], 120).isel(window=1),
+    }
+    x, u = (np.stack([unseen[n].values for n in names], axis=1) for names in (STATES, INPUTS))
+    now = round(65.0 / DT) + 1
+    table = centred.forecast_arrays(x[:now], u[:now], u[now:], 120)
+    live, alone_live = centred.live(), single.live()
+    for service in (live, alone_live):
+        for at in range(now):
+            service.step(u[at], x[at])
+    served, alone_served = (each.forecast(120, u[now:]) for each in (live, alone_live))
+    far = apart.forecast_summary(unseen, 65.0, 120)
+    for column, name in enumerate(STATES):
+        mean, std, lower, upper = far[name].values
+        moved = expected[name].values - mean
+        assert np.abs(moved).max() > 1e-3
+        wanted = [mean + moved, std, lower + moved, upper + moved]
+        for found in ways.values():
+            np.testing.assert_allclose(found[name], wanted, rtol=0, atol=tolerance)
+        np.testing.assert_allclose(
+            [part[:, column] for part in table[:4]], wanted, rtol=0, atol=tolerance
+        )
+        np.testing.assert_allclose(served[name][0], expected[name], rtol=0, atol=tolerance)
+        assert np.all(served[name][1] > alone_served[name][1])  # the members' spread comes on top
+    left = centred.without("b").forecast_summary(unseen, 65.0, 120)
+    two = dataclasses.replace(settings, window=None).fit(
+        {name: runs[name] for name in "ac"}, STATES, INPUTS
+    )
+    np.testing.assert_allclose(
+        arrays(left.sel(statistic="mean")), arrays(two.forecast(unseen, 65.0, 120)), atol=tolerance
+    )
+    band = centred.calibrate(wave_run(9), 100, 0.9).forecast_summary(
+        unseen, 65.0, 100, 0.9, band="calibrated"
+    )
+    middle = 0.5 * (band.heave.sel(statistic="lower") + band.heave.sel(statistic="upper"))
+    np.testing.assert_allclose(middle, expected.heave[:100], rtol=0, atol=tolerance)
 
 
 def test_draws_are_rounded_to_the_nearest_sample(run):

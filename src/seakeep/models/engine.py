@@ -140,6 +140,10 @@ class Runs(Protocol):
     def n_members(self) -> int:
         """Number of members; one for a single model."""
 
+    @property
+    def is_centred(self) -> bool:
+        """Whether one more run, numbered `n_members`, is what the members' mean is moved to."""
+
     def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
         """Free runs of members over groups of windows, each (member, window, steps, N).
 
@@ -589,8 +593,12 @@ def run_members(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Iterator[list[FloatArray]]:
-    """Free runs member by member: of each group an array of shape (window, steps, N)."""
-    return in_order(_run_member, (model, groups), range(model.n_members), executor, progress)
+    """Free runs member by member, then those that they are centred on, where they are.
+
+    Of each group an array of shape (window, steps, N).
+    """
+    numbers = range(model.n_members + model.is_centred)
+    return in_order(_run_member, (model, groups), numbers, executor, progress)
 
 
 def _run_member(data: tuple[Runs, Sequence[Windows]], member: int) -> list[FloatArray]:
@@ -654,9 +662,26 @@ def group_series(
         ]
         for number, values in enumerate(run_members(model, groups, executor, progress)):
             for (series, lost), each in zip(runs, values, strict=True):
-                series[number] = each
-                lost[number] = first_lost(each)
+                if number == count:
+                    _centre(series, lost, each)
+                else:
+                    series[number] = each
+                    lost[number] = first_lost(each)
         yield runs
+
+
+def _centre(series: FloatArray, lost: npt.NDArray[np.int64], runs: FloatArray) -> None:
+    """Move members, shape (member, window, steps, N), so that their mean is a single model's run.
+
+    Members that are lost in a window count in none of it. Where the single model is lost, the
+    members stay where they are.
+    """
+    complete, mean = lost < 0, np.zeros(runs.shape)
+    for own, here in zip(series, complete, strict=True):
+        mean[here] += own[here]
+    shift = runs - mean / np.maximum(np.count_nonzero(complete, axis=0), 1)[:, None, None]
+    shift[~np.isfinite(shift).all(axis=(1, 2))] = 0.0
+    series += shift
 
 
 @contextmanager

@@ -28,8 +28,8 @@ from seakeep.models.calibration import (
 )
 from seakeep.models.checks import Json
 from seakeep.models.draws import Draw, draws_dataset, draws_of
-from seakeep.models.engine import Dynamics, Windows, first_lost, linear_runs, member_series
-from seakeep.models.executor import in_order, one_blas_thread
+from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
+from seakeep.models.executor import in_order
 from seakeep.models.forecasts import (
     Forecaster,
     check_arrays,
@@ -50,11 +50,7 @@ from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live
 from seakeep.models.settings import HankelSettings
-from seakeep.models.summaries import (
-    reduce_members,
-    statistic_coordinate,
-    statistics_of,
-)
+from seakeep.models.summaries import reduce_members, statistic_coordinate
 from seakeep.models.training import TrainingArrays, TrainingData
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
@@ -111,8 +107,10 @@ class HankelEnsemble(Forecaster, store.Saved):
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
     identified : tuple of Dynamics
-        All members with their matrices, where :meth:`hold` keeps them; empty where each call
-        identifies them anew.
+        All members with their matrices, where :meth:`hold` keeps them, and what they are centred
+        on; empty where each call identifies them anew.
+    centre : Draw, optional
+        The single model of all runs that the members' mean is moved to.
     """
 
     kind: ClassVar[str] = "bayesian_hankel_dmdc"
@@ -125,6 +123,7 @@ class HankelEnsemble(Forecaster, store.Saved):
     calibration: Calibration | None = None
     selection: str = ""
     identified: tuple[Dynamics, ...] = field(default=(), repr=False)
+    centre: Draw | None = None
 
     def __repr__(self) -> str:
         return (
@@ -140,6 +139,16 @@ class HankelEnsemble(Forecaster, store.Saved):
     def n_members(self) -> int:
         """Number of members."""
         return len(self.members)
+
+    @property
+    def is_centred(self) -> bool:
+        """Whether the mean of the members is the forecast of a single model of all runs."""
+        return self.centre is not None
+
+    @property
+    def _taught(self) -> tuple[Draw, ...]:
+        """The members, and what they are centred on."""
+        return self.members if self.centre is None else (*self.members, self.centre)
 
     @property
     def nbytes(self) -> int:
@@ -164,7 +173,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         for run, name in enumerate(self.arrays.names):
             ends = [
                 self.arrays.span(run, draw.settings, draw.last, self.dt)
-                for draw in self.members
+                for draw in self._taught
                 if draw.run in (None, run)
             ]
             if ends:
@@ -196,7 +205,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         return (self.member(number).A for number in range(self.n_members))
 
     def dynamics(self, number: int) -> Dynamics:
-        """What a free run of a member needs."""
+        """What a free run of a member needs, or of what they are centred on: number n_members."""
         if self.identified:
             return self.identified[number]
         settings, data, solution = self._identified(number)
@@ -223,6 +232,11 @@ class HankelEnsemble(Forecaster, store.Saved):
         RequestError
             If there is no such member.
         """
+        if not 0 <= number < self.n_members:
+            raise RequestError(
+                f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
+                f"0 to {self.n_members - 1}."
+            )
         settings, data, solution = self._identified(number)
         return HankelDMDcModel(
             settings=settings,
@@ -234,12 +248,7 @@ class HankelEnsemble(Forecaster, store.Saved):
 
     def _identified(self, number: int) -> tuple[HankelSettings, TrainingData, Solution]:
         """Settings, training data and regression of a member."""
-        if not 0 <= number < self.n_members:
-            raise RequestError(
-                f"there is no member {number!r}: the ensemble has {self.n_members}, counted from "
-                f"0 to {self.n_members - 1}."
-            )
-        draw = self.members[number]
+        draw = self._taught[number]
         settings = draw.settings
         data = self.arrays.data(settings, draw.run, draw.last, self.signature)
         all_rows = settings.delay_rows == "ridge"
@@ -313,6 +322,8 @@ class HankelEnsemble(Forecaster, store.Saved):
         lines += [
             f"    {name}: {span_text(*span, self.dt)}" for name, span in self.training_spans.items()
         ]
+        if self.is_centred:
+            lines.append("  centre        the mean is the single model of all runs")
         if self.selection:
             lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
         if (calibration := self.calibration) is not None:
@@ -582,7 +593,7 @@ class HankelEnsemble(Forecaster, store.Saved):
             The same, with members :attr:`identified`: N(N(s+1) + Q(z+1)) numbers per member with
             exact delay rows, and s + 1 times as many with regressed ones.
         """
-        numbers = range(self.n_members)
+        numbers = range(len(self._taught))
         return replace(
             self, identified=tuple(in_order(_dynamics, self, numbers, executor, progress))
         )
@@ -632,30 +643,33 @@ class HankelEnsemble(Forecaster, store.Saved):
         level = fraction(level, "level")
         check_band(self.calibration, level, band)
         windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
-        with one_blas_thread():
-            out = self.free_runs([windows], range(self.n_members))[0][:, 0]
-        complete = out[first_lost(out) < 0]
-        values = statistics_of(complete, level)[None]
+        with member_series(self, windows) as (series, lost):
+            values = reduce_members(series, lost, level)
         values = widened(self.calibration, values, band, self.signature, windows)
         mean, std, lower, upper = values[0]
-        return BandForecast(mean, std, lower, upper, len(out) - len(complete))
+        return BandForecast(mean, std, lower, upper, int(np.count_nonzero(lost >= 0)))
 
     def live(
         self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
     ) -> Live:
         """Put the members into service; arguments and errors as :meth:`HankelDMDcModel.live`.
 
-        The filter predicts with the mean of the members, whose errors on what they learnt from
-        are found here; a forecast runs all of them.
+        The filter predicts with the mean of the members, or with what they are centred on, whose
+        errors on what they learnt from are found here; a forecast runs all of them.
         """
         members = self if self.identified else self.hold()
-        return Live(members, members.identified, members.errors, like=like, noise=noise)
+        return Live(members, members._means, members.errors, like=like, noise=noise)
+
+    @property
+    def _means(self) -> list[Dynamics]:
+        """What the mean of the members is made of: all of them, or what they are centred on."""
+        first = self.n_members if self.is_centred else 0
+        return [self.dynamics(number) for number in range(first, len(self._taught))]
 
     @cached_property
     def errors(self) -> LeadErrors:
         """Errors of the members' mean on what they learnt from."""
-        signature, arrays = self.signature, self.arrays
-        members = [self.dynamics(number) for number in range(self.n_members)]
+        signature, arrays, members = self.signature, self.arrays, self._means
         stretches = [
             Stretch(x, u, v, signature.history_samples - 1, min(len(x) - 1, len(u)))
             for x, u, v in zip(arrays.states, arrays.delayed, arrays.direct, strict=True)
@@ -796,7 +810,12 @@ class HankelEnsemble(Forecaster, store.Saved):
 
     @classmethod
     def from_dataset(
-        cls, dataset: xr.Dataset, signature: Signature, settings: HankelSettings, origin: Json
+        cls,
+        dataset: xr.Dataset,
+        signature: Signature,
+        settings: HankelSettings,
+        origin: Json,
+        centre: Draw | None,
     ) -> HankelEnsemble:
         """Rebuild an ensemble from :meth:`to_dataset`; its members are equal to the last bit."""
         place = store.content(dataset, "runs")
@@ -816,6 +835,7 @@ class HankelEnsemble(Forecaster, store.Saved):
             coverage=Coverage.from_dataset(dataset, signature),
             calibration=Calibration.from_json(store.content(dataset, "calibration")),
             selection=str(dataset.attrs["selection"]),
+            centre=centre,
         )
 
 

@@ -93,6 +93,7 @@ class SingleModel(Forecaster):
     """Methods of every model with one member; it adds a signature and ``free_runs``."""
 
     n_members: ClassVar[int] = 1
+    is_centred: ClassVar[bool] = False
     settings: Any
     training: Training
 

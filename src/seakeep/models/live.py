@@ -603,8 +603,8 @@ class Live:
             )
         futures, known = self._futures(count, future)
         windows = self._windows(count, futures)
-        values = self.model.free_runs([windows], range(self.model.n_members))[0]
-        complete = values[engine.first_lost(values).max(axis=1) < 0].reshape(-1, *values.shape[2:])
+        with engine.member_series(self.model, windows) as (values, lost):
+            complete = values[lost.max(axis=1) < 0].reshape(-1, *values.shape[2:])
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(complete):
             spread = (

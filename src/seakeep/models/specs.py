@@ -14,8 +14,8 @@ from seakeep.arrays import Progress
 from seakeep.errors import SHOWN, DataError, RequestError
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.checks import Json, check_choice, check_integer
-from seakeep.models.draws import PRIORS, Sampling, TrainOn, draw_members
+from seakeep.models.checks import Json, check_choice, check_flag, check_integer
+from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble, spectral_radius
 from seakeep.models.interface import Needs, Role, Signature, Spec
 from seakeep.models.labelled import Runs, Stop, as_runs
@@ -379,7 +379,7 @@ class BayesianHankelDMDc(HankelSettings):
         As in :class:`HankelDMDc`, such as ``Uniform("0.5 T", "1.5 T")``.
     ridge : prior, float or "rollout"
         λ. "rollout" chooses one by free runs, as :class:`HankelDMDc` does at the medians of the
-        delays, and draws log-uniformly over 0.3 to 3 times that.
+        delays, and draws log-uniformly over a third to three times that.
     window : prior, int or str, optional
         Length of the training window; None takes all of a run up to ``stop``.
     encounter_period : float, optional
@@ -395,6 +395,10 @@ class BayesianHankelDMDc(HankelSettings):
         in one run, drawn for each member; or a window that ends anywhere up to ``stop`` in one run.
         "auto" takes windows of 60 to 120 encounter periods where there are several runs, each lasts
         120, and none is of regular waves (``attrs["waves"]``), and all runs otherwise.
+    centred : bool, optional
+        Whether the members are moved so that their mean is the forecast of the single model at the
+        medians of the priors, of all of the runs up to ``stop``; their spread stays. Members that
+        learn from windows have a mean that is worse than that model.
     dt : float, optional
         Time step the runs must have, s; None takes theirs.
     lead, history, delay_rows, ridge_scale, rank, standardize, observables, stable, select
@@ -430,6 +434,7 @@ class BayesianHankelDMDc(HankelSettings):
     seed: int | str | np.random.SeedSequence | np.random.Generator = 0
     sampling: Sampling = "monte_carlo"
     train_on: TrainOn = "all"
+    centred: bool = False
     dt: float | None = None
     select: Select | None = None
 
@@ -441,6 +446,7 @@ class BayesianHankelDMDc(HankelSettings):
             periods_to_samples(1, period, self.dt or 0.5 * period)
         check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
         check_choice("train_on", self.train_on, get_args(TrainOn))
+        check_flag("centred", self.centred)
         object.__setattr__(self, "select", Select.of(self.select))
         if isinstance(seed := self.seed, np.random.Generator):
             object.__setattr__(self, "seed", int(seed.integers(2**63)))
@@ -477,6 +483,13 @@ class BayesianHankelDMDc(HankelSettings):
         """The single model at the medians of the priors."""
         return self._single(0.5, dt)
 
+    def centre(self, dt: float) -> Draw | None:
+        """The single model of all runs that members are centred on, if they are."""
+        if not self.centred:
+            return None
+        whole = replace(self.central(dt), window=None, select=None)
+        return Draw(whole, (np.nan, whole.state_delays, whole.input_delays))
+
     def _single(self, q: float, dt: float) -> HankelDMDc:
         """The single model at a quantile of the window and delays, with the median of λ."""
         values: dict[str, Any] = {}
@@ -505,7 +518,7 @@ class BayesianHankelDMDc(HankelSettings):
         spec = cls.from_json(store.content(dataset, "ensemble"))
         signature = store.unpack_signature(dataset)
         return HankelEnsemble.from_dataset(
-            dataset, signature, spec.shared(signature.dt), spec.to_json()
+            dataset, signature, spec.shared(dt := signature.dt), spec.to_json(), spec.centre(dt)
         )
 
     @classmethod
@@ -566,8 +579,9 @@ class BayesianHankelDMDc(HankelSettings):
         -------
         BayesianHankelDMDc
             As there, with half to one and a half times the delay of the states, two to four
-            periods of the inputs, 0.3 to 3 times the λ that free runs choose, and members that
-            learn from windows of long runs (``train_on = "auto"``).
+            periods of the inputs, a third to three times the λ that free runs choose, and members
+            that learn from windows of long runs (``train_on = "auto"``), centred on the single
+            model.
         """
         return cls(
             encounter_period=encounter_period,
@@ -583,6 +597,7 @@ class BayesianHankelDMDc(HankelSettings):
             lead=Length(LEAD_PERIODS),  # type: ignore[arg-type]
             readouts="auto",
             train_on="auto",
+            centred=True,
             select=Select(observables=True, period=encounter_period),
         )
 
@@ -624,7 +639,7 @@ class BayesianHankelDMDc(HankelSettings):
         ridge, scale = self.ridge, self.ridge_scale
         if isinstance(ridge, str):
             best = float(choice.settings.ridge)
-            ridge, scale = LogUniform(0.3 * best, 3.0 * best), "per_snapshot"
+            ridge, scale = LogUniform(best / 3.0, best * 3.0), "per_snapshot"
         spec = replace(
             self,
             ridge=ridge,
@@ -719,9 +734,10 @@ class BayesianHankelDMDc(HankelSettings):
         input_map = shared.input_map(named, states, inputs, None)
         samples = [run.sizes["time"] for run in named.values()]
         spec = self._taught_by(named.values(), min(samples) * dt)
-        members = draw_members(spec, dt, samples, input_map)
+        members, centre = draw_members(spec, dt, samples, input_map), spec.centre(dt)
+        every = members if centre is None else [*members, centre]
         reads = [
-            (min(draw.first(run, count, input_map) for draw in members), count)
+            (min(draw.first(run, count, input_map) for draw in every), count)
             for run, count in enumerate(samples)
         ]
         arrays = TrainingArrays.read(named, states, inputs, reads, input_map)
@@ -745,8 +761,8 @@ class BayesianHankelDMDc(HankelSettings):
             dt=dt,
             state_labels=labels[0],
             input_labels=labels[1],
-            state_delays=max(draw.settings.state_delays for draw in members),
-            input_delays=max(draw.settings.input_delays for draw in members),
+            state_delays=max(draw.settings.state_delays for draw in every),
+            input_delays=max(draw.settings.input_delays for draw in every),
             input_map=input_map,
             state_scale=scales[0],
             input_scale=scales[1],
@@ -760,6 +776,7 @@ class BayesianHankelDMDc(HankelSettings):
             arrays=arrays,
             signature=signature,
             coverage=Coverage.of(inputs, trained, dt),
+            centre=centre,
         )
 
 

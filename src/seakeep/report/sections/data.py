@@ -278,9 +278,13 @@ def _test_spans(result: StudyResult, test: str) -> Spans:
 
 
 def _trained_on(result: StudyResult) -> dict[str, Any]:
-    """Stated training length of each model that has one; None where it reads all."""
+    """Stated training length of each model that has one; None where it or its centre reads all."""
     every = {model: stated["settings"] for model, stated in result.model_settings.items()}
-    return {model: known["window"]["value"] for model, known in every.items() if "window" in known}
+    return {
+        model: None if known.get("centred", {}).get("value") else known["window"]["value"]
+        for model, known in every.items()
+        if "window" in known
+    }
 
 
 def whole_readers(result: StudyResult) -> list[str]:
