@@ -86,9 +86,7 @@ def fit_weibull(peaks: FloatArray) -> Weibull:
     return Weibull(float(k), scale, x.size)
 
 
-def most_probable_extreme(
-    law: Weibull, peaks: float, level: float = 0.95
-) -> tuple[float, float, float]:
+def most_probable_extreme(law: Weibull, peaks: float) -> tuple[float, float, float]:
     r"""Most probable largest of many peaks, with an interval for what the fit does not know.
 
     Parameters
@@ -97,8 +95,6 @@ def most_probable_extreme(
         Of peaks that do not depend on each other.
     peaks : float
         How many are expected in the time asked for.
-    level : float, optional
-        Probability of the interval.
 
     Returns
     -------
@@ -113,5 +109,5 @@ def most_probable_extreme(
     g = np.log(np.log(peaks))
     extreme = law.scale * np.exp(g / law.shape)
     variance = (1.109 + 0.608 * g**2 - 0.514 * g) / (law.peaks * law.shape**2)
-    width = np.exp(stats.t.ppf(0.5 + 0.5 * level, law.peaks - 1) * np.sqrt(variance))
+    width = np.exp(stats.t.ppf(0.975, law.peaks - 1) * np.sqrt(variance))
     return float(extreme), float(extreme / width), float(extreme * width)

@@ -192,7 +192,7 @@ def small_number(value: SupportsFloat) -> Number:
     return number(value, decimals) if decimals <= 7 else Number(f"{value:.1e}")
 
 
-def signed(value: SupportsFloat, digits: int = 0) -> Number:
+def signed(value: SupportsFloat) -> Number:
     """Text of a number with its sign, where anything of it is left after rounding.
 
     Examples
@@ -200,7 +200,7 @@ def signed(value: SupportsFloat, digits: int = 0) -> Number:
     >>> signed(1.4), signed(-0.04, 1), signed(-0.06, 1)
     ('+1', '0.0', '-0.1')
     """
-    text = number(value, digits)
+    text = number(value, 0)
     return Number(f"+{text}") if text != MISSING and float(text) > 0 else text
 
 
@@ -226,9 +226,9 @@ def to(bounds: Iterable[SupportsFloat], form: Form = number) -> Number:
     return MISSING if MISSING in texts else Number(" to ".join(texts))
 
 
-def interval(at: xr.Dataset, key: str, form: Form = number) -> Number:
+def interval(at: xr.Dataset, key: str) -> Number:
     """Text of the bounds ``KEY_lower`` and ``KEY_upper``."""
-    return to([at[f"{key}_{bound}"] for bound in ("lower", "upper")], form)
+    return to([at[f"{key}_{bound}"] for bound in ("lower", "upper")])
 
 
 def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = number) -> Number:

@@ -10,9 +10,14 @@ import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import ComplexArray, FloatArray, as_series, fraction, positive, time_step
+from seakeep.arrays import ComplexArray, FloatArray, as_series, time_step
 from seakeep.signals.waves import encounter_period, waves_part
 
+REPEATED = 0.9
+"""Modulus of the correlation from which a stretch of a test input repeats training."""
+STRETCH = 30.0
+"""Length of a stretch in zero-up-crossing periods; a shorter record is one stretch. They
+overlap by half."""
 REGULAR = 0.2
 """Envelopes that vary by less than this part of their mean are those of regular waves (a random
 sea's vary by 0.52)."""
@@ -49,8 +54,6 @@ def find_leakage(
     training: Sequence[npt.ArrayLike],
     test: npt.ArrayLike,
     dt: float,
-    threshold: float = 0.9,
-    periods: float = 30.0,
 ) -> Leakage | None:
     r"""Look for stretches of a test input that the training input holds, up to a constant phase.
 
@@ -68,11 +71,6 @@ def find_leakage(
         Test input, the same step.
     dt : float
         Time step, s.
-    threshold : float, optional
-        Modulus from which a stretch counts as repeated.
-    periods : float, optional
-        Length of a stretch in zero-up-crossing periods of the test input; a record shorter than
-        this is one stretch. Stretches overlap by half.
 
     Returns
     -------
@@ -103,7 +101,6 @@ def find_leakage(
     >>> round(find_leakage([sea[:900]], sea[900:], 0.1).correlation, 2)
     1.0
     """
-    threshold = fraction(threshold, "threshold")
     step = time_step(dt)
     record = as_series(test, minimum=8)
     if np.ptp(record) == 0 or np.sum(np.diff(np.sign(record - record.mean())) > 0) < 2:
@@ -111,7 +108,7 @@ def find_leakage(
     part = waves_part(record, step)
     record = record[part]
     waves = _analytic(record)
-    length = round(positive(periods, "periods", "1") * encounter_period(record, step) / step)
+    length = round(STRETCH * encounter_period(record, step) / step)
     length = min(max(length, 1), record.size)
     if _even(waves):
         return None
@@ -126,7 +123,7 @@ def find_leakage(
             match = _correlation(reference, piece)
             at = int(np.argmax(np.abs(match)))
             height = float(np.abs(match[at]))
-            if height < threshold:
+            if height < REPEATED:
                 continue
             repeated[start : start + length] = True
             if best is None or height > best.correlation:

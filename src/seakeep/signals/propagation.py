@@ -93,7 +93,6 @@ def phase_celerity(
     dt: float,
     separation: float,
     depth: float,
-    segment: int | None = None,
 ) -> PhaseCelerity:
     r"""Phase speed between two probes from the phase of their cross-spectrum.
 
@@ -110,9 +109,6 @@ def phase_celerity(
         Distance between the probes, m.
     depth : float
         Water depth, m; ``numpy.inf`` for deep water.
-    segment : int, optional
-        Samples per segment of Welch's method; by default 60 s, or half the record if it is shorter
-        than two such segments. Segments overlap by half.
 
     Returns
     -------
@@ -133,8 +129,7 @@ def phase_celerity(
     """
     first, second = as_pair(upstream, downstream, minimum=8, moving=True)
     step, apart = time_step(dt), positive(separation, "the separation", "m")
-    if segment is None:
-        segment = min(round(60.0 / step), first.size // 2)
+    segment = min(round(60.0 / step), first.size // 2)
     length, shared = welch_segments(first.size, step, segment, None)
     options = {"fs": 1.0 / step, "window": "hamming", "nperseg": length, "noverlap": shared}
     frequency, cross = (each[1:] for each in scipy.signal.csd(first, second, **options))
@@ -156,7 +151,6 @@ def effective_celerity(
     dt: float,
     separation: float,
     depth: float,
-    period: float | None = None,
 ) -> EffectiveCelerity:
     r"""One celerity between two probes from the peak of their normalised cross-correlation.
 
@@ -174,9 +168,6 @@ def effective_celerity(
         Distance between the probes, m.
     depth : float
         Water depth, m; ``numpy.inf`` for deep water.
-    period : float, optional
-        Period of the waves whose phase speed centres the search, s; by default the
-        zero-up-crossing period of the upstream record.
 
     Returns
     -------
@@ -198,7 +189,7 @@ def effective_celerity(
     """
     first, second = as_pair(upstream, downstream, minimum=8, moving=True)
     step, apart = time_step(dt), positive(separation, "the separation", "m")
-    cycle = encounter_period(first, step) if period is None else positive(period, "period", "s")
+    cycle = encounter_period(first, step)
     centre = apart / float(phase_speed(2 * np.pi / cycle, depth))
     bounds = (max(centre - 0.5 * cycle, 0.0), centre + 0.5 * cycle)
     lag, height = correlation_peak(first, second, step, bounds)
