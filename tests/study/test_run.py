@@ -263,9 +263,9 @@ def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folde
 
 
 def test_a_write_that_fails_names_its_cause_and_the_remedy(tmp_path):
-    with pytest.raises(StorageError, match=r"No space left.*Free space") as caught:
-        with store.storing(tmp_path):
-            raise OSError(errno.ENOSPC, "No space left on device")
+    full = pytest.raises(StorageError, match=r"No space left.*Free space")
+    with full as caught, store.storing(tmp_path):
+        raise OSError(errno.ENOSPC, "No space left on device")
     assert caught.value.exit_status == 1
 
 
