@@ -78,7 +78,7 @@ def cases():
     hinge = [ReadOut("load", of=("surge",), kind="hinge")]
     kept = {"delay_rows": "exact", "readouts": hinge}
     full = HankelDMDc(3, 6, 1.0, lead=5, observables=OBSERVABLES).fit(runs, STATES, INPUTS)
-    short = HankelDMDc(2, 4, 1e-3, **kept).fit(runs, STATES, INPUTS)
+    short = HankelDMDc(2, 4, 1e-3, memory=21, **kept).fit(runs, STATES, INPUTS)
     models = {
         "full": full,
         "short": short,
@@ -91,7 +91,7 @@ def cases():
     drifting, test = [drifting_run(seed) for seed in (1, 2)], drifting_run(7)
     for name, lead in (("following", 12), ("following_now", 0)):
         spec = HankelDMDc(
-            4, 12, 1e-3, delay_rows="exact", lead=lead,
+            4, 12, 1e-3, delay_rows="exact", lead=lead, memory=2 * lead,
             alignment=ProbeAlignment(mode="dispersion", surge="predicted"),
             observables=(SlowSquares("eta_cog", lags=(0, 1), lead=0), Powers("eta_cog")),
         )  # fmt: skip

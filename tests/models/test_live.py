@@ -20,9 +20,11 @@ SETTINGS = {
     "plain": {},
     "ridge rows": {"delay_rows": "ridge"},
     "lead": {"lead": 6},
+    "memory": {"memory": 40},
     "observables": {"lead": 6, "observables": (SQUARES, seakeep.Powers("eta_fwd"))},
     "aligned": {
         "lead": 6,
+        "memory": 40,
         "alignment": ProbeAlignment(mode="dispersion", surge="predicted"),
         "observables": (SQUARES,),
     },

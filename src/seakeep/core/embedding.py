@@ -7,6 +7,7 @@ lag-major, the newest first. Series are ``(time, channel)``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -114,3 +115,54 @@ def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray
     for lag in range(delays + 1):
         out[lag * channels : (lag + 1) * channels] = series[first - lag : first - lag + count].T
     return out
+
+
+def block_means(series: FloatArray, blocks: Sequence[tuple[int, int]]) -> FloatArray:
+    """Means of a series over blocks of lags.
+
+    Parameters
+    ----------
+    series : ndarray, shape (time, channel)
+        Samples; missing ones count as zero.
+    blocks : sequence of (int, int)
+        Of each block the lag before its first, and its last.
+
+    Returns
+    -------
+    ndarray, shape (time, channels of each block)
+        Zero where a block begins before the series.
+    """
+    total = np.cumsum(np.nan_to_num(series), axis=0)
+    total = np.concatenate([np.zeros((1, series.shape[1])), total])
+    out = np.zeros((len(series), len(blocks), series.shape[1]))
+    for number, (before, last) in enumerate(blocks):
+        sums = total[last - before : len(series) - before] - total[: max(len(series) - last, 0)]
+        out[last:, number] = sums / (last - before)
+    return out.reshape(len(series), -1)
+
+
+def spread_means(
+    coefficients: FloatArray, states: int, delays: int, blocks: Sequence[tuple[int, int]]
+) -> FloatArray:
+    """Coefficients of delayed states instead of :func:`block_means`, on the last axis.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (…, N(s+1) + others + N · blocks)
+        Of the states, of other regressors, and of the means.
+    states, delays : int
+        N and s, where the first block begins after.
+    blocks : sequence of (int, int)
+        The blocks, side by side.
+
+    Returns
+    -------
+    ndarray, shape (…, N(last + 1) + others)
+        Each mean is a sum of delayed states of equal weights.
+    """
+    size, end = states * (delays + 1), coefficients.shape[-1] - states * len(blocks)
+    parts = [coefficients[..., :size]]
+    for number, (before, last) in enumerate(blocks):
+        own = coefficients[..., end + number * states : end + (number + 1) * states]
+        parts.append(np.tile(own / (last - before), last - before))
+    return np.concatenate([*parts, coefficients[..., size:end]], axis=-1)

@@ -446,10 +446,16 @@ class HankelDMDcModel(SingleModel, store.Saved):
         if self.settings.title:
             return "\n".join([f"{self.settings.title}, dt {self.dt:g} s", *self.lines()])
         rows = "exact" if self.settings.delay_rows == "exact" else "regressed"
+        memory = ""
+        if blocks := self.settings.blocks:
+            memory = (
+                f"; {counted(len(blocks), 'mean')} over delays of {blocks[0][0] + 1} samples and "
+                "more"
+            )
         lines = [
             f"Hankel DMD with control: {counted(len(self.states), 'state')}, "
             f"{counted(len(self.inputs), 'input')}, dt {self.dt:g} s",
-            *self.lines(f"{_regression(self.settings, self.training)}; delay rows {rows}"),
+            *self.lines(f"{_regression(self.settings, self.training)}; delay rows {rows}{memory}"),
         ]
         if self.selection:
             lines.append("  chosen        " + self.selection.replace("\n", "\n  "))

@@ -579,7 +579,7 @@ def select(
     else:
         longest = max(run.sizes["time"] for run in runs.values())
         note = (
-            f"ridge {settings.ridge:g} per snapshot pair: no window of "
+            f"{settings.ridge_text(float(settings.ridge))}: no window of "
             f"{round(min(horizon) * samples)} samples can be held out of runs of at most {longest}"
         )
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
@@ -671,7 +671,7 @@ def _note(
     """How the choice was made, in words."""
     count = sum(len(trial.levels) for trial in trials.values())
     score = trials[taken].means[trials[taken].levels.index(level)]
-    chosen = f"ridge {level:g} per snapshot pair" if taken.rank is None else f"rank {level:g}"
+    chosen = taken.ridge_text(level) if taken.rank is None else f"rank {level:g}"
     note = (
         f"{chosen}: out of {count} settings (below, the best λ of each kind) in free runs on "
         f"{len(problem.folds())} parts held out in turn, mean NRMSE {score:.3f}{worth}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
 from collections.abc import Mapping, Sequence
@@ -223,6 +224,7 @@ class HankelSettings:
         "state_delays": 0,
         "input_delays": 0,
         "lead": 0,
+        "memory": 0,
     }
     """Settings that are lengths, and the least number of samples of each."""
     state_delays: int
@@ -239,6 +241,7 @@ class HankelSettings:
     observables: tuple[Observable, ...] = ()
     readouts: ReadOuts = ()
     stable: bool | float = False
+    memory: int = 0
 
     def __post_init__(self) -> None:
         for name in (*self.lengths, "ridge"):
@@ -253,6 +256,12 @@ class HankelSettings:
         object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "readouts", readouts_of(self.readouts))
         self._check_readouts()
+        if self.memory and (self.delay_rows != "exact" or self.stable is not False):
+            raise RequestError(
+                "memory averages delayed states, which takes delay_rows = 'exact' and stable = "
+                f"False; received delay_rows = '{self.delay_rows}', stable = {self.stable}. Change "
+                "them, or set memory = 0."
+            )
         if self.rank is not None and self.ridge != 0 and not isinstance(self.ridge, Prior):
             ridge = self.ridge if isinstance(self.ridge, str) else f"{self.ridge:g}"
             warn(
@@ -298,6 +307,11 @@ class HankelSettings:
             dt, labelled.mean_period(runs, inputs) * dt if self.in_periods else None
         )
 
+    def ridge_text(self, ridge: float) -> str:
+        """A λ of these settings in words, with what it counts by."""
+        per = " per snapshot pair" if self.ridge_scale == "per_snapshot" else ""
+        return f"ridge {ridge:g}{per}"
+
     @property
     def in_periods(self) -> bool:
         """Whether a length, or a prior of one, counts in encounter periods."""
@@ -328,6 +342,22 @@ class HankelSettings:
                 f"delay_rows = '{self.delay_rows}', rank = {self.rank}. Change them, or take "
                 "kind = 'hinge'."
             )
+
+    @property
+    def blocks(self) -> list[tuple[int, int]]:
+        """Of each block of delays that is averaged the delay before its first, and its last.
+
+        They begin after s, and double in length up to the memory.
+        """
+        edges = [self.state_delays]
+        while edges[-1] < self.memory:
+            edges.append(min(max(2 * edges[-1], 1), self.memory))
+        return list(itertools.pairwise(edges))
+
+    @property
+    def state_reach(self) -> int:
+        """Longest delay of the states: s, or the memory."""
+        return max(self.state_delays, self.memory)
 
     @property
     def radius(self) -> float | None:
@@ -383,7 +413,7 @@ class HankelSettings:
             delayed += round(BACK * encounter_period / dt)
         return Needs(
             self.window or 1,
-            max(self.state_delays, delayed, *before),
+            max(self.state_reach, delayed, *before),
             self.history == "inside",
             max(after),
         )

@@ -97,6 +97,10 @@ class HankelDMDc(HankelSettings):
         Channels that are read off the forecast states, such as loads of lines that fall slack;
         "auto" reads every load among the states (in N) off the motions among them where that
         helps.
+    memory : int or str, optional
+        Longest delay of averages of the states, such as ``"8 T"``: beyond `state_delays` their
+        means over blocks of delays that double in length are further regressors. It takes exact
+        delay rows.
     select : Select, optional
         What `fit` chooses by free runs beside λ; a mapping of its keys is taken too.
 
@@ -345,11 +349,11 @@ class HankelDMDc(HankelSettings):
 
 def _check_growth(model: HankelDMDcModel) -> None:
     """Refuse a model that was chosen and grows."""
-    radius = spectral_radius(model.dynamics)
+    radius, settings = spectral_radius(model.dynamics), model.settings
     if radius >= 1.0:
         raise DataError(
-            f"the model that was chosen grows: its spectral radius is {radius:.6f} at ridge = "
-            f"{model.settings.ridge:g} per snapshot pair. Look for transients at the ends of the "
+            f"the model that was chosen grows: its spectral radius is {radius:.6f} at "
+            f"{settings.ridge_text(float(settings.ridge))}. Look for transients at the ends of the "
             "training runs, use fewer state delays, clip eigenvalues (stable=True), or state the "
             "ridge to have it as it is."
         )
@@ -401,7 +405,7 @@ class BayesianHankelDMDc(HankelSettings):
         learn from windows have a mean that is worse than that model.
     dt : float, optional
         Time step the runs must have, s; None takes theirs.
-    lead, history, delay_rows, ridge_scale, rank, standardize, observables, stable, select
+    lead, history, delay_rows, ridge_scale, rank, standardize, observables, stable, memory, select
         As in :class:`HankelDMDc`.
     alignment
         As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
@@ -761,7 +765,7 @@ class BayesianHankelDMDc(HankelSettings):
             dt=dt,
             state_labels=labels[0],
             input_labels=labels[1],
-            state_delays=max(draw.settings.state_delays for draw in every),
+            state_delays=max(draw.settings.state_reach for draw in every),
             input_delays=max(draw.settings.input_delays for draw in every),
             input_map=input_map,
             state_scale=scales[0],

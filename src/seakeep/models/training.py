@@ -11,7 +11,13 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
-from seakeep.core.embedding import History, TrainingWindow, training_window
+from seakeep.core.embedding import (
+    History,
+    TrainingWindow,
+    block_means,
+    spread_means,
+    training_window,
+)
 from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import labelled
@@ -111,7 +117,7 @@ class TrainingData:
             dt=self.dt,
             state_labels=self.state_labels,
             input_labels=self.input_labels,
-            state_delays=settings.state_delays,
+            state_delays=settings.state_reach,
             input_delays=settings.input_delays,
             input_map=self.input_map,
             state_scale=self.state_scale,
@@ -122,20 +128,33 @@ class TrainingData:
     def regress(
         self, settings: HankelSettings, state_delays: int | None, *, all_rows: bool = False
     ) -> Solution:
-        """Rows of the next states, or of all delayed ones, from these data."""
-        return identify(
+        """Rows of the next states, or of all delayed ones, from these data.
+
+        Means over blocks of delayed states enter as regressors without delays; the rows that are
+        returned spread them over these delays.
+        """
+        blocks = settings.blocks
+        solution = identify(
             self.states,
             self.delayed,
             self.windows,
             state_delays=state_delays,
             input_delays=settings.input_delays,
-            direct=self.direct,
+            direct=[
+                np.concatenate([direct, block_means(states, blocks)], axis=1)
+                for direct, states in zip(self.direct, self.states, strict=True)
+            ],
             ridge=float(settings.ridge),
             per_snapshot=settings.ridge_scale == "per_snapshot",
             rank=settings.rank,
             all_rows=all_rows,
             radius=settings.radius,
         )
+        count = len(self.state_labels)
+        if not blocks:
+            return solution
+        spread = spread_means(solution.coefficients, count, settings.state_delays, blocks)
+        return replace(solution, coefficients=spread)
 
     def training(self, solution: Solution) -> Training:
         """What a model that was fitted to these data keeps of them."""
@@ -186,7 +205,7 @@ def gather(
     check_names(states, inputs)
     states, inputs = list(states), list(inputs)  # arrays of names are welcome too
     window, history = settings.window, settings.history
-    state_delays, input_delays = settings.state_delays, settings.input_delays
+    state_delays, input_delays = settings.state_reach, settings.input_delays
     dt = labelled.common_step(runs)
     runs = until(runs, stop)
     labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
@@ -230,7 +249,7 @@ def _place(
 
     A step from j reads the input up to j + lead, and none after the window.
     """
-    delays = settings.state_delays
+    delays = settings.state_reach
     reach = max(delays, input_map.history(settings.input_delays))
     place = training_window(last, settings.window, delays, reach, settings.history)
     begin = min(place.first, place.first_column - reach)
@@ -327,6 +346,18 @@ class TrainingArrays:
         """Those of the other runs."""
         parts = (getattr(self, each.name) for each in fields(self))
         return type(self)(*(part[:run] + part[run + 1 :] for part in parts))
+
+    def beside(self, begin: int, end: int, dt: float) -> Self:
+        """What lies before and after some samples of a single run, each as a run of its own."""
+        (name,), (states,), (delayed,), (direct,), (offset,), (start,) = (
+            getattr(self, each.name) for each in fields(self)
+        )
+        read = [
+            (name, states[cut], delayed[cut], direct[cut], offset + at, start + at * dt)
+            for cut, at in ((slice(0, begin), 0), (slice(end, None), end))
+            if len(states[cut])
+        ]
+        return type(self)(*zip(*read, strict=True))
 
     def span(
         self, run: int, settings: HankelSettings, last: int | None, dt: float
