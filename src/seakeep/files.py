@@ -274,12 +274,11 @@ def write_netcdf(
 
 def write_whole(path: Path, buffer: io.BytesIO) -> None:
     """Write a NetCDF file that was made in memory, and its checksum."""
-    with path.open("wb") as whole, buffer.getbuffer() as content:
-        whole.write(content)
-        whole.write(_seal_of(content))
+    content = buffer.getvalue()
+    path.write_bytes(content + _seal_of(content))
 
 
-def _seal_of(content: bytes | memoryview) -> bytes:
+def _seal_of(content: bytes) -> bytes:
     return SEAL + hashlib.sha256(content).hexdigest().encode()
 
 
