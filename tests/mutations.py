@@ -26,7 +26,7 @@ MUTATIONS = (
      "tank/test_quality_on_tank.py"),
     ("core/harmonics.py", "part.std(axis=-2, ddof=1)", "part.std(axis=-2, ddof=0)",
      "check/test_response.py::test_type_a_uncertainty_is_that_of_the_mean_of_few_windows"),
-    ("core/decay.py", "p / np.hypot(2 * np.pi, p)", "p / (2 * np.pi)",
+    ("core/extremes.py", "p / np.hypot(2 * np.pi, p)", "p / (2 * np.pi)",
      "check/test_free.py::test_strong_damping_is_no_small_angle"),
     ("check/free.py", "linear / np.hypot(2 * np.pi, linear)", "linear / (2 * np.pi)",
      "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
@@ -70,7 +70,7 @@ MUTATIONS = (
      "models/test_stability.py"),
     ("core/bootstrap.py", "special.stdtrit(blocks - 1.0, 0.5 + level / 2)", "1.96",
      "statistics/test_two_way.py"),
-    ("core/whiteness.py", "out[: len(found), column] = found", "out[: len(found), column] += 1",
+    ("core/spectra.py", "out[: len(found), column] = found", "out[: len(found), column] += 1",
      "check/test_residuals.py"),
 )  # fmt: skip
 

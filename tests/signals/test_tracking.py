@@ -15,7 +15,7 @@ from seakeep.signals.tracking import FLAGS
 cv2 = pytest.importorskip("cv2")
 pytest.importorskip("numba", reason="the renderer belongs to the virtual tank")
 
-from seakeep.tank import video as tank_video  # noqa: E402
+from seakeep.tank import delivery as tank_video  # noqa: E402
 
 RATE, FRAMES = 30.0, 90
 COG = 0.03  # m above still water

@@ -20,7 +20,6 @@ from seakeep.signals.lags import (
     correlation_peak,
     windowed_lags,
 )
-from seakeep.signals.leakage import find_leakage
 from seakeep.signals.panel import TrackingSettings
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.propagation import (
@@ -49,6 +48,7 @@ from seakeep.signals.time_axis import TimeReport, bridge, inspect_times, onto_un
 from seakeep.signals.tracking import Track, contact_sheet, track_video
 from seakeep.signals.waves import (
     encounter_period,
+    find_leakage,
     peak_period,
     repeated_waves,
     significant_height,

@@ -31,8 +31,7 @@ from seakeep.arrays import (
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
 from seakeep.signals.lags import correlation_peak, peak_place
-from seakeep.signals.leakage import is_regular
-from seakeep.signals.waves import encounter_period, welch_segments
+from seakeep.signals.waves import encounter_period, is_regular, welch_segments
 from seakeep.waves import group_speed, phase_speed, wavenumber
 
 EARLIEST = 1e-3
