@@ -245,7 +245,7 @@ def test_progress_counts_all_that_is_tried_once():
     [
         ({}, ("rigde",), r"vary names 'rigde'\. Did you mean 'ridge'\?"),
         ({"delay_rows": "ridge"}, (), r"takes delay_rows = 'exact' and no rank"),
-        ({}, ("rank", "readouts"), "vary names 'rank', and read-outs learn from free runs"),
+        ({}, ("rank", "readouts"), "vary names 'rank', and read-outs are chosen by free runs"),
         ({"ridge": "evidence"}, (), "or the word rollout; received 'evidence'"),
     ],
 )

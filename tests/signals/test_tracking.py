@@ -279,7 +279,7 @@ def test_a_lag_one_wave_period_off_is_told():
     def found(frequencies, late, **settings):
         wave = sum(np.sin(a * t + i) for i, a in enumerate(frequencies))
         mru = sum(np.sin(a * (t + late) + i) for i, a in enumerate(frequencies))
-        return compare_motion(wave, t, mru, t, **settings)
+        return compare_motion(wave + 0.25, t, mru, t, **settings)
 
     regular, period = found([4.0], 0.3), 2 * np.pi / 4.0
     assert regular.ambiguous
@@ -289,6 +289,7 @@ def test_a_lag_one_wave_period_off_is_told():
     sea = found([3.1, 3.6, 4.0, 4.7, 5.3], 2.1)
     assert sea.max_lag == 10.0
     assert sea.lag == pytest.approx(2.1, abs=1e-3)  # a fiftieth of a step: noiseless
+    assert sea.offset == pytest.approx(0.25, abs=1e-3)
     assert not sea.ambiguous
     assert abs(sea.rival_lag - 2.1) > 1.0
     assert sea.enclosed
