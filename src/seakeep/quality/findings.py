@@ -272,7 +272,13 @@ def filled(channel: xr.DataArray) -> FloatArray:
 
 
 def sound(data: xr.Dataset, name: str) -> FloatArray:
-    """Values of a channel, straight lines across gaps and what is flagged as wrong or stuck."""
+    """Values of a channel from the first to the last that is neither missing, wrong nor stuck.
+
+    Straight lines lead across what is missing, wrong or stuck between them.
+    """
     x, flags = data.variables[name].to_numpy(), data.variables.get(f"{name}_flags")
-    right = True if flags is None else (flags.to_numpy() & (OUTLIER | STUCK)) == 0
-    return over_gaps(x, np.isfinite(x) & right)
+    right = np.isfinite(x)
+    if flags is not None:
+        right &= (flags.to_numpy() & (OUTLIER | STUCK)) == 0
+    at = np.flatnonzero(right)
+    return over_gaps(x, right)[at[0] : at[-1] + 1] if at.size else x[:0]
