@@ -88,8 +88,3 @@ def test_every_check_has_a_figure_with_labelled_axes(run, model):
         figure.canvas.draw()
     with pytest.raises(RequestError, match=r"there is no state 'yaw'\. States: surge, heave, pi"):
         seakeep.plot.coherence(check.coherence(curved, runs), states=["yaw"])
-
-
-def test_models_and_settings_show_themselves_in_notebooks(model):
-    assert ">Hankel DMD with control: 3 states" in model._repr_html_()
-    assert "<th>ridge</th><td>0.01</td>" in HankelDMDc(2, 4, 0.01)._repr_html_()

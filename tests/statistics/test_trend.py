@@ -5,7 +5,6 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kendalltau, linregress
 
-from seakeep.errors import DataError, RequestError
 from seakeep.statistics import moving_block_bootstrap, trend_test
 
 
@@ -61,16 +60,3 @@ def test_a_trend_is_found_and_moves_slope_and_interval_by_itself():
     for bound in ("slope", "lower", "upper"):
         assert getattr(steep, bound) - getattr(flat, bound) == pytest.approx(0.5, abs=1e-9)
     assert 0 < steep.upper - steep.lower < 0.5
-
-
-@pytest.mark.parametrize(
-    ("series", "settings", "error", "message"),
-    [
-        (np.arange(20.0), {}, DataError, "a constant or an exact line"),
-        (dependent(0, 20, 0), {"time": np.arange(20) ** 2}, RequestError, "even steps"),
-        (dependent(0, 20, 0), {"n_series": 0}, RequestError, "n_series must be a whole number"),
-    ],
-)
-def test_what_is_refused(series, settings, error, message):
-    with pytest.raises(error, match=message):
-        trend_test(series, rng=np.random.default_rng(0), **settings)
