@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from seakeep.arrays import FloatArray
 
-FORMAT = 5
+FORMAT = 6
 """Format of sealed files; one of another format is refused, and made again."""
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""

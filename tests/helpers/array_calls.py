@@ -132,11 +132,6 @@ CALLS = {
         ),
         TABLE[:9], TABLE[9:18],
     ),
-    "statistics.trend_test": (
-        lambda x, t: statistics.trend_test(
-            x, rng=RNG(0), time=t, n_series=3, block_length=9
-        ), X, T,
-    ),
     "waves.group_speed": (waves.group_speed, np.abs(X), np.full(T.size, 3.6)),
     "waves.phase_speed": (waves.phase_speed, np.abs(X), np.full(T.size, 3.6)),
     "waves.wavelength_to_frequency": (

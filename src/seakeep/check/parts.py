@@ -191,7 +191,7 @@ def no_energy(names: str) -> DataError:
 
 def read_off(model: Model) -> list[int]:
     """Columns of states that read-outs make of other states."""
-    return [each.column for each in model.signature.readouts if each.function is not None]
+    return [each.column for each in model.signature.readouts if each.acts]
 
 
 def driven(
