@@ -220,7 +220,6 @@ def aligned_ensemble(runs, **alignment):
 @pytest.mark.parametrize(
     "alignment",
     [
-        {"mode": "dispersion", "surge": "measured", "highest_frequency": 0.9},
         {"mode": "effective", "surge": "measured", "celerity": 3.0},
         {"mode": "dispersion", "surge": "none"},
     ],

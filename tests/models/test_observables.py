@@ -7,7 +7,7 @@ import xarray as xr
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.models import HankelDMDc
 from seakeep.models.inputs import InputMap, Regressors
-from seakeep.models.labelled import Span
+from seakeep.models.labelled import Span, channel_labels
 from seakeep.models.observables import Powers, SlowSquares
 
 DT, PERIOD = 0.1, 16  # s, samples
@@ -36,7 +36,7 @@ def irregular(seed: int = 0, samples: int = 900) -> xr.Dataset:
 
 
 INPUTS = ["eta_fwd", "eta_cog"]
-CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3), products=True))
+CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3)))
 
 
 def fitted(run, lead=12, chosen=CHOSEN) -> InputMap:
@@ -90,6 +90,26 @@ def test_slow_squares_of_a_regular_wave_weigh_the_amplitude_by_the_frequency():
         expected = 0.5 * (amplitude * omega**order * gain) ** 2
         # What the filter leaves of the wave at twice the frequency.
         assert found[order] == pytest.approx(expected, rel=0.01)
+
+
+def test_columns_are_named_with_units_and_stand_in_two_groups():
+    run = irregular()
+    chain = fitted(run)
+    delayed, direct = chain.regressors(channel_labels(run, INPUTS))
+    assert {label.name: label.units for label in delayed} == {
+        "eta_fwd": "m",
+        "eta_cog": "m",
+        "eta_fwd_power_2": "m^2",
+        "eta_cog_power_2": "m^2",
+        "eta_fwd_power_3": "m^3",
+        "eta_cog_power_3": "m^3",
+    }
+    assert len(direct) == 18
+    assert direct[6].units == "(m/s)^2"
+    # The squares look two periods ahead, which is more than the lead of the waves.
+    assert chain.lead_samples == 2 * PERIOD
+    # Five periods of lags and twice the filter's half width less the look-ahead.
+    assert chain.history(3 * PERIOD) == 5 * PERIOD + 2 * (24 + 1) - 2 * PERIOD
 
 
 def test_the_lead_shifts_the_inputs_and_not_the_squares():
