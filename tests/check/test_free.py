@@ -7,7 +7,7 @@ import xarray as xr
 
 from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, LogUniform, check
 from seakeep.check.parts import free_windows
-from seakeep.core.decay import free_decay
+from seakeep.core.extremes import free_decay
 from seakeep.errors import DataError, RequestError
 
 DT, FREQUENCY, RATIO = 0.05, 2.0, 0.06  # s, rad/s, 1

@@ -7,7 +7,7 @@ import xarray as xr
 
 from seakeep import HankelDMDc, check
 from seakeep.check.parts import free_windows
-from seakeep.core.whiteness import autocorrelation, input_correlation, ljung_box
+from seakeep.core.spectra import autocorrelation, input_correlation, ljung_box
 from seakeep.errors import DataError
 
 

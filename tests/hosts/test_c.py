@@ -103,7 +103,7 @@ def test_what_is_copied_goes_on_as_the_original_to_the_last_bit(host, cases):
 def test_the_derivative_of_a_step_is_that_of_the_jacobian(name, host, library, cases):
     case, run = cases[name], host(name)
     _, on_inputs = case.model.jacobian(case.x_history, case.u[: case.rows + 1])
-    change, found = np.array([0.3, -0.7]), np.empty(2)
+    change, found = np.array([0.3, -0.7]), np.empty(len(case.model.states))
     derivative = getattr(library, f"{name}_derivative")
     derivative(
         run.memory, pointer(case.u[case.rows]), pointer(change), found.ctypes.data_as(DOUBLES)

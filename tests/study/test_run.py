@@ -2,7 +2,6 @@
 
 import errno
 import json
-import os
 import pickle
 import shutil
 import signal
@@ -268,22 +267,11 @@ def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folde
         make_plan(read_study(path))
 
 
-@pytest.mark.parametrize(
-    ("number", "kind", "status", "mend"),
-    [
-        (errno.EACCES, RequestError, 2, "Choose a folder that you may write to"),
-        (errno.EROFS, RequestError, 2, "Choose a folder that you may write to"),
-        (errno.ENOENT, RequestError, 2, "Choose another place"),
-        (errno.ENOTDIR, RequestError, 2, "Choose another place"),
-        (errno.ENOSPC, StorageError, 1, "Free space on the disk"),
-        (errno.EIO, StorageError, 1, "Check the disk"),
-    ],
-)
-def test_a_write_that_fails_names_the_mend_of_its_cause(number, kind, status, mend, tmp_path):
-    with pytest.raises(kind, match=mend) as caught, store.storing(tmp_path):
-        raise OSError(number, os.strerror(number))
-    assert caught.value.exit_status == status
-    assert os.strerror(number) in str(caught.value)
+def test_a_write_that_fails_names_its_cause_and_the_remedy(tmp_path):
+    full = pytest.raises(StorageError, match=r"No space left.*Free space")
+    with full as caught, store.storing(tmp_path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert caught.value.exit_status == 1
 
 
 def test_a_result_that_cannot_be_read_is_told(finished, monkeypatch):

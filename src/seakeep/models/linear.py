@@ -301,14 +301,15 @@ class HankelDMDcModel(SingleModel, store.Saved):
         ----------
         x_history : array_like, shape (at least ``signature.state_samples``, N)
             States up to and including instant k, as in :meth:`forecast_arrays`.
-        u_history : array_like, shape (at least history_samples + lead_samples, Q)
-            Inputs up to and including instant k + ``lead_samples``.
+        u_history : array_like, shape (rows, Q)
+            Inputs up to and including instant k + ``lead_samples``; rows as
+            :func:`seakeep.hosts.start_rows` cuts them, and one more.
 
         Returns
         -------
         on_states : ndarray, shape (N, signature.state_samples, N)
             ∂x(k+1)/∂x, the last axes being those of the rows at the end of `x_history`.
-        on_inputs : ndarray, shape (N, history_samples + lead_samples, Q)
+        on_inputs : ndarray, shape (N, rows, Q)
             ∂x(k+1)/∂u in the same way.
 
         Notes
@@ -317,7 +318,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         or quadratic in its rows. A model that follows its surge takes a run for each number.
         """
         signature = self.signature
-        rows = signature.history_samples + signature.lead_samples
+        rows = signature.input_map.history(self.input_delays) + 1 + signature.lead_samples
         x = rows_by_name(
             "x_history", x_history, signature.state_samples, self.states, "of the states"
         )[-signature.state_samples :]
