@@ -652,7 +652,11 @@ class HankelEnsemble(Forecaster, store.Saved):
         return BandForecast(mean, std, lower, upper, int(np.count_nonzero(lost >= 0)))
 
     def live(
-        self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
+        self,
+        *,
+        like: xr.Dataset | None = None,
+        noise: Mapping[str, float] | None = None,
+        roles: Mapping[str, str] | None = None,
     ) -> Live:
         """Put the members into service; arguments and errors as :meth:`HankelDMDcModel.live`.
 
@@ -660,7 +664,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         errors on what they learnt from are found here; a forecast runs all of them.
         """
         members = self if self.identified else self.hold()
-        return Live(members, members._means, members.errors, like=like, noise=noise)
+        return Live(members, members._means, members.errors, like=like, noise=noise, roles=roles)
 
     @property
     def _means(self) -> list[Dynamics]:
