@@ -3,7 +3,7 @@ r"""Settings chosen by free runs on training runs that are held out.
 A candidate is a complete set of settings but for λ. It is fitted to all training runs but one and
 judged by its free runs on that one, in windows of one or two lengths; the mean over folds, windows
 and channels of the NRMSE decides. The regressors of all candidates are made once; one Gram matrix
-of a candidate and a fold gives the whole path of λ (:mod:`seakeep.core.path`).
+of a candidate and a fold gives the whole path of λ (:mod:`seakeep.core.gram`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ import xarray as xr
 from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
-from seakeep.core.gram import Piece, primal_system
-from seakeep.core.path import ridge_path, truncated_path
+from seakeep.core.gram import Piece, primal_system, ridge_path, truncated_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
@@ -31,10 +30,10 @@ from seakeep.models.ensemble import spectral_radius
 from seakeep.models.executor import in_order
 from seakeep.models.following import LEAD
 from seakeep.models.interface import Scale, Signature
+from seakeep.models.loads import PERIODS, Held, fit_readouts
 from seakeep.models.observables import Observable, Powers, SlowSquares, named
 from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
-from seakeep.models.stacking import PERIODS, Held, fit_readouts
 from seakeep.models.training import TrainingData, gather, scales_of
 from seakeep.signals import repeated_waves
 
@@ -292,11 +291,10 @@ class Problem:
         return np.concatenate(scores, axis=1), weights
 
     def held_out(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
-        """Free runs, end to end, on each run by the model of the others, standardised."""
-        deviations = self.data.state_scale.deviations
+        """Free runs, end to end, on each run by the model of the others."""
         for run in range(len(self.groups)) if len(self.groups) > 1 else ():
             for predicted, measured, _ in self.free_runs(candidate, [level], run, [steps]):
-                yield Held(run, deviations(predicted[0]), deviations(measured))
+                yield Held(run, self.starts(run, steps), predicted[0], measured)
 
 
 def _problem(
@@ -712,8 +710,8 @@ def _check_asked(
         )
     if "rank" in vary and (readouts or "readouts" in vary):
         raise RequestError(
-            "vary names 'rank', and read-outs learn from free runs of ridge regressions. Leave out "
-            "'rank', or the read-outs: readouts = {} in a campaign file."
+            "vary names 'rank', and read-outs are chosen by free runs of ridge regressions. Leave "
+            "out 'rank', or the read-outs: readouts = {} in a campaign file."
         )
 
 
@@ -738,9 +736,10 @@ def _learnt(
     if not readouts:
         return ()
     if problem is not None:
-        return fit_readouts(readouts, problem.data, list(problem.held_out(candidate, level, steps)))
+        judged = list(problem.held_out(candidate, level, steps))
+        return fit_readouts(readouts, problem.data, problem.runs, judged)
     settings = replace(candidate, ridge=1.0, standardize=True)
-    return fit_readouts(readouts, gather(*given, None, settings), ())
+    return fit_readouts(readouts, gather(*given, None, settings), given[0], ())
 
 
 def readouts_for(
@@ -767,19 +766,18 @@ def readouts_for(
     Raises
     ------
     RequestError
-        If a read-out names what is no state, or λ is zero where forecasts are cross-fitted.
-    DataError
-        If a stacked read-out has no forecast to learn from.
+        If a read-out names what is no state, λ is zero where forecasts are cross-fitted, or kind
+        "wave" meets no waves that are carried to the predicted surge.
     """
     readouts = readouts_asked(settings.readouts, labelled.common_labels(runs, states))
-    stacked = [each for each in readouts if each.kind != "hinge"]
-    if not stacked:
+    judged = [each for each in readouts if each.kind == "auto"]
+    if not judged:
         return _learnt(readouts, None, settings, 0.0, 0, (runs, states, inputs))
     ridge = float(settings.ridge)
     if ridge == 0.0:
         raise RequestError(
-            f"readouts: {stacked[0].channel}: kind = '{stacked[0].kind}' learns from free runs of "
-            "ridge regressions, which take ridge above zero. Raise ridge, or take kind = 'hinge'."
+            f"readouts: {judged[0].channel}: kind = 'auto' is chosen by free runs of ridge "
+            "regressions, which take ridge above zero. Raise ridge, or take kind = 'wave'."
         )
     steps = round(PERIODS * labelled.mean_period(runs, inputs))
     if len(runs) == 1 and settings.window is not None:  # whose parts are shorter
@@ -890,7 +888,7 @@ def _alignments(
     for alignment in (
         replace(carried, surge="predicted"),
         replace(carried, surge="none"),
-        replace(base, mode="effective", surge="none", highest_frequency=None),
+        replace(base, mode="effective", surge="none"),
     ):
         try:
             fitted = alignment.fit(*given, None)

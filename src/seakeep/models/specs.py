@@ -94,9 +94,8 @@ class HankelDMDc(HankelSettings):
         modes inside stay as they are, exact delay rows stay exact, and ``training.clipped`` and
         ``summary()`` say which were moved.
     readouts : sequence of ReadOut or tables, or "auto", optional
-        Channels that are read off the forecast states, such as loads of lines that fall slack;
-        "auto" reads every load among the states (in N) off the motions among them where that
-        helps.
+        Loads that are read off the forecast motions and the wave at their lines; "auto" does so
+        with every load among the states (in N) where that helps.
     memory : int or str, optional
         Longest delay of averages of the states, such as ``"8 T"``: beyond `state_delays` their
         means over blocks of delays that double in length are further regressors. It takes exact
