@@ -24,7 +24,6 @@ from pathlib import Path
 
 import numpy as np
 from alignment_on_tank import INPUTS, STATES
-from chain_on_tank import used
 from skill import markdown
 
 import seakeep
@@ -77,7 +76,8 @@ def rows_of(seed, work):
     campaign = seakeep.read_campaign(folder / "campaign.toml")
     names = [each for each in campaign.settings.runs if each.startswith("irregular")]
     prepared = campaign.prepare([*names, REGULAR])
-    runs = {name: wet(used(run)) for name, run in prepared.items()}
+    begin = prepared[names[0]].attrs["train_span"][0]
+    runs = {name: wet(run.sel(time=slice(begin, None))) for name, run in prepared.items()}
     period = campaign.encounter_period()
     spec = seakeep.HankelDMDc.recommended(period, runs[names[0]].attrs["dt"])
     found = {kind: [[], []] for kind in KINDS}
