@@ -16,7 +16,7 @@ import xarray as xr
 
 from seakeep.campaign import read_table
 from seakeep.campaign.pipeline import flag_samples
-from seakeep.quality.record import Record
+from seakeep.quality.findings import Record
 from seakeep.quality.samples import constant, flagged, noise
 from seakeep.signals.time_axis import over_gaps
 from seakeep.tank.instruments import record_run

@@ -3,7 +3,7 @@ r"""Settings chosen by free runs on training runs that are held out.
 A candidate is a complete set of settings but for λ. It is fitted to all training runs but one and
 judged by its free runs on that one, in windows of one or two lengths; the mean over folds, windows
 and channels of the NRMSE decides. The regressors of all candidates are made once; one Gram matrix
-of a candidate and a fold gives the whole path of λ (:mod:`seakeep.core.path`).
+of a candidate and a fold gives the whole path of λ (:mod:`seakeep.core.gram`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ import xarray as xr
 from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
-from seakeep.core.gram import Piece, primal_system
-from seakeep.core.path import ridge_path, truncated_path
+from seakeep.core.gram import Piece, primal_system, ridge_path, truncated_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
@@ -883,7 +882,7 @@ def _alignments(
     for alignment in (
         replace(carried, surge="predicted"),
         replace(carried, surge="none"),
-        replace(base, mode="effective", surge="none", highest_frequency=None),
+        replace(base, mode="effective", surge="none"),
     ):
         try:
             fitted = alignment.fit(*given, None)

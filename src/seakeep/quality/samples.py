@@ -18,8 +18,7 @@ from seakeep.quality.faults import (
     STUCK,
     noise_share,
 )
-from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, channels_of, sound, step_of
+from seakeep.quality.findings import Finding, Kind, Record, channels_of, sound, step_of
 from seakeep.signals.time_axis import stretches
 from seakeep.signals.waves import dominant_period
 

@@ -535,34 +535,6 @@ def _channel_densities(
     return np.array(table), np.stack(curves)
 
 
-def wave_frequency(elevation: npt.ArrayLike, dt: float) -> float:
-    """Frequency of a regular wave, Hz: the peak of its spectrum, interpolated.
-
-    Parameters
-    ----------
-    elevation : array_like, shape (time,)
-        A record of several periods.
-    dt : float
-        Time step, s.
-
-    Returns
-    -------
-    float
-        To about a hundredth of one over the length of the record.
-
-    Examples
-    --------
-    >>> t = np.arange(1200) * 0.05
-    >>> round(wave_frequency(np.sin(2 * np.pi * 0.8586 * t), 0.05), 4)
-    0.8586
-    """
-    x = np.asarray(elevation, dtype=float)
-    padded = 64 * x.size
-    tapered = (x - x.mean()) * np.hanning(x.size)
-    spectrum = np.abs(np.fft.rfft(tapered, padded))
-    return float(np.argmax(spectrum) / (padded * dt))
-
-
 def is_regular(groups: Mapping[str, xr.Dataset], test: str) -> bool:
     """Whether all windows of a test set lie in runs of regular waves of known frequency."""
     return bool(np.isfinite(_frequencies(groups, test)).all())
