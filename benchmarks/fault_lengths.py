@@ -1,6 +1,6 @@
 """What the quality checks report of faults of every length: channel, kind of fault, length.
 
-    python benchmarks/faults.py [--places 8] [--out FILE.md]
+    python benchmarks/fault_lengths.py [--places 8] [--out FILE.md]
 
 Faults are put into the channels of a run of the tutorial and of the virtual tank, each at its own
 rate, at random places. A fault counts as reported if the checks of samples name its channel.
@@ -16,7 +16,7 @@ import xarray as xr
 
 from seakeep.campaign import read_table
 from seakeep.campaign.pipeline import flag_samples
-from seakeep.quality.record import Record
+from seakeep.quality.findings import Record
 from seakeep.quality.samples import constant, flagged, noise
 from seakeep.signals.time_axis import over_gaps
 from seakeep.tank.instruments import record_run
@@ -55,15 +55,20 @@ def filled(value: float):
     return fault
 
 
-def spiked(x: np.ndarray, at: slice, rng: np.random.Generator) -> np.ndarray:
-    """Write random values up to 100 standard deviations from the mean."""
-    out = x.copy()
-    out[at] = x.mean() + 100 * x.std() * rng.uniform(-1, 1, at.stop - at.start)
-    return out
+def wild(least: float, most: float):
+    """Write random values so many standard deviations from the mean, to either side."""
+
+    def fault(x: np.ndarray, at: slice, rng: np.random.Generator) -> np.ndarray:
+        out, shape = x.copy(), at.stop - at.start
+        away = rng.uniform(least, most, shape) * rng.choice([-1, 1], shape)
+        out[at] = x.mean() + x.std() * away
+        return out
+
+    return fault
 
 
 FAULTS = {"held": held, "zero": filled(0.0), "-99.9": filled(-99.9), "-999": filled(-999.0),
-          "spiked": spiked}  # fmt: skip
+          "5 to 15 SD": wild(5, 15), "to 100 SD": wild(0, 100)}  # fmt: skip
 
 
 def reported(x: np.ndarray, dt: float) -> set[str]:
@@ -115,12 +120,13 @@ def table(places: int) -> str:
         f"Made by `python benchmarks/fault_lengths.py`: of {places} random places, those at which "
         "the fault is reported, by its length in samples or in parts of the record.",
         "",
-        "- held: readings repeat the one before. Up to three repetitions occur by chance in sound "
-        "records.",
+        "- held: readings repeat the one before. Three equal readings, two repetitions, may be "
+        "chance in a record of this length, and four where readings repeat now and then.",
         "- zero: where readings are further from zero than 1.5 standard deviations. Beside them it "
         "is a plausible reading, as are two or three of them on a steep flank.",
         "- -99.9 and -999, in the unit of the file.",
-        "- spiked: random readings up to 100 standard deviations from the mean.",
+        "- SD: random readings so many standard deviations from the mean, to either side. Four to "
+        "eight of 5 to 15 SD that happen to lie on one side pass for the snap of a line.",
         "",
         f"| channel | fault | {' | '.join(heads)} |",
         "|---|---|" + "---|" * len(heads),

@@ -22,7 +22,7 @@ import xarray as xr
 from seakeep.campaign.pipeline import flag_samples
 from seakeep.quality.agreement import FEWEST_STEPS, LATE, RUN_AWAY, compare_sensors
 from seakeep.quality.faults import MISSING, flag_attributes
-from seakeep.quality.record import Record, Redundant
+from seakeep.quality.findings import Record, Redundant
 from seakeep.quality.samples import constant, flagged, levels
 from seakeep.quality.sensors import redundant
 from seakeep.signals import bridge, integrate

@@ -100,31 +100,33 @@ observables = [
 | `kind` | keys and defaults | columns |
 |---|---|---|
 | `"slow_squares"` | `of`; `orders = [0, 1, 2]` of the derivatives; `cutoff = "0.333 /T"`; `lead = "2 T"`; `lags = ["0 T", …, "5 T"]` | slow parts of the squares of elevations and their derivatives, which drive drift |
-| `"powers"` | `of`; `powers = [2, 3]`; `products = false`, or with those of different channels too | powers of inputs, with the input delays, which steep waves need |
+| `"powers"` | `of`; `powers = [2, 3]` | powers of inputs, with the input delays, which steep waves need |
 | `"expression"` | `name`, `expression`, `units = ""` | an expression of inputs, with the input delays |
 
 `cutoff`, `lead` and `lags` count in encounter periods, with or without `T`.
 
-## Loads of lines that fall slack
+## Loads of lines
 
-A linear model cannot follow a load that stops at a floor. A read-out replaces the forecast of such a channel by a
-function of the forecast states, with hinges max(0, x − q) at six knots q of each state in `of`:
+A linear model cannot follow a load that depends on how deep its line is in the water. A read-out replaces the forecast of
+such a channel by a ridge regression on the motions in `of`, hinges of the surge, and elevation and rate of the wave at one
+place, the line's:
 
 ```toml
 [model.readouts.mooring_stern]
-of = ["surge", "heave", "pitch"]
+of = ["surge", "heave", "pitch", "surge_rate", "heave_rate", "pitch_rate"]
 kind = "auto"
 ```
 
-| `kind` | function of | fitted to |
-|---|---|---|
-| `"hinge"` | the states in `of` and their hinges | measured states of the training runs |
-| `"stacked"` | all forecast states and the hinges of those in `of` | forecasts of each training run by the model of the others, in free runs of 15 T̂ |
-| `"auto"` | the better of these on held-out runs if it beats no read-out by two standard errors, else none | – |
+| `kind` | |
+|---|---|
+| `"wave"` | the regression, fitted to measured motions; the place is found by a scan in which each training run is left out once |
+| `"auto"` | the same where free runs on held-out runs gain two standard errors and 2 % by it, else none |
 
-Neither reads a measurement after the start of a forecast. If the load rests on a floor in a hundredth of the training
-samples or more, its forecast does not fall below their 0.002 quantile, whichever kind is chosen. A line that is never slack in
-training gets no floor, since it may fall slack in higher waves. `readouts = "auto"` applies `"auto"` to every channel in newtons, as a function of the motions among the
+The waves are carried to the line by the filters of an alignment with `surge = "predicted"`, without which `"wave"` is refused
+and `"auto"` takes none. It reads no measured state after the start of a forecast. Where motions or wave leave the range of
+training, the forecast of the load as a state takes over. If the load rests on a floor in a hundredth of the training
+samples or more, its forecast does not fall below their 0.002 quantile, with either kind and with none. A line that is never slack in
+training gets no floor, since it may fall slack in higher waves. `readouts = "auto"` applies `"auto"` to every channel in newtons, as a function of the motions and their rates among the
 states. `seakeep fit` prints the choice, and `seakeep tune --vary readouts` writes it into the file. An ensemble
 fits its read-outs once, with the medians of its priors, and applies them to every member. A model with read-outs
 cannot be exported as a linear system.

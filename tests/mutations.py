@@ -1,115 +1,284 @@
-"""Wrong one-line changes, and the test that fails on each: `python tests/mutations.py [WORD]`.
+"""Wrong one-line changes, and the tests that fail on each: `python tests/mutations.py`.
 
-Not collected by pytest. Each change is applied to a copy of the sources; a change whose test still
-passes is a survivor, and the command ends with status 1. WORD picks the changes whose file, line or
-test hold it.
+Not collected by pytest. Each change is made in a copy of the project, and its tests run there. A
+change with which they pass survives; one whose line or tests are not there is stale. The command
+ends with status 1 if there is either. It goes on where it was interrupted: the file of results holds
+one line per change, which is tried again once its file or its tests are others.
 """
 
+import argparse
+import hashlib
+import multiprocessing
 import os
+import queue
 import shutil
-import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from rich.progress import track
+
 ROOT = Path(__file__).parents[1]
-PARTS = ("src", "tests", "conftest.py", "pyproject.toml", "README.md")
-MUTATIONS = (
-    # file below src/seakeep, old line, new line, test below tests
-    ("core/two_way.py", "np.arange(block)) % size", "0 * np.arange(block)) % size",
-     "statistics/test_two_way.py::test_neighbours_are_drawn_together"),
-    ("core/calibration.py", "total += 2.0 * correlation", "total += correlation",
-     "statistics/test_calibration.py::test_the_block_is_the_integrated_correlation_time"),
-    ("core/metrics.py", "NOISE_FACTOR = 2**0.5", "NOISE_FACTOR = 2.0",
-     "test_metrics.py::test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise"),
-    ("core/metrics.py", "load <= noise_std", "load <= 2 * noise_std",
-     "tank/test_quality_on_tank.py"),
-    ("core/harmonics.py", "part.std(axis=-2, ddof=1)", "part.std(axis=-2, ddof=0)",
-     "check/test_response.py::test_type_a_uncertainty_is_that_of_the_mean_of_few_windows"),
-    ("core/decay.py", "p / np.hypot(2 * np.pi, p)", "p / (2 * np.pi)",
-     "check/test_free.py::test_strong_damping_is_no_small_angle"),
-    ("check/free.py", "linear / np.hypot(2 * np.pi, linear)", "linear / (2 * np.pi)",
-     "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
-    ("check/residuals.py", "1.96 / np.sqrt(count)", "1.96 / np.sqrt(count - lags)",
-     "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
-    ("check/residuals.py", "inputs = channel_matrix(run, model.inputs, name, after)",
-     "inputs = channel_matrix(run, model.inputs, name, slice(first, last))",
-     "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
-    ("signals/lags.py", "count = a.size - np.abs(lags)", "count = a.size + 0 * np.abs(lags)",
-     "signals/test_synchronisation.py::test_the_correlation_at_a_lag_is_that_of_the_samples_in_common"),
-    ("signals/calculus.py", "(slope / dt if times == 1", "(slope if times == 1",
-     "signals/test_calculus.py::test_a_complementary_rate_keeps_the_steady_drift"),
-    ("models/alignment.py", "speeds.std(ddof=1)", "2**0.5 * speeds.std(ddof=1)",
-     "models/test_alignment.py::test_the_spread_of_celerities_is_that_between_the_runs"),
-    ("models/draws.py", "max(settings.window, least) if", "settings.window + reach if",
-     "models/test_contracts.py::test_a_history_inside_the_window_is_not_counted_twice"),
-    ("study/reproduce.py", "HIGH_PASS = 0.15", "HIGH_PASS = 0.25",
-     "study/test_reproduce.py::test_the_edge_of_the_drift_lies_between_drift_and_waves"),
-    ("tank/dynamics.py", "+ 4.0 * w / GRAVITY * force", "+ 2.0 * w / GRAVITY * force",
-     "tank/test_dynamics.py::test_wave_drift_damping_is_aranhas"),
-    ("tank/instruments.py", "q[1] - settings.eye[0] * q[2]", "q[1] + settings.eye[0] * q[2]",
-     "tank/test_instruments.py::test_a_pitch_that_lifts_the_bow_lifts_the_eye_of_its_line"),
-    ("core/kalman.py", "block = top @ self.a.T + self.process", "block = top @ self.a.T",
-     "core/test_kalman.py"),
-    ("models/live.py", "white = update.whitening @ np.where(", "white = 1.0 * np.where(",
-     "models/test_live.py"),
-    ("models/selection.py", "joined / joined.sum()", "joined / len(folds)",
-     "models/test_selection.py"),
-    ("models/settings.py", "delayed += round(BACK", "delayed += 0 * round(BACK",
-     "models/test_following.py::test_settings_know_the_history_that_carriers_read"),
-    ("models/export.py", "lead - (term.order > 0)", "lead", "hosts/test_mat.py"),
-    ("models/labelled.py", "*filter(is_elevation, inputs), *lengths", "*inputs",
-     "models/test_selection.py"),
-    ("models/selection.py", "return self.widest.lead - candidate.lead", "return 0",
-     "models/test_selection.py::test_a_look_ahead_that_the_data_has_is_found"),
-    ("models/selection.py", "self.groups[other] != self.groups[run]]", "True]",
-     "test_tuning.py::test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts"),
-    ("models/engine.py", "<= reach[:, [column]] * excess", "<= reach[:, [column]]",
-     "models/test_stability.py"),
-    ("models/forecasts.py", '"diverged_at": lost, ', "",
-     "models/test_stability.py"),
-    ("core/bootstrap.py", "special.stdtrit(blocks - 1.0, 0.5 + level / 2)", "1.96",
-     "statistics/test_two_way.py"),
-    ("core/whiteness.py", "out[: len(found), column] = found", "out[: len(found), column] += 1",
-     "check/test_residuals.py"),
+# What tests import besides seakeep: imported once, and not for each change.
+IMPORTED = "scipy.signal scipy.stats scipy.io xarray pandas h5netcdf pydantic numba matplotlib.pyplot typer pytest"
+PASSED, FAILED = 10, 11  # exit status: that of pytest plus ten, as Python itself ends with 1
+# File below src/seakeep, its line (a part of it that stands there once), what replaces it, and the
+# tests below tests/ that fail.
+CHANGES = (
+    ("campaign/pipeline.py", "settings.sign * factor * (logger.columns.values[column] + settings.offset)", "settings.sign * factor * logger.columns.values[column] + settings.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
+    ("check/free.py", "linear / np.hypot(2 * np.pi, linear)", "linear / (2 * np.pi)", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
+    ("check/residuals.py", "1.96 / np.sqrt(count)", "1.96 / np.sqrt(count - lags)", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
+    ("check/residuals.py", "inputs = channel_matrix(run, model.inputs, name, after)", "inputs = channel_matrix(run, model.inputs, name, slice(first, last))", "check/test_residuals.py::test_limits_and_past_inputs_are_those_of_the_errors_by_hand"),
+    ("check/residuals.py", "rows = starts[:, None] + np.arange(1, count + 1)", "rows = starts[:, None] + np.arange(count)", "check/test_residuals.py::test_bands_and_ages_add_up"),
+    ("check/response.py", "* dynamics.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_that_of_python_control"),
+    ("check/response.py", "early = np.exp(2j * np.pi", "early = np.exp(-2j * np.pi", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
+    ("check/response.py", "np.hypot(radius, moved)[:, 0]", "radius[:, 0]", "check/test_response.py::test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectrum"),
+    ("check/response.py", "type_b = np.hypot(accuracy[1:], ratio * accuracy[0])", "type_b = np.hypot(accuracy[1:], 0 * ratio)", "check/test_response.py::test_accuracy_of_the_instruments_widens_the_interval"),
+    ("check/response.py", "waves = np.nan_to_num(np.exp(-1j * turns))", "waves = np.nan_to_num(np.exp(1j * turns))", "check/test_response.py::test_a_passing_wave_adds_the_probes"),
+    ("check/second_order.py", "(amplitude**2 * (2 if apart else 1))", "(amplitude**2 * 2)", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
+    ("check/second_order.py", "samples * (1 if apart == 0 else 2)", "samples", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
+    ("check/worth.py", '1 / (1 + both[f"all_{other}"]) - 1', 'both[f"all_{other}"]', "check/test_worth.py::test_errors_are_those_of_the_tests_and_verdicts_follow_from_them"),
+    ("core/bands.py", 'padtype="even"', 'padtype="odd"', "statistics/test_bands.py::test_waves_are_not_forced_to_nothing_at_the_ends"),
+    ("core/bands.py", "return low, x - low", "return low, x", "statistics/test_bands.py::test_the_parts_add_up_to_the_series"),
+    ("core/bootstrap.py", "(x.size - pieces.size) * zero", "x.size * zero", "statistics/test_bootstrap.py::test_the_lag_one_correlation_is_the_printed_sum_with_its_square"),
+    ("core/bootstrap.py", "bandwidth = min(2 * last, longest)", "bandwidth = min(last, longest)", "statistics/test_bootstrap.py::test_politis_white_agrees_with_arch"),
+    ("core/bootstrap.py", "np.arange(a, a + n - block_length + 1)", "np.arange(a, a + n)", "statistics/test_bootstrap.py::test_no_block_crosses_a_join_of_segments"),
+    ("core/bootstrap.py", "odds ** (2.0 / 3.0)", "odds ** (1.0 / 3.0)", "statistics/test_bootstrap.py::test_carlstein_finds_the_closed_form_of_an_autoregression"),
+    ("core/bootstrap.py", "special.stdtrit(blocks - 1.0, 0.5 + level / 2)", "1.96", "statistics/test_two_way.py::test_the_interval_holds_the_truth_as_often_as_it_says"),
+    ("core/calibration.py", "1.0 + 1.0 / blocks", "1.0", "statistics/test_calibration.py::test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept"),
+    ("core/calibration.py", "lower - margin, upper + margin", "lower - margin, upper", "models/test_calibration.py::test_the_calibrated_band_covers_unseen_windows_as_it_says"),
+    ("core/calibration.py", "np.hypot(std, floor)", "np.maximum(std, floor)", "models/test_calibration.py::test_the_band_is_a_factor_times_the_spread_with_a_floor"),
+    ("core/calibration.py", 'np.maximum(low - finite(y, "measured"), y - high)', 'np.maximum(low - finite(y, "measured"), high - y)', "statistics/test_calibration.py::test_a_band_that_is_too_narrow_covers_what_it_says_in_new_windows"),
+    ("core/calibration.py", "total += 2.0 * correlation", "total += correlation", "statistics/test_calibration.py::test_the_block_is_the_integrated_correlation_time"),
+    ("core/coverage.py", "2.0 * density - 1.0 / np.sqrt(np.pi)", "density - 1.0 / np.sqrt(np.pi)", "statistics/test_coverage.py::test_the_crps_is_the_integral_that_defines_it"),
+    ("core/coverage.py", '2.0 / (1.0 - fraction(level, "level")) * outside', '1.0 / (1.0 - fraction(level, "level")) * outside', "statistics/test_coverage.py::test_scores_of_the_true_band_are_those_of_the_normal_distribution"),
+    ("core/coverage.py", "below, above = (m < low).mean(axis=-2), (m > high).mean(axis=-2)", "below, above = (m > high).mean(axis=-2), (m < low).mean(axis=-2)", "statistics/test_coverage.py::test_each_channel_and_window_is_judged_alone"),
+    ("core/extremes.py", "decrements = 2 * np.log", "decrements = np.log", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
+    ("core/extremes.py", "p / np.hypot(2 * np.pi, p)", "p / (2 * np.pi)", "check/test_free.py::test_strong_damping_is_no_small_angle"),
+    ("core/extremes.py", "period = 2 * dt * float", "period = dt * float", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
+    ("core/density.py", '1.06, 1.0) if bandwidth == "paper" else (0.9, 1.34)', '1.06, 1.34) if bandwidth == "paper" else (0.9, 1.34)', "statistics/test_density.py::test_the_papers_bandwidth_lacks_the_divisor"),
+    ("core/density.py", "np.exp(-0.5 * (h * angular) ** 2)", "np.exp(-((h * angular) ** 2))", "statistics/test_density.py::test_densities_are_scipys"),
+    ("core/divergence.py", "again = bootstrapped_densities(m, others,", "again = bootstrapped_densities(m, positions,", "statistics/test_divergence.py::test_a_perfect_prediction_is_zero_and_its_floor_is_not"),
+    ("core/divergence.py", "np.clip(0.5 * total", "np.clip(total", "statistics/test_divergence.py::test_it_is_bounded_symmetric_and_scipys_square"),
+    ("core/embedding.py", "last - window + 1", "last - window", "core/test_embedding.py::test_windows_at_the_papers_delays"),
+    ("core/embedding.py", "max(first, earliest)", "max(first, earliest) + 1", "core/test_embedding.py::test_windows_at_the_papers_delays"),
+    ("core/embedding.py", "reach = max(state_delays, input_delays)", "reach = state_delays", "core/test_embedding.py::test_windows_at_the_papers_delays"),
+    ("core/embedding.py", "series[first - lag : first - lag + count]", "series[first - delays + lag : first - delays + lag + count]", "core/test_embedding.py::test_blocks_are_lag_major_the_newest_first"),
+    ("core/extremes.py", "1.109 + 0.608 * g**2 - 0.514 * g", "1.109 + 0.608 * g**2 + 0.514 * g", "check/test_peaks.py::test_intervals_of_the_extreme_cover_as_they_say"),
+    ("core/extremes.py", "k *= 1 - 1.38 / x.size", "k *= 1.0", "check/test_peaks.py::test_weibull_is_that_of_scipy"),
+    ("core/gram.py", "min(piece.count, delay + 1))", "min(piece.count, delay))", "core/test_fast_paths.py::test_the_trace_is_the_sum_of_squares"),
+    ("core/gram.py", "return self.states[self.first + 1 : self.first + 1 + self.count]", "return self.states[self.first : self.first + self.count]", "core/test_fast_paths.py::test_every_form_gives_the_papers_formula"),
+    ("core/gram.py", "row[:, other.older] += above[:, other.newer]", "row[:, other.older] += 0.0 * above[:, other.newer]", "core/test_fast_paths.py::test_the_displaced_gram_is_the_gram"),
+    ("core/gram.py", "signed[1::2] *= -1.0", "signed[0::2] *= -1.0", "core/test_fast_paths.py::test_the_displaced_gram_is_the_gram"),
+    ("core/harmonics.py", "[2] - 1j *", "[2] + 1j *", "check/test_response.py::test_intervals_of_a_harmonic_fit_cover_as_they_say"),
+    ("core/harmonics.py", "part.std(axis=-2, ddof=1)", "part.std(axis=-2, ddof=0)", "check/test_response.py::test_type_a_uncertainty_is_that_of_the_mean_of_few_windows"),
+    ("core/kalman.py", "+ np.diag(self.noise[rows])", "+ np.diag(self.noise[rows] ** 0.5)", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
+    ("core/kalman.py", "= before[count:, count:]", "= before[:-count, :-count]", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
+    ("core/kalman.py", "block = top @ self.a.T + self.process", "block = top @ self.a.T", "core/test_kalman.py::test_it_is_the_textbook_filter_with_rows_missing"),
+    ("core/kalman.py", "factor = np.minimum(factor, 1.0)", "factor = np.maximum(factor, 1.0)", "core/test_kalman.py::test_a_limit_scales_a_state_with_its_correlations"),
+    ("core/kalman.py", "residual - np.diag(noise) - (a * every) @ a.T", "residual - np.diag(noise)", "core/test_kalman.py::test_residuals_less_measurement_noise_are_process_noise"),
+    ("core/metrics.py", "NOISE_FACTOR = 2**0.5", "NOISE_FACTOR = 2.0", "test_metrics.py::test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise"),
+    ("core/metrics.py", "load <= noise_std", "load <= 2 * noise_std", "tank/test_quality_on_tank.py::test_the_share_of_a_slack_line_is_that_of_the_truth"),
+    ("core/metrics.py", "np.sqrt(m.shape[-2] - 1)", "np.sqrt(m.shape[-2])", "test_metrics.py::test_fit_percent_is_matlabs_formula"),
+    ("core/metrics.py", "p.min(axis=-2) - m.min(axis=-2)", "p.min(axis=-2) - m.max(axis=-2)", "test_metrics.py::test_nammae_by_hand"),
+    ("core/metrics.py", "spread = m.std(axis=-2, ddof=1)", "spread = m.std(axis=-2, ddof=0)", "test_metrics.py::test_nrmse_by_hand"),
+    ("core/metrics.py", "total / np.maximum(count, 1)", "total / values.shape[-1]", "test_metrics.py::test_a_slack_channel_is_nan_and_left_out_of_averages"),
+    ("core/observables.py", "(series[2:] - series[:-2]) / (2.0 * dt)", "(series[2:] - series[:-2]) / dt", "models/test_observables.py::test_slow_squares_are_the_sums_that_they_stand_for"),
+    ("core/recursion.py", "here -= place.centre", "here -= 0.0", "models/test_following.py::test_models_and_windows_side_by_side_are_each_alone"),
+    ("core/recursion.py", "rows + 1, axis=0) - lower)", "rows + 1, axis=0))", "models/test_following.py::test_the_wave_is_read_where_the_vessel_goes"),
+    ("core/response.py", "back = turn[:, None] ** -np.arange(input_delays + 1)", "back = turn[:, None] ** np.arange(input_delays + 1)", "check/test_response.py::test_the_response_is_that_of_python_control"),
+    ("core/rollout.py", "gone = np.logical_or.accumulate(~finite.all(axis=2), axis=1)", "gone = ~finite.all(axis=2)", "core/test_rollout.py::test_a_window_that_was_given_up_does_not_come_back"),
+    ("core/rollout.py", "moved[:, : size - N] += row[:, N:]", "moved[:, : size - N] += 0.0 * row[:, N:]", "core/test_rollout.py::test_every_form_of_the_same_run_agrees"),
+    ("core/rollout.py", "start = start[:, ::-1].reshape", "start = start.reshape", "core/test_rollout.py::test_every_form_of_the_same_run_agrees"),
+    ("core/rollout.py", "states[:number] = _forced(rows, propagator.state_input)", "states[:number] = 0.5 * _forced(rows, propagator.state_input)", "core/test_fast_paths.py::test_free_runs_are_the_loop_over_the_extended_state"),
+    ("core/solve.py", "@ regressors.T - ridge *", "@ regressors.T - 0.0 *", "core/test_solve.py::test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen"),
+    ("core/solve.py", "min(count, rank)", "min(count, rank + 1)", "core/test_fast_paths.py::test_a_rank_is_that_of_the_truncated_matrix"),
+    ("core/solve.py", "return bool(ridge >= GRAM_LIMIT * largest[0])", "return True", "core/test_solve.py::test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below"),
+    ("core/solve.py", "ridge * problem.columns if per_snapshot else ridge", "ridge", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
+    ("core/solve.py", "solving[:, group.newest] *= 0.5", "solving[:, group.newest] *= 1.0", "core/test_fast_paths.py::test_every_form_gives_the_papers_formula"),
+    ("core/solve.py", "weights = values / (values**2 + ridge)", "weights = values / (values**2 + ridge**2)", "core/test_solve.py::test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen"),
+    ("core/spectra.py", "1 + 2 * OVERLAP_CORRELATION * (count - 1) / count", "1 + 0 * count", "check/test_coherence.py::test_averages_and_the_interval_of_a_gain_are_those_of_repetitions"),
+    ("core/spectra.py", "both = self.input_power[:, :, None] * self.outputs[:, None]", "both = np.sqrt(self.input_power[:, :, None] * self.outputs[:, None])", "check/test_coherence.py::test_coherence_is_that_of_scipy"),
+    ("core/spectra.py", "gain = np.linalg.pinv(scaled, rcond=1e-9, hermitian=True) @ cross", "gain = cross", "check/test_coherence.py::test_the_interval_of_what_is_left_covers_as_it_says"),
+    ("core/spectra.py", "left * self.averages / (self.averages - size)", "left", "check/test_coherence.py::test_the_interval_of_what_is_left_covers_as_it_says"),
+    ("core/response.py", "np.hypot(real, imag) > radius", "abs(real) > radius", "core/test_clipping.py::test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots"),
+    ("core/response.py", "wanted, gain = value * radius / abs(value), reach @ direction", "wanted, gain = value * radius, reach @ direction", "core/test_clipping.py::test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots"),
+    ("core/subspace.py", "embed(u, input_delays - 1, first - 1, columns)", "embed(u, input_delays - 1, first, columns)", "core/test_subspace.py::test_a_known_system_is_recovered_and_forecast_to_rounding"),
+    ("core/two_way.py", "drawn.reshape(count, -1)[:, :size]", "drawn.reshape(count, -1)[:, :1]", "statistics/test_two_way.py::test_cells_that_are_not_judged_are_left_out"),
+    ("core/two_way.py", "max(0.0, min(end, last) - max(begin, first))", "max(0.0, min(end, last) - min(begin, first))", "statistics/test_two_way.py::test_blocks_are_as_long_as_windows_overlap"),
+    ("core/two_way.py", "np.arange(block)) % size", "0 * np.arange(block)) % size", "statistics/test_two_way.py::test_neighbours_are_drawn_together"),
+    ("core/spectra.py", "out[: len(products), column] = products", "out[: len(products), column] += 1", "check/test_residuals.py::test_a_right_model_leaves_white_errors"),
+    ("core/spectra.py", "samples * (samples + 2) / (samples - lags)", "samples / 1.0 + 0 * lags", "check/test_residuals.py::test_ljung_box_is_that_of_statsmodels"),
+    ("models/alignment.py", "at = surge[first:stop] + offsets[column]", "at = offsets[column] - surge[first:stop]", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
+    ("models/alignment.py", "celerity.lag / apart", "apart / celerity.lag", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
+    ("models/alignment.py", "float(1.0 / np.mean(slowness))", "float(np.mean(1.0 / np.array(slowness)))", "models/test_alignment.py::test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for"),
+    ("models/alignment.py", "out[column] += reference - float(here)", "out[column] += float(here) - reference", "models/test_alignment.py::test_a_probe_that_was_moved_and_says_so_changes_nothing"),
+    ("models/alignment.py", "speeds.std(ddof=1)", "2**0.5 * speeds.std(ddof=1)", "models/test_alignment.py::test_the_spread_of_celerities_is_that_between_the_runs"),
+    ("models/baselines.py", "factor = 1.0", "factor = 0.5", "models/test_baselines.py::test_mean_and_hold_last_are_what_they_say_and_read_no_input"),
+    ("models/baselines.py", "np.hstack([np.zeros((size, size))", "np.hstack([np.eye(size)", "models/test_baselines.py::test_fir_finds_a_known_impulse_response"),
+    ("models/calibration.py", "measured = np.stack([states[at + 1 : at + 1 + steps] for at in places])", "measured = np.stack([states[at : at + steps] for at in places])", "models/test_calibration.py::test_no_window_touches_what_a_member_has_read"),
+    ("models/draws.py", "key = (*seed.spawn_key, member)", "key = (*seed.spawn_key, 0)", "models/test_ensemble.py::test_infeasible_draws_are_drawn_again_and_counted"),
+    ("models/draws.py", "max(settings.window, least) if", "settings.window + reach if", "models/test_contracts.py::test_a_history_inside_the_window_is_not_counted_twice"),
+    ("models/draws.py", "points[number])", "points[0])", "models/test_ensemble.py::test_sobol_points_fill_the_prior_evenly"),
+    ("models/engine.py", "<= reach[:, [column]] * excess", "<= reach[:, [column]]", "models/test_stability.py::test_an_answer_to_waves_thirty_times_as_high_is_not_lost"),
+    ("models/engine.py", "available + 1 - lead if signature.inputs", "available - lead if signature.inputs", "models/test_forecast.py::test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it"),
+    ("models/engine.py", "first = span.known + 1 - signature.state_samples", "first = span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
+    ("models/engine.py", "run[name].values[end:] = predict_waves(known, stop - end)", "run[name].values[end:] = 0.0", "models/test_ahead.py::test_missing_waves_are_those_of_a_record_that_was_continued"),
+    ("models/engine.py", "self.known - math.ceil(ahead - 1e-6) - span.known + 1", "self.known - span.known + 1", "models/test_ahead.py::test_the_status_says_from_when_and_before_that_nothing_changes"),
+    ("models/ensemble.py", "data.regress(settings, settings.state_delays, all_rows=all_rows)", "data.regress(settings, settings.state_delays, all_rows=True)", "models/test_ensemble.py::test_members_equal_the_deterministic_model"),
+    ("models/ensemble.py", "replace(draw, run=draw.run - 1)", "draw", "models/test_calibration.py::test_members_that_learn_from_the_run_alone_do_not_forecast_it"),
+    ("models/export.py", "lead - (term.order > 0)", "lead", "hosts/test_mat.py::test_a_mat_file_with_observables_computes_the_forecast"),
+    ("models/forecasts.py", '"diverged_at": lost, ', "", "models/test_stability.py::test_a_forecast_that_diverges_ends_in_nan_with_its_status"),
+    ("models/growth.py", "self.at(np.arange(1, steps + 1) + since) ** 2", "self.at(np.arange(steps) + 1) ** 2", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
+    ("models/labelled.py", "*filter(is_elevation, inputs), *lengths", "*inputs", "models/test_selection.py::test_periods_are_counted_in_the_first_elevation"),
+    ("models/linear.py", "-poles.real / natural", "-poles.real / frequency", "models/test_stability.py::test_modes_are_natural_frequency_and_damping_of_the_oscillator"),
+    ("models/linear.py", ".astype(complex)) / dt", ".astype(complex)) * dt", "models/test_stability.py::test_modes_are_natural_frequency_and_damping_of_the_oscillator"),
+    ("models/live.py", "final = at - max(self._ahead - 1, 0)", "final = at", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
+    ("models/live.py", "free = (measured - predicted) / self.errors.at(lead)", "free = (measured - predicted) / self.errors.at(1)", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
+    ("models/live.py", "self._filter.limit(limit, exactly=not (count.partly or seen.any()))", "self._filter.limit(limit)", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
+    ("models/live.py", "self._squares[:, taken] *= self._fade[taken]", "self._squares[:, taken] *= 1.0", "models/test_live.py::test_a_spike_is_forgotten_by_the_consistency"),
+    ("models/live.py", "table[1] = np.sqrt(spread + self._error_variances(count))", "table[1] = np.sqrt(self._error_variances(count))", "models/test_live.py::test_waves_that_are_not_known_widen_the_band"),
+    ("models/live.py", "wanted = steps - 1 + self._ahead", "wanted = steps + self._ahead", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
+    ("models/live.py", "white = update.whitening @ np.where(", "white = 1.0 * np.where(", "models/test_live.py::test_a_spike_is_forgotten_by_the_consistency"),
+    ("models/selection.py", "joined / joined.sum()", "joined / len(folds)", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
+    ("models/selection.py", "return self.widest.lead - candidate.lead", "return 0", "models/test_selection.py::test_a_look_ahead_that_the_data_has_is_found"),
+    ("models/selection.py", "self.groups[other] != self.groups[run]]", "True]", "test_tuning.py::test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts"),
+    ("models/settings.py", "delayed += round(BACK", "delayed += 0 * round(BACK", "models/test_following.py::test_settings_know_the_history_that_carriers_read"),
+    ("models/validity.py", "period = 2.0 * seconds / crossings", "period = seconds / crossings", "models/test_slow.py::test_the_period_of_a_slow_drift_is_found"),
+    ("models/training.py", "/ (pooled.shape[1] - 1))", "/ pooled.shape[1])", "models/test_training_window.py::test_moments_are_those_of_the_windows_pooled_with_ddof_one"),
+    ("models/training.py", "final = last - max(input_map.lead_samples - 1, 0)", "final = last", "models/test_training_window.py::test_a_stop_between_two_samples_takes_the_one_before"),
+    ("models/training.py", "nearest if time[nearest] <= stop + 1e-3 * step else max(nearest - 1, 0)", "nearest", "models/test_training_window.py::test_a_stop_between_two_samples_takes_the_one_before"),
+    ("models/validity.py", "outside := own[~known].sum()) > 0.5", "outside := own[~known].sum()) > 2.0", "check/test_peaks.py::test_waves_outside_the_training_are_named"),
+    ("models/validity.py", "periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])", "periods = np.sqrt(edges[:-1] * edges[1:])", "study/test_fit.py::test_waves_of_periods_that_were_not_trained_are_warned_of"),
+    ("signals/calculus.py", "(gain / (1j * omega) ** times)", "(gain / (-1j * omega) ** times)", "signals/test_calculus.py::test_integral_of_a_wave_in_the_band"),
+    ("signals/calculus.py", "(slope / dt if times == 1", "(slope if times == 1", "signals/test_calculus.py::test_a_complementary_rate_keeps_the_steady_drift"),
+    ("signals/calculus.py", "-2.0 * float(forward @ backward) / power", "-1.0 * float(forward @ backward) / power", "signals/test_prediction.py::test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on"),
+    ("signals/calculus.py", "1.1 * high - frequency) / (0.2 * high)", "1.1 * high - frequency) / (0.4 * high)", "signals/test_calculus.py::test_gain_of_the_band"),
+    ("signals/calculus.py", "np.abs(analytic) ** 2", "np.abs(analytic)", "signals/test_calculus.py::test_envelope_of_a_group"),
+    ("signals/calculus.py", "weight * slow + (1 - weight) * fast", "weight * slow + fast", "signals/test_rigid_body.py::test_blend_keeps_slow_motion_and_needs_no_drift_removal"),
+    ("signals/filters.py", "0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)", "0.5", "signals/test_time_axis.py::test_what_would_alias_is_removed"),
+    ("signals/filters.py", "sum(edges) / 2, window", "edges[1], window", "signals/test_filters.py::test_gains_of_the_taps"),
+    ("signals/filters.py", "weights, view[base[rows] + 1]", "weights, view[base[rows]]", "signals/test_time_axis.py::test_tabulated_kernels_are_the_kernels"),
+    ("signals/froude.py", "* density_ratio**mass", "", "signals/test_rigid_body.py::test_words_and_density"),
+    ("signals/froude.py", "length + 0.5 * time + 3.0 * mass", "length + 0.5 * time + 2.0 * mass", "signals/test_rigid_body.py::test_froude"),
+    ("signals/lags.py", "count = a.size - np.abs(lags)", "count = a.size + 0 * np.abs(lags)", "signals/test_synchronisation.py::test_the_correlation_at_a_lag_is_that_of_the_samples_in_common"),
+    ("signals/lags.py", "offset=float(np.mean(difference))", "offset=-float(np.mean(difference))", "signals/test_tracking.py::test_a_lag_one_wave_period_off_is_told"),
+    ("signals/lags.py", "shift = 0.5 * (before - after) / bend", "shift = 0.5 * (after - before) / bend", "signals/test_celerity.py::test_a_peak_between_samples"),
+    ("signals/waves.py", "height > best.correlation", "height < best.correlation", "signals/test_leakage.py::test_equally_spaced_components_come_back_after_116_5_seconds"),
+    ("signals/prediction.py", "return np.asarray(values.mean() + predicted(", "return np.asarray(predicted(", "signals/test_prediction.py::test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on"),
+    ("signals/rigid_body.py", "[-sp, cp * sr, cp * cr]", "[sp, cp * sr, cp * cr]", "signals/test_rigid_body.py::test_positions_differentiate_to_velocities_and_accelerations"),
+    ("signals/rigid_body.py", "force) - upward", "force) + upward", "signals/test_rigid_body.py::test_gravity_is_removed"),
+    ("signals/rigid_body.py", "np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))", "np.cross(alpha, r)", "signals/test_rigid_body.py::test_positions_differentiate_to_velocities_and_accelerations"),
+    ("signals/waves.py", "4.0 * float(np.std(as_series(series)))", "2.0 * float(np.std(as_series(series)))", "signals/test_waves.py::test_statistics_of_a_regular_wave"),
+    ("signals/waves.py", "before - x[before] / (x[before + 1] - x[before])", "before + x[before] / (x[before + 1] - x[before])", "signals/test_waves.py::test_crossings_lie_between_samples"),
+    ("signals/waves.py", "return float((crossings[-1] - crossings[0]) / (crossings.size - 1))", "return float((crossings[-1] - crossings[0]) / crossings.size)", "signals/test_waves.py::test_it_is_a_period_and_no_frequency"),
+    ("study/reproduce.py", "HIGH_PASS = 0.15", "HIGH_PASS = 0.25", "study/test_reproduce.py::test_the_edge_of_the_drift_lies_between_drift_and_waves"),
+    ("tank/_loop.py", "2.0 * (s[1, i] + s[2, i]) + s[3, i]", "2.0 * s[1, i] + 2.0 * s[2, i] + s[3, i] * 0.99", "tank/test_dynamics.py::test_response_in_time_is_that_in_frequency"),
+    ("tank/_loop.py", "relative = v[3] - (v[1] - pool[0] * v[2])", "relative = v[3] - (v[1] + pool[0] * v[2])", "tank/test_dynamics.py::test_response_in_time_is_that_in_frequency"),
+    ("tank/dynamics.py", "+ 4.0 * w / GRAVITY * force", "+ 2.0 * w / GRAVITY * force", "tank/test_dynamics.py::test_wave_drift_damping_is_aranhas"),
+    ("tank/dynamics.py", "8 * np.sqrt(2) / (3 * np.pi)", "8 / (3 * np.pi)", "tank/test_dynamics.py::test_drift_is_what_energy_and_momentum_allow"),
+    ("tank/dynamics.py", "form[:, 1:, 1:] += 0.5 * omega", "form[:, 1:, 1:] += omega", "tank/test_dynamics.py::test_drift_is_what_energy_and_momentum_allow"),
+    ("tank/dynamics.py", "sea.phase - sea.omega * begin", "sea.phase + sea.omega * begin", "tank/test_dynamics.py::test_runs_start_anywhere_on_the_time_axis"),
+    ("tank/dynamics.py", "w**2 / GRAVITY * slope +", "0 * slope +", "tank/test_dynamics.py::test_wave_drift_damping_is_aranhas"),
+    ("tank/instruments.py", "0.5 * self.sea.mean_wavenumber * squared", "self.sea.mean_wavenumber * squared", "tank/test_instruments.py::test_second_order_crest_of_a_regular_wave"),
+    ("tank/instruments.py", "q[1] - settings.eye[0] * q[2]", "q[1] + settings.eye[0] * q[2]", "tank/test_instruments.py::test_a_pitch_that_lifts_the_bow_lifts_the_eye_of_its_line"),
+    ("tank/instruments.py", "share * values.size / rate / 0.11", "share * values.size / rate / 0.2", "tank/test_instruments.py::test_dropouts_take_the_stated_share"),
+    ("tank/moorings.py", "slope = (3.0 * cubic * stretch + 2.0 * square) * stretch + linear", "slope = (2.0 * cubic * stretch + 2.0 * square) * stretch + linear", "tank/test_moorings.py::test_another_kind_of_line_is_one_entry"),
+    ("tank/moorings.py", "tension * float(unit @ np.array([eye_x, eye_z]))", "-tension * float(unit @ np.array([eye_x, eye_z]))", "tank/test_moorings.py::test_stiffness_is_the_slope_of_the_forces"),
+    ("tank/seas.py", "np.exp(-1.25 * relative)", "np.exp(-relative)", "tank/test_seas.py::test_height_and_peak_of_the_spectra"),
+    ("tank/seas.py", "np.sqrt(2.0 * spectral_density", "np.sqrt(spectral_density", "tank/test_seas.py::test_components_hold_the_energy_of_the_band"),
+    ("tank/seas.py", "np.where(relative <= 1.0, 0.07, 0.09)", "np.where(relative <= 1.0, 0.09, 0.07)", "tank/test_seas.py::test_spectra_are_those_of_wavespectra"),
+    ("waves.py", "0.5 * phase_speed(omega, h) * (1.0 + ratio)", "phase_speed(omega, h) * (1.0 + ratio)", "test_waves.py::test_deep_water"),
+    ("waves.py", "k = 2.0 * np.pi / length", "k = 1.0 / length", "test_waves.py::test_speeds_of_the_paper"),
 )  # fmt: skip
 
 
-def survives(place: Path, file: str, old: str, new: str, test: str) -> bool:
-    """Whether a test passes with a line changed in a copy of the project."""
-    path = place / "src" / "seakeep" / file
-    text = path.read_text(encoding="utf-8")
+def run(place: Path, tests: list[str]) -> None:
+    """Run tests in a copy of the project; the body of a process."""
+    import pytest
+
+    os.chdir(place)
+    os.environ["PYTHONPATH"] = str(place / "src")
+    sys.path.insert(0, str(place / "src"))
+    log = os.open(place / "log.tmp", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(log, 1)
+    os.dup2(log, 2)
+    command = ["-q", "-x", "-p", "no:cacheprovider", *(f"tests/{test}" for test in tests)]
+    os._exit(PASSED + pytest.main(command))
+
+
+def status(place: Path, tests: list[str]) -> int | None:
+    """Exit status of tests in a process of their own."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(IMPORTED.split())
+    process = context.Process(target=run, args=(place, tests))
+    process.start()
+    process.join()
+    return process.exitcode
+
+
+def verdict(place: Path, file: str, old: str, new: str, tests: str) -> str:
+    """What tests say of one change: killed, survives or stale."""
+    path = place / "src/seakeep" / file
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
     if text.count(old) != 1:
-        raise SystemExit(f"{file} holds {old!r} {text.count(old)} times: correct the table.")
+        return "stale"
     path.write_text(text.replace(old, new), encoding="utf-8")
-    environment = os.environ | {"PYTHONPATH": str(place / "src"), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider"]
-    try:
-        done = subprocess.run(
-            [*command, f"tests/{test}"], cwd=place, env=environment, capture_output=True, text=True
-        )
-    finally:
-        path.write_text(text, encoding="utf-8")
-    if done.returncode not in (0, 1):
-        raise SystemExit(f"{test} cannot run:\n{done.stdout}{done.stderr}")
-    return done.returncode == 0
+    found = status(place, tests.split())
+    path.write_text(text, encoding="utf-8")
+    return {PASSED: "survives", FAILED: "killed"}.get(found, "stale")
 
 
-def main(words: list[str]) -> int:
-    chosen = [each for each in MUTATIONS if all(word in " ".join(each) for word in words)]
-    survivors = 0
-    with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        for part in PARTS:
-            copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy2
-            copy(ROOT / part, place / part)
-        for each in chosen:
-            alive = survives(place, *each)
-            survivors += alive
-            print(f"{'SURVIVES' if alive else 'killed'}  {each[0]}: {each[2]}  ({each[3]})")
-    print(f"{len(chosen) - survivors} of {len(chosen)} wrong changes are killed")
-    return int(survivors > 0)
+def key(change: tuple[str, ...]) -> str:
+    """A change, the file that it is made in and its tests, in short."""
+    files = [f"src/seakeep/{change[0]}", *(f"tests/{t.split('::')[0]}" for t in change[3].split())]
+    texts = [path.read_bytes() for name in files if (path := ROOT / name).exists()]
+    return hashlib.sha256(b"\0".join([repr(change).encode(), *texts])).hexdigest()[:16]
+
+
+def main() -> int:
+    """Make the chosen changes and print what survives."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("-k", default="", help="words that file, line or tests of a change hold")
+    parser.add_argument("-j", "--jobs", type=int, default=1, help="changes at a time")
+    parser.add_argument("--results", type=Path, default=ROOT / "build/mutations.txt")
+    chosen = parser.parse_args()
+    changes = [each for each in CHANGES if all(word in " ".join(each) for word in chosen.k.split())]
+    chosen.results.parent.mkdir(exist_ok=True)
+    chosen.results.touch()
+    lines = chosen.results.read_text(encoding="utf-8").splitlines()
+    known = dict(line.split(maxsplit=2)[:2] for line in lines)
+    left = [each for each in changes if key(each) not in known]
+    places: queue.Queue[Path] = queue.Queue()
+
+    def judge(change: tuple[str, ...]) -> None:
+        place = places.get()
+        found = verdict(place, *change)
+        places.put(place)
+        known[key(change)] = found
+        with chosen.results.open("a", encoding="utf-8") as file:
+            file.write(f"{key(change)} {found} {change[0]}: {change[2]}\n")
+
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(chosen.jobs) as pool:
+        for number in range(chosen.jobs):
+            place = Path(folder, str(number))
+            without = shutil.ignore_patterns(".*", "__pycache__", "build", "dist")
+            shutil.copytree(ROOT, place, ignore=without)
+            places.put(place)
+        tests = sorted({test for change in left for test in change[3].split()})
+        if tests and status(place, tests) != PASSED:
+            print((place / "log.tmp").read_text(), "Tests fail without a change.", sep="\n")
+            return 1
+        for _ in track(pool.map(judge, left), "Wrong changes", len(left)):
+            pass
+    found = [known[key(each)] for each in changes]
+    for each, what in zip(changes, found, strict=True):
+        if what != "killed":
+            print(f"{what}: {each}")
+    print(f"{found.count('killed')} of {len(found)} wrong changes are killed")
+    return int(found.count("killed") < len(found))
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

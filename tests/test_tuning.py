@@ -164,7 +164,7 @@ def test_the_command_takes_windows_and_folds_from_the_file(tutorial, capsys, set
 
 
 def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():
-    chosen = [seakeep.ReadOut("bow", ("heave", "pitch"), "stacked"), seakeep.ReadOut("a", ("b",))]
+    chosen = [seakeep.ReadOut("bow", ("heave", "pitch"), "wave"), seakeep.ReadOut("a", ("b",))]
     spec = replace(SPEC, ridge=1e-3, lead=3, readouts=chosen)
     before = """[model]
 ridge = 1  # as it was
@@ -181,7 +181,7 @@ states = ["a"]  # kept
     text = tuned_campaign(before, None, spec, ["readouts"], None, None)
     middle = """
 [model.readouts.bow]
-kind = "stacked"
+kind = "wave"
 of = ["heave", "pitch"]
 
 [model.readouts.a]
@@ -270,7 +270,7 @@ of = ["eta_fwd"]
 powers = [2]
 
 [model.readouts.mooring_bow]
-kind = "hinge"
+kind = "wave"
 of = ["heave"]
 """
     )
@@ -281,7 +281,7 @@ of = ["heave"]
     squares, powers = spec.observables
     assert squares == seakeep.SlowSquares("eta_mid", (0, 1, 2), 0.33, 2.0, (0.0, 1.0), 1.5)
     assert powers == seakeep.Powers("eta_fwd", (2,))
-    assert spec.readouts == (seakeep.ReadOut("mooring_bow", ("heave",), "hinge"),)
+    assert spec.readouts == (seakeep.ReadOut("mooring_bow", ("heave",), "wave"),)
     assert isinstance(spec, HankelDMDc)
 
 

@@ -333,10 +333,10 @@ def tank():
         tank_spectrum_figure,
     )
     from seakeep.signals.panel import opencv
+    from seakeep.tank.delivery import side_view
     from seakeep.tank.play import check_settings, play_run, truth
     from seakeep.tank.realised import realise
     from seakeep.tank.settings import default_settings
-    from seakeep.tank.video import side_view
 
     settings = default_settings()
     rig = check_settings(settings)

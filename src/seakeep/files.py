@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from seakeep.arrays import FloatArray
 
-FORMAT = 5
+FORMAT = 6
 """Format of sealed files; one of another format is refused, and made again."""
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""
@@ -269,16 +269,16 @@ def write_netcdf(
     buffer = io.BytesIO()
     with h5netcdf.File(buffer, "w") as file:
         dataset.dump_to_store(H5NetCDFStore(file, mode="a"), encoding=encoding or {})
-    _seal(path, buffer)
+    write_whole(path, buffer)
 
 
-def _seal(path: Path, buffer: io.BytesIO) -> None:
-    with path.open("wb") as whole, buffer.getbuffer() as content:
-        whole.write(content)
-        whole.write(_seal_of(content))
+def write_whole(path: Path, buffer: io.BytesIO) -> None:
+    """Write a NetCDF file that was made in memory, and its checksum."""
+    content = buffer.getvalue()
+    path.write_bytes(content + _seal_of(content))
 
 
-def _seal_of(content: bytes | memoryview) -> bytes:
+def _seal_of(content: bytes) -> bytes:
     return SEAL + hashlib.sha256(content).hexdigest().encode()
 
 
@@ -363,7 +363,7 @@ def write_sealed_array(
         file["values"] = values
         file["values"].make_scale("values")  # a dimension of NetCDF
     with replacing(target) as temporary:
-        _seal(temporary, buffer)
+        write_whole(temporary, buffer)
     return target
 
 

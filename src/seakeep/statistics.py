@@ -1,4 +1,4 @@
-"""Statistics of forecasts and measurements: bootstrap, densities, divergence, coverage, trend.
+"""Statistics of forecasts and measurements: bootstrap, densities, divergence, coverage.
 
 Series are arrays or one-dimensional DataArrays of uniform samples without gaps.
 :func:`moving_block_bootstrap`, :func:`jsd_interval` and :func:`coverage` take Datasets too, channel
@@ -45,7 +45,6 @@ from seakeep.core.density import (
     kernel_density,
 )
 from seakeep.core.divergence import JsdInterval, jensen_shannon
-from seakeep.core.trend import TrendTest, trend_test
 from seakeep.core.two_way import overlap_block, two_way_interval
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.pairing import channel_names, pair
@@ -59,7 +58,6 @@ __all__ = [
     "CoverageTable",
     "DensityInterval",
     "JsdInterval",
-    "TrendTest",
     "band_crps",
     "band_error_over_time",
     "band_scores",
@@ -79,7 +77,6 @@ __all__ = [
     "moving_block_bootstrap",
     "overlap_block",
     "split_bands",
-    "trend_test",
     "two_way_interval",
     "winkler_score",
 ]

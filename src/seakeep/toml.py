@@ -101,8 +101,8 @@ def _length(value: object) -> Length:
 
 
 def _is(words: str, fits: Callable[[float], bool]) -> AfterValidator:
-    def check(length: Length) -> Length:
-        if not fits(length.value):
+    def check(length: float | Length) -> float | Length:
+        if isinstance(length, Length) and not fits(length.value):
             raise ValueError(f"this length must be {words}")
         return length
 
@@ -125,7 +125,11 @@ def _branch(value: object) -> str:
 
 
 _Length = Annotated[Length, PlainValidator(_length), PlainSerializer(str)]
-_PERIODS = Discriminator(_branch)
+_Number = TypeVar("_Number")
+_OrLength = Annotated[
+    Annotated[_Number, Tag("<number>")] | Annotated[_Length, Tag("<length>")],
+    Discriminator(_branch),
+]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -133,33 +137,18 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Pair = Annotated[tuple[Positive, Positive], Field(strict=False)]
 Count = Annotated[int, Field(ge=1)]
 Names = Annotated[tuple[str, ...], Field(strict=False)]
-Duration = Annotated[
-    Annotated[Positive, Tag("<number>")]
-    | Annotated[_Length, _is("finite and positive", lambda x: 0 < x < math.inf), Tag("<length>")],
-    _PERIODS,
-]
+Duration = Annotated[_OrLength[Positive], _is("finite and positive", lambda x: 0 < x < math.inf)]
 """A positive duration: seconds or a :class:`Length`."""
-Instant = Annotated[
-    Annotated[Finite, Tag("<number>")]
-    | Annotated[_Length, _is("finite", math.isfinite), Tag("<length>")],
-    _PERIODS,
-]
+Instant = Annotated[_OrLength[Finite], _is("finite", math.isfinite)]
 """An instant: seconds or a :class:`Length`."""
 Delay = Annotated[
-    Annotated[int, Field(ge=0), Tag("<number>")]
-    | Annotated[
-        _Length, _is("finite and not negative", lambda x: 0 <= x < math.inf), Tag("<length>")
-    ],
-    _PERIODS,
+    _OrLength[Annotated[int, Field(ge=0)]],
+    _is("finite and not negative", lambda x: 0 <= x < math.inf),
 ]
 """A number of samples, or a :class:`Length` that becomes samples once the step is known."""
-Window = Annotated[
-    Annotated[int, Field(ge=2), Tag("<number>")]
-    | Annotated[_Length, _is("positive", lambda x: x > 0), Tag("<length>")],
-    _PERIODS,
-]
+Window = Annotated[_OrLength[Annotated[int, Field(ge=2)]], _is("positive", lambda x: x > 0)]
 """The same, of at least two samples; ``"inf T"`` stands for all there are."""
-_Edge = Annotated[Annotated[float, Tag("<number>")] | Annotated[_Length, Tag("<length>")], _PERIODS]
+_Edge = _OrLength[float]
 Span = Annotated[tuple[_Edge, _Edge], Field(strict=False), AfterValidator(_rising)]
 """Start and end, each in seconds or a :class:`Length`."""
 

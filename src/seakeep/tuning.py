@@ -134,8 +134,8 @@ def tune(
         Out of "ridge" (always chosen), "observables" (none, slow squares, powers, both; or those of
         the spec), "lead", "input_delays", "state_delays", "memory" (none, or eight periods),
         "alignment" (none, dispersion or one celerity, to the surge that is predicted or to the
-        place at rest: what the runs allow) and "readouts" (none, hinge or stacked, for those of the
-        spec or for every load).
+        place at rest: what the runs allow) and "readouts" (none or by the wave at the line, for
+        those of the spec or for every load).
     horizon : sequence of float, optional
         Lengths of the free runs, encounter periods.
     folds : {"auto", "run", "sea_state"} or int, optional

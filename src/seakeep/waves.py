@@ -36,9 +36,7 @@ def _checked(
     return one, other
 
 
-def wavenumber(
-    frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
-) -> FloatArray:
+def wavenumber(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> FloatArray:
     r"""Wavenumber of the linear dispersion relation.
 
     Solves :math:`\omega^2 = g k \tanh(k h)` by Newton's method to rounding.
@@ -49,8 +47,6 @@ def wavenumber(
         Angular frequency ω, rad/s, zero or positive.
     depth : array_like, optional
         Water depth h, m; ``numpy.inf`` (the default) for deep water.
-    gravity : float, optional
-        Acceleration of gravity, m/s².
 
     Returns
     -------
@@ -70,7 +66,7 @@ def wavenumber(
     2.11
     """
     omega, h = _checked("the frequency", frequency, depth)
-    deep = omega**2 / gravity
+    deep = omega**2 / GRAVITY
     k = np.array(deep, dtype=float)
     finite = np.isfinite(h) & (omega > 0)
     # In units of the depth: x tanh x = y. The start value is within 5 % for every y.
@@ -86,9 +82,7 @@ def wavenumber(
     return k
 
 
-def phase_speed(
-    frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
-) -> FloatArray:
+def phase_speed(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> FloatArray:
     r"""Phase speed :math:`c = \omega / k`, m/s; at ω = 0 its limit :math:`\sqrt{g h}`.
 
     Parameters
@@ -97,8 +91,6 @@ def phase_speed(
         Angular frequency, rad/s.
     depth : array_like, optional
         Water depth, m.
-    gravity : float, optional
-        Acceleration of gravity, m/s².
 
     Returns
     -------
@@ -111,14 +103,12 @@ def phase_speed(
         As :func:`wavenumber`.
     """
     omega, h = _checked("the frequency", frequency, depth)
-    k = wavenumber(omega, h, gravity)
+    k = wavenumber(omega, h)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(omega > 0, omega / k, np.sqrt(gravity * h))
+        return np.where(omega > 0, omega / k, np.sqrt(GRAVITY * h))
 
 
-def group_speed(
-    frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
-) -> FloatArray:
+def group_speed(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> FloatArray:
     r"""Group speed :math:`c_g = \frac{c}{2}\left(1 + \frac{2kh}{\sinh 2kh}\right)`, m/s.
 
     Parameters
@@ -127,8 +117,6 @@ def group_speed(
         Angular frequency, rad/s.
     depth : array_like, optional
         Water depth, m.
-    gravity : float, optional
-        Acceleration of gravity, m/s².
 
     Returns
     -------
@@ -141,18 +129,14 @@ def group_speed(
         As :func:`wavenumber`.
     """
     omega, h = _checked("the frequency", frequency, depth)
-    two_kh = np.where(
-        omega > 0, 2.0 * wavenumber(omega, h, gravity) * np.where(omega > 0, h, 1.0), 0
-    )
+    two_kh = np.where(omega > 0, 2.0 * wavenumber(omega, h) * np.where(omega > 0, h, 1.0), 0)
     # sinh overflows where the ratio has long been zero: 2kh/sinh(2kh) < 1e-300 for 2kh > 700.
     bounded = np.clip(two_kh, 1e-12, 700.0)
     ratio = np.where(two_kh > 700.0, 0.0, bounded / np.sinh(bounded))
-    return 0.5 * phase_speed(omega, h, gravity) * (1.0 + ratio)
+    return 0.5 * phase_speed(omega, h) * (1.0 + ratio)
 
 
-def wavelength_to_frequency(
-    wavelength: npt.ArrayLike, depth: npt.ArrayLike = np.inf, gravity: float = GRAVITY
-) -> FloatArray:
+def wavelength_to_frequency(wavelength: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> FloatArray:
     r"""Angular frequency of a wave of given length, :math:`\omega = \sqrt{g k \tanh k h}`.
 
     Parameters
@@ -161,8 +145,6 @@ def wavelength_to_frequency(
         Wavelength λ = 2π/k, m, positive.
     depth : array_like, optional
         Water depth, m.
-    gravity : float, optional
-        Acceleration of gravity, m/s².
 
     Returns
     -------
@@ -176,4 +158,4 @@ def wavelength_to_frequency(
     """
     length, h = _checked("the wavelength", wavelength, depth, positive=True)
     k = 2.0 * np.pi / length
-    return np.sqrt(gravity * k * np.tanh(k * h))
+    return np.sqrt(GRAVITY * k * np.tanh(k * h))

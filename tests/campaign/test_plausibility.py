@@ -134,7 +134,7 @@ class TestSteps:
         assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
         assert fate is None or re.search(fate, found["eta_fwd"])
 
-    @pytest.mark.parametrize("edges", ["[0.2, 0.3]", "[2.0, 3.0]"])
+    @pytest.mark.parametrize("edges", ["[0.17, 0.33]", "[2.0, 3.0]"])
     def test_a_low_pass_that_removes_the_waves_is_named(self, edited, edges):
         """Waves of 0.5 to 0.9 Hz: the first filter leaves none of them, the second all."""
         path = edited(("sampling_rate = 10", f"sampling_rate = 10\nlow_pass = {edges}"))
@@ -148,6 +148,12 @@ class TestSteps:
             r"which halves what lies at 0\.25 Hz .*\. Raise low_pass in \[preparation\]",
         ):
             assert "low pass" in kinds(campaign.prepare(["first"])["first"])
+
+    def test_a_low_pass_longer_than_the_record(self, edited):
+        """60 dB over 0.1 Hz take 41.8 s by Kaiser's formula, and the record has 20 s."""
+        path = edited(("sampling_rate = 10", "sampling_rate = 10\nlow_pass = [2.0, 2.1]"))
+        with pytest.raises(DataError, match=r"'first': low_pass .* over 41\.8 s, .* lasts 20 s"):
+            read_campaign(path).prepare(["first"])
 
     def test_noise_has_nothing_to_lose(self, edited, tank):
         noise = np.random.default_rng(0).normal(0.0, 1.0, 1001)

@@ -7,7 +7,7 @@ import xarray as xr
 
 from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, LogUniform, check
 from seakeep.check.parts import free_windows
-from seakeep.core.decay import free_decay
+from seakeep.core.extremes import free_decay
 from seakeep.errors import DataError, RequestError
 
 DT, FREQUENCY, RATIO = 0.05, 2.0, 0.06  # s, rad/s, 1
@@ -67,6 +67,13 @@ def test_modes_say_which_states_take_part(model):
     # Heave and its rate hold half of the energy each.
     assert found.participation[0].values == pytest.approx([0.5, 0.5], abs=0.01)
     assert found.participation.sum("state").values == pytest.approx(1.0)
+    states = ["heave", "heave_rate"]
+    overdamped = HankelDMDc(0, 0, 1e-9).fit(oscillator_run(ratio=2.0), states, ["eta"])
+    real = check.modes(overdamped)
+    slow, fast = FREQUENCY * (2 - 3**0.5), FREQUENCY * (2 + 3**0.5)
+    assert real.decay_time.values == pytest.approx([1 / slow, 1 / fast], rel=1e-4)  # the ridge
+    # The eigenvector (1, λ) and the left one, (λ', −1) of the other, give λ' and −λ.
+    assert real.participation[0].values * (fast + slow) == pytest.approx([fast, slow], rel=1e-4)
 
 
 def test_quadratic_damping_is_found_from_a_decay(model):

@@ -581,6 +581,7 @@ MISTAKES = [
         r"steps: received '1{12}\.\.\.1{13}'\. Give a whole number",
     ),
     (f"compare model.nc {CAMPAIGN} --steps 1", r"has 1 measured instant.* earlier start"),
+    (f"compare model.nc {CAMPAIGN} --steps 7", r"of \w+ from .* 7 measured .* over 8 or more"),
     (f"forecast ensemble.nc {FROM_20} -o no/f.nc", r"the folder no does not exist"),
     (f"fit {CAMPAIGN} -o m.nc --workers 0", r"Invalid value for '--workers'"),
     (f"prepare {CAMPAIGN} -o model.nc", r"cannot make the folder model\.nc: File exists"),

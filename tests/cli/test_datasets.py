@@ -37,10 +37,10 @@ def upstream(tmp_path):
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
-    files = tuple(
-        (path.name, hashlib.sha256(path.read_bytes()).hexdigest())
+    files = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(folder.iterdir())
-    )
+    }
     address = f"http://127.0.0.1:{server.server_port}"
     yield (
         folder,
@@ -86,16 +86,16 @@ def test_no_network_names_the_addresses_tried(upstream, tmp_path):
     with pytest.raises(
         RequestError, match=r"could not be fetched\. Tried: http.*Check the network"
     ):
-        datasets.fetch(dataset, tmp_path, sources=["http://127.0.0.1:9/nothing"])
+        datasets.fetch(replace(dataset, sources=["http://127.0.0.1:9/nothing"]), tmp_path)
 
 
 def test_a_cut_download_is_no_file_and_the_next_source_is_tried(upstream, tmp_path):
     _, dataset = upstream
     whole = dataset.sources[-1]
     with pytest.raises(RequestError, match=r"a\.csv could not be fetched\. Tried: .*Incomplete"):
-        datasets.fetch(dataset, tmp_path, sources=[f"{whole}/cut"])
+        datasets.fetch(replace(dataset, sources=[f"{whole}/cut"]), tmp_path)
     assert list((tmp_path / "toy").iterdir()) == []
-    datasets.fetch(dataset, tmp_path, sources=[f"{whole}/cut", whole])
+    datasets.fetch(replace(dataset, sources=[f"{whole}/cut", whole]), tmp_path)
     assert datasets.state_of(dataset, tmp_path) == "complete"
 
 

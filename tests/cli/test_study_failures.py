@@ -115,7 +115,7 @@ def a_file(folder):
             ["run3.csv has no column 'FWD_LINE'", "Its columns: t, WP_01", "Name one of these"],
         ),
         (of_another, 2, ["holds the results of another study", "000000000000", "-o"]),
-        (a_file, 2, ["results could not be written to", "Choose another place"]),
+        (a_file, 1, ["results could not be written to", "or choose a folder"]),
     ],
     ids=["training", "length", "startup", "trains", "channel", "digest", "file"],
 )

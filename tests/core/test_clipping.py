@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seakeep.core.stability import clip_modes
+from seakeep.core.response import clip_modes
 
 
 def whole(rows):

@@ -95,10 +95,20 @@ def test_a_state_measured_without_noise_is_known():
 
 
 def test_errors_of_today_are_carried_as_the_model_carries_them():
-    filter_ = DelayFilter(A, PROCESS, np.zeros(N), np.eye(SIZE))
-    found = filter_.ahead(5)
+    covariance = np.diag(np.arange(1.0, SIZE + 1))
+    found = DelayFilter(A, PROCESS, np.zeros(N), covariance).ahead(5)
     carried = np.linalg.matrix_power(companion(), 5)
-    np.testing.assert_allclose(found[-1], np.diagonal(carried @ carried.T)[-N:], rtol=1e-12)
+    expected = np.diagonal(carried @ covariance @ carried.T)[-N:]
+    np.testing.assert_allclose(found[-1], expected, rtol=1e-12)  # rounding
+
+
+@pytest.mark.parametrize(("exactly", "factors"), [(False, [0.5, 1.0]), (True, [0.5, 2.0])])
+def test_a_limit_scales_a_state_with_its_correlations(exactly, factors):
+    covariance = np.diag(np.arange(1.0, SIZE + 1)) + 0.1
+    filter_ = DelayFilter(A, PROCESS, np.zeros(N), covariance)
+    filter_.limit(np.diagonal(covariance)[-N:] * [0.25, 4.0], exactly=exactly)
+    scale = np.append(np.ones(SIZE - N), factors)
+    np.testing.assert_allclose(filter_.covariance, covariance * np.outer(scale, scale), rtol=1e-14)
 
 
 def test_residuals_less_measurement_noise_are_process_noise():

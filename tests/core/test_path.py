@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from seakeep.core.path import ridge_path
+from seakeep.core.gram import ridge_path
 
 
 def test_the_path_gives_the_ridge_solution_at_every_lambda_from_the_upper_triangle():

@@ -1,58 +1,71 @@
-"""Read-outs with hinges: a line that falls slack."""
+"""Read-outs: a load by the wave at its line, and the floor of a line that falls slack."""
 
 import numpy as np
 import pytest
 
-from seakeep.core.readouts import KNOTS, fit_hinges, floor_of, hinges, knots_of
+from seakeep.core.readouts import KNOTS, LoadMap, best_place, features, floor_of, sums, weights_of
 
 
-def states_and_load(seed: int = 0, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Surge and heave, and the load of a line that is taut where the surge exceeds 0.2."""
-    rng = np.random.default_rng(seed)
-    states = rng.normal(size=(4000, 2))
-    load = np.maximum(0.0, 2.0 * (states[:, 0] - 0.2)) + 0.3 * states[:, 1]
-    return states, load + noise * rng.normal(size=len(load))
+def motions_and_wave(seed: int = 0, count: int = 4000) -> np.ndarray:
+    """Surge, heave, and elevation and rate of a wave, standardised."""
+    return np.random.default_rng(seed).standard_normal((count, 4))
 
 
-def test_a_hinge_bends_at_its_knot():
-    knots = np.array([[0.0, 1.0]])
-    found = hinges(np.array([[-1.0, 5.0], [0.5, 5.0], [3.0, 5.0]]), [0], knots)
-    np.testing.assert_array_equal(found, [[0, 0], [0.5, 0], [3.0, 2.0]])
+def test_features_are_those_of_the_recipe():
+    values = [np.array([1.5]), np.array([-2.0]), np.array([1.25]), np.array([-3.0])]
+    found = np.ravel(features(values, np.array([-1.0, 2.0])))
+    expected = [
+        *(1.5, -2.0, 2.5, 0.0),  # motions and hinges
+        *(1.25, -3.0, 3.0, 1.5625, -3.75, 0.75),
+        *(-3.0, 3.0, -3.0, 3.0, -1.5, 1.5),  # wet above 0, 0.5 and 1 SD, over half an SD
+    ]
+    np.testing.assert_array_equal(found, expected)
 
 
-def test_a_function_that_is_linear_between_the_knots_is_recovered():
-    states, _ = states_and_load()
-    knots = knots_of(states, [0])
-    assert knots.shape == (1, KNOTS)
-    target = 1.5 + 0.7 * states[:, 1] + np.maximum(0, states[:, 0] - knots[0, 2])
-    fitted = fit_hinges(states, target, [0, 1], [0], knots, ridge=1e-12, floor=-np.inf)
-    # λ moves the weights by about λ times their size over the least variance of a feature.
-    np.testing.assert_allclose(fitted(states), target, atol=1e-8)
+def test_weights_of_a_load_of_known_form_are_recovered_but_for_the_ridge():
+    values = motions_and_wave(count=20_000)
+    knots = np.quantile(values[:, 0], KNOTS)
+    columns = np.stack(features([*values.T], knots), axis=1)
+    known = np.zeros(columns.shape[1])
+    known[[0, 4, 7, -1]] = 2.0, 1.0, -3.0, 4.0  # surge, a hinge, the wave, a ramp
+    products = sums(values, 7.0 + columns @ known, knots)
+    found = weights_of(products)
+    # λ pulls combinations of nearly collinear features; without it they are exact.
+    gram, right = products[:-1, :-1].copy(), products[:-1, -1]
+    np.testing.assert_allclose(np.linalg.solve(gram, right), [7.0, *known], atol=1e-8)
+    gram[np.diag_indices_from(gram)] += 1e-2 * len(values) * (np.arange(len(gram)) > 0)
+    np.testing.assert_allclose(gram @ found, right, rtol=1e-9)
 
 
-def test_a_slack_line_is_followed_far_better_than_by_a_linear_map():
-    states, load = states_and_load(noise=0.02)
-    knots = knots_of(states, [0])
-    bent = fit_hinges(states, load, [0, 1], [0], knots, ridge=1e-6, floor=-np.inf)
-    gram = np.c_[np.ones(len(states)), states]
-    linear = gram @ np.linalg.lstsq(gram, load, rcond=None)[0]
-    errors = [np.sqrt(np.mean((each - load) ** 2)) for each in (bent(states), linear)]
-    # The kink at 0.2 lies between two knots half a standard deviation apart.
-    assert errors[0] < 0.08
-    assert errors[0] < 0.2 * errors[1]
+def test_the_place_is_the_one_that_other_runs_vouch_for():
+    rng = np.random.default_rng(1)
+    runs = [motions_and_wave(seed, 500) for seed in range(3)]
+    knots = np.quantile(runs[0][:, 0], KNOTS)
+    loads = [each[:, 2] + each[:, 0] + 0.1 * rng.standard_normal(500) for each in runs]
+    # One run errs least at a place where the others' waves mean nothing.
+    noisy = [np.where([1, 1, 0, 0], each, rng.standard_normal(each.shape)) for each in runs]
+    fits_one = [noisy[0], noisy[1], np.column_stack([runs[2][:, :2], 9 * loads[2], loads[2]])]
+    products = np.stack(
+        [
+            [sums(values, load, knots) for values, load in zip(each, loads, strict=True)]
+            for each in (fits_one, noisy, runs)
+        ]
+    )
+    assert best_place(products) == 2
+    assert best_place(products[:, :1]) == 2
 
 
-def test_a_load_never_falls_below_its_floor():
-    states, load = states_and_load()
-    fitted = fit_hinges(states, load, [0, 1], [0], knots_of(states, [0]), 1e-6, floor=-0.1)
-    assert fitted(10 * states).min() == pytest.approx(-0.1)
-
-
-def test_a_constant_is_not_regularised():
-    states, _ = states_and_load()
-    target = np.full(len(states), 7.0)
-    fitted = fit_hinges(states, target, [0], [], np.empty((0, KNOTS)), ridge=1e6, floor=-np.inf)
-    np.testing.assert_allclose(fitted(states[:5]), 7.0, rtol=1e-12)  # rounding of a mean
+def test_a_load_gives_way_to_its_state_outside_training():
+    ends = np.ones(3)
+    load = LoadMap(
+        -1.0, 1, [0], np.zeros(3), np.array([1.0, 1.0, 2.0]), -2 * ends, 2 * ends,
+        np.zeros(5), np.concatenate([[3.0], np.zeros(18)]), np.array([-1.0, 2.5]),
+    )  # fmt: skip
+    states = np.array([[0.0, 9.0], [0.0, 9.0], [-2.5, 9.0], [0.0, 9.0], [-3.0, 9.0]])
+    wave = np.array([[0.0, 0.0], [2.0, 2.0], [0.0, 0.0], [0.0, 3.0], [2.5, 0.0]])
+    # The regression says 3 and is clipped to 2.5; half of the weight is left half an SD outside.
+    parts = np.array([1.0, 1.0, 1 / 2, 1 / 2, 1 / 6])
+    np.testing.assert_allclose(load(states, wave), 9.0 + parts * (2.5 - 9.0), rtol=1e-15)
 
 
 @pytest.mark.parametrize("taut", [0.5, 0.8, 0.98])

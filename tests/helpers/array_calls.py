@@ -33,6 +33,12 @@ CALLS = {
     ),
     "signals.band_pass": (lambda x: signals.band_pass(x, 0.05, (0.1, 2.0)), X),
     "signals.bridge": (lambda x: signals.bridge(x, 0.05, 1.0), X),
+    "signals.carry_by_celerity": (
+        lambda x: signals.carry_by_celerity(x, 0.05, (0.0, 0.5), 3.0).at(0.5), X,
+    ),
+    "signals.carry_by_dispersion": (
+        lambda x: signals.carry_by_dispersion(x, 0.05, (0.0, 0.5), 3.6).at(0.5), X,
+    ),
     "signals.clock_from_correlation": (
         lambda a, c, b, t: signals.clock_from_correlation(a, c, b, t, 10.0, 1.0),
         Y, T, X, T,
@@ -45,12 +51,6 @@ CALLS = {
     "signals.compare_motion": (signals.compare_motion, X, T, Y, T),
     "signals.correlation_peak": (
         lambda x, y: signals.correlation_peak(x, y, 0.05, (0.0, 1.0)), X, Y,
-    ),
-    "signals.delay_by_celerity": (
-        lambda x, d: signals.delay_by_celerity(x, 0.05, d, 3.0), X, np.full(T.size, 0.5),
-    ),
-    "signals.delay_by_dispersion": (
-        lambda x, d: signals.delay_by_dispersion(x, 0.05, d, 3.6), X, np.full(T.size, 0.5),
     ),
     "signals.differentiate": (lambda x: signals.differentiate(x, 0.05), X),
     "signals.effective_celerity": (
@@ -131,11 +131,6 @@ CALLS = {
             lambda x, y: x.mean(axis=(1, 2)), a, b, rng=RNG(0), n_series=9
         ),
         TABLE[:9], TABLE[9:18],
-    ),
-    "statistics.trend_test": (
-        lambda x, t: statistics.trend_test(
-            x, rng=RNG(0), time=t, n_series=3, block_length=9
-        ), X, T,
     ),
     "waves.group_speed": (waves.group_speed, np.abs(X), np.full(T.size, 3.6)),
     "waves.phase_speed": (waves.phase_speed, np.abs(X), np.full(T.size, 3.6)),

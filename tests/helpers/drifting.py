@@ -8,10 +8,14 @@ from seakeep.waves import wavenumber
 DT, DEPTH = 0.1, 3.6
 POSITIONS = {"eta_fwd": 48.42, "eta_cog": 52.09}
 STATES, INPUTS = ["surge", "heave"], ["eta_fwd", "eta_cog"]
+LINE, LOAD_NOISE = -1.33, 0.5  # m from the last probe, N
 
 
 def drifting_run(seed=0, samples=1500, moved=0.0, name="run"):
     """Heave answers the elevation where the vessel is; surge drifts slowly over half a wavelength.
+
+    The load of a bow line is 30 − 2 surge + 5 heave and, where the wave at `LINE` is above half
+    its standard deviation, 200 times what it is above, N.
 
     The surge is an oscillation, which a model with state delays continues; the probes may stand
     `moved` metres downstream of their stated places.
@@ -31,14 +35,20 @@ def drifting_run(seed=0, samples=1500, moved=0.0, name="run"):
 
     vessel = POSITIONS["eta_cog"] + surge
     heave = 0.8 * waves(vessel, 0.2) + 0.4 * waves(vessel, 0.5)
-    noise = 1e-4
+    noise, spread = 1e-4, np.sqrt(np.sum(amplitude**2) / 2)
+    load = 30.0 - 2.0 * surge + 5.0 * heave
+    load += 200.0 * np.maximum(waves(POSITIONS["eta_cog"] + LINE) - 0.5 * spread, 0.0)
     channels = {
         "surge": surge + noise * rng.standard_normal(samples),
         "heave": heave + noise * rng.standard_normal(samples),
         **{key: waves(x + moved) for key, x in POSITIONS.items()},
+        "mooring_bow": load + LOAD_NOISE * rng.standard_normal(samples),
     }
     run = xr.Dataset(
-        {key: ("time", values, {"units": "m"}) for key, values in channels.items()},
+        {
+            key: ("time", values, {"units": "N" if key == "mooring_bow" else "m"})
+            for key, values in channels.items()
+        },
         coords={"time": ("time", time, {"units": "s"})},
         attrs={"water_depth": DEPTH, "run": name, "encounter_period": 1.5},
     )

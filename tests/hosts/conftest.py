@@ -23,8 +23,8 @@ DT, PERIOD = 0.1, 8  # s, samples
 STATES, INPUTS = ["surge", "load"], ["eta", "wave probe"]
 OBSERVABLES = (
     SlowSquares(("eta", "wave probe"), orders=(0, 1, 2), lags=(0, 1), period=PERIOD * DT),
-    Powers("eta", (2, 3), products=False),
-    Powers(("eta", "wave probe"), (4,), products=True),
+    Powers("eta"),
+    Powers(("eta", "wave probe"), (4,)),
     Expression("mixed", "cos(9*eta)*abs(`wave probe`)/(1 + square(eta)) - average(-eta, eta**2)"),
     Expression("root", "sqrt(2 + sin(`wave probe`) - 0.1)"),
 )
@@ -75,8 +75,7 @@ def case_of(model, steps=60, start=200, run=None):
 @pytest.fixture(scope="session")
 def cases():
     runs = {f"run{seed}": sea_run(seed) for seed in range(3)}
-    hinge = [ReadOut("load", of=("surge",), kind="hinge")]
-    kept = {"delay_rows": "exact", "readouts": hinge}
+    kept = {"delay_rows": "exact", "readouts": [ReadOut("load", of=("surge",))]}
     full = HankelDMDc(3, 6, 1.0, lead=5, observables=OBSERVABLES).fit(runs, STATES, INPUTS)
     short = HankelDMDc(2, 4, 1e-3, memory=21, **kept).fit(runs, STATES, INPUTS)
     models = {
@@ -94,7 +93,9 @@ def cases():
             4, 12, 1e-3, delay_rows="exact", lead=lead, memory=2 * lead,
             alignment=ProbeAlignment(mode="dispersion", surge="predicted"),
             observables=(SlowSquares("eta_cog", lags=(0, 1), lead=0), Powers("eta_cog")),
+            readouts=[ReadOut("mooring_bow", of=("surge", "heave"), kind="wave")],
         )  # fmt: skip
-        model = spec.fit(drifting, ["surge", "heave"], ["eta_fwd", "eta_cog"])
+        states = ["surge", "heave", "mooring_bow"]
+        model = spec.fit(drifting, states, ["eta_fwd", "eta_cog"])
         made[name] = case_of(model, run=test)
     return made

@@ -46,7 +46,8 @@ def pointer(values):
 class Estimator:
     """The functions of an estimator, on memory of its own."""
 
-    def __init__(self, library, name):
+    def __init__(self, library, name, count=2):
+        self.count = count
         self.memory = (ctypes.c_double * 200_000)()  # more than the struct
         self.calls = {
             verb: getattr(library, f"{name}_{verb}")
@@ -60,14 +61,14 @@ class Estimator:
 
     @property
     def state(self):
-        return np.array(self.calls["estimated"](self.memory)[:2])
+        return np.array(self.calls["estimated"](self.memory)[: self.count])
 
     @property
     def deviations(self):
         return np.array([self.calls["deviation"](self.memory, each) for each in (0, 1)])
 
     def forecast(self, steps, future=None):
-        out = np.empty((steps, 2))
+        out = np.empty((steps, self.count))
         known = None if future is None else pointer(future)
         return self.calls["forecast"](self.memory, steps, known, pointer(out)), out
 
@@ -193,7 +194,8 @@ def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
     subprocess.run(
         ["cc", *FLAGS, "-o", "rom.so", "rom.c", "rom_estimator.c", "-lm"], cwd=tmp_path, check=True
     )
-    found, live = Estimator(ctypes.CDLL(str(tmp_path / "rom.so")), "rom"), model.live(noise=noises)
+    compiled = ctypes.CDLL(str(tmp_path / "rom.so"))
+    found, live = Estimator(compiled, "rom", len(model.states)), model.live(noise=noises)
     u, y = measured(cases[name].run, model)
     # The same sums in another order, through gains of the order of ten.
     close = {"rtol": 0, "atol": (1e-10 if "following" in name else 1e-12) * np.nanmax(np.abs(y))}

@@ -152,6 +152,15 @@ def test_waves_that_have_not_arrived_drive_where_a_lead_is_set(kind, runs):
     assert found.attrs["reads_input_until"] == pytest.approx(2 * DT)
 
 
+@pytest.mark.parametrize("state", STATES)
+def test_the_recommended_subspace_model_takes_one_state(state):
+    """The future of a period of 8 samples has 9 values of one state, fewer than 40."""
+    spec = Subspace.recommended(8 * DT, DT)
+    model = spec.fit(linear_run(1), [state], INPUTS)
+    assert spec.order is None
+    assert model.settings.order == len(model.space.A) == 9
+
+
 def test_settings_that_a_baseline_does_not_have_are_refused():
     with pytest.raises(TypeError, match="state_delays"):
         FIR(state_delays=3, input_delays=4)

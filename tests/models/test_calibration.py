@@ -259,10 +259,10 @@ def test_a_file_keeps_the_calibration(calibrated, moved, learnt, ensemble, run, 
     assert seakeep.load_model(tmp_path / "plain.nc").calibration is None
 
 
-def pooled(train_on, runs):
+def pooled(train_on, runs, window=None):
     spec = seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
-        window=None,
+        window=window,
         state_delays=seakeep.Uniform("0.2 T", "0.6 T"),
         input_delays=seakeep.Uniform("0.5 T", "1.5 T"),
         ridge=seakeep.Uniform(200, 400),
@@ -315,10 +315,38 @@ def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
     told = []
     ensemble.calibrate(runs, 40, folds="run", progress=lambda *each: told.append(each))
     assert [(done, total) for done, total, _ in told] == [(k, 6) for k in range(1, 7)]
-    with pytest.raises(RequestError, match="no member learnt from another run than 'a'"):
-        pooled("all", {"a": runs["a"]}).calibrate(runs["a"], 40, folds="run")
     with pytest.raises(RequestError, match="no run 'c' trains"):
         ensemble.without("c")
+
+
+def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
+    run = sea(0, 900, "a")
+    found = pooled("all", {"a": run}).calibrate({"a": run}, 40, folds="run").calibration
+    judged = []
+    for begin, end in ((0, 300), (300, 600), (600, 900)):
+        rest = {"before": run.isel(time=slice(0, begin)), "after": run.isel(time=slice(end, None))}
+        ensemble = pooled("all", {name: each for name, each in rest.items() if each.sizes["time"]})
+        part = {"part": run.isel(time=slice(begin, end))}
+        judged.append(held_out(ensemble, part, 40, 0.95)["part"])
+    expected, floor, _ = learn_margin(judged, 0.95, "spread")
+    np.testing.assert_allclose(found.conformal.margin, expected.margin, rtol=1e-9)  # rounding
+    np.testing.assert_allclose(found.floor, floor, rtol=1e-9)
+    count = (300 - ensemble.history_samples) // 40
+    assert found.windows == {f"a, part {number}": count for number in (1, 2, 3)}
+
+
+def test_members_whose_windows_reach_into_a_third_do_not_forecast_it():
+    ensemble = pooled("windows", {"a": sea(0, 900, "a")}, seakeep.Uniform("4 T", "8 T"))
+    before = ensemble.arrays.offsets[0]  # samples that no member reads
+    kept = ensemble.without_part(300 - before, 600 - before)
+    spans = [(d.first(0, 900, ensemble.signature.input_map), d.last) for d in ensemble.members]
+    free = [number for number, (first, last) in enumerate(spans) if last < 300 or first >= 600]
+    assert 0 < len(free) < 6
+    other = sea(3, 300, "other")
+    np.testing.assert_array_equal(
+        kept.forecast(other, 10.0, 40)["heave"],
+        ensemble.forecast(other, 10.0, 40)["heave"].isel(member=free),
+    )
 
 
 def test_the_summary_says_it(calibrated, moved, ensemble):

@@ -423,3 +423,6 @@ def test_a_history_inside_the_window_is_not_counted_twice():
     )
     assert [draws[key].needed(plain) for key in draws] == [50, 62]
     assert draws["inside"].needed(longer) == 62  # a pair after the longest history
+    early = SimpleNamespace(history=lambda z: z, lead_samples=7)
+    every = Draw(HankelDMDc(4, 12, 1.0), (1.0, 0.2, 0.5))
+    assert every.needed(early) == 12 + 2 + 6  # and the inputs that lead by six samples more

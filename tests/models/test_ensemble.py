@@ -336,6 +336,9 @@ def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
     expected = alone(ensemble, 1).fit(run, STATES, INPUTS, stop=last)
     np.testing.assert_allclose(ensemble.member(1).A, expected.A, atol=1e-10)
     assert ensemble.member(1).training.stop == pytest.approx((last,))
+    shortest = run.isel(time=slice(0, 160 + 16))  # which leaves one place for the window
+    found = small(train_on="windows", **fixed).fit(shortest, STATES, INPUTS)
+    assert set(found.draws.last_sample.values) == {175}
 
 
 def test_members_over_runs_learn_from_one_run_each(run):

@@ -97,6 +97,10 @@ def test_fed_with_everything_it_is_the_forecast(models, run, key):
     np.testing.assert_array_equal(mean(found), matrix(expected, STATES))
     np.testing.assert_array_equal(live.state, matrix(run, STATES)[START - 1])
     assert not live.covariance.any()
+    play(live, run, START, START + max(model.signature.lead_samples, 1))  # and then it is final
+    surprise = matrix(run, STATES)[START] - matrix(expected, STATES)[0]
+    # One-step predictions in physical units, and the forecast in deviations: rounding.
+    np.testing.assert_allclose(live.innovation, surprise, rtol=0, atol=1e-9)
 
 
 def test_members_that_are_held_give_the_mean_of_the_ensemble(ensemble, run):
@@ -104,9 +108,11 @@ def test_members_that_are_held_give_the_mean_of_the_ensemble(ensemble, run):
     found = live.forecast(STEPS, matrix(run, INPUTS)[START:])
     expected = ensemble.forecast_summary(run, float(run.time[START - 1]), STEPS)
     np.testing.assert_array_equal(mean(found), mean(expected))
-    for name in STATES:
+    errors = live.errors.at(np.arange(1, STEPS + 1))
+    for column, name in enumerate(STATES):
         spread = expected[name].sel(statistic="std").values
-        assert np.all(found[name].sel(statistic="std").values > spread)
+        both = np.hypot(spread, errors[:, column])
+        np.testing.assert_allclose(found[name].sel(statistic="std"), both, rtol=1e-9)
 
 
 def test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop(models, run):
@@ -124,6 +130,17 @@ def test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop(mo
     for column, name in enumerate(STATES):
         limit = model.errors.at(lost + np.arange(1, 11))[:, column]
         np.testing.assert_allclose(found[name].sel(statistic="std"), limit, rtol=1e-9)
+
+
+def test_errors_are_those_of_data_that_were_not_trained_on(make_dataset):
+    """Of p coefficients from n rows, the residual holds σ²(1 − p/n), a new error σ²(1 + p/n)."""
+    found, rng = [], np.random.default_rng(0)
+    for _ in range(100):
+        heave, wave = rng.standard_normal((2, 105))
+        noise = make_dataset(np.arange(105.0), heave=heave, eta_fwd=wave)
+        found.append(HankelDMDc(4, 4, 1e-9).fit(noise, ["heave"], ["eta_fwd"]).errors.residual)
+    # 100 rows of 10 coefficients; 100 repetitions tell a variance to 1.4 %.
+    assert np.mean(found) == pytest.approx(1.1, rel=0.05)
 
 
 def test_waves_that_come_later_mend_an_estimate_with_a_look_ahead(models, run):
@@ -166,6 +183,13 @@ def test_a_dead_sensor_is_followed_through_the_others(models, run):
     deviation = np.sqrt(live.covariance[1, 1])
     assert 0 < deviation <= model.errors.at(steps)[1]
     assert np.sqrt(np.mean((found[:, 1] - truth[:, 1]) ** 2)) < 3 * deviation
+    forecast = live.forecast(STEPS, matrix(run, INPUTS)[START + steps :])
+    own, bound = (model.errors.of_forecast(STEPS, since) for since in (0, steps))
+    carried = np.minimum(own + live._filter.ahead(STEPS), bound)
+    variance = matrix(forecast.sel(statistic="std"), STATES) ** 2
+    np.testing.assert_allclose(variance, carried, rtol=1e-9)
+    assert np.any(carried > 1.1 * own)
+    assert np.any(carried < 0.9 * bound)
     again = play(live, run, START + steps, START + steps + 5)
     np.testing.assert_array_equal(again[-1], matrix(run, STATES)[START + steps + 4])
     assert not live.covariance.any()

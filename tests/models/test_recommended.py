@@ -54,6 +54,11 @@ def test_columns_and_ridge_are_chosen_and_the_model_says_from_what(tmp_path):
     assert model.lead_samples <= SPEC.needs(DT).lead
 
 
+def test_the_note_counts_the_ridge_as_the_settings_do():
+    stated = dataclasses.replace(SPEC, ridge=0.5, ridge_scale="absolute")
+    assert stated.fit(runs(), STATES, INPUTS).selection.startswith("ridge 0.5: out of 4 settings")
+
+
 def test_where_nothing_can_be_held_out_the_ridge_is_a_default():
     short = sea(0, samples=200).assign_attrs(encounter_period=T)
     model = SPEC.fit(short, STATES, INPUTS)

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from seakeep import SeakeepWarning
-from seakeep.models.slow import FEWEST, slow_motions, warn_of_slow_motions
+from seakeep.models.validity import FEWEST, slow_motions, warn_of_slow_motions
 
 DT, PERIOD = 0.1, 1.64
 

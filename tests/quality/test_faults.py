@@ -11,7 +11,7 @@ from seakeep.campaign import read_campaign
 from seakeep.campaign.pipeline import flag_samples
 from seakeep.quality import Record, findings_of
 from seakeep.quality.faults import find_held, find_outliers, noise_share, saturated
-from seakeep.quality.samples import constant, flagged, level_drift, noise
+from seakeep.quality.samples import constant, flagged, level_drift, levels, noise
 
 TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
 DT = 0.04
@@ -42,18 +42,39 @@ def faulty(x, kind, length, place):
     """A series with a fault; one that is held repeats the reading before it."""
     at = slice(start := round(place * (x.size - length)), start + length)
     x = np.round(x, 3)
-    random = np.random.default_rng(length).uniform(40, 200, length) * (-1) ** np.arange(length)
-    x[at] = {"held": x[max(start - 1, 0)], "zero": 0.0, "-99.9": -99.9, "spiked": random}[kind]
+    rng = np.random.default_rng(length)
+    random = rng.uniform(40, 200, length) * (-1) ** np.arange(length)
+    burst = rng.uniform(5, 15, length) * x.std() * rng.choice([-1, 1], length)
+    held = x[max(start - 1, 0)]
+    kinds = {"held": held, "zero": 0.0, "-99.9": -99.9, "spiked": random, "burst": burst}
+    x[at] = kinds[kind]
     return x
 
 
 @pytest.mark.parametrize("length", [1, 3, 4, 5, 10, 40, 300, 1600, 3000])
-@pytest.mark.parametrize("kind", ["held", "zero", "-99.9", "spiked"])
+@pytest.mark.parametrize("kind", ["held", "zero", "-99.9", "spiked", "burst"])
 def test_a_fault_of_any_length_is_reported(kind, length):
     """Shorter runs of plausible readings occur by chance: 4 equal ones do not in 3000 samples."""
-    if kind in ("-99.9", "spiked") or length > 3:
+    if kind in ("-99.9", "spiked", "burst") or length > 3:
         for place in (0.2, 0.37, 0.5, 0.9):
             assert reported(faulty(waves() + 0.2, kind, length, place)), place
+
+
+@pytest.mark.parametrize(("equal", "stuck"), [(2, 0), (3, 0), (4, 4), (5, 5)])
+def test_the_shortest_run_of_equal_readings_that_is_held(equal, stuck):
+    """Where none repeats, one in n may, and twice the longest run of that chance is three."""
+    x = waves()
+    x[1000 : 1000 + equal] = x[1000]
+    assert find_held(x, DT).sum() == stuck
+
+
+@pytest.mark.parametrize("length", [4, 40, 300])
+def test_a_burst_is_flagged_whole(noisy, length):
+    """Alternating readings, of which the first and the last may pass for a flank."""
+    at = 1000 + np.arange(length)
+    noisy[at] = noisy.std() * np.random.default_rng(0).uniform(5, 15, length) * (-1) ** at
+    hit = np.flatnonzero(find_outliers(noisy))
+    assert set(at[1:-1]) <= set(hit) <= set(at)
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 300])
@@ -92,6 +113,16 @@ def test_spikes_of_harmful_size(noisy, size):
     at = [100, 700, 1500, 2980]
     noisy[at] += size * noisy.std()
     assert np.flatnonzero(find_outliers(noisy)).tolist() == at
+
+
+def test_a_probe_that_dies_has_no_drift_besides():
+    """Stuck on a crest from the middle on: the level has moved by more than half the spread."""
+    x = waves()
+    dead = 1500 + int(np.argmax(x[1500:1600]))
+    x[dead:] = x[dead]
+    group = flag_samples(xr.Dataset({"eta": ("time", x, {"units": "m"})}, {"time": T}), False)
+    assert list(levels(Record("r", group, {"": group}))) == []
+    assert [each.kind.name for each in flagged(Record("r", group, {"": group}))] == ["STUCK"]
 
 
 def test_a_line_that_sticks_and_slips_has_no_outliers():

@@ -15,6 +15,7 @@ from seakeep.report.comparison import (
     difference_blocks,
     forecast_header,
     model_blocks,
+    nowcast_blocks,
     write_comparison,
     write_differences,
     write_forecast,
@@ -213,6 +214,18 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
     ]
     (only,) = difference_blocks(difference_table({k: each[:1] for k, each in found.items()}))
     assert only.title == "long: change of ANRMSE from ours"
+
+
+@pytest.mark.parametrize(("lead_time", "words"), [(0.5, "0.500"), (2.0, "at least 2.000")])
+def test_a_lead_time_as_long_as_the_forecast_is_a_bound(lead_time, words):
+    over, facts = ("lead", "channel"), {"share": 0.5, "starts": 24}
+    made = xr.Dataset(
+        {key: (over, [[0.1], [0.2]]) for key in ("error", "claimed", "coverage")}
+        | {"lead_time": ("channel", [lead_time])},
+        {"lead": [1.0, 2.0], "channel": ["heave"]},
+    )
+    (table,) = nowcast_blocks({"m": made.expand_dims(run=["r"]).assign_attrs(facts)})
+    assert table.rows[0][:2] == ("heave", words)
 
 
 def test_no_name_is_a_formula_in_what_is_written(tmp_path):

@@ -55,6 +55,8 @@ def test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it(sea):
     spread = sea.std(axis=0)
     errors = [(each.mean(axis=0) - sea[900:]) / spread for each in (found, alone)]
     np.testing.assert_array_equal(errors[0][:, 0], errors[1][:, 0])
+    middle = found.reshape(2, -1, *found.shape[1:]).mean(axis=0)  # of each pair
+    np.testing.assert_allclose(middle, middle[:1] + np.zeros(middle.shape), atol=1e-9)
     for column, x in ((1, 2.0), (2, 4.0)):
         known = int(predictable_time(sea[:900, 0], 0.1, x, 3.6) / 0.1)
         error, own = (np.sqrt(np.mean(each[:known, column] ** 2)) for each in errors)

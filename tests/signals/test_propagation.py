@@ -5,8 +5,7 @@ import pytest
 from seas import sea
 
 from seakeep.errors import DataError, RequestError
-from seakeep.signals import delay_by_celerity, delay_by_dispersion, encounter_period
-from seakeep.signals.propagation import carry_by_celerity, carry_by_dispersion
+from seakeep.signals import carry_by_celerity, carry_by_dispersion, encounter_period
 from seakeep.waves import wavenumber
 
 DEPTH = 3.6
@@ -21,10 +20,16 @@ def drifting():
     return 0.5 + 0.4 * np.sin(2 * np.pi * TIME / 30) + 0.03 * np.sin(3.0 * TIME)
 
 
+def carried_to(place, carry, record, *how):
+    """Elevation at one place, or at one per sample."""
+    span = float(np.min(place)), float(np.max(place))
+    return carry(record, DT, span, *how).at(place).reshape(record.shape)
+
+
 def test_a_vessel_that_drifts_downstream_meets_waves_later():
     omega = 2 * np.pi * 0.6
     speed = 0.1  # m/s, downstream
-    carried = delay_by_dispersion(np.cos(omega * TIME), DT, speed * TIME, DEPTH)
+    carried = carried_to(speed * TIME, carry_by_dispersion, np.cos(omega * TIME), DEPTH)
     encountered = omega - float(wavenumber(omega, DEPTH)) * speed
     # The record is cut: half a wave in sixty at either end.
     period = encounter_period(carried[INNER], DT)
@@ -35,20 +40,20 @@ def test_a_vessel_that_drifts_downstream_meets_waves_later():
 @pytest.mark.parametrize("distance", [1.0, -1.0, 3.67, "moving"])
 def test_an_irregular_sea_is_carried_by_dispersion(distance):
     place = drifting() if distance == "moving" else distance
-    carried = delay_by_dispersion(WAVES.at(TIME), DT, place, DEPTH, highest_frequency=1.2)
+    carried = carried_to(place, carry_by_dispersion, WAVES.at(TIME), DEPTH, 1.2)
     error = (carried - WAVES.at(TIME, place))[INNER]
     # 1e-3 of the sea's SD: the Jacobi-Anger series ends at 1e-9; the rest is the ends' fade.
     assert np.sqrt(np.mean(error**2)) < 1e-3 * WAVES.at(TIME).std()
     # Above the frequency that holds 99.9 % of the variance the wavenumber goes on along its
     # tangent: the root of a thousandth (3 %) times a phase error of some 0.3 rad over 3.67 m.
-    limited = delay_by_dispersion(WAVES.at(TIME), DT, place, DEPTH) - WAVES.at(TIME, place)
+    limited = carried_to(place, carry_by_dispersion, WAVES.at(TIME), DEPTH) - WAVES.at(TIME, place)
     assert np.sqrt(np.mean(limited[INNER] ** 2)) < 0.015 * WAVES.at(TIME).std()
 
 
 def test_one_celerity_is_the_paper_s_delay():
     place, celerity = drifting(), 2.8
     slow = 0.3 * np.cos(3.0 * TIME + 0.4) + 0.2 * np.cos(5.1 * TIME)
-    carried = delay_by_celerity(slow, DT, place, celerity)
+    carried = carried_to(place, carry_by_celerity, slow, celerity)
     late = TIME - place / celerity
     exact = 0.3 * np.cos(3.0 * late + 0.4) + 0.2 * np.cos(5.1 * late)
     np.testing.assert_allclose(carried[INNER], exact[INNER], atol=1e-4)
@@ -57,8 +62,9 @@ def test_one_celerity_is_the_paper_s_delay():
 def test_nothing_moves_at_no_distance():
     record = np.column_stack([WAVES.at(TIME) + 0.3, sea(1).at(TIME) - 2.0])
     # A transform and its inverse, at the rounding of values of some 10.
-    np.testing.assert_allclose(delay_by_dispersion(record, DT, 0.0, DEPTH), record, atol=1e-12)
-    np.testing.assert_allclose(delay_by_celerity(record, DT, 0.0, 2.8), record, atol=1e-12)
+    for carry, by in ((carry_by_dispersion, DEPTH), (carry_by_celerity, 2.8)):
+        here = carry(record, DT, (0.0, 0.0), by).at(0.0)
+        np.testing.assert_allclose(here.reshape(record.shape), record, atol=1e-12)
 
 
 def test_a_place_outside_the_range_is_taken_to_its_end():
@@ -71,17 +77,12 @@ def test_a_place_outside_the_range_is_taken_to_its_end():
     ("call", "kind", "message"),
     [
         (
-            lambda: delay_by_dispersion(WAVES.at(TIME), DT, np.zeros(5), DEPTH),
-            RequestError,
-            r"the distance has shape \(5,\); expected one number, or one per sample: \(2048,\)",
-        ),
-        (
-            lambda: delay_by_dispersion(np.ones(100), DT, 1.0, DEPTH),
+            lambda: carry_by_dispersion(np.ones(100), DT, (0.0, 1.0), DEPTH),
             DataError,
             "the elevation is constant: there are no waves in it. Look for a dead probe",
         ),
         (
-            lambda: delay_by_celerity(WAVES.at(TIME), DT, 1.0, -2.0),
+            lambda: carry_by_celerity(WAVES.at(TIME), DT, (0.0, 1.0), -2.0),
             RequestError,
             r"the celerity must be positive \(m/s\); received -2.0",
         ),

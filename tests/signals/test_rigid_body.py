@@ -42,6 +42,7 @@ def test_positions_differentiate_to_velocities_and_accelerations(body):
     position, angles = body
     r = [0.5, -0.2, 0.3]
     moved = transfer_position(position, angles, r)
+    np.testing.assert_array_equal(transfer_position([[0.0] * 3], [[0.0] * 3], r), [[0.0] * 3])
     rates = body_rates(angles)
     velocity = transfer_velocity(differentiate(position, DT), angles, rates, r)
     inner = slice(20, -20)

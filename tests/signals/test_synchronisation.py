@@ -167,6 +167,7 @@ def test_the_correlation_at_a_lag_is_that_of_the_samples_in_common():
 
 
 NOISE, TIMES = np.random.default_rng(0).standard_normal((2, 2000)), np.arange(2000) / 20
+LONG = np.arange(0.0, 270.0, 0.02)
 GAP = np.where(TIMES == 25.0, np.nan, NOISE[0])
 
 
@@ -175,6 +176,8 @@ GAP = np.where(TIMES == 25.0, np.nan, NOISE[0])
     [
         (lambda: clock_from_pulses(NOISE[0], TIMES, pulses(TIMES), TIMES), DataError,
          r"the logger's trigger has no pulses that stand out .* shared .* correlated .* offset"),
+        (lambda: clock_from_pulses(pulses(LONG), 1e3 * LONG, pulses(LONG), LONG), DataError,
+         r"fit together; the former come every 2e\+04 s, the latter every 20 s\. .* unit of both"),
         (lambda: clock_from_correlation(NOISE[0], TIMES, NOISE[1], TIMES, 20.0, 2.0), DataError,
          r"0 of \d+ windows correlate by 0\.6 or more"),
         (lambda: clock_from_correlation(*[NOISE[0], TIMES] * 2, 98.0, 2.0), RequestError,

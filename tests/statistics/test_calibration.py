@@ -163,6 +163,16 @@ def test_a_learnt_band_covers_by_simulation_and_is_narrower():
     assert widths[0].mean() < 0.85 * widths[1].mean()
 
 
+def test_a_learnt_scale_is_judged_by_runs_that_it_did_not_learn_from():
+    rng, zeros = np.random.default_rng(4), np.zeros((8, 50, 1))
+    errors = [spread * rng.standard_normal(zeros.shape) for spread in (1.0, 3.0)]
+    values = np.stack([zeros, zeros + 1, zeros, zeros], axis=1)
+    found, *_ = learn_margin([Judged(values, y, np.ones((8, 50))) for y in errors], 0.95, "learnt")
+    # The scale of the calm run is three times too small for the other: of |z| · 3 and
+    # |z|/3 in equal parts, 95 % lie below 1.645 · 3. 800 errors tell it to 6 %.
+    assert found.margin[0] == pytest.approx(1.645 * 3, rel=0.15)
+
+
 def test_the_envelope_is_that_of_the_waves_that_drive_a_step():
     rng = np.random.default_rng(5)
     waves, z, steps = rng.standard_normal((2, 12, 3)), 4, 8

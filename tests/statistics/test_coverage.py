@@ -236,5 +236,3 @@ def test_diverged_values_are_left_out_and_counted():
 def test_what_a_box_refuses():
     with pytest.raises(DataError, match=r"none of 2 value\(s\) is finite"):
         box_statistics([np.nan, np.inf])
-    with pytest.raises(RequestError, match="reach must be zero or more; received -1"):
-        box_statistics([1.0, 2.0], reach=-1)

@@ -95,6 +95,8 @@ def results(tmp_path_factory):
         return reproduce(folder, "paper", size=SMALL)
 
 
+TIMED = "times as long"
+"""In the one row of a table that is measured on the machine."""
 STAGES = (
     "campaign/played.txt",
     "campaign/prepared/*.nc",
@@ -148,7 +150,9 @@ def test_a_command_that_is_killed_at_any_stage_goes_on_and_ends_the_same(tmp_pat
             told = process.communicate()[1]
             assert process.returncode == 0, told
         for path in (tmp_path / "alone" / "tables").glob("*"):
-            assert (out / "tables" / path.name).read_bytes() == path.read_bytes(), path.name
+            both = (each.read_text("utf-8") for each in (path, out / "tables" / path.name))
+            same, other = ([r for r in text.splitlines() if TIMED not in r] for text in both)
+            assert same == other, path.name
 
 
 @pytest.fixture(scope="module")
@@ -217,7 +221,7 @@ def test_every_claim_has_a_figure_and_a_verdict(results):
     from seakeep.report.claims import CLAIMS, claims_table
 
     table = claims_table(results)
-    assert len({row[0] for row in table.rows}) == len(CLAIMS) == 17
+    assert len({row[0] for row in table.rows}) == len(CLAIMS) == 20
     assert {row[2] for row in table.rows} <= {"holds", "does not", "cannot tell"}
     assert not [row for row in table.rows if "nan" in row[1] or MISSING in row[1]]
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.study.judge import is_regular, regular_response, wave_frequency
+from seakeep.core.harmonics import dominant_frequency
+from seakeep.study.judge import is_regular, regular_response
 
 DT, FREQUENCY = 0.05, 0.86
 TIME = DT * np.arange(1, 161)
@@ -64,5 +65,5 @@ def test_a_set_in_an_irregular_sea_is_not_taken_apart():
 
 def test_the_frequency_of_a_noisy_wave():
     noise = 0.1 * np.random.default_rng(1).standard_normal(1200)
-    found = wave_frequency(np.sin(2 * np.pi * 0.86 * np.arange(1200) * DT) + noise, DT)
+    found = dominant_frequency(np.sin(2 * np.pi * 0.86 * np.arange(1200) * DT) + noise, DT)
     assert found == pytest.approx(0.86, abs=1e-3)  # 6 % of the resolution of 60 s

@@ -9,6 +9,8 @@ from seakeep.tank.moorings import KINDS, LineSettings, line_table, mooring_stiff
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
+from seakeep.tank._loop import line_tension
+
 
 def test_unstretched_lengths_of_the_page(rig):
     assert rig.lines[:, 5] == pytest.approx([2.368, 2.673], abs=0.0005)  # three decimals are stated
@@ -34,17 +36,18 @@ def test_a_line_damps_only_while_it_pulls(rig):
     assert bow == pytest.approx([1.25, 0.95, 0.0], abs=1e-12)
 
 
+def test_a_line_damps_the_rate_of_its_length(rig):
+    position, velocity = np.random.default_rng(0).normal(0.0, 0.1, (2, 5, 1))
+    slack = [tensions(rig, position + step * velocity, 0 * velocity) for step in (-1e-5, 0, 1e-5)]
+    rate = (slack[2] - slack[0]) / 2e-5 / rig.lines[:, [4]]
+    damped = tensions(rig, position, velocity) - slack[1]
+    # Central differences of step 1e-5: rounding of 1e-10.
+    assert damped == pytest.approx(rig.lines[:, [6]] * rate, abs=1e-8)
+
+
 def test_stiffness_is_the_slope_of_the_forces(rig):
     def force(q):
-        total = np.zeros(3)
-        for line in rig.lines:
-            cosine, sine = np.cos(q[2]), np.sin(q[2])
-            arm = np.array([line[0] * cosine + line[1] * sine, -line[0] * sine + line[1] * cosine])
-            reach = line[2:4] - q[:2] - arm
-            length = np.hypot(*reach)
-            pull = max(0.0, line[4] * (length - line[5])) * reach / length
-            total += [*pull, arm[1] * pull[0] - arm[0] * pull[1]]
-        return total
+        return np.sum([line_tension(line, *q, np.zeros(3))[1:] for line in rig.lines], axis=0)
 
     step = 1e-6
     slopes = [(force(step * e) - force(-step * e)) / (2 * step) for e in np.eye(3)]

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
+from seakeep.tank.delivery import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, pixel_of, render_side_view
 from seakeep.tank.instruments import clock_instants
 from seakeep.tank.play import play, play_run
-from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, pixel_of, render_side_view
 
 cv2 = pytest.importorskip("cv2", reason="needs the extra video")
 pytest.importorskip("numba", reason="needs the extra tank")

@@ -573,6 +573,12 @@ def _on_axis(
     if low is not None and low[1] >= 0.5 / own:
         low = None
     if low is not None:
+        length = 60 / (14.36 * (low[1] - low[0]))  # of 60 dB, by Kaiser's formula
+        if (lasts := time.size * own) < 0.5 * length:
+            raise DataError(
+                f"low_pass = {list(low)} in [preparation] averages over {length:.3g} s, and the "
+                f"record lasts {lasts:.3g} s. Move its second edge away from the first."
+            )
         series = low_pass(series, own, *low)
     if strays(own, time.size, dt) or abs(wanted[0] - time[0]) > 0.05 * own:
         # The last instant may lie a rounding beyond the record.

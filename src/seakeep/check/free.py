@@ -10,7 +10,7 @@ import xarray as xr
 
 from seakeep.check.parts import single_model
 from seakeep.conventions import MOTIONS, canonical_channel
-from seakeep.core.decay import free_decay
+from seakeep.core.extremes import free_decay
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model
 from seakeep.models.labelled import channel_matrix

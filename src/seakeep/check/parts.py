@@ -16,6 +16,7 @@ from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
 from seakeep.models import HankelDMDcModel, InputMap, Model, SlowSquares, is_ensemble
 from seakeep.models.labelled import Span, channel_matrix, check_step
 from seakeep.models.observables import HALF_WIDTH
+from seakeep.models.registry import is_linear
 from seakeep.signals.time_axis import stretches
 from seakeep.waves import wavenumber
 
@@ -108,7 +109,7 @@ def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
         states = channel_matrix(run, model.states, name)
         try:
             inputs = channel_matrix(run, model.inputs, name)
-            if isinstance(model, HankelDMDcModel):
+            if is_linear(model):
                 aligned = model.aligned_inputs(run)
                 inputs = channel_matrix(aligned, model.inputs, name)
         except DataError as error:
@@ -191,7 +192,7 @@ def no_energy(names: str) -> DataError:
 
 def read_off(model: Model) -> list[int]:
     """Columns of states that read-outs make of other states."""
-    return [each.column for each in model.signature.readouts if each.function is not None]
+    return [each.column for each in model.signature.readouts if each.acts]
 
 
 def driven(
@@ -336,7 +337,7 @@ def _at_once(input_map: InputMap) -> InputMap:
 
 def single_model(model: Model) -> HankelDMDcModel:
     """The model itself, where it is one of delayed states and inputs."""
-    if not isinstance(model, HankelDMDcModel):
+    if not is_linear(model):
         raise RequestError(
             "free motion and second order are those of one Hankel or ARX model; received one of "
             f"kind '{model.kind}'. For an ensemble, check a member: "

@@ -18,8 +18,7 @@ from seakeep.check.parts import (
     ratio,
     window_of,
 )
-from seakeep.core.spectra import cross_spectra
-from seakeep.core.whiteness import autocorrelation, input_correlation, ljung_box
+from seakeep.core.spectra import autocorrelation, cross_spectra, input_correlation, ljung_box
 from seakeep.errors import DataError
 from seakeep.models import Model
 from seakeep.models.labelled import channel_matrix, mean_period

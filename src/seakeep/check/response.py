@@ -26,9 +26,10 @@ from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.core.response import frequency_response
 from seakeep.core.spectra import Spectra, cross_spectra, segment_length
 from seakeep.errors import DataError, RequestError
-from seakeep.models import HankelDMDcModel, HankelEnsemble, Model
+from seakeep.models import Model, is_ensemble
 from seakeep.models.engine import Dynamics
 from seakeep.models.labelled import mean_period
+from seakeep.models.registry import is_linear
 
 WAVE = "wave"
 """Name of the input that is a wave which passes all probes."""
@@ -136,9 +137,9 @@ def _lead(model: Model) -> int:
 
 
 def _dynamics(model: Model) -> list[Dynamics]:
-    if isinstance(model, HankelDMDcModel):
+    if is_linear(model):
         return [model.dynamics]
-    if isinstance(model, HankelEnsemble):
+    if is_ensemble(model):
         return [model.dynamics(member) for member in range(model.n_members)]
     raise RequestError(
         f"a model of kind '{model.kind}' has no matrices of delayed states and inputs, from which "

@@ -12,11 +12,9 @@ from typing import Annotated
 import typer
 
 from seakeep.cli import (
-    calibrating,
     campaigns,
     checking,
     exporting,
-    information,
     modelling,
     tank,
     tracking,
@@ -71,7 +69,7 @@ for _verb in (
     campaigns.prepare,
     tuning.tune,
     modelling.fit,
-    calibrating.calibrate,
+    checking.calibrate,
     modelling.forecast,
     modelling.compare,
     exporting.export,
@@ -80,7 +78,7 @@ for _verb in (
     studying.report,
     studying.reproduce,
     tracking.track,
-    information.info,
+    exporting.info,
 ):
     app.command()(_verb)
 app.add_typer(campaigns.datasets, name="datasets")

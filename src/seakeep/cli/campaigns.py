@@ -189,9 +189,8 @@ def _list(context: typer.Context) -> None:
         table.add_row("name", each.name, style="bold")
         facts = {"what": each.title, "origin": each.origin, "licence": each.licence}
         facts |= {"cite": each.reference, "here": state_of(each, folder), "note": each.note}
-        facts["files"] = "\n".join(
-            ["with their SHA-256", *(f"{name}  {checksum}" for name, checksum in each.files)]
-        )
+        listed = (f"{name}  {checksum}" for name, checksum in each.files.items())
+        facts["files"] = "\n".join(["with their SHA-256", *listed])
         for key, value in facts.items():
             if value:
                 table.add_row(key, value)

@@ -260,6 +260,7 @@ def compare(
     from seakeep.models import load_model
     from seakeep.report.comparison import difference_blocks, write_comparison, write_differences
     from seakeep.study import compare_models, comparison_table, difference_table
+    from seakeep.study.nowcast import served
 
     make_folder(out)
     names = _named(model)
@@ -280,7 +281,7 @@ def compare(
         given = {"--start": start, "--band": band, "--workers": workers, "--scheduler": scheduler}
         stated = {option: value is not None for option, value in given.items()}
         _refuse(stated | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
-        serving = {n: each for n, each in fitted.items() if n in names or hasattr(each, "live")}
+        serving = {n: each for n, each in fitted.items() if n in names or served(each)}
         _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
         return
     with member_executor(workers, scheduler) as executor, progress_bar("Comparing") as progress:

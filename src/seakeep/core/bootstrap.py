@@ -277,7 +277,12 @@ def bootstrap_indices(
 
 
 def student_interval(
-    value: npt.ArrayLike, redrawn: FloatArray, blocks: float, level: float, axis: int = 0
+    value: npt.ArrayLike,
+    redrawn: FloatArray,
+    blocks: float,
+    level: float,
+    axis: int = 0,
+    signed: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
     r"""Interval of a statistic from its redrawn values, for few blocks.
 
@@ -285,7 +290,7 @@ def student_interval(
     draws, k the number of blocks, and t the quantile of Student's distribution (Hesterberg, The
     American Statistician 69, 2015). Quantiles of the draws cover too little for ten blocks or
     fewer. A statistic of which all values are positive is taken in the logarithm, so that its
-    bounds are positive too.
+    bounds are positive too, unless it is `signed`.
 
     Parameters
     ----------
@@ -299,13 +304,15 @@ def student_interval(
         Probability between the bounds.
     axis : int, optional
         Axis of the draws.
+    signed : bool, optional
+        Whether the statistic may be negative, whatever the draws are.
 
     Returns
     -------
     lower, upper : ndarray
     """
     middle = np.asarray(value, dtype=float)
-    positive = not (np.any(redrawn <= 0) or np.any(middle <= 0))
+    positive = not (signed or np.any(redrawn <= 0) or np.any(middle <= 0))
     if positive:
         middle, redrawn = np.log(middle), np.log(redrawn)
     with warnings.catch_warnings():

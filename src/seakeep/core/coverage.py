@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction, number
+from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction
 from seakeep.errors import DataError, RequestError
 
 WAVE_PARTS = ("lowest waves", "middle waves", "highest waves")
@@ -345,15 +345,13 @@ class BoxStatistics:
     left_out: int
 
 
-def box_statistics(values: npt.ArrayLike, reach: float = 1.5) -> BoxStatistics:
+def box_statistics(values: npt.ArrayLike) -> BoxStatistics:
     """Quartiles, whiskers and outliers of a sample (Tukey), as matplotlib draws them.
 
     Parameters
     ----------
     values : array_like
         Numbers in any shape; those that are not finite are left out and counted.
-    reach : float
-        Inter-quartile ranges beyond the box within which a whisker ends.
 
     Returns
     -------
@@ -376,10 +374,8 @@ def box_statistics(values: npt.ArrayLike, reach: float = 1.5) -> BoxStatistics:
     x = np.sort(everything[np.isfinite(everything)])
     if x.size == 0:
         raise DataError(f"none of {everything.size} value(s) is finite; there is no box to draw.")
-    if not number(reach, "reach") >= 0:
-        raise RequestError(f"reach must be zero or more; received {reach}.")
     first, middle, third = (float(item) for item in np.quantile(x, [0.25, 0.5, 0.75]))
-    room = reach * (third - first)
+    room = 1.5 * (third - first)
     # A whisker never ends inside the box, also where no value lies between it and the fence.
     low = min(float(x[x >= first - room][0]), first)
     high = max(float(x[x <= third + room][-1]), third)

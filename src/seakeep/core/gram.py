@@ -25,6 +25,11 @@ block that serves, moved down by q d rows, the lags q d … q d + d − 1. So a 
 times the data replace one with L times the data, and H is never built.
 
 Only upper triangles are made; what stands below the diagonal is not meaningful.
+
+Coefficients of one delayed regression at many λ or ranks, from its Gram matrix.
+
+A Cholesky factorisation gives those at each λ, :math:`H (C + \lambda I)^{-1}`, and one
+eigendecomposition those of all ranks.
 """
 
 from __future__ import annotations
@@ -35,6 +40,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy import linalg
 
 from seakeep.arrays import FloatArray
 
@@ -293,3 +299,29 @@ def lagged_response(series: FloatArray, weights: FloatArray, first: int, count: 
     for channel, own in zip(reached.T, weights.reshape(lags, -1).T, strict=True):
         out += np.convolve(channel, own, mode="valid")
     return out
+
+
+def ridge_path(gram: FloatArray, right: FloatArray, ridges: Sequence[float]) -> FloatArray:
+    """Coefficients of ridge regressions of one problem at several λ.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (p, p)
+        Products of the regressors; the upper triangle is read.
+    right : ndarray, shape (N, p)
+        Products of the targets with the regressors.
+    ridges : sequence of float
+        λ > 0, each; what is below the rounding of the Gram matrix is raised to it.
+
+    Returns
+    -------
+    ndarray, shape (len(ridges), N, p)
+    """
+    path = np.empty((len(ridges), *right.shape))
+    least = len(gram) * float(np.finfo(float).eps * gram.diagonal().max())
+    for out, ridge in zip(path, ridges, strict=True):
+        shifted = gram.copy()
+        shifted[np.diag_indices_from(shifted)] += max(ridge, least)
+        factor = linalg.cho_factor(shifted, overwrite_a=True, check_finite=False)
+        out[:] = linalg.cho_solve(factor, right.T, check_finite=False).T
+    return path

@@ -53,7 +53,7 @@ from seakeep.core.gram import (
     primal_system,
     snapshot_gram,
 )
-from seakeep.core.stability import clip_modes
+from seakeep.core.response import clip_modes
 from seakeep.errors import DataError, RequestError
 
 Method = Literal["primal", "dual", "svd"]
@@ -139,7 +139,7 @@ def identify(
     method : {"primal", "dual", "svd"}, optional
         Forces a form; by default shape and conditioning decide.
     radius : float, optional
-        Eigenvalues outside it are clipped (:func:`seakeep.core.stability.clip_modes`).
+        Eigenvalues outside it are clipped (:func:`seakeep.core.response.clip_modes`).
 
     Returns
     -------

@@ -32,6 +32,7 @@ def two_way_interval(
     blocks: tuple[int, int] = (1, 1),
     n_series: int = 1000,
     level: float = 0.95,
+    signed: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
     """Interval of a statistic of crossed cells by a two-way block bootstrap.
 
@@ -51,6 +52,9 @@ def two_way_interval(
         Number of redrawn tables.
     level : float, optional
         Probability between the bounds.
+    signed : bool, optional
+        Whether the statistic may be negative, whatever the draws are; bounds of any other that is
+        positive throughout are positive.
 
     Returns
     -------
@@ -99,7 +103,7 @@ def two_way_interval(
     if smallest < FEWEST or np.isnan(values).all():
         return np.full(values.shape[1:], np.nan), np.full(values.shape[1:], np.nan)
     value = np.asarray(statistic(*(each[None] for each in tables)), dtype=float)[0]
-    return student_interval(value, values, smallest, part)
+    return student_interval(value, values, smallest, part, signed=signed)
 
 
 def overlap_block(spans: Sequence[tuple[str, float, float]]) -> int:

@@ -10,10 +10,9 @@ from pathlib import Path
 
 from seakeep.errors import DataError
 from seakeep.files import reading
-from seakeep.formats.columns import Columns
+from seakeep.formats.columns import Columns, Options, Reader
 from seakeep.formats.matlab import read_matlab
 from seakeep.formats.netcdf import read_netcdf
-from seakeep.formats.reader import Options, Reader
 from seakeep.formats.rosbag import read_recording
 from seakeep.formats.tdms import read_tdms
 from seakeep.formats.text import read_text

@@ -11,8 +11,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError
-from seakeep.formats.columns import Columns, check_lengths, unique_names
-from seakeep.formats.reader import Options, decoding
+from seakeep.formats.columns import Columns, Options, check_lengths, decoding, unique_names
 
 if TYPE_CHECKING:
     import h5py

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from seakeep.errors import DataError, did_you_mean
-from seakeep.formats.columns import Columns
-from seakeep.formats.reader import Options, decoding
+from seakeep.formats.columns import Columns, Options, decoding
 
 if TYPE_CHECKING:
     import h5py

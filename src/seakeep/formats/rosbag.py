@@ -15,8 +15,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
-from seakeep.formats.columns import Columns
-from seakeep.formats.reader import Options, decoding
+from seakeep.formats.columns import Columns, Options, decoding
 
 _STANDARD = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
 _UNITS = {

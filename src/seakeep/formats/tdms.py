@@ -17,8 +17,7 @@ import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.formats.columns import Columns, check_lengths
-from seakeep.formats.reader import Options, decoding
+from seakeep.formats.columns import Columns, Options, check_lengths, decoding
 
 LEAD_IN = 28
 _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")

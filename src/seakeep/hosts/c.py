@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
-from seakeep.core.readouts import LinearHinges
+from seakeep.core.readouts import SOFT
 from seakeep.files import MARK, check_output, make_folder, replacing
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
@@ -107,10 +107,14 @@ def content_of(model: HankelDMDcModel, name: str) -> dict[str, Any]:
         "kernels": kernels,
         "growth": GROWTH,
         "fade": fading(signature),
-        "readouts": [
-            {"column": each.column, "code": _hinges(each.function)}
+        "soft": SOFT,
+        "readouts": [each for each in signature.readouts if each.acts],
+        "lines": ()
+        if follows is None
+        else [
+            (each.load, *follows.lines(None, (each.load.place,)))
             for each in signature.readouts
-            if each.function is not None
+            if each.load is not None
         ],
     }
 
@@ -164,17 +168,3 @@ def _columns(
         kernels.append(term.kernel)
     filtered = f"{term.order}, kernel_{number}, {len(term.kernel) // 2}"
     return [f"slow_square(u + ({shift}) * Q + {term.place}, {filtered})" for shift in term.shifts]
-
-
-def _hinges(function: LinearHinges) -> str:
-    """Expression of C in the states x."""
-    terms = [_number(function.weights[0])]
-    states = [f"x[{column}]" for column in function.linear]
-    states += [
-        f"fmax(x[{column}] - {_number(knot)}, 0.0)"
-        for column, knots in zip(function.columns, function.knots, strict=True)
-        for knot in knots
-    ]
-    weights = function.weights[1:]
-    terms += [f"{_number(w)} * {state}" for w, state in zip(weights, states, strict=True)]
-    return f"fmax({' + '.join(terms)}, {_number(function.floor)})"

@@ -218,8 +218,9 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
         graph("Slice", every, [steps], [END], [0], into="x_after")
     columns = {column: x[:, column : column + 1] for column in range(N)}
     for each in signature.readouts:
-        if each.function is not None:
-            columns[each.column] = each.function(x).reshape(steps, 1)
+        if each.acts:
+            wave = None if each.load is None else _wave(u, each.load.place, signature, steps)
+            columns[each.column] = each.read(x, wave).reshape(steps, 1)
     graph("Concat", *columns.values(), into="x", axis=1)
     given = [value("x_history", size, N)]
     if signature.inputs:
@@ -331,6 +332,17 @@ def _tables(
         "surge": (surge[last], (past,)),
         "line": (line.reshape(z * n), (z * n,)),
     }
+
+
+def _wave(u: _Value, place: float, signature: Signature, steps: int) -> _Value:
+    """Elevation and rate at the line of a load, (steps, 2)."""
+    follows = signature.input_map.follows
+    assert follows is not None
+    taps, probes = follows.lines(None, (place,))
+    samples = signature.input_map.history(signature.input_delays) + np.arange(steps)
+    around = samples[:, None] + np.arange(-follows.back, follows.ahead + 1)
+    parts = [u[:, at][around] @ taps[:, i].T for i, at in enumerate(probes)]
+    return sum(parts[1:], parts[0])
 
 
 def _followed(step: _Graph, model: HankelDMDcModel, forced: _Value) -> _Value:

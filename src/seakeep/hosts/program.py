@@ -12,6 +12,7 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
 from seakeep.models import HankelDMDcModel, Model, is_ensemble, labelled
+from seakeep.models.registry import is_linear
 
 
 def exportable(model: Model) -> HankelDMDcModel:
@@ -38,7 +39,7 @@ def exportable(model: Model) -> HankelDMDcModel:
             f"an ensemble of {model.n_members} members cannot be exported as one model. Export one "
             "of them: --member 0, or ensemble.member(0)."
         )
-    if not isinstance(model, HankelDMDcModel):
+    if not is_linear(model):
         raise RequestError(
             f"a model of kind '{model.kind}' cannot be exported; those of delayed states and "
             "inputs can: hankel_dmdc, arx, fir."

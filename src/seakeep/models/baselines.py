@@ -30,6 +30,9 @@ from seakeep.models.store import content, numbers
 from seakeep.models.training import Training, TrainingData, gather
 from seakeep.models.validity import Coverage
 
+ORDER = 40
+"""Latent states of a subspace model, where the future has as many values."""
+
 
 @dataclass(frozen=True)
 class Constant:
@@ -258,8 +261,8 @@ class Subspace(HankelSettings):
     ----------
     state_delays, input_delays : int
         s and z, how far back the past reaches. A forecast needs max(s, z) + 1 samples of history.
-    order : int
-        Number of latent states.
+    order : int, optional
+        Number of latent states; by default 40, or as many as the future has values.
     future : int, optional
         Instants of the future that the state must predict; by default s + 1.
     ridge : float, optional
@@ -277,12 +280,12 @@ class Subspace(HankelSettings):
     readouts: ReadOuts = field(default=(), init=False, repr=False)
     stable: bool | float = field(default=False, init=False, repr=False)
     memory: int = field(default=0, init=False, repr=False)
-    order: int = field(kw_only=True)
+    order: int | None = field(default=None, kw_only=True)
     future: int | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_integer("order", self.order, 1)
+        check_integer("order", self.order, 1, optional=True)
         check_integer("future", self.future, 1, optional=True)
         if self.alignment is not None and self.alignment.surge == "predicted":
             raise RequestError(
@@ -292,9 +295,9 @@ class Subspace(HankelSettings):
 
     @classmethod
     def recommended(cls, encounter_period: float, dt: float) -> Self:
-        """One encounter period of the states, three of the inputs, 40 latent states, λ = 0.1."""
+        """One encounter period of the states, three of the inputs, λ = 0.1."""
         s, z = (periods_to_samples(periods, encounter_period, dt) for periods in (1, 3))
-        return cls(state_delays=s, input_delays=z, order=40, ridge=0.1)
+        return cls(state_delays=s, input_delays=z, ridge=0.1)
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
@@ -303,9 +306,10 @@ class Subspace(HankelSettings):
         data = gather(as_runs(runs), states, inputs, stop, self)
         future = self.state_delays + 1 if self.future is None else self.future
         most = future * len(data.state_labels)
-        if self.order > most:
+        order = min(ORDER, most) if self.order is None else self.order
+        if order > most:
             raise RequestError(
-                f"order = {self.order} is more than the {most} values of {future} future instants "
+                f"order = {order} is more than the {most} values of {future} future instants "
                 f"of {counted(len(data.state_labels), 'state')}. In the table of the "
                 "model, lower the key order, or raise the key future."
             )
@@ -313,7 +317,7 @@ class Subspace(HankelSettings):
             data.states,
             data.delayed,
             data.windows,
-            order=self.order,
+            order=order,
             output_delays=self.state_delays,
             input_delays=self.input_delays,
             future=future,
@@ -321,10 +325,10 @@ class Subspace(HankelSettings):
             direct=data.direct,
         )
         columns = sum(window.columns for window in data.windows)
-        solution = Solution(space.A, "svd", float(self.ridge) * columns, self.order)
+        solution = Solution(space.A, "svd", float(self.ridge) * columns, order)
         signature = data.signature(self)
         return SubspaceModel(
-            settings=self,
+            settings=replace(self, order=order),
             space=space,
             signature=signature,
             training=data.training(solution),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol, get_args
@@ -34,6 +34,9 @@ from seakeep.models.training import TrainingArrays
 
 Band = Literal["members", "calibrated"]
 BandScale = Literal["spread", "constant", "learnt"]
+
+PARTS = 3
+"""Parts of a run that trains alone, each of which is forecast by what the others teach."""
 NUMBERS = ("margin", "block_length", "blocks", "warranted")
 
 
@@ -71,6 +74,10 @@ class Ensemble(FreeRuns, Protocol):
 
     def without(self, run: str) -> Ensemble:
         """Members as they learn from the other runs."""
+
+    def without_part(self, begin: int, end: int) -> Ensemble:
+        """Members as they learn from the rest of the one run that trains."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,9 +179,15 @@ def calibrate(
     if not (folds is None or (isinstance(folds, str) and folds == "run")):
         raise RequestError(f"folds must be 'run', or None for unread windows; received {folds!r}.")
     sources = dict.fromkeys(named, ensemble)
-    for name, run in named.items() if folds else ():
-        if (known := _read_run(ensemble, name, run)) is not None:
+    for name, run in list(named.items()) if folds else ():
+        if (known := _read_run(ensemble, name, run)) is None:
+            continue
+        if len(ensemble.arrays.names) > 1:
             sources[name] = ensemble.without(known)
+            continue
+        del named[name], sources[name]
+        for part, piece, source in _parts(ensemble, name, run):
+            named[part], sources[part] = piece, source
     judged = _judged(sources, named, steps, level, executor, progress)
     history = ensemble.signature.history_samples
     if not judged:
@@ -290,6 +303,20 @@ def _judged(
         measured = np.stack([states[at + 1 : at + 1 + steps] for at in places])
         judged[name] = Judged(values, measured, envelope_of(signature, windows), starts)
     return judged
+
+
+def _parts(
+    ensemble: Ensemble, name: str, run: xr.Dataset
+) -> Iterator[tuple[str, xr.Dataset, Ensemble]]:
+    """Thirds of the run that trains alone, and the ensemble as it learns from the rest of it."""
+    begin, half = ensemble.arrays.begins[0], 0.5 * ensemble.signature.dt
+    edges = np.linspace(0, len(ensemble.arrays.states[0]), PARTS + 1).round().astype(int)
+    times = begin + edges * ensemble.signature.dt - half
+    times[[0, -1]] = -np.inf, np.inf  # what no member reads goes with its neighbour
+    for number in range(PARTS):
+        part = run.sel(time=slice(times[number], times[number + 1]))
+        source = ensemble.without_part(int(edges[number]), int(edges[number + 1]))
+        yield f"{name}, part {number + 1}", part, source
 
 
 def envelope_of(signature: Signature, windows: Windows) -> FloatArray:

@@ -7,7 +7,6 @@ members to an executor, and :func:`group_series` collects them, in a file where 
 
 from __future__ import annotations
 
-import itertools
 import math
 import os
 import tempfile
@@ -15,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -80,6 +79,8 @@ class Windows:
         Samples of the table from which the windows start.
     predicted : tuple of int
         First step of each window that reads predicted input, or −1.
+    waves : ndarray, shape (window, steps, line, 2), optional
+        Elevation and rate of the wave at the line of each load that reads it.
     """
 
     places: tuple[tuple[str, float], ...]
@@ -93,6 +94,7 @@ class Windows:
     table: FloatArray | None = None
     starts: IntArray | None = None
     predicted: tuple[int, ...] = ()
+    waves: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.histories)
@@ -214,7 +216,6 @@ def _driven(
     """Windows of one length, each with its run's drive."""
     pairs = list(zip(runs, spans, strict=True))
     maps, dt = signature.input_map, signature.dt
-    delayed, direct, table, starts = _regressors(signature, drives, spans)
     return Windows(
         places=tuple((run.name, float(run.time[span.known])) for run, span in pairs),
         steps=spans[0].stop - spans[0].known,
@@ -223,17 +224,14 @@ def _driven(
         look_ahead=tuple(maps.look_ahead(run.run, dt) for run in runs),
         notes=maps.notes(runs[0].run),
         predicted=tuple(run.first_predicted(signature, span) for run, span in pairs),
-        delayed=delayed,
-        direct=direct,
-        table=table,
-        starts=starts,
+        **_regressors(signature, drives, spans),
     )
 
 
 def _regressors(
     signature: Signature, drives: Sequence[Drive], spans: Sequence[Span]
-) -> tuple[FloatArray, FloatArray, FloatArray | None, IntArray | None]:
-    """Regressors, table and starts of windows of one length, each from its run's drive."""
+) -> dict[str, Any]:
+    """What drives windows of one length, each from its run's drive."""
     z, pairs = signature.input_delays, list(zip(drives, spans, strict=True))
     if signature.input_map.follows is None:
         rows = [
@@ -241,7 +239,7 @@ def _regressors(
             for drive, span in pairs
         ]
         delayed = np.stack([each.delayed for each in rows])
-        return delayed, np.stack([each.direct[z:] for each in rows]), None, None
+        return {"delayed": delayed, "direct": np.stack([each.direct[z:] for each in rows])}
     place = signature.input_map.follows.place
     tables, starts, first = [], {}, 0
     for drive in dict.fromkeys(drives):
@@ -256,7 +254,12 @@ def _regressors(
     measured = read_table(place, table, at[:, None] + np.arange(steps), here.repeat(steps, axis=1))
     before = np.stack([drive.rows(span.first, span.known).delayed for drive, span in pairs])
     direct = np.stack([drive.direct(span.known, span.stop) for drive, span in pairs])
-    return np.concatenate([before, measured], axis=1), direct, table, at
+    out = {"delayed": np.concatenate([before, measured], axis=1), "direct": direct}
+    lines = tuple(each.load.place for each in signature.readouts if each.load is not None)
+    if lines:
+        waves = [drive.waves(lines, span.known, span.stop) for drive, span in pairs]
+        out["waves"] = np.stack(waves)
+    return out | {"table": table, "starts": at}
 
 
 @dataclass(frozen=True, eq=False)
@@ -429,16 +432,12 @@ def array_windows(
             surge = np.concatenate([np.full(history - len(known), np.nan), known])
         drives.append(signature.input_map.drive(values, [span], run=rig, surge=surge))
     time = xr.Variable(("time",), signature.dt * np.arange(1, steps + 1))
-    delayed, direct, table, starts = _regressors(signature, drives, [span] * len(drives))
     return Windows(
         places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
         time=(time,) * len(histories),
         histories=histories,
-        delayed=delayed,
-        direct=direct,
-        table=table,
-        starts=starts,
+        **_regressors(signature, drives, [span] * len(drives)),
     )
 
 
@@ -452,8 +451,9 @@ def linear_runs(
     Read-outs see each member's series when its run is done.
     """
     runs = [model_runs(each, each.coefficients[None], groups) for each in members]
-    for values in itertools.chain.from_iterable(runs):
-        read_out(readouts, values)
+    for every in runs:
+        for values, windows in zip(every, groups, strict=True):
+            read_out(readouts, values, windows.waves)
     # One member needs no copy.
     return [each[0] if len(each) == 1 else np.concatenate(each) for each in zip(*runs, strict=True)]
 

@@ -723,9 +723,10 @@ class HankelEnsemble(Forecaster, store.Saved):
             the windows of a single one.
         folds : {"run"}, optional
             For runs that train, read to their ends: each is forecast by the same members as they
-            learn from the other runs, and the margin goes to the members as they are. What the
-            input map and the read-outs learnt, they learnt from all of them. Members that learn
-            from the run alone are left out there.
+            learn from the other runs, or a third of a single run as they learn from the rest of
+            it; the margin goes to the members as they are. What the input map and the read-outs
+            learnt, they learnt from all of them. Members that learn from the run alone, or whose
+            window reaches into the third, are left out there.
         executor, progress
             As in :meth:`forecast`; a step is a member in one of the runs.
 
@@ -778,6 +779,47 @@ class HankelEnsemble(Forecaster, store.Saved):
             )
         arrays = self.arrays.without(left_out)
         return replace(self, members=members, arrays=arrays, calibration=None, identified=())
+
+    def without_part(self, begin: int, end: int) -> HankelEnsemble:
+        """The same draws as they learn from the rest of the one run that trains.
+
+        Parameters
+        ----------
+        begin, end : int
+            Samples of what members read: the first that is left out, and the next that is not.
+
+        Returns
+        -------
+        HankelEnsemble
+            With the members whose window does not reach into the part; the input map is kept.
+
+        Raises
+        ------
+        RequestError
+            If no member is left.
+        """
+        arrays = self.arrays.beside(begin, end, self.dt)
+        whole = self.arrays.offsets[0] + len(self.arrays.states[0])
+        pieces = [
+            (number, offset, offset + len(x))
+            for number, (offset, x) in enumerate(zip(arrays.offsets, arrays.states, strict=True))
+        ]
+        members = [replace(draw, run=None) for draw in self.members if draw.settings.window is None]
+        for draw in (each for each in self.members if each.settings.window is not None):
+            first = draw.first(0, whole, self.signature.input_map)
+            last = whole - 1 if draw.last is None else draw.last
+            members += [
+                replace(draw, run=number, last=last)
+                for number, start, stop in pieces
+                if start <= first and last < stop
+            ]
+        if not members:
+            raise RequestError(
+                "the windows of all members reach into each third of the run, and none is left "
+                "to forecast it. Train with shorter windows or on several runs, or calibrate on "
+                "a run that does not train."
+            )
+        return replace(self, members=tuple(members), arrays=arrays, calibration=None, identified=())
 
     def to_dataset(self) -> xr.Dataset:
         """The ensemble as a Dataset: what :meth:`save` writes."""

@@ -183,8 +183,7 @@ class Following:
             Elevations at stated positions, by their places among the inputs.
         """
         rig = self._rig(run)
-        placed = self.alignment.placed or tuple(np.flatnonzero(self.alignment.carried).tolist()[:1])
-        at = [rig.positions[column] or 0.0 for column in placed]
+        placed, at = self._probes(rig)
         taps, _ = carriers(
             *self._waves,
             rig.depth,
@@ -196,6 +195,32 @@ class Following:
             leads=np.repeat(np.arange(1, count + 1), len(at)),
         )
         return taps.reshape(count, len(at), *taps.shape[1:]), placed
+
+    def lines(
+        self, run: xr.Dataset | None, places: tuple[float, ...]
+    ) -> tuple[FloatArray, tuple[int, ...]]:
+        """Filters that read the wave at places in the rig of a run, an instant after their row.
+
+        Parameters
+        ----------
+        run : Dataset or None
+            The run; the rig of training without one.
+        places : tuple of float
+            Places, m, positive downstream of the last probe.
+
+        Returns
+        -------
+        taps : ndarray, shape (2 places, probe, back + ahead + 1)
+            Elevation and rate at each place; oldest sample first.
+        placed : tuple of int
+            Probes that are read, by their places among the inputs.
+        """
+        return _lines(self, self._rig(run), places)
+
+    def _probes(self, rig: Rig) -> tuple[tuple[int, ...], list[float]]:
+        """Elevations at stated positions, or the first, by their places among inputs; positions."""
+        placed = self.alignment.placed or tuple(np.flatnonzero(self.alignment.carried).tolist()[:1])
+        return placed, [rig.positions[column] or 0.0 for column in placed]
 
     @property
     def _waves(self) -> tuple[FloatArray, FloatArray]:
@@ -270,6 +295,28 @@ def _banks(following: Following, rig: Rig) -> tuple[Bank, ...]:
         )
         out.append(Bank(column, tuple(columns), taps, errors))
     return tuple(out)
+
+
+@lru_cache(maxsize=16)
+def _lines(
+    following: Following, rig: Rig, places: tuple[float, ...]
+) -> tuple[FloatArray, tuple[int, ...]]:
+    """Filters of :meth:`Following.lines`."""
+    placed, probes = following._probes(rig)
+    last = placed[int(np.argmax(probes))]
+    taps, _ = carriers(
+        *following._waves,
+        rig.depth,
+        following.dt,
+        targets=np.repeat(places, 3) + rig.offsets[last] + max(probes),
+        probes=probes,
+        back=following.back,
+        ahead=following.ahead,
+        leads=np.tile([0, 1, 2], len(places)),
+    )
+    before, now, after = taps.reshape(len(places), 3, *taps.shape[1:]).swapaxes(0, 1)
+    filters = np.stack([now, (after - before) / (2.0 * following.dt)], axis=1)
+    return filters.reshape(-1, *taps.shape[1:]), placed
 
 
 @dataclass(frozen=True, eq=False)

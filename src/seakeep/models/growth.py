@@ -150,7 +150,7 @@ def lead_errors(
         square = np.where(known, errors**2, 0.0).sum(axis=0) / known.sum(axis=0)
     square = square[np.isfinite(square).all(axis=1)]
     # One step is what the residuals are, of which there are more.
-    read_off = [each.column for each in readouts if each.function is not None]
+    read_off = [each.column for each in readouts if each.acts]
     regressed = np.setdiff1d(np.arange(square.shape[1]), read_off)
     square[:1, regressed] = np.mean(residuals[:, regressed] ** 2, axis=0)
     grown = np.stack([isotonic_regression(each).x for each in square.T], axis=1)

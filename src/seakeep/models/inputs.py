@@ -153,7 +153,7 @@ class InputMap:
             Surge of the vessel at the same samples, where the model follows it.
         """
         if self.follows is not None:
-            return Drive(self, values, first, surge, self.follows.banks(run))
+            return Drive(self, values, first, surge, self.follows.banks(run), run)
         if spans:
             read = [self.reads(span) for span in spans]
             if self.alignment is not None and run is not None:
@@ -231,6 +231,8 @@ class Drive:
         Surge at the same samples, of a model that follows it.
     banks : tuple of Bank, optional
         Carriers in the rig of the run, of a model that follows its surge.
+    run : Dataset, optional
+        The run, with its rig; that of training without one.
     """
 
     input_map: InputMap
@@ -238,6 +240,7 @@ class Drive:
     first: int
     surge: FloatArray | None = None
     banks: tuple[Bank, ...] = ()
+    run: xr.Dataset | None = None
 
     def rows(self, first: int, stop: int) -> Regressors:
         """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
@@ -283,6 +286,18 @@ class Drive:
             return out
         flat = input_map.observed.with_delayed(out.reshape(-1, out.shape[2]))
         return flat.reshape(stop - first, count, -1)
+
+    def waves(self, places: tuple[float, ...], first: int, stop: int) -> FloatArray:
+        """Wave at places about the vessel at rest an instant after samples.
+
+        Elevation and its rate, shape (time, place, 2).
+        """
+        follows = self.input_map.follows
+        assert follows is not None
+        taps, columns = follows.lines(self.run, places)
+        begin = first - follows.back - self.first
+        values = self.values[begin : stop + follows.ahead - self.first, columns]
+        return carried(taps, values).reshape(stop - first, len(places), 2)
 
     def places(self, first: int, stop: int) -> FloatArray:
         """Place of the vessel by its measured surge; at rest in the mean without one."""

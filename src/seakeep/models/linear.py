@@ -427,10 +427,10 @@ class HankelDMDcModel(SingleModel, store.Saved):
                 "system in its inputs cannot represent. Use forecast_arrays, export C, an FMU, an "
                 "ONNX graph or a MATLAB file, or fit a model with observables=[]."
             )
-        if read := [each.channel for each in self.signature.readouts if each.function]:
+        if read := [each.channel for each in self.signature.readouts if each.acts]:
             raise RequestError(
-                f"the model reads {', '.join(read)} off its other states with hinges, which no "
-                "linear system can represent. Use forecast_arrays, or fit the model without "
+                f"the model reads {', '.join(read)} off its other states, which no linear "
+                "system can represent. Use forecast_arrays, or fit the model without "
                 "readouts to export it."
             )
         return export.matrices(self.A, self.B, self.signature)

@@ -10,37 +10,40 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.conventions import MOTIONS
-from seakeep.core.readouts import LinearHinges
+from seakeep.core.readouts import LoadMap
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models.checks import Json, check_choice, check_keys, names_of, plain
 from seakeep.models.labelled import ChannelLabel
 
-ReadOutKind = Literal["none", "hinge", "stacked"]
-Asked = Literal["hinge", "stacked", "auto"]
+ReadOutKind = Literal["none", "wave"]
+Asked = Literal["wave", "auto"]
+ARRAYS = ("mean", "std", "low", "high", "knots", "weights", "span")
+"""Parts of a load map that are arrays."""
 
 
 @dataclass(frozen=True)
 class ReadOut:
-    r"""A channel that is read off the forecast states, such as the load of a line that falls slack.
+    r"""A load that is read off the forecast: a function of motions and of the wave at its line.
 
-    A linear model cannot follow a load that stops at a floor. A read-out replaces the forecast
-    of the channel by a function with hinges :math:`\max(0, x - q)` at six knots q per state, fitted
-    by ridge regression (1e-2 per sample, standardised). A channel that rests on a floor in
-    training never falls below it by more than its noise, whichever kind is chosen: below the 0.002
-    quantile of its training. It must rest there in a hundredth of the samples or more.
+    A linear model cannot follow a load that depends on how deep its line is in the water, or that
+    stops at a floor. A read-out replaces the forecast of the channel by a ridge regression (1e-2
+    per sample, standardised) on motions, hinges of the surge, and elevation and rate of the wave
+    at one place, which is the one whose regression errs least on training runs that are left out
+    in turn. The waves are carried there by the filters of an alignment with ``surge="predicted"``.
+    Where motions or wave leave the range of training, the forecast of the channel itself takes
+    over. A channel that rests on a floor in training never falls below it by more than its noise,
+    whichever kind is chosen: below the 0.002 quantile of its training. It must rest there in a
+    hundredth of the samples or more.
 
     Parameters
     ----------
     channel : str
         The state that is read off.
     of : sequence of str
-        The states that bend it; the motions that tauten the line.
-    kind : {"auto", "hinge", "stacked"}, optional
-        ``"hinge"``: a function of the states in `of`, fitted to measured states. ``"stacked"``: a
-        function of all forecast states and of the hinges of those in `of`, fitted to forecasts of
-        each training run by the model of the others, so that it knows their errors; it takes
-        exact delay rows. ``"auto"``: whichever of these forecasts training runs that are held out
-        better than no read-out, by more than two standard errors of the gain; else none.
+        The motions that it depends on, and their rates.
+    kind : {"auto", "wave"}, optional
+        ``"auto"``: ``"wave"`` where that forecasts training runs that are held out better than no
+        read-out, by more than two standard errors of the gain and 2 % of the error; else none.
 
     Raises
     ------
@@ -58,10 +61,6 @@ class ReadOut:
     kind: Asked = "auto"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.channel, str) or not self.channel:
-            raise RequestError(
-                f"readouts: channel must be a name; received {self.channel!r:.{SHOWN}}."
-            )
         what = f"readouts: {self.channel}"
         check_choice(f"{what}: kind", self.kind, get_args(Asked))
         example = "of = ['surge', 'heave', 'pitch']"
@@ -85,7 +84,7 @@ class FittedReadOut:
     ----------
     channel, of
         As in :class:`ReadOut`.
-    kind : {"none", "hinge", "stacked"}
+    kind : {"none", "wave"}
         What it is; what was chosen.
     column : int
         Place of the channel among the states.
@@ -93,9 +92,10 @@ class FittedReadOut:
         Of the channel.
     scores : mapping of str to float
         NRMSE by kind in free runs on training runs that were held out, where kinds were compared.
-    function : LinearHinges or None
-        The channel of forecast states, physical units; None where the forecast stays as it is.
-        Without a kind, that of a channel which rests on a floor keeps it there.
+    floor : float
+        Least value of a channel that rests on a floor in training; else −inf.
+    load : LoadMap or None
+        The channel of forecast states and waves, physical units; None without a kind.
     """
 
     channel: str
@@ -104,16 +104,26 @@ class FittedReadOut:
     column: int
     units: str
     scores: Mapping[str, float]
-    function: LinearHinges | None
+    floor: float
+    load: LoadMap | None
+
+    @property
+    def acts(self) -> bool:
+        """Whether it changes anything."""
+        return self.load is not None or self.floor > -np.inf
+
+    def read(self, states: Any, wave: Any) -> Any:
+        """The channel, shape (…), of states, shape (…, N), and the wave at its line, (…, 2)."""
+        linear = states[..., self.column] if self.load is None else self.load(states, wave)
+        return np.maximum(linear, self.floor)
 
     def describe(self) -> str:
         """Line of a summary."""
         text = f"{self.channel}: {self.kind}"
-        if self.function is not None:
-            if self.kind != "none":
-                text += f", of {', '.join(self.of)}"
-            if np.isfinite(self.function.floor):
-                text += f", floor {self.function.floor:.4g} {self.units}".rstrip()
+        if self.load is not None:
+            text += f" at {self.load.place:.3g} m, of {', '.join(self.of)}"
+        if self.floor > -np.inf:
+            text += f", floor {self.floor:.4g} {self.units}".rstrip()
         if self.scores:
             scores = ", ".join(f"{kind} {score:.3f}" for kind, score in self.scores.items())
             text += f" (NRMSE on held-out runs: {scores})"
@@ -129,19 +139,36 @@ class FittedReadOut:
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Rebuild from :meth:`to_json`."""
-        function = content["function"]
-        if function is not None:
-            arrays = {key: np.array(function[key], dtype=float) for key in ("knots", "weights")}
-            function = LinearHinges(**function | arrays)
-        return cls(**content | {"of": tuple(content["of"]), "function": function})
+        load = content["load"]
+        if load is not None:
+            arrays = {key: np.array(value) for key, value in load.items() if key in ARRAYS}
+            load = LoadMap(**load | arrays)
+        return cls(**content | {"of": tuple(content["of"]), "load": load})
 
 
-def read_out(readouts: Sequence[FittedReadOut], values: FloatArray) -> FloatArray:
-    """Free runs, shape (…, N), physical units, with the channels that are read off them."""
-    computed = [
-        (each.column, each.function(values)) for each in readouts if each.function is not None
-    ]
-    for column, channel in computed:
+def read_out(
+    readouts: Sequence[FittedReadOut], values: FloatArray, waves: FloatArray | None
+) -> FloatArray:
+    """Free runs, shape (…, N), physical units, with the channels that are read off them.
+
+    Parameters
+    ----------
+    readouts : sequence of FittedReadOut
+        What is read off.
+    values : ndarray, shape (…, N)
+        Free runs; they are changed.
+    waves : ndarray, shape (…, line, 2), or None
+        Elevation and rate at the line of each that has one; None leaves their channels as they are.
+    """
+    lines = [each for each in readouts if each.load is not None]
+    channels = []
+    for each in readouts:
+        if each.load is None:
+            channels.append((each.column, each.read(values, None)))
+        elif waves is not None:
+            wave = waves[..., lines.index(each), :]
+            channels.append((each.column, each.read(values, wave)))
+    for column, channel in channels:
         values[..., column] = channel
     return values
 
@@ -183,7 +210,8 @@ def readouts_json(readouts: ReadOuts) -> Any:
 def readouts_asked(readouts: ReadOuts, states: Sequence[ChannelLabel]) -> tuple[ReadOut, ...]:
     """Read-outs of a model with these states; refuses those of, or off, what is no state."""
     if readouts == "auto":
-        of = tuple(label.name for label in states if label.name in MOTIONS)
+        motions = {*MOTIONS, *(f"{name}_rate" for name in MOTIONS)}
+        of = tuple(label.name for label in states if label.name in motions)
         loads = [label.name for label in states if label.units == "N"]
         return tuple(ReadOut(name, of) for name in loads) if of else ()
     names = [label.name for label in states]

@@ -10,6 +10,7 @@ from seakeep.models import store
 from seakeep.models.baselines import ARX, FIR, HoldLast, Mean, Subspace
 from seakeep.models.ensemble import HankelEnsemble
 from seakeep.models.interface import Model, Spec
+from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 
 KINDS: dict[str, type[Spec]] = {
@@ -23,6 +24,11 @@ Kind = TypeVar("Kind")
 def is_ensemble(model: Model) -> TypeGuard[HankelEnsemble]:
     """Whether a model has members, and so a band, as its kind in :data:`KINDS` states."""
     return KINDS[model.kind].is_ensemble
+
+
+def is_linear(model: Model) -> TypeGuard[HankelDMDcModel]:
+    """Whether a model is one matrix of delayed states and inputs, as a Hankel, ARX or FIR model."""
+    return isinstance(model, HankelDMDcModel)
 
 
 @overload

@@ -6,7 +6,7 @@ and channels of the NRMSE decides. The noise is the standard error, over what is
 difference between two candidates. Of what settings leave open, the simplest candidate is taken that
 is as good as the best but for the noise; what a search starts from is left for nothing less. The
 regressors of all candidates are made once; one Gram matrix of a candidate and a fold gives the
-whole path of λ (:mod:`seakeep.core.path`).
+whole path of λ (:mod:`seakeep.core.gram`).
 """
 
 from __future__ import annotations
@@ -33,8 +33,7 @@ from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.embedding import block_means, spread_means
-from seakeep.core.gram import Piece, primal_system
-from seakeep.core.path import ridge_path
+from seakeep.core.gram import Piece, primal_system, ridge_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
@@ -43,13 +42,13 @@ from seakeep.models.ensemble import spectral_radius
 from seakeep.models.executor import in_order
 from seakeep.models.following import LEAD
 from seakeep.models.interface import Scale, Signature
+from seakeep.models.loads import PERIODS, Held, fit_readouts
 from seakeep.models.observables import Observable, Powers, SlowSquares, named
 from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
-from seakeep.models.stacking import PERIODS, Held, fit_readouts
 from seakeep.models.training import TrainingData, gather, scales_of
 from seakeep.signals import encounter_period, repeated_waves
-from seakeep.signals.leakage import is_regular
+from seakeep.signals.waves import is_regular
 
 RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-10, -1))
 """λ per snapshot pair that are tried, half a decade apart.
@@ -326,11 +325,10 @@ class Problem:
         return np.concatenate(scores, axis=1), weights
 
     def held_out(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
-        """Free runs, end to end, on each run by the model of the others, standardised."""
-        deviations = self.data.state_scale.deviations
+        """Free runs, end to end, on each run by the model of the others."""
         for run in range(len(self.groups)) if len(self.groups) > 1 else ():
             for predicted, measured, _ in self.free_runs(candidate, [level], run, [steps]):
-                yield Held(run, deviations(predicted[0]), deviations(measured))
+                yield Held(run, self.starts(run, steps), predicted[0], measured)
 
 
 def _problem(
@@ -629,7 +627,7 @@ def select(
     else:  # runs are too short for the shortest
         longest = max(run.sizes["time"] for run in runs.values())
         note = (
-            f"ridge {settings.ridge:g} per snapshot pair: no window of "
+            f"{settings.ridge_text(float(settings.ridge))}: no window of "
             f"{round(min(horizon) * samples)} samples can be held out of runs of at most {longest}"
         )
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
@@ -895,8 +893,8 @@ def _note(
     count = sum(len(trial.levels) for trial in trials.values())
     score = trials[taken].means[trials[taken].levels.index(level)]
     note = (
-        f"ridge {level:g} per snapshot pair: out of {count} settings (below, the best λ of each "
-        f"kind) in free runs on {len(problem.folds())} parts held out in turn, mean NRMSE "
+        f"{taken.ridge_text(level)}: out of {count} settings (below, the best λ of each kind) "
+        f"in free runs on {len(problem.folds())} parts held out in turn, mean NRMSE "
         f"{score:.3f}{worth}"
     )
     if {"lead", "input_delays", "state_delays", "alignment", "memory"} & {*tried}:
@@ -958,9 +956,10 @@ def _learnt(
     if not readouts:
         return ()
     if problem is not None:
-        return fit_readouts(readouts, problem.data, list(problem.held_out(candidate, level, steps)))
+        judged = list(problem.held_out(candidate, level, steps))
+        return fit_readouts(readouts, problem.data, problem.runs, judged)
     settings = replace(candidate, ridge=1.0, standardize=True)
-    return fit_readouts(readouts, gather(*given, None, settings), ())
+    return fit_readouts(readouts, gather(*given, None, settings), given[0], ())
 
 
 def readouts_for(
@@ -987,19 +986,18 @@ def readouts_for(
     Raises
     ------
     RequestError
-        If a read-out names what is no state, or λ is zero where forecasts are cross-fitted.
-    DataError
-        If a stacked read-out has no forecast to learn from.
+        If a read-out names what is no state, λ is zero where forecasts are cross-fitted, or kind
+        "wave" meets no waves that are carried to the predicted surge.
     """
     readouts = readouts_asked(settings.readouts, labelled.common_labels(runs, states))
-    stacked = [each for each in readouts if each.kind != "hinge"]
-    if not stacked:
+    judged = [each for each in readouts if each.kind == "auto"]
+    if not judged:
         return _learnt(readouts, None, settings, 0.0, 0, (runs, states, inputs))
     ridge = float(settings.ridge)
     if ridge == 0.0:
         raise RequestError(
-            f"readouts: {stacked[0].channel}: kind = '{stacked[0].kind}' learns from free runs of "
-            "ridge regressions, which take ridge above zero. Raise ridge, or take kind = 'hinge'."
+            f"readouts: {judged[0].channel}: kind = 'auto' is chosen by free runs of ridge "
+            "regressions, which take ridge above zero. Raise ridge, or take kind = 'wave'."
         )
     steps = round(PERIODS * labelled.mean_period(runs, inputs))
     if len(runs) == 1 and settings.window is not None:  # whose parts are shorter
@@ -1053,7 +1051,7 @@ def _alignments(
     for alignment in (
         replace(carried, surge="predicted"),
         replace(carried, surge="none"),
-        replace(base, mode="effective", surge="none", highest_frequency=None),
+        replace(base, mode="effective", surge="none"),
     ):
         try:
             fitted = alignment.fit(*given, None)

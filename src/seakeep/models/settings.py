@@ -324,6 +324,11 @@ class HankelSettings:
             dt, labelled.mean_period(runs, inputs) * dt if self.in_periods else None
         )
 
+    def ridge_text(self, ridge: float) -> str:
+        """A λ of these settings in words, with what it counts by."""
+        per = " per snapshot pair" if self.ridge_scale == "per_snapshot" else ""
+        return f"ridge {ridge:g}{per}"
+
     @property
     def in_periods(self) -> bool:
         """Whether a length, or a prior of one, counts in encounter periods."""
@@ -346,13 +351,12 @@ class HankelSettings:
                 f"takes delay_rows = 'exact'; received '{self.delay_rows}'. Change it, or take "
                 "surge = 'measured' or 'none'."
             )
-        learns = self.readouts == "auto" or any(each.kind != "hinge" for each in named)
-        if learns and (self.delay_rows != "exact" or self.rank is not None):
+        judged = self.readouts == "auto" or any(each.kind == "auto" for each in named)
+        if judged and (self.delay_rows != "exact" or self.rank is not None):
             raise RequestError(
-                "readouts of the kinds 'stacked' and 'auto' learn from free runs on training runs "
-                "that are held out, which takes delay_rows = 'exact' and no rank; received "
-                f"delay_rows = '{self.delay_rows}', rank = {self.rank}. Change them, or take "
-                "kind = 'hinge'."
+                "readouts of kind 'auto' are judged by free runs on training runs that are held "
+                "out, which takes delay_rows = 'exact' and no rank; received delay_rows = "
+                f"'{self.delay_rows}', rank = {self.rank}. Change them, or take kind = 'wave'."
             )
 
     @property

@@ -101,9 +101,8 @@ class HankelDMDc(HankelSettings):
         modes inside stay as they are, exact delay rows stay exact, and ``training.clipped`` and
         ``summary()`` say which were moved.
     readouts : sequence of ReadOut or tables, or "auto", optional
-        Channels that are read off the forecast states, such as loads of lines that fall slack;
-        "auto" reads every load among the states (in N) off the motions among them where that
-        helps.
+        Loads that are read off the forecast motions and the wave at their lines; "auto" does so
+        with every load among the states (in N) where that helps.
     memory : int or str, optional
         Longest delay of averages of the states, such as ``"8 T"``: beyond `state_delays` their
         means over blocks of delays that double in length are further regressors. It takes exact
@@ -361,11 +360,11 @@ class HankelDMDc(HankelSettings):
 
 def _check_growth(model: HankelDMDcModel) -> None:
     """Refuse a model that was chosen and grows."""
-    radius = spectral_radius(model.dynamics)
+    radius, settings = spectral_radius(model.dynamics), model.settings
     if radius >= 1.0:
         raise DataError(
-            f"the model that was chosen grows: its spectral radius is {radius:.6f} at ridge = "
-            f"{model.settings.ridge:g} per snapshot pair. Look for transients at the ends of the "
+            f"the model that was chosen grows: its spectral radius is {radius:.6f} at "
+            f"{settings.ridge_text(float(settings.ridge))}. Look for transients at the ends of the "
             "training runs, use fewer state delays, clip eigenvalues (stable=True), or state the "
             "ridge to have it as it is."
         )

@@ -347,6 +347,18 @@ class TrainingArrays:
         parts = (getattr(self, each.name) for each in fields(self))
         return type(self)(*(part[:run] + part[run + 1 :] for part in parts))
 
+    def beside(self, begin: int, end: int, dt: float) -> Self:
+        """What lies before and after some samples of a single run, each as a run of its own."""
+        (name,), (states,), (delayed,), (direct,), (offset,), (start,) = (
+            getattr(self, each.name) for each in fields(self)
+        )
+        read = [
+            (name, states[cut], delayed[cut], direct[cut], offset + at, start + at * dt)
+            for cut, at in ((slice(0, begin), 0), (slice(end, None), end))
+            if len(states[cut])
+        ]
+        return type(self)(*zip(*read, strict=True))
+
     def span(
         self, run: int, settings: HankelSettings, last: int | None, dt: float
     ) -> tuple[float, float]:

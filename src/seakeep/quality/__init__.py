@@ -5,8 +5,16 @@ from collections.abc import Callable, Collection, Iterable
 import xarray as xr
 
 from seakeep.quality import clocks, samples, sensors
-from seakeep.quality.findings import Finding, Kind, as_json, findings_of, warn_of
-from seakeep.quality.record import Rate, Record, Redundant
+from seakeep.quality.findings import (
+    Finding,
+    Kind,
+    Rate,
+    Record,
+    Redundant,
+    as_json,
+    findings_of,
+    warn_of,
+)
 from seakeep.quality.sensors import compared
 
 __all__ = [

@@ -10,8 +10,7 @@ import numpy as np
 
 from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.quality.faults import noise_share
-from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, sound, step_of
+from seakeep.quality.findings import Finding, Kind, Record, sound, step_of
 from seakeep.signals.filters import PASSBAND
 from seakeep.signals.synchronisation import ASSUMED
 from seakeep.signals.waves import energy_above

@@ -6,6 +6,8 @@ of the series' own spread, steps and period, not of any one data set.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import numpy.typing as npt
 import scipy
@@ -47,6 +49,11 @@ CALM = 0.3
 """Part of a record's mean step, and of its spread, below which all that precedes a run is calm: a
 vessel that lies still before the waves arrive is not a stuck sensor. So after the waves."""
 
+WILD, NEAR = 4.6, 4
+"""Times the 80th percentile of a record's steps, as three times the 95th of normal ones, that no
+wave takes in one; and samples within which two readings that are entered and left so make a burst.
+"""
+
 STEEP = 3.0
 """Times the 95th percentile of a record's steps that no wave takes in one."""
 
@@ -81,7 +88,8 @@ def find_outliers(series: npt.ArrayLike) -> BoolArray:
     Up to three samples in a row are compared with the medians of five on either side, by Hampel's
     rule: 6 standard deviations of the scatter there, and half of the record's. Samples at any
     length are outliers beyond 20 standard deviations of the record. That deviation is taken from
-    its percentiles 5 and 95, in which a reading counts once, however long it repeats.
+    its percentiles 5 and 95, in which a reading counts once, however long it repeats. Nearer ones
+    are outliers where the record turns back again and again in steps that no wave takes.
 
     Parameters
     ----------
@@ -124,7 +132,19 @@ def find_outliers(series: npt.ArrayLike) -> BoolArray:
         near = np.median(away[max(begin - AROUND, 0) : end + AROUND])
         apart = min(jumps[begin] / away[begin], jumps[end] / away[end - 1])
         outliers[begin:end] = away[begin:end].max() > ALONE * 1.4826 * near and apart > ABRUPT
-    return np.asarray(outliers | (np.abs(x - middle) > FAR * spread) & (spread > 0))
+    return np.asarray(outliers | _bursts(x) | (np.abs(x - middle) > FAR * spread) & (spread > 0))
+
+
+def _bursts(x: FloatArray) -> BoolArray:
+    """Samples between readings that are entered and left in opposite steps that no wave takes."""
+    steps, out = np.diff(x), np.zeros(x.size, dtype=bool)
+    if not steps.any():
+        return out
+    wild = np.abs(steps) > WILD * np.percentile(np.abs(steps[steps != 0]), 80)
+    turns = 1 + np.flatnonzero(wild[1:] & wild[:-1] & (steps[1:] * steps[:-1] < 0))
+    for begin, end in pairwise(turns):
+        out[begin : end + 1] |= end - begin <= NEAR
+    return out
 
 
 def _starts(x: FloatArray) -> npt.NDArray[np.intp]:

@@ -18,8 +18,7 @@ from seakeep.quality.faults import (
     STUCK,
     noise_share,
 )
-from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, channels_of, sound, step_of
+from seakeep.quality.findings import Finding, Kind, Record, channels_of, sound, step_of
 from seakeep.signals.time_axis import stretches
 from seakeep.signals.waves import dominant_period
 
@@ -118,7 +117,7 @@ def levels(record: Record) -> Iterator[Finding]:
     for name, channel in channels_of(record.whole).items():
         if not (is_elevation(name) or name in NO_SLOW_MOTION):
             continue
-        x = sound(record.whole, name)
+        x = sound(record.whole, name)  # a sensor that dies has no drift besides
         if x.size < 16 or not np.ptp(x):
             continue
         change, ratio = level_drift(x, dt, dominant_period(x, dt))

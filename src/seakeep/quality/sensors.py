@@ -18,8 +18,7 @@ from seakeep.quality.agreement import (
     compare_sensors,
 )
 from seakeep.quality.faults import STUCK, find_held
-from seakeep.quality.findings import Finding, Kind
-from seakeep.quality.record import Record, Redundant, channels_of, filled, step_of
+from seakeep.quality.findings import Finding, Kind, Record, Redundant, channels_of, filled, step_of
 from seakeep.signals import misplaced_probes
 
 

@@ -8,10 +8,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import binomtest
 
 from seakeep.arrays import FloatArray
 from seakeep.core.bands import split_bands
-from seakeep.report.tables import Form, Table, number, probability, signed, table, words
+from seakeep.core.metrics import slack_share
+from seakeep.report.tables import Form, Table, number, signed, table, words
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.judge import (
@@ -25,6 +27,7 @@ from seakeep.study.judge import (
 from seakeep.study.plan import random_stream
 from seakeep.study.reproduce import SLOW
 
+BOUNDS = ("change", "lower", "upper")
 Results = Mapping[str, StudyResult]
 Statistic = Callable[..., FloatArray]
 Judged = tuple[str, bool | None]
@@ -34,6 +37,12 @@ LOADS = ("mooring_bow", "mooring_stern")
 SEA, REGULAR = ("irregular",), ("regular_1_5", "regular_2", "regular_3")
 USEFUL = 0.5
 """Median NRMSE below which a forecast counts as accurate: three quarters of the variance."""
+AGED = 0.2
+"""Part of the mean error by which it may change over a window without a trend worth the word."""
+ALMOST = 0.9
+"""Share that counts as almost always."""
+SLACKER = 0.01
+"""Part of the time by which two lines must differ in being slack."""
 SINGLE, ENSEMBLE = "deterministic", "bayesian"
 MEASURES = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 
@@ -79,7 +88,8 @@ def claims_table(results: Results) -> Table:
     for key, judge in CLAIMS.items():
         claim, how = words()["claims"][key]
         figure, holds = judge(results)
-        rows.append((claim, figure, verdicts[holds], how.format(useful=USEFUL)))
+        limits = {"useful": USEFUL, "aged": 100 * AGED, "almost": 100 * ALMOST}
+        rows.append((claim, figure, verdicts[holds], how.format(**limits)))
     return table("claims", rows)
 
 
@@ -113,12 +123,16 @@ def _cells(
 
 
 def _interval(
-    result: StudyResult, tests: Sequence[str], statistic: Statistic, *cells: FloatArray
+    result: StudyResult,
+    tests: Sequence[str],
+    statistic: Statistic,
+    *cells: FloatArray,
+    signed: bool = False,
 ) -> Interval:
     """A statistic of cells (training, window, …) with its interval."""
     blocks = blocks_of([result.tests[test] for test in tests], result.groups["training"])
     rng = random_stream(int(result.attrs["seed"]), "claims")
-    lower, upper = two_way_interval(statistic, *cells, rng=rng, blocks=blocks)
+    lower, upper = two_way_interval(statistic, *cells, rng=rng, blocks=blocks, signed=signed)
     value = statistic(*(each[None] for each in cells))[0]
     return Interval(float(value), float(lower), float(upper))
 
@@ -128,9 +142,14 @@ def _flat(drawn: FloatArray) -> FloatArray:
     return drawn.reshape(len(drawn), -1)
 
 
+def _middle(drawn: FloatArray) -> FloatArray:
+    """Median over all cells of each series."""
+    return median_of(_flat(drawn))
+
+
 def _median(drawn: FloatArray) -> FloatArray:
     """Median over cells (series, training, window, channel) of the average over channels."""
-    return median_of(_flat(average_of(drawn)))
+    return _middle(average_of(drawn))
 
 
 def _spread(drawn: FloatArray) -> FloatArray:
@@ -169,15 +188,14 @@ def _robust(results: Results) -> Judged:
 
 
 def _trend(results: Results) -> Judged:
-    values, names = (
-        results[act]
-        .groups["statistics/trend"]["p_value"]
-        .sel(test="irregular", band="all", model=[SINGLE, ENSEMBLE])
-        .values
-        for act in ("paper", "raw")
-    )
-    both = (" and ".join(map(probability, each)) for each in (values, names))
-    return "p = {}; act (b): {}".format(*both), False if values.min() < 0.05 else None
+    growths = {}
+    for act in ("paper", "raw"):
+        at = results[act].groups["statistics/trend"].sel(test="irregular", band="all")
+        each = np.stack([at[key].sel(model=[SINGLE, ENSEMBLE]) for key in BOUNDS], axis=1)
+        growths[act] = [Interval(*(1.0 + row)) for row in each]
+    texts = (" and ".join(each.change() for each in of_act) for of_act in growths.values())
+    within = [v for e in growths["paper"] for v in (e.below(1 + AGED), opposite(e.below(1 - AGED)))]
+    return "{}; act (b): {}".format(*texts), all_of(within)
 
 
 def _any_length(results: Results) -> Judged:
@@ -225,7 +243,9 @@ def _densities(results: Results) -> Judged:
     at = result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
     at = at.sel(channel=_motions(result))
     within, count = int((at["mean"] <= at["noise_floor_upper"]).sum()), at.sizes["channel"]
-    return f"{within} of {count} motions within the noise of the record", within == count
+    share = Interval(within / count, *binomtest(within, count).proportion_ci())
+    words = f"{within} of {count} motions within the noise of the record: {share.part()}"
+    return words, opposite(share.below(ALMOST))
 
 
 def _against_single(
@@ -349,24 +369,64 @@ def _phase(results: Results) -> Judged:
     leads = [np.abs(phase_leads(result.groups, test, ENSEMBLE)[order]) for test in REGULAR]
     cells = np.concatenate(leads, axis=1)
     both = [cells[..., _columns(result, names)] for names in (LOADS, _motions(result))]
-
-    def middle(drawn: FloatArray) -> FloatArray:
-        return median_of(_flat(drawn))
-
-    loads, motions = (_interval(result, REGULAR, middle, each).text(0, "°") for each in both)
-    more = _interval(result, REGULAR, lambda a, b: middle(a) - middle(b), *both)
+    loads, motions = (_interval(result, REGULAR, _middle, each).text(0, "°") for each in both)
+    more = _interval(result, REGULAR, lambda a, b: _middle(a) - _middle(b), *both, signed=True)
     return f"median |phase|: loads {loads}, motions {motions}", opposite(more.below(0.0))
 
 
 def _stern(results: Results) -> Judged:
     result, line = results["paper"], "mooring_stern"
     errors = [error_of(result, (test,), (line,)) for test in REGULAR]
-    slack = results["raw"].groups["runs"]["slack"].sel(name=line, run=list(REGULAR)).values
-    parts = ", ".join(f"{100 * float(each):.0f} %" for each in slack)
-    judged = [each for each in errors if np.isfinite(each.value)]
-    falls = [longer.below_other(shorter) for shorter, longer in pairwise(judged)]
-    listed = ", ".join(each.text() if each in judged else "only noise" for each in errors)
+    slack = [_slack(results["raw"], test, line) for test in REGULAR]
+    falls = [
+        errors[longer].below_other(errors[shorter])
+        for shorter, longer in pairwise(range(len(REGULAR)))
+        if slack[longer].upper + SLACKER < slack[shorter].lower
+        and np.isfinite([errors[longer].value, errors[shorter].value]).all()
+    ]
+    listed = ", ".join(e.text() if np.isfinite(e.value) else "only noise" for e in errors)
+    parts = ", ".join(each.part() for each in slack)
     return f"NRMSE {listed}; slack {parts} of the time", all_of(falls) if falls else None
+
+
+def _slack(result: StudyResult, test: str, line: str) -> Interval:
+    """Part of the time at which a line is slack in the windows of a test set."""
+    data = result.tests[test].sel(channel=line)
+    loads = zip(data["measured"].values, data["noise_std"].values, strict=True)
+    shares = np.array([[slack_share(load, noise) for load, noise in loads]])
+    return _interval(result, (test,), lambda drawn: _flat(drawn).mean(axis=1), shares)
+
+
+def _variants(result: StudyResult, key: str) -> dict[str, FloatArray]:
+    """A number of the models with λ, without, and truncated, over (training, 1)."""
+    order, _ = training_order(result.groups["training"])
+    data = result.groups[f"regularisation/{SINGLE}"][key].isel(training=order)
+    return {str(name): data.sel(variant=name).values[:, None] for name in data["variant"].values}
+
+
+def _stable(results: Results) -> Judged:
+    radii = _variants(results["paper"], "radius")
+    ours, none = (_interval(results["paper"], SEA, _middle, radii[k]) for k in ("ridge", "none"))
+    words = f"spectral radius {ours.text()} with λ, {none.text()} without"
+    return words, all_of([ours.below(1.0), opposite(none.below(1.0))])
+
+
+def _cheaper(results: Results) -> Judged:
+    seconds = _variants(results["paper"], "seconds")
+    ratios = seconds["truncated"] / seconds["ridge"]
+    times = _interval(results["paper"], SEA, _middle, ratios)
+    return f"the SVD takes {times.text(0)} times as long", opposite(times.below(1.0))
+
+
+def _robust_to_noise(results: Results) -> Judged:
+    result = results["paper"]
+    order, _ = training_order(result.groups["training"])
+    data = result.groups[f"regularisation/{SINGLE}"].isel(training=order)
+    truncated = data["truncated_nrmse"].transpose("training", "window", "channel").values
+    cells = _cells(result, SEA, model=SINGLE), truncated
+    ratio = _interval(result, SEA, lambda a, b: _median(a) / _median(b), *cells)
+    rank = int(data["rank"].median())
+    return f"ANRMSE {ratio.change()} from {rank} singular values to λ", ratio.below(1.0)
 
 
 CLAIMS: dict[str, Callable[[Results], Judged]] = {
@@ -383,6 +443,9 @@ CLAIMS: dict[str, Callable[[Results], Judged]] = {
     "load_band": _load_band,
     "slow_loads": _slow_loads,
     "peaks": _peaks,
+    "stable": _stable,
+    "cheaper": _cheaper,
+    "robust_to_noise": _robust_to_noise,
     "regular": _regular,
     "against_irregular": _against_irregular,
     "phase": _phase,

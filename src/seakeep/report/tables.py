@@ -192,7 +192,7 @@ def small_number(value: SupportsFloat) -> Number:
     return number(value, decimals) if decimals <= 7 else Number(f"{value:.1e}")
 
 
-def signed(value: SupportsFloat, digits: int = 0) -> Number:
+def signed(value: SupportsFloat) -> Number:
     """Text of a number with its sign, where anything of it is left after rounding.
 
     Examples
@@ -200,7 +200,7 @@ def signed(value: SupportsFloat, digits: int = 0) -> Number:
     >>> signed(1.4), signed(-0.04, 1), signed(-0.06, 1)
     ('+1', '0.0', '-0.1')
     """
-    text = number(value, digits)
+    text = number(value, 0)
     return Number(f"+{text}") if text != MISSING and float(text) > 0 else text
 
 
@@ -226,9 +226,9 @@ def to(bounds: Iterable[SupportsFloat], form: Form = number) -> Number:
     return MISSING if MISSING in texts else Number(" to ".join(texts))
 
 
-def interval(at: xr.Dataset, key: str, form: Form = number) -> Number:
+def interval(at: xr.Dataset, key: str) -> Number:
     """Text of the bounds ``KEY_lower`` and ``KEY_upper``."""
-    return to([at[f"{key}_{bound}"] for bound in ("lower", "upper")], form)
+    return to([at[f"{key}_{bound}"] for bound in ("lower", "upper")])
 
 
 def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = number) -> Number:
@@ -355,16 +355,6 @@ def _least_width(table: Table, k: int) -> int:
     return longest if whole else min(longest, NAME)
 
 
-_LATEX = {
-    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
-    "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
-    "–": "--", "×": r"$\times$", "λ": r"$\lambda$", "ε": r"$\varepsilon$", "τ": r"$\tau$",
-    "−": r"$-$", "η": r"$\eta$", "≥": r"$\ge$", "²": r"$^2$", "±": r"$\pm$", "°": r"$^\circ$",
-    "→": r"$\to$", "σ": r"$\sigma$", "Δ": r"$\Delta$", "√": r"$\surd$", "π": r"$\pi$",
-    "·": r"$\cdot$", "³": r"$^3$", "φ": r"$\varphi$", "θ": r"$\theta$", "ω": r"$\omega$",
-    "<": r"$<$", ">": r"$>$", "T̂": r"$\hat T$", "τ̂": r"$\hat\tau$",
-}  # fmt: skip
-_KNOWN = re.compile("|".join(re.escape(each) for each in sorted(_LATEX, key=len, reverse=True)))
 NAME = 20
 """Characters of a word, such as the name of a channel, that a terminal does not break."""
 WIDE = 24
@@ -388,7 +378,9 @@ def latex_text(text: str) -> str:
     '$-$0.12 [$-$0.3, 0.1] a-1'
     """
     text = re.sub(r"(?<![\w)])-(?=\d)", "−", text)
-    return _KNOWN.sub(lambda match: _LATEX[match[0]], text)
+    known = words()["latex"]
+    signs = "|".join(map(re.escape, sorted(known, key=len, reverse=True)))
+    return re.sub(signs, lambda match: known[match[0]], text)
 
 
 def write_latex(table: Table, path: Path) -> Path:

@@ -20,12 +20,11 @@ from seakeep.signals.lags import (
     correlation_peak,
     windowed_lags,
 )
-from seakeep.signals.leakage import find_leakage
 from seakeep.signals.panel import TrackingSettings
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.propagation import (
-    delay_by_celerity,
-    delay_by_dispersion,
+    carry_by_celerity,
+    carry_by_dispersion,
     effective_celerity,
     misplaced_probes,
     phase_celerity,
@@ -49,6 +48,7 @@ from seakeep.signals.time_axis import TimeReport, bridge, inspect_times, onto_un
 from seakeep.signals.tracking import Track, contact_sheet, track_video
 from seakeep.signals.waves import (
     encounter_period,
+    find_leakage,
     peak_period,
     repeated_waves,
     significant_height,
@@ -68,6 +68,8 @@ __all__ = [
     "TrackingSettings",
     "band_pass",
     "bridge",
+    "carry_by_celerity",
+    "carry_by_dispersion",
     "clock_from_correlation",
     "clock_from_pulses",
     "clock_from_shared",
@@ -75,8 +77,6 @@ __all__ = [
     "complementary_filter",
     "contact_sheet",
     "correlation_peak",
-    "delay_by_celerity",
-    "delay_by_dispersion",
     "differentiate",
     "effective_celerity",
     "encounter_period",

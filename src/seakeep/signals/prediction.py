@@ -167,7 +167,7 @@ def draw_sea(
     Raises
     ------
     RequestError, DataError
-        As :func:`draw_waves` and :func:`delay_by_dispersion`.
+        As :func:`draw_waves` and :func:`carry_by_dispersion`.
     """
     array = as_series(series, minimum=4, channels=True)
     out = draw_waves(array, count, pairs, rng)

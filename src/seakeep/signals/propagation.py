@@ -23,7 +23,6 @@ from seakeep.arrays import (
     ComplexArray,
     FloatArray,
     as_pair,
-    as_real,
     as_series,
     number,
     positive,
@@ -32,8 +31,7 @@ from seakeep.arrays import (
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
 from seakeep.signals.lags import correlation_peak, peak_place
-from seakeep.signals.leakage import is_regular
-from seakeep.signals.waves import encounter_period, welch_segments
+from seakeep.signals.waves import encounter_period, is_regular, welch_segments
 from seakeep.waves import group_speed, phase_speed, wavenumber
 
 EARLIEST = 1e-3
@@ -94,7 +92,6 @@ def phase_celerity(
     dt: float,
     separation: float,
     depth: float,
-    segment: int | None = None,
 ) -> PhaseCelerity:
     r"""Phase speed between two probes from the phase of their cross-spectrum.
 
@@ -111,9 +108,6 @@ def phase_celerity(
         Distance between the probes, m.
     depth : float
         Water depth, m; ``numpy.inf`` for deep water.
-    segment : int, optional
-        Samples per segment of Welch's method; by default 60 s, or half the record if it is shorter
-        than two such segments. Segments overlap by half.
 
     Returns
     -------
@@ -134,8 +128,7 @@ def phase_celerity(
     """
     first, second = as_pair(upstream, downstream, minimum=8, moving=True)
     step, apart = time_step(dt), positive(separation, "the separation", "m")
-    if segment is None:
-        segment = min(round(60.0 / step), first.size // 2)
+    segment = min(round(60.0 / step), first.size // 2)
     length, shared = welch_segments(first.size, step, segment, None)
     options = {"fs": 1.0 / step, "window": "hamming", "nperseg": length, "noverlap": shared}
     frequency, cross = (each[1:] for each in scipy.signal.csd(first, second, **options))
@@ -157,7 +150,6 @@ def effective_celerity(
     dt: float,
     separation: float,
     depth: float,
-    period: float | None = None,
 ) -> EffectiveCelerity:
     r"""One celerity between two probes from the peak of their normalised cross-correlation.
 
@@ -175,9 +167,6 @@ def effective_celerity(
         Distance between the probes, m.
     depth : float
         Water depth, m; ``numpy.inf`` for deep water.
-    period : float, optional
-        Period of the waves whose phase speed centres the search, s; by default the
-        zero-up-crossing period of the upstream record.
 
     Returns
     -------
@@ -199,7 +188,7 @@ def effective_celerity(
     """
     first, second = as_pair(upstream, downstream, minimum=8, moving=True)
     step, apart = time_step(dt), positive(separation, "the separation", "m")
-    cycle = encounter_period(first, step) if period is None else positive(period, "period", "s")
+    cycle = encounter_period(first, step)
     centre = apart / float(phase_speed(2 * np.pi / cycle, depth))
     bounds = (max(centre - 0.5 * cycle, 0.0), centre + 0.5 * cycle)
     lag, height = correlation_peak(first, second, step, bounds)
@@ -594,113 +583,6 @@ def carry_by_celerity(
     return _carried(
         as_series(series, minimum=4, channels=True), dt, distances, lambda omega: omega / speed
     )
-
-
-def delay_by_dispersion(
-    series: npt.ArrayLike,
-    dt: float,
-    distance: npt.ArrayLike,
-    depth: float,
-    highest_frequency: float | None = None,
-) -> FloatArray:
-    """Carry an elevation to a place at a distance, fixed or moving, by linear dispersion.
-
-    Parameters
-    ----------
-    series : array_like, shape (time,) or (time, channel)
-        Elevation, uniformly sampled, without gaps.
-    dt : float
-        Time step, s.
-    distance : array_like, scalar or shape (time,)
-        Distance of the place from the probe at each sample, m, positive downstream.
-    depth : float
-        Water depth, m; ``numpy.inf`` for deep water.
-    highest_frequency : float, optional
-        As in :func:`carry_by_dispersion`.
-
-    Returns
-    -------
-    ndarray
-        Elevation at the place, same shape and unit.
-
-    Raises
-    ------
-    RequestError
-        If an argument is out of range, or the distance has gaps.
-    DataError
-        If the series is constant or has gaps.
-
-    Notes
-    -----
-    The record is continued by linear prediction at either end. What was at the probe before the
-    record started reaches a place downstream later: the first d/c_g seconds are a guess there, and
-    the last ones upstream.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> t = np.arange(0, 60, 0.05)
-    >>> omega, k = 3.0, 3.0**2 / 9.81
-    >>> carried = delay_by_dispersion(np.cos(omega * t), 0.05, 2.0, depth=np.inf)
-    >>> bool(np.max(np.abs(carried - np.cos(omega * t - 2.0 * k))) < 3e-3)
-    True
-    """
-    return _delayed(
-        series,
-        distance,
-        lambda array, span: carry_by_dispersion(array, dt, span, depth, highest_frequency),
-    )
-
-
-def delay_by_celerity(
-    series: npt.ArrayLike, dt: float, distance: npt.ArrayLike, celerity: float
-) -> FloatArray:
-    r"""Delay an elevation by the time waves of one celerity take, :math:`\eta(t - d(t)/c)`.
-
-    Parameters
-    ----------
-    series : array_like, shape (time,) or (time, channel)
-        Elevation, uniformly sampled, without gaps.
-    dt : float
-        Time step, s.
-    distance : array_like, scalar or shape (time,)
-        Distance of the place from the probe at each sample, m, positive downstream.
-    celerity : float
-        Speed of the waves, m/s.
-
-    Returns
-    -------
-    ndarray
-        Elevation at the place, same shape and unit; band-limited between samples.
-
-    Raises
-    ------
-    RequestError
-        As :func:`delay_by_dispersion`.
-    """
-    return _delayed(
-        series, distance, lambda array, span: carry_by_celerity(array, dt, span, celerity)
-    )
-
-
-def _delayed(
-    series: npt.ArrayLike,
-    distance: npt.ArrayLike,
-    carry: Callable[[FloatArray, tuple[float, float]], CarriedElevation],
-) -> FloatArray:
-    """A record read at a distance, after `carry` prepared it for a range of them."""
-    array, places = as_series(series, minimum=4, channels=True), as_real(distance, "the distance")
-    if places.shape not in ((), array.shape[:1]):
-        raise RequestError(
-            f"the distance has shape {places.shape}; expected one number, or one per sample: "
-            f"({len(array)},)."
-        )
-    if not np.all(np.isfinite(places)):
-        raise RequestError(
-            f"the distance holds {int(np.sum(~np.isfinite(places)))} values that are not finite. "
-            "Fill the gap in the position first."
-        )
-    return carry(array, (float(places.min()), float(places.max()))).at(places).reshape(array.shape)
 
 
 def _carried(

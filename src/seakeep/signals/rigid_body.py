@@ -187,7 +187,6 @@ def transfer_acceleration(
 def remove_gravity(
     specific_force: npt.ArrayLike,
     angles: npt.ArrayLike,
-    gravity: float = GRAVITY,
     zeroed: bool = False,
 ) -> FloatArray:
     r"""Acceleration in space from what three accelerometers on the body read.
@@ -198,8 +197,6 @@ def remove_gravity(
         Readings along the body's axes, m/s²: :math:`f = R^T (a + g \hat z)`, (0, 0, g) at rest.
     angles : array_like, shape (time, 3)
         Roll, pitch and yaw, rad.
-    gravity : float, optional
-        g, m/s².
     zeroed : bool, optional
         Whether the readings were set to zero at rest, upright: g is then added to z first.
 
@@ -220,7 +217,7 @@ def remove_gravity(
     >>> bool(np.allclose(at_rest, 0.0))  # tilted, and not moving
     True
     """
-    upward = np.array([0.0, 0.0, gravity])
+    upward = np.array([0.0, 0.0, GRAVITY])
     read, angles = _vectors(specific_force=specific_force, angles=angles)
     force = read + (upward if zeroed else 0.0)
     turned: FloatArray = np.einsum("tij,tj->ti", rotation_matrix(angles), force) - upward

@@ -512,7 +512,9 @@ def match_pulses(
     if first.size < max(1, min(own.size, reference.size) // 3):
         raise DataError(
             f"of {own.size} pulses of the logger and {reference.size} of the reference only "
-            f"{first.size} fit together. Check that both columns hold the same trigger."
+            f"{first.size} fit together; the former come every {np.median(np.diff(own)):.4g} s, "
+            f"the latter every {np.median(np.diff(reference)):.4g} s. Check that both columns hold "
+            "the same trigger, and the unit of both times."
         )
     return first, second, modulus
 

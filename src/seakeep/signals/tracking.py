@@ -63,6 +63,8 @@ LABELS = {
 }
 """Unit and long name of each channel of a track."""
 
+FRAMES = 12
+"""Frames of a contact sheet, three in a row, of which a third are the worst."""
 REPORT_EVERY = 150
 """Frames between two reports of progress."""
 SLOWEST, FASTEST = 0.1, 2000.0
@@ -464,7 +466,7 @@ def _motions(
     return dict(zip(("surge", "heave", "pitch"), table.T, strict=True)), filled
 
 
-def contact_sheet(path: Path | str, track: Track, frames: int = 12, columns: int = 3) -> bytes:
+def contact_sheet(path: Path | str, track: Track) -> bytes:
     """Frames of a video with the tracked panel outlined, the worst ones among them, as PNG.
 
     Parameters
@@ -473,8 +475,6 @@ def contact_sheet(path: Path | str, track: Track, frames: int = 12, columns: int
         The video.
     track : Track
         From :func:`track_video`.
-    frames, columns : int, optional
-        Number of frames, and how many of them stand in a row.
 
     Returns
     -------
@@ -488,9 +488,9 @@ def contact_sheet(path: Path | str, track: Track, frames: int = 12, columns: int
     """
     cv2 = opencv()
     there = np.flatnonzero(track["picture"] >= 0)
-    worst = there[np.argsort(track["quality"][there], kind="stable")][: frames // 3]
+    worst = there[np.argsort(track["quality"][there], kind="stable")][: FRAMES // 3]
     rest = np.setdiff1d(there, worst)
-    spread = rest[np.linspace(0, rest.size - 1, min(frames - worst.size, rest.size)).astype(int)]
+    spread = rest[np.linspace(0, rest.size - 1, min(FRAMES - worst.size, rest.size)).astype(int)]
     tiles = []
     with _open_video(path) as video:
         for index in np.union1d(worst, spread):
@@ -502,8 +502,8 @@ def contact_sheet(path: Path | str, track: Track, frames: int = 12, columns: int
                     "was tracked, or was changed since. Track it again."
                 )
             tiles.append(_tile(cv2, frame, track, int(index)))
-    tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % columns)
-    rows = [np.hstack(tiles[i : i + columns]) for i in range(0, len(tiles), columns)]
+    tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % 3)
+    rows = [np.hstack(tiles[i : i + 3]) for i in range(0, len(tiles), 3)]
     return bytes(cv2.imencode(".png", np.vstack(rows))[1])
 
 

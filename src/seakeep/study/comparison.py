@@ -16,6 +16,7 @@ from seakeep.arrays import Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.check.parts import samples_in
 from seakeep.conventions import displayed, is_elevation
+from seakeep.core.bootstrap import FEWEST_SAMPLES
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
@@ -383,11 +384,11 @@ def _compare_run(
     result = forecast(run, start, steps, **how)
     # The last instant may lie a step beyond the record: the input before it is known.
     inside = result[model.states].sel(time=slice(None, time[-1])).assign_attrs(result.attrs)
-    if (known := inside.sizes["time"]) < 2:
+    if (known := inside.sizes["time"]) < FEWEST_SAMPLES:
         raise RequestError(
             f"the forecast of {name} from {start:g} s has {known} measured instant(s), and errors "
-            f"are judged over two or more; the run ends at {time[-1]:g} s. Choose an earlier start "
-            "or more steps."
+            f"are judged over {FEWEST_SAMPLES} or more; the run ends at {time[-1]:g} s. Choose an "
+            "earlier start or more steps."
         )
     instants = {"time": inside["time"]}
     has_band = "statistic" in inside.dims

@@ -13,12 +13,12 @@ from seakeep.arrays import FloatArray
 from seakeep.campaign import Campaign
 from seakeep.check.parts import whole_span
 from seakeep.conventions import is_elevation
+from seakeep.core.harmonics import dominant_frequency
 from seakeep.core.metrics import slack_share
 from seakeep.errors import RequestError
 from seakeep.signals import significant_height, wave_spectrum
 from seakeep.signals.waves import paper_welch
 from seakeep.study.fit import find_repeat
-from seakeep.study.judge import wave_frequency
 from seakeep.study.plan import Plan, between, trained_parts, training_samples
 from seakeep.study.settings import Study
 
@@ -167,7 +167,8 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
     for run in runs.values():
         facts, frequency, nowhere = run.attrs, np.nan, (np.nan, np.nan)
         if waves is not None and facts.get("waves") == "regular":
-            frequency = wave_frequency(between(run, whole_span(run))[waves].values, plan.dt)
+            elevation = between(run, whole_span(run))[waves].values
+            frequency = dominant_frequency(elevation, plan.dt)
         spans = {use: facts.get(f"{use}_span", nowhere) for use in ("train", "test")}
         rows.append(
             {

@@ -17,8 +17,8 @@ from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, Spec, outside_training
 from seakeep.models.labelled import mean_period
 from seakeep.models.settings import Select
-from seakeep.models.slow import warn_of_slow_motions
 from seakeep.models.specs import left_open
+from seakeep.models.validity import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
 from seakeep.signals import find_leakage
 from seakeep.study.plan import between

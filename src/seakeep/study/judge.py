@@ -21,9 +21,9 @@ import xarray as xr
 
 from seakeep import metrics, statistics
 from seakeep.arrays import ComplexArray, FloatArray
-from seakeep.core.bands import band_error_over_time
+from seakeep.core.bands import split_bands
 from seakeep.core.calibration import band_scale, calibrated_bounds
-from seakeep.core.metrics import root_mean_square
+from seakeep.core.metrics import over_channels, paired, root_mean_square
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
 from seakeep.models import KINDS
 from seakeep.models.executor import in_order
@@ -43,7 +43,6 @@ CONSTANT = ("hold_last", "mean")
 """Kinds of references that read nothing after the start."""
 SHOWN = 5
 """Lost forecasts that a warning names."""
-TREND_SERIES = 500
 DIFFERENCES = 500
 """Redrawn tables of cells for the interval of a difference between models."""
 
@@ -78,16 +77,26 @@ def judge_windows(*, dt: float, frequency: float, **pair: Any) -> xr.Dataset:
     Returns
     -------
     Dataset
-        ``mean``; ``error`` over (measure, window, channel) and ``error_over_time`` over (band,
-        window, time).
+        ``mean``; ``error`` over (measure, window, channel); ``error_over_time`` over (band, window,
+        time), and over (band, window, channel) the mean of a channel's ε(t), ``level``, and
+        ``growth``: its change over the window along the line of least squares.
     """
-    bands = band_error_over_time(**pair, dt=dt, frequency=frequency)
-    over_time = np.stack([metrics.error_over_time(**pair), *bands])
+    p, m, spread, judged = paired(**pair)
+    parts = np.stack([p - m, *split_bands(p - m, dt, frequency)])
+    absolute = np.abs(parts) / spread[..., None, :]
+    age = np.linspace(-0.5, 0.5, p.shape[-2])
+    lines = np.einsum("t,...tc->...c", age / (age @ age), absolute)
+    by_channel = ("band", "window", "channel")
     return xr.Dataset(
         {
-            "mean": (("window", "time", "channel"), pair["predicted"]),
+            "mean": (("window", "time", "channel"), p),
             "error": (("measure", "window", "channel"), window_errors(**pair)),
-            "error_over_time": (("band", "window", "time"), over_time),
+            "error_over_time": (
+                ("band", "window", "time"),
+                over_channels(absolute, judged[..., None, :]),
+            ),
+            "level": (by_channel, absolute.mean(axis=-2)),
+            "growth": (by_channel, lines),
         }
     )
 
@@ -99,19 +108,16 @@ def judge(
     executor: Executor | None = None,
 ) -> dict[str, xr.Dataset]:
     """All statistics of a study, as groups ``statistics/…``; the densities side by side."""
-    kinds = {name: each.kind for name, each in settings.models.items()}
     seed = settings.study.seed
     tables: dict[str, dict[str, xr.Dataset]] = defaultdict(dict)
     for name in settings.tests:
         test = groups[f"tests/{name}"]
-        boxes, rng = box_table(test), random_stream(seed, f"differences.{name}")
-        differences = difference_table(test, groups["training"], rng)
+        rng = random_stream(seed, f"differences.{name}")
         of_test = {
-            "boxes": boxes,
-            "differences": differences,
-            "skill": skill_table(boxes, differences, kinds),
+            "boxes": box_table(test),
+            "differences": difference_table(test, groups["training"], rng),
             **band_tables(test, groups.get("calibration"), settings.statistics.level),
-            "trend": trend_table(test, random_stream(seed, f"trend.{name}")),
+            "trend": trend_table(test, groups["training"], random_stream(seed, f"trend.{name}")),
             "response": regular_response(groups, name) if is_regular(groups, name) else None,
         }
         for key, each in of_test.items():
@@ -258,29 +264,6 @@ def verdict(lower: float, upper: float) -> Literal["better", "worse", "cannot te
     return "worse" if lower > 0 else "cannot tell"
 
 
-def skill_table(
-    boxes: xr.Dataset, differences: xr.Dataset, kinds: Mapping[str, str]
-) -> xr.Dataset | None:
-    """How much smaller the median error of each model is than that of the baselines in the study.
-
-    ``change``, ``lower`` and ``upper`` over (model, reference, measure) are those of
-    :func:`difference_table` for the average over the channels. References are ``hold_last``,
-    ``mean`` and ``best_linear``, the linear baseline of least median ANRMSE; None if there are
-    none.
-    """
-    median = boxes["median"].sel(channel="average", measure="nrmse", drop=True)
-    named = {}
-    for name, among in references_of(kinds).items():
-        errors = median.sel(model=among).dropna("model")
-        if errors.size:
-            named[name] = str(errors.idxmin("model").item())
-    if not named:
-        return None
-    out = differences.sel(channel="average", other=list(named.values()), drop=True)
-    out = out.rename(other="reference").assign_coords(reference=list(named))
-    return out.assign(reference_model=("reference", list(named.values())))
-
-
 def references_of(kinds: Mapping[str, str]) -> dict[str, list[str]]:
     """Names of the references among models of some kinds, those of one sort together."""
     out: dict[str, list[str]] = {}
@@ -407,31 +390,43 @@ def band_of(
     return calibrated_bounds(mean, lower, upper, margins["margin"].values[:, None, None], scale)
 
 
-TREND = ("slope", "lower", "upper", "change", "kendall_tau", "p_value", "block_length")
 TREND_LINES = ("error_mean", "lower_quartile", "upper_quartile")
 
 
-def trend_table(test: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
-    """Test whether ε(t), averaged over all cells, grows with the age of the forecast."""
-    time, shape = test["time"].values, (test.sizes["band"], test.sizes["model"])
-    tests = np.full((*shape, len(TREND)), np.nan)
-    series = np.full((*shape, len(TREND_LINES), time.size), np.nan)
+def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
+    """How ε(t) grows with the age of the forecast.
+
+    ``change`` over (band, model) is the growth over the window, pooled over all cells and channels,
+    in parts of the mean error: 0.2 for an error that rises by a fifth of its mean. ``lower`` and
+    ``upper`` come from a two-way block bootstrap over windows and channels. ``error_mean`` and its
+    quartiles over the cells are over (band, model, time).
+    """
+    time, coords = test["time"].values, {"band": test["band"].values, "model": test["model"].values}
+    series = np.full((len(coords["band"]), len(coords["model"]), 3, time.size), np.nan)
     errors = test["error_over_time"].transpose("band", "model", ...).values
     errors = errors[:, :, test["judged"].values]
-    for place in np.ndindex(shape):
+    for place in np.ndindex(series.shape[:2]):
         cells = errors[place][np.isfinite(errors[place]).all(axis=1)]
-        if not len(cells):
-            continue
-        series[place] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SeakeepWarning)  # the block length is in the table
-            trend = statistics.trend_test(
-                series[place][0], rng=rng, time=time, n_series=TREND_SERIES
-            )
-        tests[place] = [getattr(trend, number) for number in TREND]
-    coords = {"band": test["band"].values, "model": test["model"].values}
+        if len(cells):
+            series[place] = cells.mean(axis=0), *np.quantile(cells, [0.25, 0.75], axis=0)
+    level, growth = (
+        test[key].where(test["judged"]).mean("training").transpose("window", "channel", *coords)
+        for key in ("level", "growth")
+    )
+
+    def change(level: FloatArray, growth: FloatArray) -> FloatArray:
+        with np.errstate(invalid="ignore"):
+            out: FloatArray = np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
+        return out
+
+    blocks = blocks_of([test], training)[1], 1
+    bounds = statistics.two_way_interval(
+        change, level, growth, rng=rng, blocks=blocks, n_series=DIFFERENCES, signed=True
+    )
+    values = np.stack([change(level.values[None], growth.values[None])[0], *bounds])
+    growths = _table(values, ("number", *coords), ("change", "lower", "upper"), coords)
     lines = _table(series, (*coords, "number", "time"), TREND_LINES, {**coords, "time": time})
-    return xr.merge([_table(tests, (*coords, "number"), TREND, coords), lines])
+    return xr.merge([growths, lines])
 
 
 def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
@@ -538,34 +533,6 @@ def _channel_densities(
         curves += [drawn.mean(axis=0), *np.quantile(drawn, [beyond, 1 - beyond], axis=0)]
     table = [[getattr(each, number) for number in DIVERGENCE] for each in variants.values()]
     return np.array(table), np.stack(curves)
-
-
-def wave_frequency(elevation: npt.ArrayLike, dt: float) -> float:
-    """Frequency of a regular wave, Hz: the peak of its spectrum, interpolated.
-
-    Parameters
-    ----------
-    elevation : array_like, shape (time,)
-        A record of several periods.
-    dt : float
-        Time step, s.
-
-    Returns
-    -------
-    float
-        To about a hundredth of one over the length of the record.
-
-    Examples
-    --------
-    >>> t = np.arange(1200) * 0.05
-    >>> round(wave_frequency(np.sin(2 * np.pi * 0.8586 * t), 0.05), 4)
-    0.8586
-    """
-    x = np.asarray(elevation, dtype=float)
-    padded = 64 * x.size
-    tapered = (x - x.mean()) * np.hanning(x.size)
-    spectrum = np.abs(np.fft.rfft(tapered, padded))
-    return float(np.argmax(spectrum) / (padded * dt))
 
 
 def is_regular(groups: Mapping[str, xr.Dataset], test: str) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,6 +14,7 @@ from seakeep.errors import RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.labelled import channel_matrix
 from seakeep.models.live import Servable, held_samples
+from seakeep.models.registry import is_linear
 from seakeep.quality import warn_of_runs
 from seakeep.study.comparison import samples_of
 
@@ -32,7 +32,6 @@ def nowcasts(
     runs: Sequence[str] = (),
     steps: int | str | None = None,
     *,
-    share: float = SHARE,
     level: float = 0.95,
     progress: Progress | None = None,
 ) -> dict[str, xr.Dataset]:
@@ -48,8 +47,6 @@ def nowcasts(
         Runs; by default those that test.
     steps : int or str, optional
         Longest lead, samples or a length; by default five encounter periods.
-    share : float, optional
-        Part of the training SD below which the error is to stay over the lead time.
     level : float, optional
         Probability of the band.
     progress : callable, optional
@@ -80,15 +77,13 @@ def nowcasts(
     for done, (name, key) in enumerate(product(every, prepared), 1):
         dt = every[name].signature.dt
         count = samples_of(longest, campaign, prepared.values(), dt, "steps")
-        out[name].append(nowcast(every[name], prepared[key], count, share=share, level=level))
+        out[name].append(nowcast(every[name], prepared[key], count, level=level))
         if progress is not None:
             progress(done, len(every) * len(prepared), f"{name}, {key}")
     return {name: xr.concat(each, xr.Variable("run", list(prepared))) for name, each in out.items()}
 
 
-def nowcast(
-    model: Servable, run: xr.Dataset, steps: int, *, share: float = SHARE, level: float = 0.95
-) -> xr.Dataset:
+def nowcast(model: Servable, run: xr.Dataset, steps: int, *, level: float = 0.95) -> xr.Dataset:
     """Play a run to a model in service, sample by sample, and judge its forecasts.
 
     Parameters
@@ -99,7 +94,7 @@ def nowcast(
         A prepared run; in its test span, if it states one, forecasts start at even distances.
     steps : int
         Longest lead, samples.
-    share, level : float
+    level : float
         As in :func:`nowcasts`.
 
     Returns
@@ -150,18 +145,18 @@ def nowcast(
             "error": (over, error, sd),
             "claimed": (over, np.sqrt(claimed / len(starts)), sd),
             "coverage": (over, 100.0 * inside / len(starts), {"units": "%"}),
-            "lead_time": ("channel", signature.dt * held_samples(error <= share), {"units": "s"}),
+            "lead_time": ("channel", signature.dt * held_samples(error <= SHARE), {"units": "s"}),
         },
         coords={
             "lead": ("lead", leads, {"units": "s", "long_name": "lead time"}),
             "channel": list(signature.states),
         },
-        attrs={"share": share, "level": level, "starts": len(starts)},
+        attrs={"share": SHARE, "level": level, "starts": len(starts)},
     )
 
 
-def served(model: Any) -> Servable | None:
+def served(model: Model) -> Servable | None:
     """What follows a run sample by sample: the model, or its members held; None without states."""
     if is_ensemble(model):
         return model.hold()
-    return model if hasattr(model, "live") else None
+    return model if is_linear(model) else None

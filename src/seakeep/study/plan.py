@@ -19,7 +19,7 @@ from seakeep.errors import DataError, RequestError
 from seakeep.models import Needs, Spec
 from seakeep.models.selection import groups_of
 from seakeep.models.settings import periods_to_samples
-from seakeep.models.slow import warn_of_slow_motions
+from seakeep.models.validity import warn_of_slow_motions
 from seakeep.study.resolve import ResolvedModel, can_align, resolve_model
 from seakeep.study.settings import Study, StudySettings, TestSetSettings, TrainingSettings
 

@@ -364,7 +364,7 @@ part = "test"
 n_series = {series}
 
 [output]
-paper = true
+paper = true{regularisation}
 """
 RECOMMENDED_FIR = """
 input_delays = "3 T"
@@ -416,6 +416,7 @@ def study_text(act: Act, size: Size, seed: int) -> str:
         tests=size.tests,
         regular="".join(regular),
         series=size.series,
+        regularisation="\nregularisation = true" * act.without_drift,
     )
 
 

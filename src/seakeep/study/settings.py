@@ -23,7 +23,7 @@ from seakeep.files import expanded, is_there, sha256_of
 from seakeep.study.resolve import mistakes_of
 from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
 
-FORMAT = 8
+FORMAT = 9
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 Preset = Literal["paper", "recommended"]
@@ -164,10 +164,10 @@ class OutputSettings(Table):
         default=2, description="windows of the first test set whose members are kept for figures"
     )
     eigenvalues: bool = Field(default=True, description="true or false")
-    nowcast: bool = Field(
+    regularisation: bool = Field(
         default=False,
-        description="whether the models of the first training set are judged in service too, "
-        "where waves to come are not known, against lead time (as `compare --nowcast` does)",
+        description="whether single models with delay_rows = 'ridge' are identified without λ and "
+        "by truncated singular values too, to compare stability, time and error",
     )
     paper: bool = Field(
         default=False,

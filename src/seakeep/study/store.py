@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import hashlib
 import io
 import json
 import tempfile
@@ -21,7 +19,7 @@ import xarray as xr
 from filelock import FileLock, Timeout
 
 from seakeep.errors import SHOWN, RequestError, SeakeepError, warn
-from seakeep.files import SEAL, check_report, is_there, read_bytes, read_sealed, replacing
+from seakeep.files import check_report, is_there, read_bytes, read_sealed, replacing, write_whole
 from seakeep.study.settings import FORMAT
 
 RESULT = "study.nc"
@@ -30,9 +28,6 @@ HEADER = "study.json"
 LOCK = "study.lock"
 UNITS = "units"
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-FORBIDDEN = (errno.EACCES, errno.EPERM, errno.EROFS)
-NO_FOLDER = (errno.ENOENT, errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG)
 OF_HDF5 = frozenset({"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"})
 """Attributes that tie variables to their dimensions."""
 
@@ -57,20 +52,10 @@ def storing(folder: Path) -> Iterator[None]:
         cause = error if isinstance(error, OSError) else error.__cause__
         if not isinstance(cause, OSError):
             raise
-        said = f"results could not be written to {folder}: {cause.strerror or cause}."
-        if cause.errno in FORBIDDEN:
-            raise RequestError(
-                f"{said} Choose a folder that you may write to, or change its permissions; the "
-                "same command continues with what is there."
-            ) from error
-        if cause.errno in NO_FOLDER:
-            raise RequestError(
-                f"{said} No folder can be made or kept there. Choose another place."
-            ) from error
-        mend = "Free space on the disk" if cause.errno in FULL else "Check the disk"
         raise StorageError(
-            f"{said} What was finished is kept. {mend}; the same command then continues where it "
-            "stopped."
+            f"results could not be written to {folder}: {cause.strerror or cause}. What was "
+            "finished is kept. Free space on the disk, or choose a folder that you may write to; "
+            "the same command then continues where it stopped."
         ) from error
 
 
@@ -124,9 +109,8 @@ def write_groups(path: Path, attrs: Mapping[str, Any], groups: Mapping[str, xr.D
             for key, each in group.variables.items():
                 for number, dim in enumerate(each.dims if each.dims != (key,) else ()):
                     place[key].dims[number].attach_scale(place[dim])
-    content = buffer.getvalue()
     with storing(path.parent), replacing(path) as temporary:
-        temporary.write_bytes(content + SEAL + hashlib.sha256(content).hexdigest().encode())
+        write_whole(temporary, buffer)
 
 
 def read_groups(path: Path) -> tuple[dict[str, Any], Groups]:

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -19,18 +21,20 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.conventions import is_elevation
-from seakeep.core import metrics
+from seakeep.core import embed, metrics
 from seakeep.errors import DataError, SeakeepError
 from seakeep.formats.netcdf import opened_netcdf
 from seakeep.models import Spec
 from seakeep.models.calibration import Judged, envelope_of, held_out, learn_margin
 from seakeep.models.engine import group_series, read_groups
+from seakeep.models.ensemble import spectral_radius
+from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
 from seakeep.models.summaries import STATISTICS, reduce_members
+from seakeep.models.training import gather
 from seakeep.signals import envelope_squared
 from seakeep.study.judge import BANDS, MEASURES, judge_windows
-from seakeep.study.nowcast import PERIODS, nowcast, served
 from seakeep.study.plan import Plan, TestWindow, TrainingSet, between
 from seakeep.study.settings import Study
 from seakeep.study.store import Groups
@@ -123,8 +127,8 @@ def compute(
     dict of str to Dataset
         ``tests/NAME``: ``mean``, and its ``error`` and ``error_over_time``; of an ensemble
         ``bands/NAME``, the other statistics of its members and what became of each, and
-        ``shown/NAME``, the members of windows that figures show; ``chosen``; ``calibration``. Of
-        the first training set ``eigenvalues``, ``draws`` and ``nowcast``.
+        ``shown/NAME``, the members of windows that figures show; ``chosen``; ``calibration``;
+        ``regularisation``. Of the first training set ``eigenvalues`` and ``draws``.
     """
     training, settings = plan.training[unit.training], plan.settings
     with _named_after(plan, unit):
@@ -167,12 +171,74 @@ def compute(
         out[f"tests/{test}"] = judged.assign_coords(at)
     if is_ensemble and plan.calibrated_on:
         out["calibration"] = band_margins(plan, runs, unit, fitted)
+    form = getattr(plan.specs[unit.model], "delay_rows", "")
+    if settings.output.regularisation and form == "ridge" and not is_ensemble:
+        out["regularisation"] = regularisation(plan, runs, fitted, training, facts, tested)
     if unit.training == units_of(plan)[0].training:
-        out |= _of_first(plan, runs, unit, fitted, next(iter(tested)))
+        out |= _of_first(plan, unit, fitted)
     return out
 
 
-def _of_first(plan: Plan, runs: Runs, unit: Unit, fitted: Any, test: str) -> Groups:
+def regularisation(
+    plan: Plan,
+    runs: Runs,
+    fitted: HankelDMDcModel,
+    training: TrainingSet,
+    facts: Groups,
+    tested: Mapping[str, Sequence[int]],
+) -> xr.Dataset:
+    r"""Identify a model of the paper's form with λ, without it, and by truncated singular values.
+
+    As many singular values are kept as the regression with λ has degrees of freedom,
+    :math:`\sum \sigma^2 / (\sigma^2 + \lambda)`.
+
+    Returns
+    -------
+    Dataset
+        Over ``variant``: ``radius``, the spectral radius, and ``seconds`` of processor time for
+        the matrices; ``truncated_nrmse`` over (window, channel) of the first test set; ``rank``.
+    """
+    spec: Any = fitted.settings
+    parts = training_parts(runs, training)
+    data = gather(parts, plan.states, plan.inputs, None, spec)
+    groups = (data.states, spec.state_delays), (data.delayed, spec.input_delays)
+    regressors = [
+        np.concatenate([embed(x[k], lags, at.first_column, at.columns) for x, lags in groups])
+        for k, at in enumerate(data.windows)
+    ]
+    squares = np.linalg.svd(np.concatenate(regressors, axis=1), compute_uv=False) ** 2
+    rank = round(float(np.sum(squares / (squares + fitted.training.ridge))))
+    variants = {
+        "none": replace(spec, ridge=0.0),
+        "truncated": replace(spec, ridge=0.0, rank=rank),
+        "ridge": spec,
+    }
+    radius, seconds, models = [], [], {}
+    for name, each in variants.items():
+        begin = process_time()
+        solution = data.regress(each, each.state_delays, all_rows=True)
+        seconds.append(process_time() - begin)
+        models[name] = HankelDMDcModel.fitted(each, data, data.signature(each), solution, parts)
+        radius.append(spectral_radius(models[name].dynamics))
+    test, numbers = next(iter(tested.items()))
+    known = facts[test].isel(window=numbers, training=list(plan.training).index(training))
+    pair = {key: known[key].values for key in ("measured", "training_std", "noise_std")}
+    ((_, series, *_),) = _series(plan, runs, models["truncated"], {test: numbers})
+    return xr.Dataset(
+        {
+            "radius": ("variant", radius),
+            "seconds": ("variant", seconds, {"units": "s"}),
+            "truncated_nrmse": (
+                ("window", "channel"),
+                metrics.nrmse(predicted=np.array(series[0]), **pair),
+            ),
+            "rank": rank,
+        },
+        {"variant": list(variants), "window": numbers},
+    )
+
+
+def _of_first(plan: Plan, unit: Unit, fitted: Any) -> Groups:
     """What is kept of a model of the first training set alone."""
     out = {}
     if plan.models[unit.model].is_ensemble:
@@ -186,15 +252,6 @@ def _of_first(plan: Plan, runs: Runs, unit: Unit, fitted: Any, test: str) -> Gro
             {key: (("member", "mode"), getattr(padded, key)) for key in ("real", "imag")},
             attrs={"training": plan.training[unit.training].name, "dt": plan.dt},
         )
-    if plan.settings.output.nowcast and (model := served(fitted)) is not None:
-        steps = round(PERIODS * plan.encounter_period / plan.dt)
-        level = plan.settings.statistics.level
-        numbers = tested_windows(plan, unit.training)[test]
-        names = list(dict.fromkeys(plan.tests[test][k].run for k in numbers))
-        with _named_after(plan, unit):
-            skill = [nowcast(model, runs[name], steps, level=level) for name in names]
-        starts = min(each.attrs["starts"] for each in skill)
-        out["nowcast"] = xr.concat(skill, xr.Variable("run", names)).assign_attrs(starts=starts)
     return out
 
 
@@ -322,10 +379,11 @@ def collect(plan: Plan, facts: Groups, read: Callable[[Unit], Groups]) -> Groups
         margins = stacked(plan.ensembles, "calibration", "ensemble")
         margins = margins.reindex(training=sets, fill_value=FILL)
         out["calibration"] = margins.assign_coords(channel=list(plan.states))
-    for unit in units:
-        for key in ("nowcast", "eigenvalues", "draws"):
-            if key in computed[unit]:
-                out[f"{key}/{unit.model}"] = computed[unit][key]
+    for model, key in product(plan.models, ("eigenvalues", "draws", "regularisation")):
+        if each := of(model, key):
+            several = key == "regularisation"  # of the others there is the first alone
+            group = _along("training", each) if several else next(iter(each.values()))
+            out[f"{key}/{model}"] = group
     return out
 
 

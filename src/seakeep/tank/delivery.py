@@ -1,19 +1,30 @@
-"""Files that the virtual tank delivers: raw files as loggers write them, and a campaign.toml."""
+"""Files that the virtual tank delivers: raw files as loggers write them, and a campaign.toml.
+
+Side view of a run as a video, for the tracking of the white panel on the vessel.
+
+Needs the extra ``video`` (OpenCV). Frames are 1280 × 720 at the video clock's rate; the vessel
+moves in a plane of 2.5 mm per pixel. A lamp in the upper left corner shows the trigger.
+"""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import tomlkit
 import xarray as xr
 
+from seakeep.arrays import FloatArray
+from seakeep.errors import SeakeepError
 from seakeep.files import MARK, replacing, write_netcdf
+from seakeep.signals.panel import opencv
+from seakeep.tank.instruments import Played, clock_instants, trigger
 from seakeep.tank.settings import RunPlan, TankSettings
-from seakeep.tank.video import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, SIDE_VIEW
 
 CAMPAIGN, RAW, TRUTH = "campaign", "raw file", "truth"
 """Kinds of files, as their marks say it."""
@@ -189,3 +200,181 @@ def campaign_text(
             filmed = f"Filmed: {paths[SIDE_VIEW]}, for `seakeep track`."
             document["runs"][name].comment(filmed)
     return tomlkit.dumps(document)
+
+
+Image = npt.NDArray[np.uint8]
+
+WIDTH, HEIGHT = 1280, 720
+METRES_PER_PIXEL = 0.0025
+PANEL = (0.30, 0.10)  # m
+PANEL_HEIGHT = 0.25  # m, of its centre above the centre of gravity
+SIDE_VIEW = "side_view"
+"""Name of the camera's file beside those of the loggers."""
+LEFT, TOP = -1.0, 1.1  # m, of the picture's upper left corner: x, height above still water
+FRACTION_BITS = 6  # corners are placed to 1/64 pixel
+SUBPIXELS = 8
+NOISE = 3.0  # grey levels
+NOISE_FRAMES = 12
+HULL = ((-0.70, 0.20), (-0.62, -0.06), (-0.47, -0.083), (0.42, -0.083), (0.64, -0.03), (0.68, 0.20))
+"""Outline of the CK-14e-like hull, m from the place at rest; any hull is drawn so."""
+
+
+def pixel_of(x: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
+    """Pixels to the right and downwards from the first pixel's centre, of a point in the plane.
+
+    `x` from the centre of gravity's at rest, `z` above still water, m.
+    """
+    points = np.stack([np.asarray(x, dtype=float) - LEFT, TOP - np.asarray(z, dtype=float)], -1)
+    return points / METRES_PER_PIXEL
+
+
+def _turned(points: npt.ArrayLike, centre: tuple[float, float], pitch: float) -> FloatArray:
+    """Points of the vessel (m from its centre of gravity) after surge, heave and pitch."""
+    x, z = np.asarray(points, dtype=float).T
+    cosine, sine = np.cos(pitch), np.sin(pitch)
+    return pixel_of(centre[0] + x * cosine + z * sine, centre[1] - x * sine + z * cosine)
+
+
+def _corners(points: FloatArray) -> npt.NDArray[np.int32]:
+    corners: npt.NDArray[np.int32] = np.round(points * 2**FRACTION_BITS).astype(np.int32)
+    return corners
+
+
+def _fill_exactly(cv2: Any, frame: Image, points: FloatArray, level: int) -> None:
+    """Fill a polygon in grey, each pixel by the part that the polygon covers of it.
+
+    OpenCV's own smoothed edges are off by up to half a pixel, which would turn a level panel by
+    0.2 degrees; here a pixel is divided into 8 × 8.
+    """
+    begin = np.maximum(np.floor(points.min(axis=0)).astype(int) - 1, 0)
+    end = np.minimum(np.ceil(points.max(axis=0)).astype(int) + 2, [WIDTH, HEIGHT])
+    if np.any(end <= begin):
+        return
+    width, height = (int(n) for n in end - begin)
+    fine = np.zeros((SUBPIXELS * height, SUBPIXELS * width), np.uint8)
+    places = (points - begin + 0.5) * SUBPIXELS - 0.5
+    cv2.fillPoly(fine, [_corners(places)], 255, shift=FRACTION_BITS)
+    covered = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
+    part = frame[begin[1] : end[1], begin[0] : end[0]]
+    share = covered[:, :, None] / 255.0
+    part[:] = np.round(part + share * (level - part.astype(float))).astype(np.uint8)
+
+
+def _background() -> Image:
+    """Tank wall: a vertical gradient with faint tiles."""
+    rows = np.linspace(105.0, 70.0, HEIGHT)[:, None, None] * np.array([1.0, 0.93, 0.82])
+    wall = np.broadcast_to(rows, (HEIGHT, WIDTH, 3)).copy()
+    wall[::80] *= 0.88
+    wall[:, ::80] *= 0.88
+    return wall.astype(np.uint8)
+
+
+def _light() -> npt.NDArray[np.float32]:
+    """Lighting that falls off from the upper right."""
+    right = np.linspace(0.72, 1.06, WIDTH)[None, :, None]
+    down = np.linspace(1.05, 0.90, HEIGHT)[:, None, None]
+    light = np.broadcast_to(right * down, (HEIGHT, WIDTH, 3))
+    return np.ascontiguousarray(light, dtype=np.float32)
+
+
+def frame_of(
+    cv2: Any,
+    motion: tuple[float, float, float],
+    surface: FloatArray,
+    lamp: float,
+    centre_of_gravity: float = 0.03,
+) -> Image:
+    """One frame before lighting and noise, shape (720, 1280, 3).
+
+    `motion` is surge (m), heave (m) and pitch (rad), `surface` the elevation (m) at equidistant
+    points from the left to the right edge, `lamp` a brightness of 0 to 1.
+    """
+    surge, heave, pitch = motion
+    centre = (surge, heave + centre_of_gravity)
+    frame = _background()
+
+    def polygon(points: FloatArray, colour: tuple[int, int, int]) -> None:
+        cv2.fillPoly(frame, [_corners(points)], colour, lineType=cv2.LINE_AA, shift=FRACTION_BITS)
+
+    hull = np.array(HULL) - [0.0, centre_of_gravity]
+    polygon(_turned(hull, centre, pitch), (40, 120, 190))
+    post = [(-0.02, 0.1), (0.02, 0.1), (0.02, PANEL_HEIGHT), (-0.02, PANEL_HEIGHT)]
+    polygon(_turned(post, centre, pitch), (60, 60, 60))
+    half = 0.5 * np.array(PANEL)
+    panel = half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] + [0.0, PANEL_HEIGHT]
+    _fill_exactly(cv2, frame, _turned(panel, centre, pitch), 250)
+    across = LEFT + METRES_PER_PIXEL * WIDTH * np.linspace(0.0, 1.0, surface.size)
+    edge = pixel_of(across, surface)
+    water = frame.copy()
+    below = np.concatenate([edge, [[WIDTH, HEIGHT], [0, HEIGHT]]])
+    cv2.fillPoly(water, [_corners(below)], (95, 70, 30), lineType=cv2.LINE_AA, shift=FRACTION_BITS)
+    frame = cv2.addWeighted(water, 0.75, frame, 0.25, 0.0)
+    level = int(40 + 190 * np.clip(lamp, 0.0, 1.0))
+    cv2.circle(frame, (40, 40), 14, (level // 4, level // 2, level), -1, cv2.LINE_AA)
+    return np.asarray(frame, dtype=np.uint8)
+
+
+def _noise(cv2: Any, rng: np.random.Generator) -> list[npt.NDArray[np.float32]]:
+    """Draw a stock of noise pictures; each frame takes one, shifted at random.
+
+    The grain is four pixels wide, as a camera's compression leaves it; finer grain would make
+    files of a gigabyte.
+    """
+    coarse = rng.normal(0.0, NOISE, (NOISE_FRAMES, HEIGHT // 4, WIDTH // 4)).astype(np.float32)
+    return [cv2.resize(c, (WIDTH, HEIGHT), interpolation=cv2.INTER_LINEAR) for c in coarse]
+
+
+def side_view(played: Played, rng: np.random.Generator, instants: npt.ArrayLike) -> Iterator[Image]:
+    """Frames (blue, green, red) as the camera at the tank's side would see them.
+
+    At the given reference instants. Raises RequestError if OpenCV is not installed.
+    """
+    cv2 = opencv("rendering")
+    time = np.asarray(instants, dtype=float)
+    instruments = played.settings.instruments
+    position, _, _ = played.states(time)
+    lamp = trigger(time, instruments.trigger_period, instruments.trigger_width)
+    across = LEFT + METRES_PER_PIXEL * WIDTH * np.linspace(0.0, 1.0, 41)
+    place = played.settings.vessel.position
+    surface = np.stack([played.elevation(place + x, time) for x in across], axis=1)
+    light, stock = _light(), _noise(cv2, rng)
+    height = float(played.rig.hydro.attrs["centre_of_gravity"])
+    for i in range(time.size):
+        q = position[:3, i]
+        motion = (float(q[0]), float(q[1]), float(q[2]))
+        frame = frame_of(cv2, motion, surface[i], float(lamp[i]), height)
+        grain = np.roll(stock[rng.integers(NOISE_FRAMES)], rng.integers(WIDTH), axis=1)
+        lit = cv2.multiply(frame.astype(np.float32), light)
+        lit += grain[:, :, None]
+        yield np.clip(lit, 0, 255, out=lit).astype(np.uint8)
+
+
+def render_side_view(
+    played: Played, path: Path, rng: np.random.Generator, length: float | None = None
+) -> Path:
+    """Render a run, or its first `length` seconds by the video's clock, to an MP4 file.
+
+    Raises
+    ------
+    RequestError
+        If OpenCV is not installed.
+    SeakeepError
+        If it cannot write MP4 files here.
+    """
+    cv2 = opencv("rendering")
+    clock = played.settings.instruments.clocks["video"]
+    _, instants = clock_instants(clock, played.length if length is None else length)
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        part = Path(folder) / "side_view.mp4"
+        code = cv2.VideoWriter_fourcc(*"mp4v")
+        writer = cv2.VideoWriter(str(part), code, clock.rate, (WIDTH, HEIGHT))
+        if not writer.isOpened():
+            raise SeakeepError(
+                "OpenCV cannot write MP4 files here. Install a build with FFmpeg: "
+                "pip install opencv-python-headless"
+            )
+        for frame in side_view(played, rng, instants):
+            writer.write(frame)
+        writer.release()
+        part.replace(path)
+    return path

@@ -95,9 +95,9 @@ class Kernel:
     damping: FloatArray
 
 
-def shipped_hydrodynamics(name: str = "ck14e.nc") -> Path:
+def shipped_hydrodynamics() -> Path:
     """Path of a file of coefficients that ships with the package."""
-    return Path(str(resources.files("seakeep.tank").joinpath("data", name)))
+    return Path(str(resources.files("seakeep.tank").joinpath("data", "ck14e.nc")))
 
 
 def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
@@ -164,14 +164,14 @@ def _passive(matrices: FloatArray) -> FloatArray:
     return result
 
 
-def passive_damping(hydro: Hydrodynamics, step: float = 0.02) -> tuple[FloatArray, FloatArray]:
+def passive_damping(hydro: Hydrodynamics) -> tuple[FloatArray, FloatArray]:
     """Damping for the kernel: symmetric, passive, from 0 to the end of its tail.
 
     Zero at zero frequency, shape-preserving cubics between the solver's frequencies, ω⁻³ beyond
     them; the moon pool's rows are tapered to zero over 9–12 rad/s: the solver is not clean there.
-    Returns a grid of the given step (rad/s) and matrices of shape (grid, dof, dof).
+    Returns a grid of 0.02 rad/s and matrices of shape (grid, dof, dof).
     """
-    omega = np.arange(0.0, TAIL_END + 0.5 * step, step)
+    omega = np.arange(0.0, TAIL_END + 0.01, 0.02)
     last = hydro.omega[-1]
     known = np.concatenate([np.zeros((1, *hydro.mass.shape)), _passive(hydro.damping)])
     inside = scipy.interpolate.PchipInterpolator(np.append(0.0, hydro.omega), known, axis=0)(

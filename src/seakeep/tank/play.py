@@ -19,8 +19,10 @@ from seakeep.tank.delivery import (
     CAMPAIGN,
     FIRST_LINE,
     RAW,
+    SIDE_VIEW,
     TRUTH,
     campaign_text,
+    render_side_view,
     write_dataset,
     write_record,
     write_text,
@@ -30,7 +32,6 @@ from seakeep.tank.hydrodynamics import excitation_at
 from seakeep.tank.instruments import Played, record_run
 from seakeep.tank.seas import Sea, sea_of_run
 from seakeep.tank.settings import TankSettings
-from seakeep.tank.video import SIDE_VIEW, render_side_view
 
 CAMPAIGN_FILE = "campaign.toml"
 LOGGERS = ("wave_probes", "mru", "loads", "video", "all")

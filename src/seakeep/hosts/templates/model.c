@@ -83,6 +83,47 @@ static double carried(const double *u, const double *taps, int place, int probes
 }
 
 {% endif %}
+{% if lines %}
+/* Load of a line: its regression on motions and on elevation and rate of the wave there, blended
+   with the forecast of the load itself where they leave the range of training. */
+typedef struct {
+    int column, count;
+    const int *columns;
+    const double *mean, *std, *low, *high, *knots, *weights;
+} load_map;
+
+static double load(const load_map *map, const double *x, double elevation, double rate, double least, double most)
+{
+    double apart = 1.0, sum = map->weights[0], value = 0.0, surge = 0.0, wave = 0.0;
+    const double *weight = map->weights + 1;
+    for (int i = 0; i < map->count + 2; i++) {
+        double v = i < map->count ? x[map->columns[i]] : i == map->count ? elevation : rate;
+        apart += pow(fmax(fmax(map->low[i] - v, v - map->high[i]), 0.0) / ({{ soft | hex }} * map->std[i]), 2.0);
+        value = (v - map->mean[i]) / map->std[i];
+        if (i < map->count)
+            sum += *weight++ * value;
+        if (i == 0)
+            surge = value;
+        if (i == map->count)
+            wave = value;
+    }
+    for (int i = 0; i < {{ lines[0][0].knots | length }}; i++)
+        sum += *weight++ * fmax(surge - map->knots[i], 0.0);
+    sum += *weight++ * wave;
+    sum += *weight++ * value;
+    sum += *weight++ * fabs(value);
+    sum += *weight++ * (wave * wave);
+    sum += *weight++ * (wave * value);
+    sum += *weight++ * fmax(wave - 0.5, 0.0);
+    for (int i = 0; i < 3; i++) {
+        double wet = fmin(fmax((wave - 0.5 * i) / 0.5, 0.0), 1.0);
+        sum += *weight++ * (wet * value);
+        sum += *weight++ * (wet * fabs(value));
+    }
+    return x[map->column] + (fmin(fmax(sum, least), most) - x[map->column]) / apart;
+}
+
+{% endif %}
 /* What has delays, of the inputs u of an instant. */
 static void observe(const double *u, double *v)
 {
@@ -228,9 +269,29 @@ int {{ name }}_step({{ name }}_model *m, const double *u)
     for (int i = 0; lost && i < N; i++)
         x[i] = m->regressors[i] = NAN;
     memcpy(m->x, x, sizeof x);
+{% for map, taps, probes in lines %}
+    {
+{% for name in ("mean", "std", "low", "high", "knots", "weights") %}
+        static const double {{ name }}[] = {
+{{ map[name] | numbers }}
+        };
+{% endfor %}
+        static const double taps[] = {
+{{ taps | numbers }}
+        };
+        static const int columns[] = { {{ map.columns | join(", ") }} }, probes[] = { {{ probes | join(", ") }} };
+        static const load_map line = {
+            {{ map.column }}, {{ map.columns | length }}, columns, mean, std, low, high, knots, weights
+        };
+        const double *first = m->inputs + (NOW - BACK) * Q;
+        if (!lost)
+            m->x[{{ map.column }}] = load(&line, x, carried(first, taps, 0, {{ probes | length }}, probes),
+                                carried(first, taps, 1, {{ probes | length }}, probes),
+                                {{ map.span[0] | hex }}, {{ map.span[1] | hex }});
+    }
+{% endfor %}
 {% for each in readouts %}
-    if (!lost)
-        m->x[{{ each.column }}] = {{ each.code }};
+    m->x[{{ each.column }}] = lost ? NAN : fmax(m->x[{{ each.column }}], {{ each.floor | hex }});
 {% endfor %}
     return lost ? 2 : 0;
 }

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from seakeep.conventions import displayed
-from seakeep.errors import RequestError
 from seakeep.report.style import (
     COLOURS,
     DASHED,
@@ -47,7 +46,6 @@ MARKS: dict[str, dict[str, Any]] = {
 @figure_style()
 def by_state(
     result: xr.Dataset,
-    states: Sequence[str] | None,
     axes: Places,
     size: tuple[float, float],
     draw: Callable[..., None],
@@ -55,11 +53,7 @@ def by_state(
     most: int = 3,
 ) -> Figure:
     """Draw panels for each state: `draw` takes the results of one, and its Axes, `each` of them."""
-    known = [str(name) for name in result["state"].values]
-    for name in states or ():
-        if name not in known:
-            raise RequestError(f"there is no state '{name}'. States: {', '.join(known)}.")
-    chosen = known if states is None else states
+    chosen = result["state"].values
     figure, places = panels(axes, each * len(chosen), most, size)
     for number, name in enumerate(chosen):
         draw(result.sel(state=name), *places[each * number :][:each])
@@ -91,7 +85,6 @@ def response(
     result: xr.Dataset,
     measured: xr.Dataset | None = None,
     *,
-    states: Sequence[str] | None = None,
     axes: Places = None,
 ) -> Figure:
     """Draw amplitude and phase of the response per wave amplitude, measured points beside.
@@ -102,8 +95,6 @@ def response(
         From :func:`seakeep.check.response`.
     measured : Dataset, optional
         From :func:`seakeep.check.measured_response`.
-    states : sequence of str, optional
-        States to draw; by default those that have a response.
     axes : Axes or sequence of Axes, optional
         Two for each state, amplitude and phase; by default those of a new figure.
 
@@ -111,7 +102,7 @@ def response(
     -------
     Figure
     """
-    states = _answering(result["amplitude"]) if states is None else states
+    states = _answering(result["amplitude"])
 
     def draw(own: xr.Dataset, gain: Any, turn: Any) -> None:
         factor, units, label = _shown(own)
@@ -146,13 +137,12 @@ def response(
 
     most = 2 + 2 * (len(states) % 2 == 0)
     entry = "wave" if "wave" in result["input"] else str(result.attrs["reference"])
-    return by_state(result.sel(input=entry), states, axes, (2.9, 1.75), draw, 2, most)
+    return by_state(result.sel(input=entry, state=states), axes, (2.9, 1.75), draw, 2, most)
 
 
 def coherence(
     result: xr.Dataset,
     *,
-    states: Sequence[str] | None = None,
     axes: Places = None,
 ) -> Figure:
     """Draw the coherence of each state with the inputs, over the state's own spectrum.
@@ -161,8 +151,6 @@ def coherence(
     ----------
     result : Dataset
         From :func:`seakeep.check.coherence`.
-    states : sequence of str, optional
-        States to draw; by default all.
     axes : Axes or sequence of Axes, optional
         One for each state; by default those of a new figure.
 
@@ -185,7 +173,7 @@ def coherence(
         place.set(xlim=(0, top), ylim=(0, 1.02), xlabel="frequency [Hz]")
         place.set_ylabel(f"coherence, {short_label(str(own['state'].values))} [1]")
 
-    return by_state(result, states, axes, (3.0, 1.9), draw)
+    return by_state(result, axes, (3.0, 1.9), draw)
 
 
 @figure_style()
@@ -252,13 +240,12 @@ def decay(result: xr.Dataset, *, axes: Places = None) -> Figure:
         place.set_xlabel("time after the release [s]")
         place.set_ylabel(f"{short_label(str(own['state'].values))} over offset [1]")
 
-    return by_state(result.rename(motion="state"), None, axes, (3.0, 1.8), draw)
+    return by_state(result.rename(motion="state"), axes, (3.0, 1.8), draw)
 
 
 def residuals(
     result: xr.Dataset,
     *,
-    states: Sequence[str] | None = None,
     axes: Places = None,
 ) -> Figure:
     """Draw correlations of one-step errors, the spectrum of free runs' errors, and their age.
@@ -267,8 +254,6 @@ def residuals(
     ----------
     result : Dataset
         From :func:`seakeep.check.residuals`.
-    states : sequence of str, optional
-        States to draw; by default all.
     axes : Axes or sequence of Axes, optional
         Four for each state; by default those of a new figure.
 
@@ -308,13 +293,12 @@ def residuals(
             for place in (past, spectrum):
                 place.legend(fontsize=6)
 
-    return by_state(result, states, axes, (2.6, 1.75), draw, 4, 4)
+    return by_state(result, axes, (2.6, 1.75), draw, 4, 4)
 
 
 def exceedance(
     result: xr.Dataset,
     *,
-    states: Sequence[str] | None = None,
     axes: Places = None,
 ) -> Figure:
     """Draw how often peaks exceed a level, measured and forecast, beside Rayleigh and Weibull.
@@ -323,8 +307,6 @@ def exceedance(
     ----------
     result : Dataset
         From :func:`seakeep.check.statistics`.
-    states : sequence of str, optional
-        States to draw; by default all.
     axes : Axes or sequence of Axes, optional
         One for each state; by default those of a new figure.
 
@@ -354,13 +336,12 @@ def exceedance(
         place.set_xlim(0, factor * level[-1])
         place.set(xlabel=f"peak of {label} [{unit}]", ylabel="exceeded by [1]")
 
-    return by_state(result, states, axes, (3.0, 2.0), draw)
+    return by_state(result, axes, (3.0, 2.0), draw)
 
 
 def density(
     result: xr.Dataset,
     *,
-    states: Sequence[str] | None = None,
     axes: Places = None,
 ) -> Figure:
     """Draw the densities of states, measured and forecast; arguments as :func:`exceedance`."""
@@ -373,7 +354,7 @@ def density(
         place.set_ylim(bottom=0)
         place.set(xlabel=f"{label} from its mean [{unit}]", ylabel=f"density [1/{unit}]")
 
-    return by_state(result, states, axes, (3.0, 1.9), draw)
+    return by_state(result, axes, (3.0, 1.9), draw)
 
 
 @figure_style()
@@ -421,7 +402,6 @@ def validity(result: xr.Dataset, *, axes: Places = None) -> Figure:
 def drift(
     result: xr.Dataset,
     *,
-    states: Sequence[str] | None = None,
     axes: Places = None,
 ) -> Figure:
     """Draw mean drift and slow response per amplitude squared, offsets of regular runs beside.
@@ -430,8 +410,6 @@ def drift(
     ----------
     result : Dataset
         From :func:`seakeep.check.drift`.
-    states : sequence of str, optional
-        States to draw; by default those that have a response.
     axes : Axes or sequence of Axes, optional
         One for each state; by default those of a new figure.
 
@@ -456,5 +434,5 @@ def drift(
             place.errorbar(own["point_frequency"], *offsets, **style)
         place.set(xlabel="frequency [Hz]", ylabel=f"{label} [{unit}]")
 
-    chosen = _answering(result["slow_response"]) if states is None else states
-    return by_state(result, chosen, axes, (3.0, 2.0), draw)
+    states = _answering(result["slow_response"])
+    return by_state(result.sel(state=states), axes, (3.0, 2.0), draw)

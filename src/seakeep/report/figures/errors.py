@@ -29,6 +29,7 @@ from seakeep.report.style import (
     plain_text,
     short_label,
 )
+from seakeep.report.tables import signed
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
 
@@ -201,9 +202,7 @@ def error_over_time_figure(result: StudyResult) -> Figure:
                 at = trend.sel(band=band, model=model)
                 quartiles = (at[f"{side}_quartile"] for side in ("lower", "upper"))
                 axes.fill_between(time, *quartiles, color=line["color"], alpha=0.15, linewidth=0)
-                p = float(at["p_value"])
-                words_of_p = "p < 0.01" if p < 0.01 else f"p = {p:.2f}"
-                label = f"{model_words(model)}, trend {words_of_p}"
+                label = f"{model_words(model)}, growth {growth_text(at)}"
                 axes.plot(time, at["error_mean"], label=label, **line)
             axes.set_title(words, loc="left", fontsize=8)
             axes.legend(fontsize=6.5, loc="upper left")
@@ -212,6 +211,12 @@ def error_over_time_figure(result: StudyResult) -> Figure:
     for axes in grid[-1]:
         axes.set_xlabel("time in encounter periods")
     return figure
+
+
+def growth_text(at: xr.Dataset) -> str:
+    """Change of ε(t) over the window with its interval, where there is one, in percent."""
+    value, *bounds = (signed(100 * at[key]) for key in ("change", "lower", "upper"))
+    return f"{value} %" + f" [{', '.join(bounds)}]" * bool(np.isfinite(at["lower"]))
 
 
 def member_errors(result: StudyResult, test: str, model: str) -> FloatArray:

@@ -262,7 +262,6 @@ def overlay(
     forecast: xr.Dataset,
     measured: xr.Dataset,
     *,
-    channels: Sequence[str] | None = None,
     axes: Places = None,
 ) -> Figure:
     """Draw a forecast over the measurement.
@@ -273,8 +272,6 @@ def overlay(
         From :meth:`seakeep.HankelDMDcModel.forecast`.
     measured : Dataset
         The run; the instants of the forecast are drawn.
-    channels : sequence of str, optional
-        Channels to draw; by default all of the forecast.
     axes : Axes or sequence of Axes, optional
         One for each channel; by default those of a new figure.
 
@@ -282,7 +279,7 @@ def overlay(
     -------
     Figure
     """
-    return _histories(forecast, None, measured, channels, axes)
+    return _histories(forecast, None, measured, axes)
 
 
 def band(
@@ -290,7 +287,6 @@ def band(
     measured: xr.Dataset,
     *,
     level: float = 0.95,
-    channels: Sequence[str] | None = None,
     axes: Places = None,
 ) -> Figure:
     """Draw the band of an ensemble and its mean over the measurement.
@@ -299,7 +295,7 @@ def band(
     ----------
     forecast : Dataset
         From :meth:`seakeep.models.HankelEnsemble.forecast` (its members) or ``forecast_summary``.
-    measured, channels, axes
+    measured, axes
         As for :func:`overlay`.
     level : float, optional
         Probability between the bounds, where members are given.
@@ -320,7 +316,7 @@ def band(
             "the forecast has no members and no statistics, so that it has no band. Draw it with "
             "seakeep.plot.overlay."
         )
-    return _histories(forecast.sel(statistic="mean"), forecast, measured, channels, axes)
+    return _histories(forecast.sel(statistic="mean"), forecast, measured, axes)
 
 
 @figure_style()
@@ -328,11 +324,9 @@ def _histories(
     forecast: xr.Dataset,
     bounds: xr.Dataset | None,
     measured: xr.Dataset,
-    channels: Sequence[str] | None,
     axes: Places,
 ) -> Figure:
-    every = [str(name) for name, each in forecast.data_vars.items() if "time" in each.dims]
-    chosen = every if channels is None else list(channels)
+    chosen = [str(name) for name, each in forecast.data_vars.items() if "time" in each.dims]
     for what, data in (("forecast", forecast), ("measured", measured)):
         known = [n for n in data.data_vars if data[n].dims == ("time",) and "time" in data.coords]
         for name in chosen:

@@ -22,7 +22,6 @@ SECTIONS: list[Callable[[StudyResult], Section | None]] = [
     errors.age,
     errors.coverage,
     errors.bands,
-    errors.service,
     errors.densities,
     errors.members,
     data.waves,

@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from seakeep.report.comparison import nowcast_blocks
 from seakeep.report.figures.errors import (
     BAND_WORDS,
     FEWEST,
@@ -18,8 +17,8 @@ from seakeep.report.figures.errors import (
     density_figure,
     eigenvalue_figure,
     error_over_time_figure,
+    growth_text,
     hyperparameter_figure,
-    nowcast_figure,
 )
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.sections.summary import by_channel, conditional, overview_table
@@ -31,14 +30,13 @@ from seakeep.report.tables import (
     beside,
     number,
     percent,
-    probability,
     short,
     signed,
     small_number,
     table,
 )
 from seakeep.study import StudyResult
-from seakeep.study.judge import VARIANTS, average_of, verdict
+from seakeep.study.judge import VARIANTS, average_of
 
 SELDOM = 0.01
 """Part of a run's samples below which a slack line is not worth a word."""
@@ -60,31 +58,8 @@ def errors(result: StudyResult) -> Section:
         )
         draw = partial(channel_boxes, result, test)
         figures.append(drawing("errors_by_channel", draw, words, name))
-    skill = [_skill_table(result)] if "statistics/skill" in result.groups else []
-    tables = [overview_table(result), *skill, *(error_table(result, test) for test in tests)]
+    tables = [overview_table(result), *(error_table(result, test) for test in tests)]
     return section("errors", figures=figures, tables=tables)
-
-
-def _skill_table(result: StudyResult) -> Table:
-    """By how much each model beats the baselines among the models, or does not."""
-    rows, skill = [], result.groups["statistics/skill"]
-    for test in map(str, skill["test"].values):
-        data = skill.sel(test=test).dropna("reference", how="all", subset=["change"])
-        for reference in data["reference"].values:
-            at = data.sel(reference=reference)
-            name, what = str(at["reference_model"].values), str(reference).replace("_", " ")
-            against = what if name == reference else f"{what} ({model_words(name)})"
-            for model in (each for each in result.models if each != name):
-                cells = (_change(at.sel(model=model, measure=key)) for key in HEADING)
-                rows.append((result.label_of(test), against, model_words(model), *cells))
-    return table("skill", rows)
-
-
-def _change(at: xr.Dataset) -> Number:
-    """Relative change with its interval, in percent; undecided where the interval holds zero."""
-    change, *bounds = (float(at[key]) for key in ("change", "lower", "upper"))
-    text = beside(100 * change, *(100 * each for each in bounds), form=signed)
-    return Number(f"{text} cannot tell") if verdict(*bounds) == "cannot tell" else text
 
 
 def error_table(result: StudyResult, test: str) -> Table:
@@ -299,10 +274,7 @@ def _trend_table(result: StudyResult, split: float) -> Table:
                         words,
                         model_words(model),
                         number(at["error_mean"].mean()),
-                        number(at["change"]),
-                        beside(at["slope"], at["lower"], at["upper"], form=small_number),
-                        number(at["kendall_tau"], 2),
-                        probability(at["p_value"]),
+                        Number(growth_text(at)),
                     )
                 )
     return table("trend", rows, {"split": split, "seconds": seconds}, conditional(result))
@@ -449,18 +421,3 @@ def members(result: StudyResult) -> Section | None:
             drawing("eigenvalues", partial(eigenvalue_figure, result), {"lowest": LOWEST})
         )
     return section("members", figures=figures) if figures else None
-
-
-def service(result: StudyResult) -> Section | None:
-    """Return errors against lead time of models that were judged in service."""
-    groups = {model: result.groups.get(f"nowcast/{model}") for model in result.models}
-    services = {model: each for model, each in groups.items() if each is not None}
-    if not services:
-        return None
-    first = next(iter(services.values()))
-    figures = []
-    for run in map(str, first["run"].values):
-        words = {"run": run, "starts": int(first.attrs["starts"])}
-        draw = partial(nowcast_figure, services, run)
-        figures.append(drawing("nowcast", draw, words, f"nowcast_{run}"))
-    return section("service", figures=figures, tables=[*nowcast_blocks(services)])

@@ -1,0 +1,24 @@
+"""The table of wrong changes fits the project; `python tests/mutations.py` makes them."""
+
+import ast
+import runpy
+from pathlib import Path
+
+HERE = Path(__file__).parent
+
+
+def test_lines_and_tests_of_all_changes_exist():
+    changes = runpy.run_path(str(HERE / "mutations.py"))["CHANGES"]
+    stale, names = [], {}
+    for file, old, _, tests in changes:
+        path = HERE.parent / "src/seakeep" / file
+        if not path.exists() or path.read_text("utf-8").count(old) != 1:
+            stale.append((file, old))
+        for place, name in (test.split("::") for test in tests.split()):
+            if place not in names:
+                body = ast.parse((HERE / place).read_text("utf-8")).body
+                names[place] = {each.name for each in body if isinstance(each, ast.FunctionDef)}
+            if name not in names[place]:
+                stale.append((place, name))
+    assert not stale, f"correct the table of tests/mutations.py: {stale}"
+    assert len({change[:3] for change in changes}) == len(changes)
