@@ -369,6 +369,12 @@ def _problem(
     return Problem(pieces, groups, data, widest, tuple(ridges), horizons)
 
 
+def _lacking(settings: HankelSettings, given: Given) -> str:
+    """What an optional alignment goes without, in words."""
+    aligned = settings.alignment
+    return aligned.missing(*given) if aligned is not None and aligned.optional else ""
+
+
 def _columns_of(candidate: HankelSettings) -> Columns:
     """What makes columns of their own."""
     aligned, lead = candidate.alignment, int(candidate.lead)
@@ -500,8 +506,7 @@ def settle(
     RequestError
         As :func:`select`; if λ is stated as zero and something is to be chosen.
     """
-    alignment = settings.alignment
-    lacking = alignment.missing(runs, states, inputs) if alignment and alignment.optional else ""
+    lacking = _lacking(settings, (runs, states, inputs))
     without = f"not aligned to the surge: {lacking}" if lacking else ""
     stated = not isinstance(settings.ridge, str)
     if stated and chosen is None:
@@ -617,7 +622,8 @@ def select(
     by_sea = folds == "sea_state"
     apart = folds if isinstance(folds, int) else groups_of(runs, folds, inputs)
     horizons = tuple(max(round(each * samples), 1) for each in horizon)
-    aligned = settings.alignment  # one that reads the measured surge is no choice
+    aligned = None if _lacking(settings, given) else settings.alignment
+    # One that reads the measured surge is no choice.
     first = _alignments(aligned, given)[0] if "alignment" in vary else aligned
     base = replace(settings, readouts=(), alignment=first)
     for search in _Search(base, given, samples, step, vary, opened, by_sea).shorter():
@@ -733,8 +739,7 @@ class _Search:
             return self.base.observables  # type: ignore[no-any-return]
         aligned, lead = candidate.alignment, None
         if aligned is not None and aligned.surge == "predicted":
-            is_left_out = aligned.optional and aligned.missing(*self.given)
-            lead = None if is_left_out else int(candidate.lead)
+            lead = int(candidate.lead)
         found = default_observables(self.given[2], self.period * self.step, self.unseen, lead)
         if lead is None and candidate.lead < self.base.lead and not candidate.lead:
             found = tuple(replace(o, lead=0.0) if isinstance(o, SlowSquares) else o for o in found)
