@@ -249,16 +249,17 @@ def main() -> int:
     chosen.results.touch()
     lines = chosen.results.read_text(encoding="utf-8").splitlines()
     known = dict(line.split(maxsplit=2)[:2] for line in lines)
-    left = [each for each in changes if key(each) not in known]
+    keys = {each: key(each) for each in changes}
+    left = [each for each in changes if keys[each] not in known]
     places: queue.Queue[Path] = queue.Queue()
 
     def judge(change: tuple[str, ...]) -> None:
         place = places.get()
         found = verdict(place, *change)
         places.put(place)
-        known[key(change)] = found
+        known[keys[change]] = found
         with chosen.results.open("a", encoding="utf-8") as file:
-            file.write(f"{key(change)} {found} {change[0]}: {change[2]}\n")
+            file.write(f"{keys[change]} {found} {change[0]}: {change[2]}\n")
 
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(chosen.jobs) as pool:
         for number in range(chosen.jobs):
@@ -272,7 +273,7 @@ def main() -> int:
             return 1
         for _ in track(pool.map(judge, left), "Wrong changes", len(left)):
             pass
-    found = [known[key(each)] for each in changes]
+    found = [known[keys[each]] for each in changes]
     for each, what in zip(changes, found, strict=True):
         if what != "killed":
             print(f"{what}: {each}")
