@@ -83,6 +83,8 @@ FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
 DELAYS = {"input_delays": (2.0, 3.0, 5.0), "state_delays": (0.5, 1.0, 1.5)}
 """Delays that are tried, encounter periods."""
+LENGTHS = (1.0, 0.6, 0.4)
+"""Lengths of a filter that are tried, in parts of the one that is stated."""
 LEADS = (0.0, 0.5, 0.75, 1.0)
 """Look-aheads that are tried, encounter periods."""
 MEMORY = 8.0
@@ -245,7 +247,7 @@ class Problem:
             np.concatenate([direct, block_means(states, blocks)], axis=1)
             for direct, states in zip(groups[2], groups[0], strict=True)
         ]
-        there = [number for number, group in enumerate(groups) if group[0].shape[1]]
+        there = [n for n, group in enumerate(groups) if group[0].shape[1]][candidate.is_filter :]
         system = primal_system(
             [
                 Piece(
@@ -264,6 +266,8 @@ class Problem:
         path = spread_means(path, count, candidate.state_delays, blocks)
         reach = candidate.state_reach, candidate.input_delays
         x, u, w = scales
+        if candidate.is_filter:
+            path = np.pad(path, ((0, 0), (0, 0), (len(x.mean), 0)))
         return Dynamics(path[0], *reach, x, u, w, data.input_map.follows), path
 
     def grows(self, candidate: HankelSettings, level: float) -> bool:
@@ -349,7 +353,7 @@ def _problem(
     }
     settings = candidates[0]
     most["input_delays"] += most["lead"] - min(each.lead for each in candidates)
-    widest = replace(settings, **most, observables=observables, ridge=1.0, standardize=True)
+    widest = settings.having(**most, observables=observables, ridge=1.0, standardize=True)
     runs, states, inputs = given
     chain = widest.input_map(dict(runs), states, inputs, settings.window)
     before = max(widest.state_reach, chain.history(widest.input_delays))
@@ -570,8 +574,8 @@ def select(
     vary : sequence of str
         Names out of ``VARIED``; λ is always chosen.
     opened : sequence of str
-        Names that the settings leave open: "observables", "memory", and "alignment" and "lead",
-        each with what is stated and without it.
+        Names that the settings leave open: delays, "observables", "memory", and "alignment" and
+        "lead", each with what is stated and without it.
     ridges : sequence of float, optional
         λ to try in ascending order, as the settings count it; by default ``RIDGES`` per snapshot
         pair.
@@ -625,7 +629,7 @@ def select(
     aligned = None if _lacking(settings, given) else settings.alignment
     # One that reads the measured surge is no choice.
     first = _alignments(aligned, given)[0] if "alignment" in vary else aligned
-    base = replace(settings, readouts=(), alignment=first)
+    base = settings.having(readouts=(), alignment=first)
     for search in _Search(base, given, samples, step, vary, opened, by_sea).shorter():
         problems = search.problems(apart, ridges, horizons)
         if problems:
@@ -637,7 +641,7 @@ def select(
             f"{round(min(horizon) * samples)} samples can be held out of runs of at most {longest}"
         )
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
-        complete = replace(settings, readouts=_asked(settings, fitted, vary))
+        complete = settings.having(readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
     trials: dict[Settings, Trial] = {}
     work = ({} if known is None else known), executor, progress
@@ -680,7 +684,7 @@ def select(
         )
     fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
     return Selected(
-        replace(taken, ridge=level, readouts=_asked(settings, fitted, vary)),
+        taken.having(ridge=level, readouts=_asked(settings, fitted, vary)),
         tuple(_rows_of(trials, taken, level, seed)),
         _note(
             problem,
@@ -747,7 +751,7 @@ class _Search:
 
     def left_open(self) -> list[Step]:
         """Steps through what the settings leave open."""
-        steps: list[Step] = []
+        steps = self._delays(self.opened)
         if "observables" in self.opened:
             steps.append(self._subsets)
         if {"alignment", "lead"} & {*self.opened}:
@@ -765,12 +769,19 @@ class _Search:
             steps.append(self._subsets)
         if "lead" in vary and not follows:
             steps.append(self._lengths("lead", LEADS))
-        steps += [self._lengths(n, periods) for n, periods in DELAYS.items() if n in vary]
+        steps += self._delays(vary)
         if "memory" in vary and self.remembers:
             steps.append(self._remembering)
         if "alignment" in vary or ("lead" in vary and follows):
             steps.append(self._variants)
         return steps
+
+    def _delays(self, names: Collection[str]) -> list[Step]:
+        """Delays in periods, or the length of a filter in parts of its own."""
+        if self.base.is_filter and "input_delays" in names:
+            own = self.base.input_delays / self.period
+            return [self._lengths("input_delays", [own * part for part in LENGTHS])]
+        return [self._lengths(n, periods) for n, periods in DELAYS.items() if n in names]
 
     def _subsets(self, best: Any) -> list[Any]:
         every = self.offered(best)
@@ -834,7 +845,7 @@ class _Search:
             aligned, lead, ahead = _columns_of(replace(each, observables=self.offered(each)))
             is_without = "lead" in self.opened and each.lead == 0 < self.base.lead
             mine = starts.setdefault((aligned, lead, ahead or not is_without), [])
-            mine.append(replace(each, **longest))
+            mine.append(each.having(**longest))
         problems: dict[Columns, Problem] = {}
         for number, (key, mine) in enumerate(starts.items()):  # that of the base is the first
             every = tuple(dict.fromkeys(o for each in mine for o in self.offered(each)))
