@@ -66,6 +66,8 @@ RANKS = tuple(round(2 ** (exponent / 2)) for exponent in range(18, 7, -1))
 """Numbers of singular values that are tried, half an octave apart: 512 to 16."""
 DELAYS = {"input_delays": (2.0, 3.0, 5.0), "state_delays": (0.5, 1.0, 1.5)}
 """Delays that are tried, encounter periods."""
+LENGTHS = (1.0, 0.6, 0.4)
+"""Lengths of a filter that are tried, in parts of the one that is stated."""
 LEADS = (0.0, 0.5, 0.75, 1.0)
 """Look-aheads that are tried, encounter periods."""
 VARIED = (
@@ -204,7 +206,7 @@ class Problem:
             [scale.deviations(each[:, part]) for each in group]
             for group, scale, part in zip(series, scales, parts, strict=True)
         ]
-        there = [number for number, part in enumerate(parts) if part.any()]
+        there = [n for n, part in enumerate(parts) if part.any() and (n or not candidate.is_filter)]
         system = primal_system(
             [
                 Piece(
@@ -225,6 +227,8 @@ class Problem:
             factor = pairs if candidate.ridge_scale == "per_snapshot" else 1
             path = ridge_path(system.gram, system.right, [factor * level for level in levels])
         x, u, w = scales
+        if candidate.is_filter:
+            path = np.pad(path, ((0, 0), (0, 0), (len(x.mean), 0)))
         return Dynamics(path[0], *delays[:2], x, u, w, data.input_map.follows), path
 
     def grows(self, candidate: HankelSettings, level: float) -> bool:
@@ -310,8 +314,7 @@ def _problem(
         [getattr(settings, name), *tried.get(name, ())]
         for name in ("state_delays", "input_delays", "lead")
     )
-    widest = replace(
-        settings,
+    widest = settings.having(
         state_delays=max(state_delays),
         input_delays=max(input_delays) + max(leads) - min(leads),
         lead=max(leads),
@@ -567,9 +570,9 @@ def select(
     variants = list(_variants(settings, given, vary, samples))
     apart = folds if isinstance(folds, int) else groups_of(runs, folds, inputs)
     horizons = tuple(max(round(each * samples), 1) for each in horizon)
-    base = replace(settings, readouts=(), **variants[0])
+    base = settings.having(readouts=(), **variants[0])
     for observables in offered:  # runs may be too short for the longest
-        steps = [*_steps(observables, vary, samples, variants)]
+        steps = [*_steps(observables, vary, base, samples, variants)]
         every = replace(base, observables=observables)
         problems = _problems(every, steps, given, apart, ridges or RIDGES, horizons)
         if len(problems) == len(variants):
@@ -581,7 +584,7 @@ def select(
             f"{round(min(horizon) * samples)} samples can be held out of runs of at most {longest}"
         )
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
-        complete = replace(settings, readouts=_asked(settings, fitted, vary))
+        complete = settings.having(readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
     trials: dict[Settings, Trial] = {}
     work = ({} if known is None else known), executor, progress
@@ -603,7 +606,7 @@ def select(
     problem = problems[_columns_of(taken)]
     fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
     if taken.rank is None:
-        complete = replace(taken, ridge=level, readouts=_asked(settings, fitted, vary))
+        complete = taken.having(ridge=level, readouts=_asked(settings, fitted, vary))
     else:
         complete = replace(taken, rank=int(level))
     return Selected(
@@ -832,6 +835,7 @@ def _defaults(
 def _steps(
     every: tuple[Observable, ...],
     vary: Sequence[str],
+    base: HankelSettings,
     period: float,
     variants: Sequence[Changes],
 ) -> Iterator[Sequence[Changes]]:
@@ -842,7 +846,9 @@ def _steps(
     if "lead" in vary and "lead" not in variants[0]:
         yield [{"lead": round(each * period)} for each in LEADS]
     for name, periods in DELAYS.items():
-        if name in vary:
+        if name in vary and base.is_filter:
+            yield [{name: round(part * base.input_delays)} for part in LENGTHS]
+        elif name in vary:
             yield [{name: round(each * period)} for each in periods]
     if "rank" in vary:
         yield [{}, {"rank": RANKS[0], "ridge": 0.0}]

@@ -219,6 +219,8 @@ class HankelSettings:
     role: ClassVar[Role] = "reference"
     is_ensemble: ClassVar[bool] = False
     may_choose: ClassVar[bool] = False
+    is_filter: ClassVar[bool] = False
+    """Whether no state is a regressor."""
     lengths: ClassVar[Mapping[str, int]] = {
         "window": 2,
         "state_delays": 0,
@@ -357,6 +359,11 @@ class HankelSettings:
     def state_reach(self) -> int:
         """Longest delay of the states: s, or the memory."""
         return max(self.state_delays, self.memory)
+
+    def having(self, **changes: Any) -> Self:
+        """These settings with others, as far as their kind has them."""
+        own = {each.name for each in fields(self) if each.init}
+        return replace(self, **{name: changes[name] for name in own & set(changes)})
 
     @property
     def radius(self) -> float | None:
