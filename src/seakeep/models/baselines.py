@@ -269,7 +269,7 @@ class FIR(LinearSpec):
             read,
             states,
             inputs,
-            vary=["input_delays"],
+            opened=["input_delays"],
             ridges=(*RIDGES, *LARGER),
             horizon=WINDOWS,
         )
