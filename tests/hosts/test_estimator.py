@@ -227,7 +227,7 @@ def test_what_lies_outside_the_training_is_that_of_the_live_model(
         live.step(*row)
     validity = live.conditions.validity
     assert found.calls["validity"](found.memory) == validity
-    assert bool(validity) == (factor > 1 or away > 0 or (slow and name == "following"))
+    assert bool(validity) == ((factor, slow, away) != (1, False, 0))
 
 
 @pytest.mark.parametrize("name", ["full", "short", "autonomous", "following", "following_now"])

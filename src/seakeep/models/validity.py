@@ -224,7 +224,7 @@ class Coverage:
         )
         reasons &= taught.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
         mean, reach, scale = None, np.array([-np.inf, np.inf]), signature.state_scale
-        if surge is not None and np.isfinite(surge).any():
+        if surge is not None and "surge" in signature.states and np.isfinite(surge).any():
             at, mean = signature.states.index("surge"), float(np.nanmean(surge))
             reach = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
         return Conditions(self, periods, peak, unseen, heights, steepnesses, reasons, mean, reach)
@@ -248,7 +248,9 @@ class Coverage:
         return cls(tuple(signature.inputs), first, *(store.numbers(dataset, key) for key in keys))
 
 
-def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) -> list[str]:
+def outside_training(
+    model: Model, run: xr.Dataset, start: float, steps: int, surge: FloatArray | None = None
+) -> list[str]:
     """Say in what a forecast lies outside the training: period, height, steepness, mean surge.
 
     Parameters
@@ -261,6 +263,8 @@ def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) ->
         Instant of the last measured state, s.
     steps : int
         Instants forecast.
+    surge : ndarray, optional
+        Surge that is forecast, m; by default the one that was measured.
 
     Returns
     -------
@@ -277,8 +281,8 @@ def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) ->
     values = labelled.channel_matrix(run, model.inputs, name, slice(first, at + steps))
     if len(values) < 2 or not np.all(np.isfinite(values)):
         return []
-    duration, surge = steps * model.dt, None
-    if "surge" in model.states and "surge" in run:
+    duration = steps * model.dt
+    if surge is None and "surge" in run:
         surge = run["surge"].values[(time > start) & (time <= start + duration + 1e-6)]
     conditions = coverage.conditions(values, model.signature, surge, duration)
     return conditions.sentences([label.units for label in model.signature.input_labels])
