@@ -573,10 +573,6 @@ def test_messages_of_forecasts(run):
         ensemble.forecast_windows(run, [], steps=5)
     with pytest.raises(RequestError, match="no member 6: the ensemble has 6, counted from 0 to 5"):
         ensemble.member(6)
-    with pytest.raises(
-        RequestError, match="needs an ensemble forecast with the dimension 'member'"
-    ):
-        seakeep.summarize(run)
     with pytest.raises(RequestError, match=r"leaves \d+ samples of history"):
         ensemble.forecast(run, start=0.5, steps=5)
     other = dataclasses.replace(small(), dt=0.2)

@@ -154,11 +154,6 @@ def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     RequestError
         If the unit of a channel does not scale.
     """
-    if "status" not in forecast.attrs:
-        raise RequestError(
-            "forecast must be what model.forecast or summarize returns, whose attributes hold a "
-            f"status; received a Dataset of {', '.join(map(str, forecast.data_vars)) or 'nothing'}."
-        )
     clock, own = froude_factor("s", scale), ["status", "diverged_at"]
     out = to_full_scale(forecast.drop_vars(own, errors="ignore"), scale)
     dt = float(np.diff(out["time"].values[:2]).sum())
@@ -197,8 +192,34 @@ def with_degrees(run: xr.Dataset) -> xr.Dataset:
     return out
 
 
-def compare(
-    model: Model,
+def compare(model: Model, campaign: Campaign, *where: Any, **how: Any) -> list[Comparison]:
+    """Forecast runs of a campaign with one model and pair the forecasts with the measurement.
+
+    Parameters
+    ----------
+    model : HankelDMDcModel or HankelEnsemble
+        The model. For an ensemble the members' mean is judged, and their band beside it.
+    campaign : Campaign
+        The campaign.
+    *where, **how
+        As in :func:`compare_models`: `runs`, `start`, `steps`, and by name `progress`, `members`,
+        `level`, `band`, `executor`.
+
+    Returns
+    -------
+    list of Comparison
+        One per run.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`compare_models`.
+    """
+    return compare_models({"model": model}, campaign, *where, **how)["model"]
+
+
+def compare_models(
+    models: Mapping[str, Model],
     campaign: Campaign,
     runs: Sequence[str] = (),
     start: float | str | None = None,
@@ -209,13 +230,13 @@ def compare(
     level: float = 0.95,
     band: Band = "members",
     executor: Executor | None = None,
-) -> list[Comparison]:
-    """Forecast runs of a campaign and pair the forecasts with the measurement.
+) -> dict[str, list[Comparison]]:
+    """Forecast the same instants with several models and pair them with the measurement.
 
     Parameters
     ----------
-    model : HankelDMDcModel or HankelEnsemble
-        The model. For an ensemble the members' mean is judged, and their band beside it.
+    models : mapping of str to model
+        Models by name; by default all start where the one with the longest history can.
     campaign : Campaign
         The campaign.
     runs : sequence of str, optional
@@ -241,72 +262,21 @@ def compare(
 
     Returns
     -------
-    list of Comparison
-        One per run.
-
-    Raises
-    ------
-    RequestError
-        If a run is unknown or none tests, or `start` and `steps` do not fit.
-    DataError
-        If a run cannot be read or used.
-
-    Warns
-    -----
-    SeakeepWarning
-        If an input of a test run repeats what the model was trained on.
-    """
-    several = compare_models(
-        {"model": model},
-        campaign,
-        runs,
-        start,
-        steps,
-        progress,
-        members=members,
-        level=level,
-        band=band,
-        executor=executor,
-    )
-    return several["model"]
-
-
-def compare_models(
-    models: Mapping[str, Model],
-    campaign: Campaign,
-    runs: Sequence[str] = (),
-    start: float | str | None = None,
-    steps: int | str | None = None,
-    progress: Progress | None = None,
-    *,
-    members: Progress | None = None,
-    level: float = 0.95,
-    band: Band = "members",
-    executor: Executor | None = None,
-) -> dict[str, list[Comparison]]:
-    """Forecast the same instants with several models and pair them with the measurement.
-
-    Parameters
-    ----------
-    models : mapping of str to model
-        Models by name; by default all start where the one with the longest history can.
-    campaign, runs, start, steps, progress, members, level, band, executor
-        As in :func:`compare`; `level` and `band` concern ensembles.
-
-    Returns
-    -------
     dict of str to list of Comparison
         One per run, by model.
 
     Raises
     ------
-    RequestError, DataError
-        As :func:`compare`; also if the time steps of the models differ.
+    RequestError
+        If a run is unknown or none tests, `start` and `steps` do not fit, or the models forecast
+        different states.
+    DataError
+        If a run cannot be read or used, or the time steps of the models differ.
 
     Warns
     -----
     SeakeepWarning
-        As :func:`compare`.
+        If an input of a test run repeats what the model was trained on.
     """
     wanted = list(runs) or campaign.test_runs
     if not wanted:
@@ -431,10 +401,6 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
         ``level`` and ``band`` ("members" or "calibrated"). At full scale ``scale`` ("full") and
         ``scale_factor`` over ``run``.
     """
-    if not comparisons:
-        raise RequestError(
-            "there is no comparison to tabulate. Give those of seakeep.study.compare."
-        )
     table = xr.concat([_row(comparison, intervals) for comparison in comparisons], dim="run")
     for name in set(table) & set(UNITS):
         table[name].attrs["units"] = UNITS[str(name)]
