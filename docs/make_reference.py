@@ -100,7 +100,7 @@ observables = [
 | `kind` | keys and defaults | columns |
 |---|---|---|
 | `"slow_squares"` | `of`; `orders = [0, 1, 2]` of the derivatives; `cutoff = "0.333 /T"`; `lead = "2 T"`; `lags = ["0 T", …, "5 T"]` | slow parts of the squares of elevations and their derivatives, which drive drift |
-| `"powers"` | `of`; `powers = [2, 3]`; `products = false`, or with those of different channels too | powers of inputs, with the input delays, which steep waves need |
+| `"powers"` | `of`; `powers = [2, 3]` | powers of inputs, with the input delays, which steep waves need |
 | `"expression"` | `name`, `expression`, `units = ""` | an expression of inputs, with the input delays |
 
 `cutoff`, `lead` and `lags` count in encounter periods, with or without `T`.

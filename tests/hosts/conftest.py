@@ -23,8 +23,8 @@ DT, PERIOD = 0.1, 8  # s, samples
 STATES, INPUTS = ["surge", "load"], ["eta", "wave probe"]
 OBSERVABLES = (
     SlowSquares(("eta", "wave probe"), orders=(0, 1, 2), lags=(0, 1), period=PERIOD * DT),
-    Powers("eta", (2, 3), products=False),
-    Powers(("eta", "wave probe"), (4,), products=True),
+    Powers("eta"),
+    Powers(("eta", "wave probe"), (4,)),
     Expression("mixed", "cos(9*eta)*abs(`wave probe`)/(1 + square(eta)) - average(-eta, eta**2)"),
     Expression("root", "sqrt(2 + sin(`wave probe`) - 0.1)"),
 )

@@ -248,7 +248,6 @@ def aligned_ensemble(runs, **alignment):
 @pytest.mark.parametrize(
     "alignment",
     [
-        {"mode": "dispersion", "surge": "measured", "highest_frequency": 0.9},
         {"mode": "effective", "surge": "measured", "celerity": 3.0},
         {"mode": "dispersion", "surge": "none"},
     ],
@@ -310,7 +309,6 @@ def test_an_aligned_ensemble_says_on_what_it_depends_and_comes_back(runs, surge,
         ),
         ({"offset": "3 m"}, "offset must be a number .*; received '3 m'"),
         ({"mode": "dispersion", "celerity": 2.0}, "celerity = 2.0 belongs to mode = 'effective'"),
-        ({"highest_frequency": 2.0}, "highest_frequency = 2.0 belongs to mode = 'dispersion'"),
         ({"channels": "eta"}, r"a list of one or more names; .* Write channels = \['eta'\]"),
     ],
 )

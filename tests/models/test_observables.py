@@ -39,7 +39,7 @@ def irregular(seed: int = 0, samples: int = 900) -> xr.Dataset:
 
 
 INPUTS = ["eta_fwd", "eta_cog"]
-CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3), products=True))
+CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3)))
 
 
 def fitted(run, lead=12, chosen=CHOSEN) -> InputMap:
@@ -106,7 +106,6 @@ def test_columns_are_named_with_units_and_stand_in_two_groups():
         "eta_cog_power_2": "m^2",
         "eta_fwd_power_3": "m^3",
         "eta_cog_power_3": "m^3",
-        "eta_fwd_times_eta_cog": "m m",
     }
     assert len(direct) == 18
     assert direct[6].units == "(m/s)^2"

@@ -70,9 +70,6 @@ class ProbeAlignment:
     channels : sequence of str, optional
         Inputs that are elevations; by default those with an ``attrs["x_position"]``, else those
         whose name starts with "eta".
-    highest_frequency : float, optional
-        Highest frequency of the waves in mode "dispersion", Hz; by default the one below which
-        99.9 % of the variance of the training input lies.
     optional : bool, optional
         Whether a model goes without the alignment where the training runs do not carry what it
         needs: water depth and elevations; and without the surge where that is no state, or no
@@ -90,7 +87,6 @@ class ProbeAlignment:
     offset: float = 0.0
     surge_channel: str = "surge"
     channels: tuple[str, ...] | None = None
-    highest_frequency: float | None = None
     optional: bool = False
 
     @property
@@ -108,16 +104,13 @@ class ProbeAlignment:
                 f"'{self.mode}'. Write mode = 'dispersion', or take surge = 'measured'."
             )
         check_number("alignment: offset", self.offset, "a number (m, positive downstream)", -np.inf)
-        for key, mode, meant in (
-            ("celerity", "effective", "a positive number, 'common' or None (m/s)"),
-            ("highest_frequency", "dispersion", "a positive number or None (Hz)"),
-        ):
-            value = getattr(self, key)
-            if value is not None and value != "common":
-                check_number(f"alignment: {key}", value, meant, TINY)
-            if value is not None and self.mode != mode:
+        if self.celerity is not None:
+            if self.celerity != "common":
+                meant = "a positive number, 'common' or None (m/s)"
+                check_number("alignment: celerity", self.celerity, meant, TINY)
+            if self.mode != "effective":
                 raise RequestError(
-                    f"alignment: {key} = {value!r} belongs to mode = '{mode}'; "
+                    f"alignment: celerity = {self.celerity!r} belongs to mode = 'effective'; "
                     f"received mode = '{self.mode}'. Leave it out, or change the mode."
                 )
         if self.channels is not None:
@@ -179,14 +172,13 @@ class ProbeAlignment:
         windows = {name: run.isel(time=last) for name, run in runs.items()}
         depth = _common_depth(runs)
         celerity = None if self.celerity == "common" else self.celerity
-        spread, limit = None, self.highest_frequency
+        spread = limit = None
         elevations = [channel for channel, yes in zip(inputs, carried, strict=True) if yes]
         if self.mode == "dispersion":
             depth = depth_of(first, first_name, depth)
-            if limit is None:
-                limit = float(
-                    np.median([_band(run, name, elevations) for name, run in windows.items()])
-                )
+            limit = float(
+                np.median([_band(run, name, elevations) for name, run in windows.items()])
+            )
         elif celerity is None:
             celerity, spread = _celerity(runs, elevations, depth)
         return FittedAlignment(
@@ -251,7 +243,7 @@ class FittedAlignment:
     water_depth : float or None
         m, of the training runs.
     highest_frequency : float or None
-        Hz (mode "dispersion").
+        Below which 99.9 % of the variance of the training input lies, Hz (mode "dispersion").
     """
 
     settings: ProbeAlignment

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
-from itertools import combinations
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -20,7 +19,7 @@ from seakeep.arrays import FloatArray
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.checks import TINY, check_choice, check_flag, check_keys, check_number, names_of
+from seakeep.models.checks import TINY, check_choice, check_keys, check_number, names_of
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals import expressions
 
@@ -35,17 +34,6 @@ STIFF = 100.0
 """How much more λ weighs on powers: an error of a high wave is an error of its cube."""
 SLOPE = 0.7
 """Slope of slow squares above the largest of training: a force does not grow for ever."""
-
-
-class Product(NamedTuple):
-    """A column as the product of two inputs."""
-
-    one: int
-    other: int
-
-    def columns(self, inputs: Any, limits: FloatArray) -> Any:
-        """The column of inputs, shape (time, Q); `limits` are those of powers."""
-        return inputs[:, [self.one]] * inputs[:, [self.other]]
 
 
 class Power(NamedTuple):
@@ -92,7 +80,7 @@ class SlowSquare(NamedTuple):
         return slow_squares(inputs[:, self.place], self.order, self.kernel, self.shifts, self.dt)
 
 
-Term = Product | Power | SlowSquare | Formula
+Term = Power | SlowSquare | Formula
 """Columns as Python and all other hosts compute them.
 
 All but slow squares are arithmetic of numpy, which arrays, texts of C and nodes of graphs know."""
@@ -113,7 +101,7 @@ class Bound:
     columns : callable, optional
         From the inputs, shape (time, Q), to the columns, shape (time, len(labels)); rows are NaN
         where they need samples that are not there; by default what the terms say.
-    terms : tuple of Product, Power, SlowSquare or Formula, optional
+    terms : tuple of Power, SlowSquare or Formula, optional
         The columns as all hosts compute them; a model without runs in Python alone.
     stiffness : float, optional
         How much more λ weighs on the columns than on others.
@@ -287,7 +275,7 @@ class SlowSquares:
 
 @dataclass(frozen=True)
 class Powers:
-    r"""Powers of inputs, and products of pairs of them, with the input delays of the model.
+    r"""Powers of inputs, with the input delays of the model.
 
     Steep waves move a vessel at wave frequency by more than a linear map of the elevation makes.
     Powers stay bounded by the input far out, :math:`u^q/(1 + u^2/36σ^2)^{(q-1)/2}`, so that seas
@@ -300,8 +288,6 @@ class Powers:
         Inputs.
     powers : sequence of int, optional
         Exponents, 2 to 5.
-    products : bool, optional
-        Whether the product of each pair of the inputs is taken too.
 
     Raises
     ------
@@ -311,19 +297,16 @@ class Powers:
 
     of: tuple[str, ...]
     powers: tuple[int, ...] = (2, 3)
-    products: bool = False
     kind: ClassVar[str] = "powers"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "of", _inputs(self.of, self.kind))
         powers = _integers(self.powers, "powers: powers", "integers from 2 to 5", 2, 5)
         object.__setattr__(self, "powers", powers)
-        check_flag("powers: products", self.products)
 
     def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""
         places = [_column(inputs, name, self.kind) for name in self.of]
-        pairs = list(combinations(places, 2)) if self.products else []
         labels = [
             ChannelLabel(
                 f"{inputs[place].name}_power_{power}",
@@ -333,17 +316,8 @@ class Powers:
             for power in self.powers
             for place in places
         ]
-        labels += [
-            ChannelLabel(
-                f"{inputs[a].name}_times_{inputs[b].name}",
-                f"{inputs[a].units} {inputs[b].units}".strip(),
-                f"product of {inputs[a].long_name} and {inputs[b].long_name}",
-            )
-            for a, b in pairs
-        ]
-        terms: list[Term] = [Power(tuple(places), self.powers)]
-        terms += [Product(one, other) for one, other in pairs]
-        return Bound(tuple(labels), True, 0, 0, terms=tuple(terms), stiffness=STIFF)
+        terms = (Power(tuple(places), self.powers),)
+        return Bound(tuple(labels), True, 0, 0, terms=terms, stiffness=STIFF)
 
     def reach(self, dt: float) -> tuple[int, int]:
         """0, 0: the instant itself."""

@@ -882,7 +882,7 @@ def _alignments(
     for alignment in (
         replace(carried, surge="predicted"),
         replace(carried, surge="none"),
-        replace(base, mode="effective", surge="none", highest_frequency=None),
+        replace(base, mode="effective", surge="none"),
     ):
         try:
             fitted = alignment.fit(*given, None)
