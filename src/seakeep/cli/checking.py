@@ -152,8 +152,7 @@ def calibrate(
     from seakeep.quality import warn_of_runs
     from seakeep.report.comparison import margins_table
     from seakeep.signals.time_axis import span_text
-    from seakeep.study.calibration import calibration_parts
-    from seakeep.study.comparison import samples_of
+    from seakeep.study.comparison import calibration_parts, samples_of
 
     fitted = load_model(ensemble)
     if not is_ensemble(fitted):

@@ -71,7 +71,6 @@ class Servable(Runs, Protocol):
         self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
     ) -> Live:
         """Put the model into service."""
-        ...
 
 
 class _Update(NamedTuple):

@@ -136,11 +136,9 @@ class Observable(Protocol):
         `period` is the encounter period in samples, None where no observable of the model has a
         ``period`` to fill in; `dt` is the time step in s.
         """
-        ...
 
     def reach(self, dt: float) -> tuple[int, int]:
         """Samples before and after an instant that its row reads, delays of the model apart."""
-        ...
 
 
 def _column(inputs: Sequence[ChannelLabel], name: str, what: str) -> int:

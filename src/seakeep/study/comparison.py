@@ -1,7 +1,13 @@
-"""Comparison of models with the measurement: forecasts of test runs, and their table."""
+"""Comparison of models with the measurement: forecasts of test runs, and their table.
+
+Runs and forecasts at full scale, by Froude's law.
+
+Parts of runs on which the band of an ensemble is calibrated.
+"""
 
 from __future__ import annotations
 
+import math
 import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -15,19 +21,18 @@ from seakeep import metrics, statistics
 from seakeep.arrays import Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.check.parts import samples_in
-from seakeep.conventions import displayed, is_elevation
+from seakeep.conventions import displayed, froude_factor, is_elevation
 from seakeep.core.bootstrap import FEWEST_SAMPLES
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_text
 from seakeep.quality import warn_of_runs
-from seakeep.signals import encounter_period, froude_factor
-from seakeep.signals.time_axis import span_text
+from seakeep.signals import encounter_period
+from seakeep.signals.time_axis import instant_text, span_text
 from seakeep.study.fit import warn_of_repeats, warn_of_waves
-from seakeep.study.full_scale import times, to_full_scale
 from seakeep.study.judge import MEASURES, window_errors
-from seakeep.study.plan import named
+from seakeep.study.plan import between, named
 from seakeep.toml import parse_length
 
 
@@ -557,3 +562,122 @@ def _seconds(
         )
     known = (float(r.attrs["encounter_period"]) for r in runs if "encounter_period" in r.attrs)
     return length.value * (next(known, None) or campaign.encounter_period())
+
+
+ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s",
+               "test_span": "s", "water_depth": "m",
+               "reads_input_until": "s", "input_predicted_from": "s", "diverged_at": "s",
+               "probe_offset": "m", "probe_offset_spread": "m"}  # fmt: skip
+"""Times and lengths among the attributes of a run, with their units."""
+
+
+def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> xr.Dataset:
+    """Convert a run, or a forecast, from model to full scale.
+
+    Parameters
+    ----------
+    run : Dataset
+        With a coordinate ``time`` in seconds and ``units`` on each variable.
+    scale : float
+        Scale factor, full-scale length over model length.
+    density_ratio : float, optional
+        As in :func:`seakeep.signals.froude_factor`.
+
+    Returns
+    -------
+    Dataset
+        Times and values at full scale; units keep their names. ``attrs["scale"]`` says
+        ``"full"``; times and lengths among the attributes are converted with them.
+
+    Raises
+    ------
+    RequestError
+        If the run is at full scale already, or a unit does not scale.
+
+    Examples
+    --------
+    >>> run = xr.Dataset(
+    ...     {"heave": ("time", [0.1, 0.2], {"units": "m"})},
+    ...     {"time": ("time", [0.0, 1.0], {"units": "s"})},
+    ... )
+    >>> full = to_full_scale(run, 100.0)
+    >>> full["heave"].values, full["time"].values
+    (array([10., 20.]), array([ 0., 10.]))
+    """
+    if run.attrs.get("scale") == "full":
+        raise RequestError("the run is at full scale already; convert it once.")
+    clock = froude_factor("s", scale)
+    out = run.assign_coords(time=run["time"] * clock)
+    out["time"].attrs = dict(run["time"].attrs)
+    for name, variable in run.data_vars.items():
+        factor = froude_factor(str(variable.attrs.get("units", "1")), scale, density_ratio)
+        out[name] = times(variable.assign_coords(time=out["time"]), factor)
+        if "x_position" in variable.attrs:
+            out[name].attrs["x_position"] = scale * float(variable.attrs["x_position"])
+    out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}
+    for key in ATTRIBUTES.keys() & run.attrs:
+        by = clock if ATTRIBUTES[key] == "s" else scale
+        value = run.attrs[key]
+        pair = isinstance(value, tuple | list)
+        out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
+    return out
+
+
+def times(channel: xr.DataArray, factor: float) -> xr.DataArray:
+    """Multiply a channel, and the standard deviations among its attributes, by a factor."""
+    known = {"training_std", "noise_std"} & set(channel.attrs)
+    spreads = {key: factor * float(channel.attrs[key]) for key in known}
+    return (channel * factor).assign_attrs(channel.attrs | spreads)
+
+
+def calibration_parts(
+    campaign: Campaign,
+    runs: Mapping[str, xr.Dataset],
+    dt: float,
+    start: str | None = None,
+    stop: str | None = None,
+) -> dict[str, xr.Dataset]:
+    """Part of each run between two instants, by default its training span, or the whole run.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign.
+    runs : mapping of str to Dataset
+        Prepared runs.
+    dt : float
+        Their time step, s.
+    start, stop : str, optional
+        Seconds, or encounter periods such as ``"20 T"``; a stop of ``"inf"`` is the end of all.
+
+    Returns
+    -------
+    dict of str to Dataset
+        The parts.
+
+    Raises
+    ------
+    RequestError
+        If an instant lies in none of the runs, or the start at or after the stop.
+    """
+    spans = {name: (float(each["time"][0]), float(each["time"][-1])) for name, each in runs.items()}
+    edges: dict[str, float] = {}
+    for option, stated in (("--start", start), ("--stop", stop)):
+        if stated is None:
+            continue
+        instant = edges[option] = instant_of(stated, campaign, runs.values(), option)
+        inside = any(begin <= instant <= end for begin, end in spans.values())
+        if not (inside or (option == "--stop" and instant == math.inf)):
+            known = ", ".join(f"{name}: {span_text(*span, dt)}" for name, span in spans.items())
+            raise RequestError(
+                f"{option} {stated} ({instant_text(instant, dt)} s) lies in none of the runs "
+                f"({known}). Name an instant inside, or leave {option} out."
+            )
+    if len(edges) == 2 and edges["--start"] >= edges["--stop"]:
+        begin, end = (instant_text(edge, dt) for edge in edges.values())
+        raise RequestError(f"--start {start} ({begin} s) lies at or after --stop {stop} ({end} s).")
+    parts = {}
+    for name, run in runs.items():
+        first, last = run.attrs.get("train_span", spans[name])
+        parts[name] = between(run, (edges.get("--start", first), edges.get("--stop", last)))
+    return parts
