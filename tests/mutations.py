@@ -59,8 +59,8 @@ CHANGES = (
     ("core/extremes.py", "period = 2 * dt * float", "period = dt * float", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
     ("core/density.py", '1.06, 1.0) if bandwidth == "paper" else (0.9, 1.34)', '1.06, 1.34) if bandwidth == "paper" else (0.9, 1.34)', "statistics/test_density.py::test_the_papers_bandwidth_lacks_the_divisor"),
     ("core/density.py", "np.exp(-0.5 * (h * angular) ** 2)", "np.exp(-((h * angular) ** 2))", "statistics/test_density.py::test_densities_are_scipys"),
-    ("core/divergence.py", "again = bootstrapped_densities(m, others,", "again = bootstrapped_densities(m, positions,", "statistics/test_divergence.py::test_a_perfect_prediction_is_zero_and_its_floor_is_not"),
-    ("core/divergence.py", "np.clip(0.5 * total", "np.clip(total", "statistics/test_divergence.py::test_it_is_bounded_symmetric_and_scipys_square"),
+    ("core/density.py", "again = bootstrapped_densities(m, others,", "again = bootstrapped_densities(m, positions,", "statistics/test_divergence.py::test_a_perfect_prediction_is_zero_and_its_floor_is_not"),
+    ("core/density.py", "np.clip(0.5 * total", "np.clip(total", "statistics/test_divergence.py::test_it_is_bounded_symmetric_and_scipys_square"),
     ("core/embedding.py", "last - window + 1", "last - window", "core/test_embedding.py::test_windows_at_the_papers_delays"),
     ("core/embedding.py", "max(first, earliest)", "max(first, earliest) + 1", "core/test_embedding.py::test_windows_at_the_papers_delays"),
     ("core/embedding.py", "reach = max(state_delays, input_delays)", "reach = state_delays", "core/test_embedding.py::test_windows_at_the_papers_delays"),
@@ -105,9 +105,9 @@ CHANGES = (
     ("core/response.py", "np.hypot(real, imag) > radius", "abs(real) > radius", "core/test_clipping.py::test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots"),
     ("core/response.py", "wanted, gain = value * radius / abs(value), reach @ direction", "wanted, gain = value * radius, reach @ direction", "core/test_clipping.py::test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots"),
     ("core/subspace.py", "embed(u, input_delays - 1, first - 1, columns)", "embed(u, input_delays - 1, first, columns)", "core/test_subspace.py::test_a_known_system_is_recovered_and_forecast_to_rounding"),
-    ("core/two_way.py", "drawn.reshape(count, -1)[:, :size]", "drawn.reshape(count, -1)[:, :1]", "statistics/test_two_way.py::test_cells_that_are_not_judged_are_left_out"),
-    ("core/two_way.py", "max(0.0, min(end, last) - max(begin, first))", "max(0.0, min(end, last) - min(begin, first))", "statistics/test_two_way.py::test_blocks_are_as_long_as_windows_overlap"),
-    ("core/two_way.py", "np.arange(block)) % size", "0 * np.arange(block)) % size", "statistics/test_two_way.py::test_neighbours_are_drawn_together"),
+    ("core/bootstrap.py", "drawn.reshape(count, -1)[:, :size]", "drawn.reshape(count, -1)[:, :1]", "statistics/test_two_way.py::test_cells_that_are_not_judged_are_left_out"),
+    ("core/bootstrap.py", "max(0.0, min(end, last) - max(begin, first))", "max(0.0, min(end, last) - min(begin, first))", "statistics/test_two_way.py::test_blocks_are_as_long_as_windows_overlap"),
+    ("core/bootstrap.py", "np.arange(block)) % size", "0 * np.arange(block)) % size", "statistics/test_two_way.py::test_neighbours_are_drawn_together"),
     ("core/spectra.py", "out[: len(products), column] = products", "out[: len(products), column] += 1", "check/test_residuals.py::test_a_right_model_leaves_white_errors"),
     ("core/spectra.py", "samples * (samples + 2) / (samples - lags)", "samples / 1.0 + 0 * lags", "check/test_residuals.py::test_ljung_box_is_that_of_statsmodels"),
     ("models/alignment.py", "at = surge[first:stop] + offsets[column]", "at = offsets[column] - surge[first:stop]", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
@@ -249,16 +249,17 @@ def main() -> int:
     chosen.results.touch()
     lines = chosen.results.read_text(encoding="utf-8").splitlines()
     known = dict(line.split(maxsplit=2)[:2] for line in lines)
-    left = [each for each in changes if key(each) not in known]
+    keys = {each: key(each) for each in changes}
+    left = [each for each in changes if keys[each] not in known]
     places: queue.Queue[Path] = queue.Queue()
 
     def judge(change: tuple[str, ...]) -> None:
         place = places.get()
         found = verdict(place, *change)
         places.put(place)
-        known[key(change)] = found
+        known[keys[change]] = found
         with chosen.results.open("a", encoding="utf-8") as file:
-            file.write(f"{key(change)} {found} {change[0]}: {change[2]}\n")
+            file.write(f"{keys[change]} {found} {change[0]}: {change[2]}\n")
 
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(chosen.jobs) as pool:
         for number in range(chosen.jobs):
@@ -272,7 +273,7 @@ def main() -> int:
             return 1
         for _ in track(pool.map(judge, left), "Wrong changes", len(left)):
             pass
-    found = [known[key(each)] for each in changes]
+    found = [known[keys[each]] for each in changes]
     for each, what in zip(changes, found, strict=True):
         if what != "killed":
             print(f"{what}: {each}")

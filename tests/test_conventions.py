@@ -110,16 +110,3 @@ def test_an_angle_is_no_number_and_no_length():
         conversion("mm", "rad", "pitch")
     with pytest.raises(RequestError, match="does not fit the channel"):
         conversion("-", "rad")
-
-
-def test_unknown_unit():
-    with pytest.raises(RequestError, match=r"the unit 'furlong' is not known.*Write it as 'mm'"):
-        si_unit("furlong")
-
-
-@pytest.mark.parametrize(
-    "unit", ["m**9**9**9", "m^9^9", "(((m^9)^9)^9)^9", "m^10", "m" + "*m" * 60, "*" * 70 + "€"]
-)
-def test_a_unit_that_would_keep_the_parser_busy_is_refused_at_once(unit):
-    with pytest.raises(RequestError, match=r"is not known\."):
-        si_unit(unit)

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -55,17 +54,6 @@ def test_what_keeps_a_file_from_being_written_is_named(tmp_path, place, error, m
 
 
 @pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
-def test_permissions_follow_the_umask(tmp_path):
-    before = os.umask(0o027)
-    try:
-        with replacing(tmp_path / "a.txt") as temporary:
-            temporary.write_text("x")
-    finally:
-        os.umask(before)
-    assert Path(tmp_path / "a.txt").stat().st_mode & 0o777 == 0o640
-
-
-@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
 def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path):
     """Written anew, a private file (0600) could be read by the group."""
     place = tmp_path / "a.txt"
@@ -75,16 +63,6 @@ def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path):
         with replacing(place) as temporary:
             temporary.write_text("x")
         assert place.stat().st_mode & 0o777 == mode
-
-
-@pytest.mark.skipif(os.name != "posix", reason="links of POSIX")
-def test_a_link_stays_one(tmp_path):
-    (tmp_path / "a.txt").write_text("old")
-    (tmp_path / "link.txt").symlink_to("a.txt")
-    with replacing(tmp_path / "link.txt") as temporary:
-        temporary.write_text("new")
-    assert (tmp_path / "link.txt").is_symlink()
-    assert (tmp_path / "a.txt").read_text() == "new"
 
 
 def test_a_netcdf_file_is_packed_as_asked(tmp_path):

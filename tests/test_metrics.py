@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep import DataError, RequestError, metrics
+from seakeep import RequestError, metrics
 
 MEASURED = np.array([[0.0, 10.0], [2.0, 30.0], [4.0, 20.0], [2.0, 40.0]])
 PREDICTED = np.array([[1.0, 10.0], [2.0, 20.0], [3.0, 20.0], [2.0, 50.0]])
@@ -26,13 +26,6 @@ def both(predicted=PREDICTED, measured=MEASURED):
 def test_nrmse_by_hand():
     # Arithmetic of four numbers: rounding alone, here and below.
     np.testing.assert_allclose(metrics.nrmse(**both()), np.sqrt([0.5, 50.0]) / SD, rtol=1e-14)
-
-
-def test_anrmse_is_the_average_over_the_channels():
-    expected = np.mean(np.sqrt([0.5, 50.0]) / SD)
-    value = metrics.anrmse(**both())
-    assert isinstance(value, float)
-    assert value == pytest.approx(expected, rel=1e-14)
 
 
 def test_error_over_time_by_hand():
@@ -274,29 +267,3 @@ def test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise():
         pair = both(measured, measured)
         found = metrics.is_slack(**pair, noise_std=np.sqrt(part) * spread)
         np.testing.assert_array_equal(found, [slack, slack])
-
-
-STEPPED = labelled(PREDICTED, units="m")
-
-
-@pytest.mark.parametrize(
-    ("predicted", "measured", "message"),
-    [
-        (PREDICTED.T, MEASURED, r"\(2, 4\) and measured \(4, 2\); .*\(time, channel\).* transp"),
-        (PREDICTED[:3], MEASURED, r"predicted has shape \(3, 2\) and measured \(4, 2\)"),
-        (PREDICTED[:1], MEASURED[:1], r"a window of 1 sample\(s\) has no standard deviation"),
-        (STEPPED, MEASURED, r"both be Datasets .* received Dataset and ndarray"),
-        (STEPPED, labelled(MEASURED, ("heave", "mooring_bo")),
-         r"measured has no channel 'mooring_bow'\. Did you mean 'mooring_bo'\? It has: heave"),
-        (STEPPED.assign_coords(time=STEPPED.time + 0.1), labelled(MEASURED),
-         r"not every instant of the first is one of the second"),
-        (STEPPED.assign_coords(time=[0.0, 1.0, 0.5, 1.5]), labelled(MEASURED),
-         r"the times of predicted are not sorted"),
-        (STEPPED, labelled(MEASURED).rename(time="sample"), "measured has no coordinate 'time'"),
-        (STEPPED, labelled(MEASURED, units="mm"), "'heave' is in 'm' in predicted and in 'mm' in"),
-        (STEPPED.astype(complex), labelled(MEASURED), "'heave' of predicted is of type complex128"),
-    ],
-)  # fmt: skip
-def test_what_is_refused(predicted, measured, message):
-    with pytest.raises((RequestError, DataError), match=message):
-        metrics.nrmse(predicted=predicted, measured=measured)

@@ -84,8 +84,3 @@ def test_every_check_has_a_figure_with_labelled_axes(run, model):
         bare = [each for each in labels(figure)[1::2] if not each]
         assert not bare, draw.__name__
         figure.canvas.draw()
-
-
-def test_models_and_settings_show_themselves_in_notebooks(model):
-    assert ">Hankel DMD with control: 3 states" in model._repr_html_()
-    assert "<th>ridge</th><td>0.01</td>" in HankelDMDc(2, 4, 0.01)._repr_html_()

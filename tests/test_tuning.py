@@ -78,24 +78,6 @@ def test_the_result_is_the_same_for_any_number_of_workers():
     assert alone.table.identical(other.table)
 
 
-@pytest.mark.parametrize(
-    ("sea", "words"), [("calm", "all runs have the same"), (None, "no two runs share a")]
-)
-def test_sea_states_that_hold_nothing_together_are_named(sea, words):
-    given = runs()
-    if sea is not None:
-        given = {name: run.assign_attrs(sea_state=sea) for name, run in given.items()}
-    result = seakeep.tune(SPEC, given, STATES, INPUTS, ["ridge"], (15,), "sea_state")
-    assert f"{words} sea state, so each was held out alone" in result.describe()
-
-
-def test_folds_that_are_no_number_of_parts_are_refused():
-    with pytest.raises(
-        RequestError, match=r"folds must be 'auto', 'run', 'sea_state' or an integer of at least 2"
-    ):
-        seakeep.tune(SPEC, runs(), STATES, INPUTS, folds=1)
-
-
 @pytest.mark.parametrize("vary", ["lead", "rank"])
 def test_the_figure_has_a_line_per_candidate_and_units(vary):
     pyplot = pytest.importorskip("matplotlib.pyplot")
@@ -152,22 +134,6 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tutorial, cap
     assert "lies in another folder" in capsys.readouterr().err
     assert main(["tune", "campaign.toml", "-o", "tuned"]) == 2
     assert "Name it tuned.toml" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ('horizon = ["900 T", 1000]', "no window of {} samples can be held out"),
-        ('horizon = "5 T", folds = "sea_state"', "sea state, so each was held out alone"),
-    ],
-)
-def test_the_command_takes_windows_and_folds_from_the_file(tutorial, capsys, settings, words):
-    path = tutorial / "campaign.toml"
-    text = path.read_text().replace("[model]\n", f"[model]\nselect = {{ {settings} }}\n", 1)
-    path.write_text(text)
-    assert main(["tune", "campaign.toml", "--vary", "ridge"]) == 0
-    samples = round(seakeep.read_campaign(path).seconds("900 T") / 0.08)
-    assert words.format(samples) in capsys.readouterr().out
 
 
 def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():

@@ -1,11 +1,9 @@
 """Linear waves: limits, the paper's speeds, and the way back."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seakeep.errors import RequestError
 from seakeep.waves import GRAVITY, group_speed, phase_speed, wavelength_to_frequency, wavenumber
 
 
@@ -54,20 +52,6 @@ def test_length_to_frequency_and_back(length, depth):
     k = wavenumber(wavelength_to_frequency(length, depth), depth)
     # Newton's method ends at rounding; ω² and tanh cost a few digits more.
     np.testing.assert_allclose(2 * np.pi / k, length, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: wavenumber(-1.0), "the frequency must be zero or positive, .*; received -1.0"),
-        (lambda: wavenumber(np.nan), "the frequency must be zero or positive, .*; received nan"),
-        (lambda: wavenumber(1.0, 0.0), "the water depth must be positive; received 0"),
-        (lambda: wavelength_to_frequency(0.0), "the wavelength must be positive; received 0"),
-    ],
-)
-def test_what_is_no_wave(call, message):
-    with pytest.raises(RequestError, match=message):
-        call()
 
 
 def test_no_number_of_a_sea_overflows():

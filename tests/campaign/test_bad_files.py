@@ -15,7 +15,7 @@ from scipy import io
 from small_tank import CAMPAIGN, tank_columns, write_csv
 
 from seakeep.campaign import read_campaign, read_table
-from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, SeakeepWarning
 
 T = 0.05 * np.arange(400)
 HEAVE = np.sin(T)
@@ -110,12 +110,6 @@ def path(request, tmp_path):
     READERS[request.param](made)
     assert read_table(made).sizes["time"] == T.size
     return made
-
-
-def test_empty(path):
-    path.write_bytes(b"")
-    with pytest.raises(DataError, match=r"run\..* is empty \(0 bytes\)\. Export the run again\."):
-        read_table(path)
 
 
 @pytest.mark.parametrize("part", [0.15, 0.5, 0.9])
@@ -264,26 +258,6 @@ class TestBagFolder:
             read_table(folder)
 
 
-def test_units_of_an_attribute_that_is_not_utf_8(tmp_path):
-    path = tmp_path / "run.h5"
-    with h5py.File(path, "w") as file:
-        file["time"], file["pitch"] = T, HEAVE
-        file["pitch"].attrs["units"] = np.bytes_("°".encode("latin-1"))
-    assert read_table(path)["pitch"].attrs["units"] == "°"
-
-
-def test_channels_of_another_length_in_one_netcdf_file(tmp_path):
-    path = tmp_path / "run.h5"
-    with h5py.File(path, "w") as file:
-        file["time"], file["heave"], file["load"] = T, HEAVE, HEAVE[:-3]
-    assert list(read_table(path, columns=["heave"]).data_vars) == ["heave"]
-    with pytest.raises(
-        DataError,
-        match=r"'load' has 397 values along '.*', and the time 400 along '.*'\. Save chan",
-    ):
-        read_table(path, columns=["load"])
-
-
 class TestUnits:
     """Runs and files that state different units."""
 
@@ -355,24 +329,3 @@ class TestLengths:
             r"to 39\.98 s, on the reference's clock\)\. Check the files of the run and the clocks",
         ):
             self.prepared(tmp_path, 30.0, 40.0)
-
-
-@pytest.mark.parametrize("content", [png(), b"a text\n" * 9, "é à".encode("latin-1") * 9])
-def test_what_is_no_video(tmp_path, content):
-    pytest.importorskip("cv2")
-    from seakeep.signals import track_video
-
-    path = tmp_path / "side.mp4"
-    path.write_bytes(content)
-    with pytest.raises(SeakeepError, match=r"side\.mp4 (cannot be opened as a video|holds|states)"):
-        track_video(path)
-
-
-def test_a_long_folder_is_not_listed(tmp_path):
-    for i in range(200):
-        (tmp_path / f"run_{i:03d}.csv").write_text("")
-    with pytest.raises(RequestError) as caught:
-        read_table(tmp_path / "run_17.csv")
-    message = str(caught.value)
-    assert "Its folder holds 200 names, the nearest of them run_017.csv, " in message
-    assert message.count(".csv") <= 1 + 1 + 5  # the one asked for, the guess, five names

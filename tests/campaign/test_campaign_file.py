@@ -4,7 +4,6 @@ import pytest
 
 from seakeep.campaign import read_campaign
 from seakeep.errors import RequestError
-from seakeep.study import read_study
 from seakeep.toml import Length
 
 
@@ -27,20 +26,6 @@ def test_reads(tank):
     assert hash(campaign.path)
     with pytest.raises(AttributeError):
         campaign.path = tank
-
-
-def test_a_campaign_is_shown_in_a_line(tank):
-    campaign = read_campaign(tank / "campaign.toml")
-    path = str(tank / "campaign.toml")
-    assert repr(campaign) == (
-        f"Campaign('Small tank', path={path!r}, 2 runs: first, second; models: model)"
-    )
-
-
-def test_byte_order_mark_and_crlf(tank):
-    path = tank / "campaign.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
-    assert read_campaign(path).name == "Small tank"
 
 
 # One mistake each: (old text, new text, the line of the message about it).
@@ -238,62 +223,6 @@ def test_every_mistake_is_named_at_once(edited):
     assert "3 mistakes in the campaign file" in message
     for key in ("channels.heave.colum: ", "runs.second.role: ", "model.states: missing"):
         assert key in message
-
-
-def test_circle(edited):
-    path = edited(
-        (
-            "[runs.first]",
-            '[derived.a]\nexpression = "b + 1"\nunit = "m"\n'
-            '[derived.b]\nfrom = "c"\nstep = "low_pass"\npassband = 1\n'
-            '[derived.c]\nexpression = "a * heave"\nunit = "m"\n[runs.first]',
-        )
-    )
-    assert (
-        "derived: derived channels need one another in a circle: a -> b -> c -> a. Make one of "
-        "them from measured channels." in refusal(path)
-    )
-
-
-def test_no_runs_no_channels(tmp_path):
-    path = tmp_path / "campaign.toml"
-    path.write_text("")
-    assert "channels: missing. Add it: at least one table [channels.NAME]." in refusal(path)
-    assert "runs: missing. Add it: at least one table [runs.NAME] with a file." in refusal(path)
-
-
-def test_toml_that_is_none(tank):
-    path = tank / "campaign.toml"
-    path.write_text("[campaign]\nname = Small tank\n")
-    message = refusal(path)
-    assert message.startswith(f"{path} is not valid TOML: ")
-    assert "line 2" in message
-    assert "Write texts in quotes" in message
-    path.write_bytes(b"[campaign]\nname = '\xff'\n")
-    assert refusal(path) == (
-        f"{path}, line 2: not UTF-8, which TOML asks for. Save the file as UTF-8."
-    )
-
-
-def test_another_kind_of_file_is_told_by_what_it_holds(tank):
-    path = tank / "study.toml"
-    path.write_text('[study]\ncampaign = "campaign.toml"\n[tests.all]\n')
-    assert refusal(path) == (
-        f"{path} is a study file (it has [study], [tests]), and a campaign file is expected here. "
-        "Name the right file."
-    )
-    campaign = tank / "campaign.toml"
-    with pytest.raises(
-        RequestError, match=r"is a campaign file \(it has \[channels\], .*and a stu"
-    ):
-        read_study(campaign)
-    for content in (b"t [s];x [m]\n0;1\n", b"t [\xb5s];x\n"):
-        table = tank / "run.csv"
-        table.write_bytes(content)
-        assert refusal(table).endswith(
-            " If it holds measurements: a campaign file is expected here, whose name ends in "
-            ".toml. Draft a campaign with 'seakeep init run.csv'."
-        )
 
 
 def test_file_that_is_not_there(tank):

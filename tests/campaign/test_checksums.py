@@ -1,14 +1,12 @@
 """Files are hashed in pieces, and again only when they have changed."""
 
 import hashlib
-import tracemalloc
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
-from seakeep.files import sha256_of
 
 
 @pytest.fixture
@@ -22,17 +20,6 @@ def hashed(monkeypatch):
 
     monkeypatch.setattr(hashlib, "file_digest", counting)
     return count
-
-
-def test_a_file_is_read_in_pieces(tmp_path):
-    path, size = tmp_path / "long.bin", 2**24
-    path.write_bytes(bytes(size))
-    tracemalloc.start()
-    found = sha256_of(path)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert found == hashlib.sha256(bytes(size)).hexdigest()
-    assert peak < size / 16
 
 
 def test_a_campaign_reads_each_file_once_for_its_checksum(tank, edited, hashed):

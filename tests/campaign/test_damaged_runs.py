@@ -109,23 +109,6 @@ def test_every_bad_file_is_named(edited, tank):
         campaign.encounter_period()
 
 
-def test_a_mistake_in_the_campaign_stops_at_once(edited):
-    campaign = read_campaign(edited(('column = "Heave"', 'column = "Heaven"')))
-    seen = []
-    with pytest.raises(RequestError, match="Heaven"):
-        write_prepared(campaign, progress=lambda *call: seen.append(call))
-    assert seen == []
-
-
-def test_a_probe_that_saw_no_wave_is_left_out(edited, tank):
-    still = tank_columns(1)
-    still["WP fwd [mm]"][:] = 3.0
-    write_csv(tank / "second.csv", still)
-    campaign = read_campaign(edited(POOLED))
-    with pytest.warns(SeakeepWarning, match="run 'second' is left out of the encounter period"):
-        campaign.prepare(["first"])
-
-
 LOGGERS = """
 [channels.heave]
 unit = "m"

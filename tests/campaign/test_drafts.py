@@ -11,9 +11,8 @@ from seakeep import cli
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import SeakeepWarning
 from seakeep.quality import findings_of
-from seakeep.quality.faults import BRIDGED
 
 ASSUMED = "{} is taken as .*, which is assumed: no file states its unit"
 
@@ -101,46 +100,6 @@ def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path):
     assert "# Hz; guessed: about 32 samples per wave of 0.6 s, the shortest" in text
 
 
-def test_no_step_is_finer_than_the_files(tmp_path):
-    """Of 13 samples a wave, as full-scale records have them, no 32 are made."""
-    text, campaign = drafted(tmp_path, [waves_of_period(tmp_path, "slow", 10.0, 1.25)])
-    settings = campaign.settings.preparation
-    assert (settings.sampling_rate, settings.steps_per_period) == (None, None)
-    assert "# sampling_rate = 1.25  # Hz; left out, the files' own" in text
-    assert "steps_per_period" not in text
-
-
-def test_columns_that_do_not_serve_are_listed(tmp_path):
-    for name, last in (("a", "3"), ("b", "4")):
-        (tmp_path / f"{name}.csv").write_text(
-            "t;heave;state;odd [furlong];gaps;twice;twice\n"
-            f"0;1,5;ok;1;1;1;1\n0,1;2,5;ok;1;;1;1\n0,2;{last},5;ok;1;1;1;1\n"
-        )
-    text, campaign = drafted(tmp_path, [tmp_path / "a.csv", tmp_path / "b.csv"])
-    assert list(campaign.settings.channels) == ["heave"]
-    for line in (
-        "# column 'state' left out: not all of it are numbers, or its name is there twice",
-        "# column 'odd [furlong]' left out: its unit 'furlong' is not known; state unit = '…'",
-        "# column 'gaps' left out: has gaps in a.csv, b.csv",
-        "# column 'twice' left out: not all of it are numbers, or its name is there twice",
-        'unit = "m" # ASSUMED: the file states none. Correct it',
-    ):
-        assert line in text.splitlines()
-    with pytest.warns(SeakeepWarning, match=ASSUMED.format("heave")):
-        run = campaign.prepare()["b"]
-    np.testing.assert_allclose(run["heave"], [1.5, 2.5, 4.5], rtol=1e-15)
-
-
-def test_a_column_that_is_missing_elsewhere(tmp_path):
-    write_csv(tmp_path / "a.csv", tank_columns())
-    fewer = tank_columns()
-    del fewer["acc [g]"]
-    write_csv(tmp_path / "b.csv", fewer)
-    text, campaign = drafted(tmp_path, [tmp_path / "a.csv", tmp_path / "b.csv"])
-    assert "# column 'acc [g]' left out: missing or unusable in b.csv" in text
-    assert campaign.prepare()
-
-
 def test_files_without_time_or_with_odd_names(tmp_path):
     for name in ("1.run of today.csv", "1.other.csv"):
         (tmp_path / name).write_text("heave [m],heave,`x`\n1,2,3\n2,3,4\n3,4,6\n")
@@ -187,62 +146,6 @@ def test_units_that_names_end_on(tmp_path, time, unit):
         assert run[name].attrs["units"] == units
         assert float(np.ptp(run[name].to_numpy())) == pytest.approx(2 * size, rel=1e-12)
     assert run["strain"].attrs["long_name"] == "Strain"  # kN it is no more
-
-
-@pytest.mark.parametrize("count", ["Sample", "WP [mm]"])
-def test_what_rises_evenly_and_is_no_time(tmp_path, count):
-    """Numbers of samples, and what a unit says to be something else."""
-    t = 0.02 * np.arange(100)
-    rising = np.arange(100.0) if count == "Sample" else 3 * t
-    write_csv(tmp_path / "run.csv", {count: rising, "Heave [mm]": np.sin(9 * t)})
-    text, campaign = drafted(tmp_path, [tmp_path / "run.csv"])
-    assert campaign.settings.files.sampling_rate == 100.0
-    assert campaign.settings.files.sampling_rate_assumed
-    left = "# column 'Sample' left out: it counts; if it counts seconds, state time = …"
-    assert (left in text) is (count == "Sample")
-
-
-def test_numbers_without_a_header(tmp_path):
-    t = 0.02 * np.arange(100)
-    np.savetxt(tmp_path / "run.txt", np.column_stack([t, np.sin(9 * t), np.cos(9 * t)]))
-    text, campaign = drafted(tmp_path, [tmp_path / "run.txt"])
-    assert 'time = "1" # guessed: it rises evenly, as times do, in s: 50 samples per second' in text
-    assert "# CORRECT IT: the files have no header; give [channels.…] their names, such" in text
-    assert list(campaign.settings.channels) == ["column_2", "column_3"]
-
-
-def test_files_in_the_data_folder_are_named_by_it(tmp_path, monkeypatch):
-    data = tmp_path / "data" / "set"
-    data.mkdir(parents=True)
-    write_csv(data / "run.csv", tank_columns())
-    monkeypatch.setenv("SEAKEEP_DATA_DIR", str(tmp_path / "data"))
-    text, campaign = drafted(tmp_path, [data / "run.csv"])
-    assert 'file = "${SEAKEEP_DATA_DIR}/set/run.csv"' in text
-    assert campaign.prepare()
-    monkeypatch.delenv("SEAKEEP_DATA_DIR")
-    (tmp_path / "settings").mkdir()
-    text, campaign = drafted(tmp_path / "settings", [data / "run.csv"])
-    assert 'file = "../data/set/run.csv"' in text
-    assert campaign.prepare()
-
-
-def test_nothing_to_draft_from(tmp_path):
-    with pytest.raises(
-        RequestError, match=r"no file was given\. Name the runs' files: seakeep init"
-    ):
-        draft_campaign([])
-    path = tmp_path / "words.csv"
-    path.write_text("t,a\n0,x\n1,y\n")
-    with pytest.raises(
-        RequestError,
-        match=r"no column has numbers that a channel could be made of \(columns: t, a\)",
-    ):
-        draft_campaign([path])
-    with pytest.raises(RequestError, match="does not exist"):
-        draft_campaign([tmp_path / "none.csv"])
-    path.write_text("")
-    with pytest.raises(DataError, match="is empty"):
-        draft_campaign([path])
 
 
 def test_motions_are_the_states_and_loads_are_named_beside_them(tmp_path):
@@ -320,57 +223,6 @@ def test_loggers_without_a_trigger_or_a_file(tmp_path):
     assert set(campaign.prepare()) == {"a", "b"}
 
 
-def test_files_that_have_nothing_in_common(tmp_path):
-    (tmp_path / "first.csv").write_text("t [s],heave [m]\n0,1\n1,2\n2,3\n")
-    (tmp_path / "second.csv").write_text("t [s],load [N]\n0,1\n1,2\n2,3\n")
-    other = tmp_path / "other"
-    other.mkdir()
-    moved = (tmp_path / "second.csv").rename(other / "first.csv")
-    with pytest.raises(
-        RequestError,
-        match=r"first\.csv and .*first\.csv have no column in common\. .* as RUN/LOGGER\.csv or",
-    ):
-        draft_campaign([tmp_path / "first.csv", moved])
-
-
-def probes(folder, runs):
-    """One logger a run, ``RUN/wave_probes.csv``, with a trigger; what it measures its name says."""
-    for seed, run in enumerate(runs):
-        columns = tank_columns(seed)
-        waves = columns["WP fwd [mm]"]
-        trigger = (columns["Time [s]"] % 5 < 0.1).astype(float)
-        (folder / run).mkdir()
-        yield write_csv(
-            folder / run / "wave_probes.csv",
-            {"time [s]": columns["Time [s]"], "trigger [V]": trigger, "us_fwd [mm]": waves},
-        )
-
-
-def test_one_logger_a_run_keeps_the_names_of_runs_and_logger(tmp_path):
-    runs = ["irregular_1", "irregular_2", "regular_1", "regular_2"]
-    text, campaign = drafted(tmp_path, list(probes(tmp_path, runs)))
-    assert campaign.runs == runs
-    assert list(campaign.settings.channels) == ["eta_us_fwd"]
-    assert "# column 'trigger [V]' left out: pulses of a trigger" in text
-    assert "STATE IT" not in text
-    assert "measured: the mean of the irregular runs (this is that of irregular_1)" in text
-    assert 'states = ["eta_us_fwd"] # CORRECT IT: no motion was found; name the files of' in text
-    assert campaign.training_runs == ["irregular_1"]
-    assert text.count("# guessed: irregular runs train but one, the rest tests\n") == 4
-
-
-def test_a_few_missing_samples_leave_a_motion_among_the_states(tmp_path):
-    """Three of three thousand: they are bridged, and no other sensor takes the place."""
-    columns = tank_columns(seconds=60.0)
-    columns["Heave 2 [mm]"] = columns["Heave [mm]"].copy()
-    columns["Heave [mm]"] = np.where(np.isin(np.arange(3001), (9, 500, 501)), np.nan, 1.0)
-    columns["Heave [mm]"] *= columns["Heave 2 [mm]"]
-    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
-    assert campaign.model().states == ("heave", "pitch")
-    assert 'gaps = "bridge" # heave: ' in text
-    assert (campaign.prepare()["run"]["heave_flags"] == BRIDGED).any()
-
-
 @pytest.mark.parametrize("lost", [20, 200])  # of 1001 samples: a channel with gaps, and none
 def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
     columns = tank_columns() | {"WP 2 [mm]": tank_columns()["WP fwd [mm]"]}
@@ -384,32 +236,6 @@ def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
     for name, key in (("heave", "states"), ("eta_2", "inputs")):
         said = f"# {name} left out: it has gaps, and a model takes none. To be among the {key}, "
         assert said in text
-
-
-@pytest.mark.parametrize("rest", ["constant", "noise"])
-def test_restrained_motions_are_no_states(tmp_path, rest):
-    columns = tank_columns(0, seconds=40.0)
-    noise = np.random.default_rng(0).normal(0.0, 0.1, columns["Time [s]"].size)
-    columns |= {"Roll [deg]": noise if rest == "noise" else 0 * noise + 0.2, "Surge [m]": 0 * noise}
-    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
-    assert campaign.model().states == ("heave", "pitch")
-    assert "# roll, surge left out: next to no motion beside the others: restrained?" in text
-    assert {"roll", "surge"} <= set(campaign.settings.channels)
-
-
-def test_probes_behind_the_vessel_are_no_inputs(tmp_path):
-    columns = tank_columns()
-    for name in ("WP aft [mm]", "wave downstream [mm]"):
-        columns[name] = 0.8 * columns["WP fwd [mm]"]
-    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
-    assert campaign.model().inputs == ("eta_fwd",)
-    assert "# eta_aft, eta_1 left out: behind the vessel, by name, where its own waves are" in text
-    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", tank_columns())])
-    assert campaign.training_runs == ["run"]
-    assert campaign.settings.rig.water_depth is None  # none is made up
-    assert (
-        "# Remove probes that stand behind the vessel: the waves it makes are not an input." in text
-    )
 
 
 def regular(folder, name, period, height=9.0):
@@ -434,27 +260,6 @@ def test_runs_have_the_role_that_their_waves_give_them(tmp_path):
     }  # fmt: skip
     assert 'waves = "regular" # guessed from its spectrum' in text
     assert 'role = "unused" # guessed: no waves were found, as in still water or decay' in text
-
-
-def test_a_run_with_a_dead_motion_is_not_used(tmp_path):
-    columns = [tank_columns(i, 60.0) for i in range(4)]
-    columns[1]["Pitch (deg)"][:] = 0.3
-    files = [write_csv(tmp_path / f"a{i}.csv", each) for i, each in enumerate(columns)]
-    text, campaign = drafted(tmp_path, files)
-    assert campaign.runs == ["a0", "a2", "a3"]
-    assert campaign.model().states == ("heave", "pitch")
-    why = "# guessed: pitch is constant, and moves in other runs: a dead sensor?"
-    assert f'role = "unused" {why}' in text
-
-
-def test_a_test_lies_within_what_trains(tmp_path):
-    files = [regular(tmp_path, f"r{i}", period) for i, period in enumerate((1.0, 1.4, 2.4))]
-    _, campaign = drafted(tmp_path, files)
-    assert campaign.test_runs == ["r1"]
-    high = {n: (1 if "Time" in n else 3) * each for n, each in tank_columns(3).items()}
-    files = [write_csv(tmp_path / f"i{i}.csv", tank_columns(i)) for i in range(3)]
-    _, campaign = drafted(tmp_path, [*files, write_csv(tmp_path / "i3.csv", high)])
-    assert campaign.test_runs == ["i2"]
 
 
 def rigged(folder, name, period, height, seed, begin=12.0):
@@ -505,15 +310,6 @@ def test_waves_that_all_repeat_are_held_out_together(tmp_path):
     assert drafted(tmp_path, files)[1].test_runs == ["b", "b_2"]
     # Of one wave alone, nothing else is left to hold out.
     assert drafted(tmp_path, files[:2])[1].test_runs == ["a_2"]
-
-
-def test_noise_that_leads_the_count_of_waves(tmp_path):
-    columns = tank_columns(seconds=60.0)
-    sound = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])[1].encounter_period()
-    columns["WP fwd [mm]"] += np.random.default_rng(0).normal(0, 5.0, columns["Time [s]"].size)
-    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
-    assert "period_hysteresis = 0.3 # guessed: without it, noise of eta_fwd counts as waves" in text
-    assert campaign.encounter_period() == pytest.approx(sound, rel=0.05)  # some waves are lower
 
 
 def test_init_takes_what_the_message_asks_for(tmp_path, capsys):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from seakeep.campaign import draft_campaign, read_campaign, write_prepared
-from seakeep.errors import DataError, RequestError
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
@@ -74,35 +73,6 @@ def test_interrupted_half_way_a_second_call_continues(copied):
     assert (folder / f"{RUNS[0]}.nc").stat().st_mtime_ns == written
     assert calls[-1] == (2, 2, RUNS[1])
     assert {call[:2] for call in calls[:-1]} == {(1, 2)}  # one is done, also while clocks are found
-
-
-@pytest.mark.parametrize(
-    ("pair", "error", "message"),
-    [
-        (('column = "heave [m]"', 'column = "heavy"'), RequestError,
-         r"none of its 4 files has a column 'heavy' for channel 'heave'\. Did you mean 'heave'\? "
-         r"Correct \[channels\.heave\]\. Their columns: .*pitch"),
-        (('column = "heave [m]"', 'column = "heave [mm]"'), RequestError,
-         r"no.* 'heave \[mm\]' for channel 'heave'\. There is a column 'heave \[m\]', in another "
-         r"unit\. Correct"),
-        (('column = "heave [m]"\nunit = "m"', 'column = "trigger"\nunit = "m"'), RequestError,
-         r"column 'trigger' of channel 'heave' stands in the files of wave_probes and"),
-        (('reference = "wave_probes"', 'reference = "wave_prober"'), RequestError,
-         r"instruments\.reference: received 'wave_prober', which no run has a file of"),
-        (('[instruments.mru]', '[instruments.mrv]'), RequestError,
-         r"runs\.irregular_1\.files\.mru: no table \[instruments\.mru\]\. Did you mean 'mrv'"),
-        (('trigger_unit = "-"', 'trigger_unit = "-"\ntriger = 3'), RequestError,
-         r"instruments\.video\.triger: unknown key, received 3\. Did you mean 'trigger'"),
-        (('trigger = "lamp"', 'trigger = "lamp"\nshared = ["surge", "us_fwd"]'), RequestError,
-         r"state only one of trigger, shared to find the clock from"),
-        (('trigger = "lamp"', 'trigger = "surge"'), DataError,
-         r"clock of 'video' .*video\.csv\)"),
-    ],
-)  # fmt: skip
-def test_mistakes(copied, pair, error, message):
-    path = copied(pair)
-    with pytest.raises(error, match=message):
-        read_campaign(path).prepare(["regular_2"])
 
 
 def test_the_draft_of_the_raw_files_prepares_as_it_stands(copied):

@@ -131,22 +131,3 @@ def test_a_silent_logger_is_named_before_the_rows_of_others_pile_up(tmp_path):
     found = chain.push({"probes": between("probes", 36, 48), "mru": lost})
     assert found["eta_fwd"].sel(time=slice(25.0, 40.0)).notnull().all()
     assert found["heave"].sel(time=slice(25.0, 40.0)).isnull().all()
-
-
-def test_bad_samples_are_refused_and_not_taken(campaign, rows):
-    chain = campaign.live_chain("unseen")
-    first = {name: each[:50] for name, each in rows.items()}
-    chain.push({"": first})
-    with pytest.raises(RequestError, match="the instants of '' do not increase"):
-        chain.push({"": first})
-    with pytest.raises(RequestError, match="there is no logger 'mru'"):
-        chain.push({"mru": first})
-    with pytest.raises(RequestError, match="Send NaN for a value that was lost"):
-        chain.push({"": {"t": rows["t"][50:60]}})
-    with pytest.raises(RequestError, match="has no column 'bogus'"):
-        chain.push({"": {"bogus": rows["t"][50:60]}})
-    chain.push({"": {name: each[50:60] for name, each in rows.items()}})
-    with pytest.raises(RequestError, match="at least four times as long as the delay"):
-        campaign.live_chain("unseen", delay=10.0, window=20.0)
-    with pytest.raises(RequestError, match="has no run 'nowhere'"):
-        campaign.live_chain("nowhere")

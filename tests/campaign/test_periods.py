@@ -6,7 +6,6 @@ import xarray as xr
 from small_tank import CAMPAIGN, tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
-from seakeep.errors import RequestError
 from seakeep.models.settings import periods_to_samples
 from seakeep.study import fit_campaign
 
@@ -99,48 +98,6 @@ def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(edit
     assert run.attrs["encounter_period"] == period
 
 
-@pytest.mark.parametrize(
-    ("pairs", "message"),
-    [
-        (
-            [("span = [2, 18]", 'span = ["1 T", 18]')],
-            r"runs\.second\.span: counts in encounter periods, and the period is measured with "
-            r"it, as the zero-up-crossing period of eta_fwd\. State encounter_period \(s\)",
-        ),
-        (
-            [("[preparation]", '[instruments.a]\nwindow = "9 T"\n[preparation]')],
-            r"instruments\.a\.window: counts in encounter periods, and the period is measured",
-        ),
-        (
-            [("[preparation]", '[preparation]\nlongest_gap = "0.1 T"')],
-            r"preparation\.longest_gap: received '0\.1 T', which should be a number",
-        ),
-        (
-            [("eta_fwd = -2.5", ""), ("[channels.eta_fwd]", "[channels.probe]"),
-             ('inputs = ["eta_fwd"]', ""), ("input_delays = 8", 'input_delays = "5 T"')],
-            r"model\.input_delays: counts in encounter periods, and the campaign has none\. State",
-        ),
-        ([("span = [2, 18]", 'span = ["2 /T", 18]')], r"span.*written like '1\.5 T'"),
-        ([("ridge = 1", 'ridge = 1\nstop = "inf T"')], r"model\.stop: this length must be finite"),
-        ([("span = [2, 18]", 'span = ["8 T", "2 T"]')], "start before end"),
-        ([("sampling_rate = 10", 'dt = "0.1 T"')], r"preparation\.dt: received '0\.1 T', which sh"),
-    ],
-)  # fmt: skip
-def test_what_cannot_count_in_periods(edited, pairs, message):
-    with pytest.raises(RequestError, match=message):
-        read_campaign(edited(*pairs))
-
-
-def test_a_span_of_both_kinds_that_runs_backwards(edited):
-    campaign = read_campaign(edited(STATED, ("span = [2, 18]", 'span = ["8 T", 12]')))
-    with pytest.raises(
-        RequestError,
-        match=r"runs\.second\.span: received \[8 T, 12\.0\], which with an encounter period of "
-        r"1\.6 s is \[12\.8, 12\]\. State the lower one first",
-    ):
-        campaign.prepare()
-
-
 @pytest.mark.parametrize("measured", [False, True])
 def test_delays_window_and_stop_of_a_model(edited, measured):
     pairs = [] if measured else [STATED]
@@ -159,8 +116,3 @@ def test_delays_window_and_stop_of_a_model(edited, measured):
     path = edited(*pairs, (keys[0], f"state_delays = {s}\ninput_delays = {z}\nridge = 1\n"
                            f"window = {m}\nstop = {5 * period}\n"))  # fmt: skip
     np.testing.assert_array_equal(model.A, fit_campaign(read_campaign(path)).A)
-
-
-def test_a_frequency_is_no_instant(tank):
-    with pytest.raises(RequestError, match=r"received '4 /T', a frequency\. Give a length such as"):
-        read_campaign(tank / "campaign.toml").seconds("4 /T")

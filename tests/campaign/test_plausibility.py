@@ -310,37 +310,8 @@ class TestValues:
         assert "scale" in kinds(run)
 
 
-@pytest.mark.parametrize(
-    ("begin", "why"),
-    [(300, "a gap of 2 s is longer than longest_gap = 0.25 s in [preparation]"),
-     (901, "it stands at an end of the record")],
-)  # fmt: skip
-def test_why_a_gap_is_not_bridged(edited, tank, begin, why):
-    columns = tank_columns(0)
-    columns["Heave [mm]"][begin : begin + 100] = np.nan
-    columns["Heave [mm]"][100:105] = np.nan  # short
-    write_csv(tank / "first.csv", columns)
-    path = edited(("[preparation]", '[preparation]\ngaps = "bridge"'))
-    said = findings_of(read_campaign(path).prepare(["first"])["first"])
-    missing, bridged = (each.text for each in said)
-    assert missing.startswith("missing: 100 samples in 1 place(s)")
-    assert missing.endswith(f"; not bridged: {why}")
-    assert bridged.startswith("bridged: 5 samples in 1 place(s)")
-
-
 def kinds(run):
     return {each.kind.word for each in findings_of(run)}
-
-
-@pytest.mark.usefixtures("empty_sheet")
-def test_the_commands_show_step_and_period(edited, tank, capsys):
-    path = edited(("sampling_rate = 10", "steps_per_period = 20"))
-    assert cli.main(["prepare", str(path)]) == 0
-    period = read_campaign(path).encounter_period()
-    words = f"ime step {period / 20:.4g} s ({20 / period:.4g} Hz), encounter period T {period:.4g}"
-    assert words in " ".join(capsys.readouterr().err.split())
-    page = (tank / "prepared" / "quality.html").read_text(encoding="utf-8")
-    assert page.count(words) == 2
 
 
 @pytest.mark.usefixtures("empty_sheet")

@@ -5,11 +5,9 @@ import pytest
 import xarray as xr
 from small_tank import DT, tank_columns, write_csv
 
-from seakeep import cli
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.files import write_netcdf
-from seakeep.quality import findings_of
 from seakeep.signals import (
     band_pass,
     differentiate,
@@ -64,19 +62,6 @@ def test_accuracy_is_kept_in_si_units(edited):
     run = read_campaign(path).read_run("first")
     assert run["heave"].attrs["accuracy"] == pytest.approx(0.5e-3)  # mm
     assert "accuracy" not in run["eta_fwd"].attrs
-
-
-def test_a_run_may_differ(edited):
-    path = edited(
-        (
-            "[preparation]",
-            '[runs.second.channels.heave]\nsign = -1\ncolumn = "WP fwd"\n[preparation]',
-        )
-    )
-    campaign = read_campaign(path)
-    first, second = campaign.read_run("first"), campaign.read_run("second")
-    np.testing.assert_array_equal(second["heave"], -second["eta_fwd"])
-    assert abs(float(np.corrcoef(first["heave"], first["eta_fwd"])[0, 1])) < 0.999
 
 
 def test_prepared_runs(campaign):
@@ -145,16 +130,6 @@ def test_derived_at_the_files_own_rate(edited):
     units = {n: run[n].attrs["units"] for n in ("speed", "way", "smooth", "group", "sway")}
     assert units == {"speed": "m/s", "way": "m", "smooth": "m", "group": "m^2", "sway": "m"}
     assert run["way"].attrs["long_name"] == "way of the bow"
-
-
-def test_a_step_whose_unit_does_not_fit(edited):
-    campaign = read_campaign(edited(("[derived.pitch_rate]", "[derived.heave_rate]")))
-    with pytest.raises(
-        RequestError,
-        match=r"run 'first', derived channel 'heave_rate': the unit 'rad/s' does not fit the "
-        r"derived channel 'heave_rate', which is measured in 'm/s'",
-    ):
-        campaign.read_run("first")
 
 
 class TestStep:
@@ -372,18 +347,6 @@ class TestBadRuns:
             campaign.prepare(["secnd"])
 
 
-def test_unused_runs_are_left_alone(edited, tank):
-    campaign = read_campaign(edited(('role = "test"', 'role = "unused"')))
-    (tank / "second.csv").unlink()
-    assert list(campaign.prepare()) == ["first"]
-
-
-def test_home_folder(edited, monkeypatch):
-    path = edited(('file = "second.csv"', 'file = "~/second.csv"'))
-    monkeypatch.setenv("HOME", str(path.parent))
-    assert read_campaign(path).prepare(["second"])
-
-
 class TestDigest:
     def test_what_does_not_matter(self, edited):
         digest = read_campaign(edited()).digest
@@ -478,15 +441,3 @@ def test_a_span_to_the_end_of_the_record(tank, edited):
         assert run.attrs["test_span"][1] == pytest.approx(float(run["time"][-1]))
     with pytest.raises(RequestError, match=r"first\.test: received \[10, 20\.1\] s, and"):
         read_campaign(edited(("test = [10, inf]", "test = [10, 20.1]"))).prepare(["first"])
-
-
-@pytest.mark.parametrize("stated", [True, False])
-def test_windows_of_redundant_sensors_in_periods(edited, stated, capsys):
-    """`window = "6 T"` is documented, and was a fault of seakeep."""
-    period = [("scale_factor = 30.0", "encounter_period = 1.6")] if stated else []
-    table = "[redundant.heave]\nchannels = ['heave', 'eta_fwd']\nwindow = '3 T'\n[preparation]"
-    path = edited(*period, ("[preparation]", table))
-    assert cli.main(["prepare", str(path), "--no-sheet"]) == 0
-    assert "fault of seakeep" not in capsys.readouterr().err
-    found = findings_of(read_campaign(path).prepare(["first"])["first"])
-    assert {each.channel for each in found} <= {"eta_fwd"}

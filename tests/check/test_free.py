@@ -8,7 +8,6 @@ import xarray as xr
 from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, LogUniform, check
 from seakeep.check.parts import free_windows
 from seakeep.core.extremes import free_decay
-from seakeep.errors import DataError, RequestError
 
 DT, FREQUENCY, RATIO = 0.05, 2.0, 0.06  # s, rad/s, 1
 
@@ -82,35 +81,6 @@ def test_quadratic_damping_is_found_from_a_decay(model):
     # Equivalent linearisation: p = 2πζ, q = 8b/3, to second order in the damping.
     assert float(found.p[0]) == pytest.approx(2 * np.pi * 0.02, rel=0.03)
     assert float(found.q[0]) == pytest.approx(8 / 3 * 0.3, rel=0.03)
-
-
-def test_too_few_extremes_are_nothing():
-    found = free_decay(np.exp(-np.arange(200) / 20), 0.1)
-    assert np.isnan(found.period)
-    assert found.cycles == 0
-
-
-def test_what_cannot_be_judged_says_why(model):
-    run = oscillator_run(samples=400)
-    with pytest.raises(DataError, match=r"no run is a free decay in still water\. State waves ="):
-        check.measured_decay(model, {"run": run})
-    rates = HankelDMDc(1, 0, 1.0).fit(run, ["heave_rate"], ["eta"])
-    with pytest.raises(RequestError, match="no state of the model is a rigid motion"):
-        check.decay(rates)
-    named = run.rename(heave="heave_mru")
-    words = r"If heave_mru is the vessel's heave, call it heave in the campaign file"
-    by_device = HankelDMDc(1, 0, 1.0).fit(named, ["heave_rate", "heave_mru"], ["eta"])
-    with pytest.raises(RequestError, match=words):
-        check.decay(by_device)
-    with pytest.raises(RequestError, match=words):
-        check.measured_decay(by_device, {"run": named})
-    spec = BayesianHankelDMDc(
-        encounter_period=3.0, window=Fixed("3 T"), state_delays=Fixed("0.1 T"),
-        input_delays=Fixed("0.1 T"), ridge=Fixed(1.0), n_members=2, seed=0,
-    )  # fmt: skip
-    ensemble = spec.fit(run, ["heave"], ["eta"])
-    with pytest.raises(RequestError, match=r"For an ensemble, check a member"):
-        check.modes(ensemble)
 
 
 def test_free_runs_of_an_ensemble_are_the_mean_of_its_members():

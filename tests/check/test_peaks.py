@@ -7,7 +7,6 @@ import xarray as xr
 
 from seakeep import HankelDMDc, check
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
-from seakeep.errors import DataError
 
 
 def sea_run(height=0.04, period=2.0, seed=0, samples=3000, **attrs):
@@ -93,17 +92,3 @@ def test_waves_outside_the_training_are_named(model, train):
     assert "outside the periods that trained the model" in told["short"]
     assert "steepness" in told["short"]
     assert found.height.sel(run="train", part="train") == pytest.approx(0.04, rel=0.01)
-
-
-def test_what_cannot_be_judged_says_why(model):
-    regular = sea_run(waves="regular")
-    with pytest.raises(DataError, match="a statistic of peaks takes a run in irregular waves"):
-        check.statistics(model, {"regular": regular})
-    lost = sea_run()
-    lost["eta"] = lost.eta * np.nan
-    lost.eta.attrs["units"] = "m"
-    with (
-        pytest.warns(match="no sample of it has all channels"),
-        pytest.raises(DataError, match="no run has all channels of the model"),
-    ):
-        check.validity(model, {"lost": lost})

@@ -8,7 +8,6 @@ import xarray as xr
 from seakeep import HankelDMDc, check
 from seakeep.check.parts import free_windows
 from seakeep.core.spectra import autocorrelation, input_correlation, ljung_box
-from seakeep.errors import DataError
 
 
 def noisy_run(seed=0, samples=3000):
@@ -87,15 +86,6 @@ def test_limits_of_the_correlation_with_inputs_cover_as_they_say():
     inside = np.abs(found[:, :, 0]) < limit[:, 0]
     # 500 repetitions know a coverage of 95 % to 1 % (one SD) at each of 41 lags.
     assert inside.mean() == pytest.approx(0.95, abs=0.01)
-
-
-def test_a_short_test_says_so(run):
-    short = run.isel(time=slice(0, 40)).assign_attrs(test_span=(0.0, 3.9))
-    with pytest.raises(DataError, match="whiteness over an encounter period takes more than 40"):
-        check.residuals(fitted(run, 1), {"short": short})
-    shorter = run.isel(time=slice(0, 2)).assign_attrs(test_span=(0.0, 0.1))
-    with pytest.raises(DataError, match=r"no run can be forecast\. short: "):
-        check.residuals(fitted(run, 3), {"short": shorter})
 
 
 def test_limits_and_past_inputs_are_those_of_the_errors_by_hand(run):

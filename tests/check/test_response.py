@@ -7,8 +7,7 @@ from moored import moored_run
 
 from seakeep import HankelDMDc, check
 from seakeep.check.parts import reference_probe
-from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
-from seakeep.errors import DataError, RequestError
+from seakeep.core.harmonics import estimate, harmonic_fits
 from seakeep.waves import wavenumber
 
 DT, DEPTH, PLACES = 0.1, 3.6, {"eta_fwd": -1.5, "eta_cog": 0.0}
@@ -163,26 +162,6 @@ def test_intervals_of_a_harmonic_fit_cover_as_they_say():
     assert 0.92 <= turned.mean() <= 0.98
     offset = estimate(means[:, 1:].astype(complex), np.zeros(500))
     assert 0.92 <= np.mean(np.abs(offset.ratio.real) < offset.amplitude) <= 0.98
-
-
-def test_what_cannot_be_judged_says_why(sea, model):
-    with pytest.raises(RequestError, match="the model has no input: it answers no wave"):
-        check.response(HankelDMDc(2, 0, 1.0).fit(sea, ["heave"], []))
-    with pytest.raises(RequestError, match=r"up to half the sampling rate \(5 Hz\); received 9"):
-        check.response(model, [9.0])
-    short = vessel_run([0.5], 1, 100, waves="regular")
-    why = (
-        r"no run gives a measured response\. short: the record holds 5\.0 periods of the wave "
-        r"\(2 s\); its scatter takes 9 or more"
-    )
-    with pytest.raises(DataError, match=why):
-        check.measured_response(model, {"short": short})
-    dead = sea.assign(eta_cog=sea.eta_cog * 0)
-    dead.eta_cog.attrs = sea.eta_cog.attrs
-    with pytest.raises(DataError, match="eta_cog holds no energy: it is constant"):
-        check.measured_response(model, {"dead": dead})
-    with pytest.raises(DataError, match="it has no frequency"):
-        dominant_frequency(np.ones(100), 0.1)
 
 
 def test_type_a_uncertainty_is_that_of_the_mean_of_few_windows():

@@ -6,7 +6,6 @@ import xarray as xr
 
 from seakeep import Expression, HankelDMDc, SlowSquares, check
 from seakeep.core.observables import slow_kernel
-from seakeep.errors import RequestError
 
 DT, PERIOD = 0.1, 1.0
 GAIN, MEMORY = 0.3, 0.9
@@ -66,9 +65,3 @@ def test_slow_squares_answer_by_their_filter():
         filtered = abs(np.sum(kernel * np.exp(-1j * turn * lag)))
         ratio = filtered * abs((1 - pole) / (np.exp(1j * turn) - pole))
         assert row[0] / mean[0] == pytest.approx(ratio, rel=1e-2)
-
-
-def test_a_linear_model_has_no_drift():
-    model = HankelDMDc(1, 1, 1.0).fit(drifting_run(), ["surge"], ["eta"])
-    with pytest.raises(RequestError, match=r"the model has no observables, so that its mean"):
-        check.drift(model, {"sea": drifting_run()})

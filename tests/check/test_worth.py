@@ -68,17 +68,6 @@ def test_errors_are_those_of_the_tests_and_verdicts_follow_from_them(model, runs
     assert calm.change.sel(model="fir").values == pytest.approx(ratio.values)
 
 
-def test_the_page_starts_with_the_verdict(checked):
-    first, *_ = check_sections(checked)
-    text = "\n".join(first.points)
-    assert "1 test in irregular waves: ANRMSE 0.0" in text
-    assert "of the best baseline, " in text
-    assert "Irregular waves, surge, heave: can stand in for a measurement" in text
-    assert "Regular waves, surge: cannot be used instant by instant" in text
-    assert "Look-ahead: none" in text
-    assert [table.name for table in first.tables] == ["worth", "verdicts", "worth_of_runs"]
-
-
 def test_training_is_judged_apart(model, runs, checked):
     found = checked.results
     assert found["residuals"].attrs["of"] == "tests"

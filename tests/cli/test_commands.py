@@ -5,8 +5,6 @@ import importlib.util
 import re
 import shlex
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +13,6 @@ import xarray as xr
 
 import seakeep
 from seakeep import cli
-from seakeep.cli import modelling
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = ROOT / "docs" / "tutorial"
@@ -74,17 +71,6 @@ def _empty_figures(request, monkeypatch):
     monkeypatch.setattr(histories, "overlay_figure", lambda found: histories.new_figure(1, 1))
 
 
-def test_the_entry_point_and_the_module_are_one_program():
-    answers = [
-        subprocess.run([*command, "--version"], capture_output=True, text=True, check=True).stdout
-        for command in (
-            [sys.executable, "-m", "seakeep"],
-            [sys.executable, "-c", "import sys; from seakeep.cli import main; sys.exit(main())"],
-        )
-    ]
-    assert answers == [f"seakeep {seakeep.__version__}\n"] * 2
-
-
 @pytest.mark.usefixtures("drawn")
 @pytest.mark.parametrize("verb", VERBS)
 def test_the_example_of_each_help_runs(verb, run, place):
@@ -106,13 +92,6 @@ def test_the_example_of_each_help_runs(verb, run, place):
         status, _, err = run(words.removeprefix("seakeep "))
         shutil.rmtree(place / "docs/tutorial/prepared", ignore_errors=True)
         assert status == 0, err
-
-
-def test_help_lists_every_verb(run):
-    status, out, _ = run("--help")
-    assert status == 0
-    for verb in VERBS:
-        assert re.search(rf"^  {verb}\s", out, re.MULTILINE)
 
 
 def test_fit_prints_what_was_identified_on_stdout_and_the_rest_on_stderr(run, place):
@@ -167,23 +146,6 @@ def test_lengths_in_encounter_periods(run, place, model):
     assert tables[0] == tables[1]
 
 
-def test_fit_says_what_an_ensemble_is_made_of(run, place):
-    status, out, _ = run(f"fit {CAMPAIGN} --model ensemble -o again.nc --workers 2")
-    assert status == 0
-    for words in (
-        "Ensemble of 8 Hankel DMD models with control: 5 states, 2 inputs, dt 0.08 s",
-        "Monte Carlo, seed 0; none infeasible",
-        "2 runs, a window of one of them per member, drawn",
-        "(stable)",
-    ):
-        assert words in out
-    one, two = (seakeep.load_model(place / f"{name}.nc") for name in ("ensemble", "again"))
-    assert one.members == two.members
-    radii = two.spectral_radii()
-    np.testing.assert_array_equal(one.spectral_radii(), radii)
-    assert radii[3] == pytest.approx(two.member(3).spectral_radius, rel=1e-12)
-
-
 FROM_20 = f"{CAMPAIGN} --run unseen --start 20 --steps 50"
 
 
@@ -223,19 +185,6 @@ def test_forecast_writes_the_band_of_an_ensemble_as_netcdf_and_csv(run, place):
         np.testing.assert_array_equal(found, expected["heave"].sel(statistic=statistic))
 
 
-def test_forecast_writes_the_members_when_asked(run, place):
-    for name in ("members.nc", "members.csv"):
-        status, _, err = run(f"forecast ensemble.nc {FROM_20} --members -o {name}")
-        assert status == 0
-        assert "8 members at 50 instants" in err
-    with xr.open_dataset(place / "members.nc", engine="h5netcdf") as stored:
-        assert dict(stored.sizes) == {"member": 8, "time": 50}
-        heave = stored["heave"].values
-        assert set(stored["status"].values) == {"ok"}
-    table = np.genfromtxt(place / "members.csv", delimiter=",", names=True, deletechars="")
-    np.testing.assert_array_equal(table["heave_member_7_[m]"], heave[7])
-
-
 def test_compare_judges_the_mean_of_an_ensemble_and_its_band(run, place):
     status, out, err = run(f"compare ensemble.nc {CAMPAIGN} -o judged --level 0.8")
     assert status == 0, err
@@ -256,20 +205,6 @@ def test_compare_judges_the_mean_of_an_ensemble_and_its_band(run, place):
     mean = band.sel(statistic="mean", drop=True).to_dataset()
     expected = seakeep.metrics.nrmse(predicted=mean, measured=measured.to_dataset())
     assert float(heave["nrmse"]) == pytest.approx(float(expected["heave"]), rel=1e-12)
-
-
-def test_angles_of_a_forecast_may_be_written_in_degrees(run, place):
-    for option, unit, name in (("", "rad", "r.csv"), ("--degrees", "deg", "d.csv")):
-        status, _, err = run(f"forecast model.nc {FROM_20} {option} -o {name}")
-        assert status == 0, err
-        assert f"pitch [{unit}]" in (place / name).read_text("utf-8").splitlines()[0]
-    columns = [
-        np.genfromtxt(place / name, delimiter=",", skip_header=1).T for name in ("r.csv", "d.csv")
-    ]
-    header = (place / "r.csv").read_text("utf-8").splitlines()[0].split(",")
-    for before, after, title in zip(*columns, header, strict=True):
-        factor = 180 / np.pi if "[rad" in title else 1.0
-        np.testing.assert_allclose(after, factor * before, rtol=1e-6)  # seven digits are written
 
 
 def test_calibrate_takes_an_unread_part_of_a_run_that_trains(run, place):
@@ -339,41 +274,6 @@ def test_calibrate_scales_by_the_spread_and_folds_over_the_runs_that_train(run, 
     assert re.search(rf"heave +m +{k:.2f} +{floor:.4g} ".replace(".", r"\."), out)
 
 
-def test_compare_tells_where_a_forecast_shows_memory_or_a_band_does_not_hold(run):
-    calibrate = f"calibrate ensemble.nc {CAMPAIGN} --run unseen --stop 60 --steps 200 -o known.nc"
-    assert run(calibrate)[0] == 0
-    _, _, err = run(f"compare known.nc {CAMPAIGN} --start 60 --steps 200 --band calibrated -o k")
-    for word in ("memory", "longer than", "is calibrated"):
-        assert word not in err
-    _, _, err = run(f"compare known.nc {CAMPAIGN} --start 40 --steps 100 -o k")
-    assert "Note: the ensemble is calibrated, and the band shown is that of its members" in err
-    assert "memory" not in err
-    _, _, err = run(f"compare known.nc {CAMPAIGN} --start 40 --band calibrated -o k")
-    assert "the band was calibrated on a part of this forecast (7.84 to 55.84 s): this show" in err
-    assert "the forecast of unseen is longer than the 200 instants that the band was calib" in err
-    _, _, err = run(f"compare model.nc {CAMPAIGN} --run first --start 20 --steps 100 -o k")
-    assert "the forecast of first lies in what trained the model (0 to " in err
-    assert "repeats training input" not in err
-
-
-def test_instants_are_told_to_the_step_where_times_count_from_1970(run, tmp_path):
-    campaign = tmp_path / "campaign.toml"
-    shutil.copy(TUTORIAL / "campaign.toml", campaign)
-    smaller(campaign)
-    for path in TUTORIAL.glob("run?.csv"):
-        head, *rows = path.read_text("utf-8").splitlines()
-        instants = [row.split(";", 1) for row in rows]
-        rows = [f"{1700000000.02 + float(time):.2f};{rest}" for time, rest in instants]
-        (tmp_path / path.name).write_text("\n".join([head, *rows]) + "\n", "utf-8")
-    assert run(f"fit {campaign} -o {tmp_path}/late.nc --model ensemble")[0] == 0
-    compare = f"compare {tmp_path}/late.nc {campaign} --run first --steps 100 -o {tmp_path}/c"
-    _, _, err = run(f"{compare} --start 1700000030")
-    assert re.search(r"lies in what trained the model \(17000000\d\d\.\d+ to 1700000\d+", err)
-    calibrate = f"calibrate {tmp_path}/late.nc {campaign} --run unseen --steps 9 -o {tmp_path}/w.nc"
-    _, _, err = run(f"{calibrate} --stop 1700000900.06")
-    assert "--stop 1700000900.06 (1700000900.06 s) lies in none of the runs" in err
-
-
 def rows_of(path):
     """Rows of a CSV file by their headings."""
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
@@ -410,15 +310,6 @@ def test_bands_come_in_degrees_and_at_full_scale(run, place):
     np.testing.assert_allclose(large["heave"], 25 * small["heave"], rtol=1e-12)
     np.testing.assert_allclose(large["time"], 5 * small["time"], rtol=1e-12)
     assert list(large["status"].values) == ["ok"] * 8
-
-
-def test_compare_without_matplotlib_judges_and_says_what_is_missing(run, place, monkeypatch):
-    monkeypatch.setattr(modelling, "find_spec", lambda name: None)
-    status, out, err = run(f"compare model.nc {CAMPAIGN} -o plain")
-    assert status == 0
-    assert "NRMSE" in out
-    assert "no figures, because matplotlib is not installed. Install it with: pip" in err
-    assert [path.name for path in (place / "plain").iterdir()] == ["comparison.csv"]
 
 
 @pytest.mark.usefixtures("drawn")
@@ -483,35 +374,6 @@ def test_baselines_stand_beside_a_model_and_their_loss_is_not_its_own(run, place
     assert {row["model"] for row in rows} == kinds
     mean = next(row for row in rows if row["model"] == "mean")
     assert float(mean["nrmse"]) == pytest.approx(1.0, abs=0.01)
-
-
-@pytest.mark.parametrize("model", ["model.nc", "ensemble.nc", "model.nc ensemble.nc"])
-def test_tables_of_compare_fit_a_terminal_of_80_columns(model, run, monkeypatch):
-    monkeypatch.setattr("seakeep.cli.console.PIPE_WIDTH", 80)
-    _, out, _ = run(f"compare {model} {CAMPAIGN} -o narrow")
-    table = [line for line in out.splitlines() if "heave_rate" in line or "NRMSE" in line]
-    assert table
-    assert max(map(len, table)) <= 80
-    assert "…" not in out
-    assert any(re.search(r"heave_rate .* 0\.\d{3}", line) for line in table)
-
-
-def test_prepared_files_are_used_while_fresh(run, place, monkeypatch):
-    status, out, err = run(f"prepare {CAMPAIGN} -o docs/tutorial/prepared --no-sheet")
-    assert status == 0
-    assert [Path(line).name for line in out.split()] == ["first.nc", "second.nc", "unseen.nc"]
-
-    assert "look for prepared runs" not in err
-    status, _, err = run(f"prepare {CAMPAIGN} -o elsewhere --no-sheet")
-    assert "fit, forecast and compare look for prepared runs in docs/tutorial/prepared alone" in err
-
-    def refuse(*_args, **_keywords):
-        raise AssertionError("the raw file was read again")
-
-    monkeypatch.setattr(seakeep.Campaign, "prepare", refuse)
-    status, _, err = run(f"compare model.nc {CAMPAIGN} -o judged")
-    assert status == 0, err
-    shutil.rmtree(place / "docs/tutorial/prepared")
 
 
 MISTAKES = [
@@ -603,12 +465,6 @@ def test_a_mistake_gets_one_message_and_no_traceback(command, message, run):
     assert "Traceback" not in out + err
 
 
-def test_debug_shows_the_traceback(run):
-    status, _, err = run("--debug fit missing.toml -o m.nc")
-    assert status == 2
-    assert "Traceback" in err
-
-
 @pytest.mark.parametrize(
     ("command", "kept"),
     [
@@ -654,24 +510,6 @@ def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, pla
     assert (place / kept).read_bytes() == before
 
 
-def test_a_command_that_is_repeated_replaces_what_it_wrote(run, place):
-    for _ in range(2):
-        command = f"forecast ensemble.nc {CAMPAIGN} --run unseen --start 20 --steps 5 -o again.csv"
-        assert run(command)[0] == 0
-        assert run(f"{command.replace('again', 'full')} --members --degrees")[0] == 0
-        for form in ("pdf", "svg", "png"):
-            command = f"compare model.nc {CAMPAIGN} --start 60 --steps 50 -o twice --format {form}"
-            assert run(command)[0] == 0
-
-
-def test_a_draft_is_not_overwritten(run, place):
-    (place / "mine.toml").write_text("precious")
-    status, _, err = run("init docs/tutorial/run1.csv -o mine.toml")
-    assert status == 2
-    assert "mine.toml exists already" in err
-    assert (place / "mine.toml").read_text() == "precious"
-
-
 def test_ctrl_c_ends_with_130_and_says_what_is_kept(run, monkeypatch):
     def interrupt(*_args, **_keywords):
         raise KeyboardInterrupt
@@ -682,56 +520,12 @@ def test_ctrl_c_ends_with_130_and_says_what_is_kept(run, monkeypatch):
     assert "Interrupted. Finished files are kept: run the same command again" in err
 
 
-def test_an_unforeseen_error_asks_for_a_report(run, monkeypatch):
-    def fail(*_args, **_keywords):
-        raise RuntimeError("the tank is empty")
-
-    monkeypatch.setattr("seakeep.study.fit_campaign", fail)
-    status, _, err = run(f"fit {CAMPAIGN} -o m.nc")
-    assert status == 1
-    assert "RuntimeError: the tank is empty. This is a fault of seakeep" in err
-
-
-def test_members_that_diverge_are_counted_and_left_out_of_file_and_table(run, place):
-    text = (place / CAMPAIGN).read_text()
-    for key, value in {
-        "state_delays": '{ uniform = ["1 T", "5 T"] }',
-        "input_delays": '"0.5 T"',
-        "ridge": "{ log_uniform = [1e-13, 1e-2] }",
-    }.items():
-        text = re.sub(rf"^{key} = .*uniform.*$", f"{key} = {value}", text, flags=re.MULTILINE)
-    (place / "docs/tutorial/wild.toml").write_text(text)
-    status, out, err = run("fit docs/tutorial/wild.toml --model ensemble -o wild.nc")
-    assert status == 0
-    unstable = re.search(r"\((\d) of 8 UNSTABLE: their long forecasts diverge\)", out)
-    assert unstable
-    assert f"Note: {unstable[1]} of 8 members have a spectral radius of one or more" in err
-    status, _, err = run(f"forecast wild.nc {CAMPAIGN} --run unseen --start 20 -o wild_band.nc")
-    band = xr.load_dataset(place / "wild_band.nc")
-    lost = int(band.attrs["diverged"])
-    assert 0 < lost < 8
-    assert status == 0
-    assert f"{8 - lost} members at" in err
-    assert f"status {lost} of 8 members diverged" in err
-    assert np.isfinite(band["heave"].values).all()
-    status, out, _ = run(f"compare wild.nc {CAMPAIGN} -o wild --start 20")
-    assert status == 0
-    assert f"{lost} of 8 members diverged and are left out" in out
-
-
 def test_datasets_lists_origin_licence_and_state(run, monkeypatch):
     monkeypatch.delenv("SEAKEEP_DATA_DIR", raising=False)
     status, out, _ = run("datasets")
     assert status == 0
     for text in ("CC0-1.0", "MIT", "2465cee", "9279ed4", "SEAKEEP_DATA_DIR is not set", "[m]"):
         assert text in out
-
-
-def test_info_names_versions(run):
-    status, out, _ = run("info")
-    assert status == 0
-    assert f"seakeep {seakeep.__version__}" in out
-    assert f"numpy {np.__version__}" in out
 
 
 def test_full_scale_by_froudes_law(run, place):

@@ -81,14 +81,6 @@ def test_an_altered_file_upstream_is_refused_and_nothing_is_written(upstream, tm
     assert list((tmp_path / "toy").iterdir()) == []
 
 
-def test_no_network_names_the_addresses_tried(upstream, tmp_path):
-    _, dataset = upstream
-    with pytest.raises(
-        RequestError, match=r"could not be fetched\. Tried: http.*Check the network"
-    ):
-        datasets.fetch(replace(dataset, sources=["http://127.0.0.1:9/nothing"]), tmp_path)
-
-
 def test_a_cut_download_is_no_file_and_the_next_source_is_tried(upstream, tmp_path):
     _, dataset = upstream
     whole = dataset.sources[-1]
@@ -97,14 +89,3 @@ def test_a_cut_download_is_no_file_and_the_next_source_is_tried(upstream, tmp_pa
     assert list((tmp_path / "toy").iterdir()) == []
     datasets.fetch(replace(dataset, sources=[f"{whole}/cut", whole]), tmp_path)
     assert datasets.state_of(dataset, tmp_path) == "complete"
-
-
-def test_pickles_are_never_fetched(tmp_path):
-    with pytest.raises(RequestError, match="the originals are pickles"):
-        datasets.fetch(datasets.find_dataset("sjtu_semisub"), tmp_path)
-
-
-def test_absent_and_unknown_are_told_apart(upstream, tmp_path):
-    _, dataset = upstream
-    assert datasets.state_of(dataset, tmp_path) == "absent"
-    assert datasets.state_of(dataset, None).startswith("unknown")

@@ -1,6 +1,5 @@
 """``seakeep study``, ``report`` and ``reproduce`` as a user runs them."""
 
-import io
 import signal
 import subprocess
 import sys
@@ -11,7 +10,6 @@ from started import started
 from tutorial_study import put_tutorial
 
 from seakeep import cli
-from seakeep.cli.console import results
 from seakeep.models import executor
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
@@ -63,25 +61,6 @@ def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd, 
     assert (out / "report.html").exists()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["study", "missing.toml"], "missing.toml does not exist"),
-        (["report", "nowhere"], "nowhere holds no finished study"),
-        (["reproduce", "--preset", "papers"], "'papers' is not one of 'paper', 'recommended'"),
-        (
-            ["reproduce", "--workers", "2", "--scheduler", "tcp://127.0.0.1:8786"],
-            "--workers 2 counts processes on this machine, and --scheduler tcp://127.0.0.1:8786 "
-            "hands all work to a cluster. Give one of the two",
-        ),
-    ],
-)
-def test_a_wrong_request_is_told_and_ends_with_2(arguments, words, tmp_path, monkeypatch, capfd):
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(arguments) == 2
-    assert words in capfd.readouterr().err
-
-
 @pytest.mark.parametrize("verb", ["study", "reproduce"])
 def test_a_scheduler_that_does_not_answer_is_told_before_any_work(verb, folder, monkeypatch, capfd):
     pytest.importorskip("distributed", reason="a Dask cluster needs distributed")
@@ -113,15 +92,6 @@ def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(folder, ctrl_c):
     assert "Interrupted. Finished files are kept" in told
     assert "Traceback" not in told
     assert list((out / "units").glob("*.nc"))
-
-
-def test_output_in_a_code_page_without_greek_letters_is_no_error(monkeypatch):
-    stream = io.TextIOWrapper(io.BytesIO(), encoding="cp1252")
-    monkeypatch.setattr(sys, "stdout", stream)
-    assert cli.main(["--version"]) == 0
-    results().print("ε over 15 T̂")
-    stream.flush()
-    assert b"? over 15 T?" in stream.buffer.getvalue()
 
 
 @pytest.mark.parametrize(

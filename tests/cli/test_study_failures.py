@@ -9,7 +9,7 @@ import xarray as xr
 from tutorial_study import put_tutorial
 
 from seakeep import cli
-from seakeep.study import read_result, read_study, run_study
+from seakeep.study import read_study, run_study
 from seakeep.study.store import UnitFolder
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
@@ -170,13 +170,3 @@ def test_a_disk_that_fills_up_loses_no_finished_unit(folder, room, undisturbed, 
     assert found.groups.keys() == undisturbed.groups.keys()
     for name, group in undisturbed.groups.items():
         xr.testing.assert_identical(group, found.groups[name])
-
-
-def test_a_disk_that_fills_up_before_the_report_keeps_the_result(folder, monkeypatch, capfd):
-    with monkeypatch.context() as patch:
-        # The header of the folder has room, the first table has not.
-        patch.setattr(Path, "write_text", filling(1, Path.write_text))
-        assert study(folder) == 1
-    assert "No space left on device. What was finished is kept" in capfd.readouterr().err
-    assert not (folder / "out" / "report.html").exists()
-    assert read_result(folder / "out").attrs["study"]

@@ -53,10 +53,3 @@ def test_stable_modes_keep_eigenvalues_and_right_eigenvectors(regressed):
     )
     # Moved modes may share an angle, and a double eigenvalue is known to half the digits.
     assert np.abs(np.linalg.eigvals(whole(found))).max() == pytest.approx(radius, rel=1e-6)
-
-
-def test_a_stable_matrix_is_left_as_it_is():
-    rows = companion(np.array([0.9, 0.5]))
-    found, moduli = clip_modes(rows, 0.999)
-    assert found is rows
-    assert moduli == ()

@@ -180,18 +180,3 @@ def test_free_runs_are_the_loop_over_the_extended_state(case, piece):
     with patch.object(ROLLOUT, "PIECE", piece):
         found = rollout(a[:rows], b[:rows], histories, driving, n_states=N, **options)
     np.testing.assert_allclose(found, expected, atol=RESULT)
-
-
-@pytest.mark.parametrize("windows", [1, 2, 12])
-def test_free_runs_of_the_papers_size_are_the_loop(windows):
-    rng = np.random.default_rng(6)
-    N, s, z, steps = 4, 49, 5, 400
-    size = N * (s + 1)
-    a, b = rng.normal(size=(size, size)) / (2 * size), rng.normal(size=(size, 2 * (z + 1)))
-    histories = rng.normal(size=(windows, s + 1, N))
-    inputs = rng.normal(size=(windows, z + steps, 2))
-    expected = [
-        stepwise(a, b, history[::-1].ravel(), series, z, steps, N)
-        for history, series in zip(histories, inputs, strict=True)
-    ]
-    np.testing.assert_allclose(rollout(a, b, histories, inputs), expected, atol=RESULT)

@@ -5,7 +5,6 @@ import pytest
 
 from seakeep.core.embedding import TrainingWindow
 from seakeep.core.subspace import identify_subspace
-from seakeep.errors import DataError
 
 
 def plant(seed=0, order=4, outputs=2, inputs=2):
@@ -117,12 +116,3 @@ def test_another_package_finds_the_same_system():
     # Both are consistent; with this noise their eigenvalues are within a hundredth of the truth.
     assert max(ours, theirs) < 0.01
     assert ours < 2.0 * theirs + 1e-3
-
-
-def test_an_order_that_the_data_do_not_hold_is_refused():
-    system = plant()
-    u = np.random.default_rng(8).normal(size=(300, 2))
-    with pytest.raises(DataError, match=r"fewer than 9 directions .* Lower order"):
-        fitted([simulate(system, u)], [u], order=9)
-    with pytest.raises(DataError, match=r"13 snapshot pairs .* future of 20 .* longer run"):
-        fitted([simulate(system, u[:26])], [u[:26]], future=20)

@@ -150,35 +150,6 @@ def test_it_follows_a_gap_of_inputs_and_starts_anew_after_a_long_one(model, run)
     assert len(play(follower, messages(model, run, range(120, 140)))) == 20
 
 
-def test_a_constant_delay_beyond_patience_is_reported_and_one_within_does_nothing(model, run):
-    starts, sent = [], messages(model, run, delay=0.25)
-    strict = Follower(lambda: starts.append(0) or model.live(), patience=0.1)
-    assert play(strict, sent) == []
-    assert len(starts) == 1
-    assert strict.lost == {(name, "late"): COUNT for name in [*model.inputs, *model.states]}
-    patient = Follower(model.live, patience=PATIENCE)
-    assert len(play(patient, sent)) == COUNT
-    assert not patient.lost
-
-
-def test_it_waits_for_all_inputs_without_growing(model, run):
-    follower = Follower(model.live)
-    sent = messages(model, run)
-    assert play(follower, [each for each in sent if each[1] != "eta_cog"]) == []
-    assert set(follower.lost) == {("all", "waiting for all inputs")}
-    assert play(Follower(model.live), [each for each in sent if each[1] in model.states]) == []
-    assert max(map(len, follower.waiting.values())) < 10
-
-
-def test_it_continues_from_a_state(model, run):
-    sent = messages(model, run)
-    whole, first = Follower(model.live), Follower(model.live)
-    expected = play(whole, sent)[40:]
-    play(first, sent[: 4 * 40])
-    found = play(Follower(model.live, first.live), sent[4 * 40 :])
-    np.testing.assert_array_equal(states(found), states(expected))
-
-
 @pytest.fixture
 def node(monkeypatch):
     pytest.importorskip("rosbags")

@@ -101,13 +101,6 @@ def test_netcdf(tmp_path, engine):
     check(read_table(tmp_path / "run.nc"))
 
 
-def test_netcdf_with_times_since(tmp_path):
-    run = dataset()
-    run["time"].attrs["units"] = "seconds since 2024-05-01"
-    run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
-    check(read_table(tmp_path / "run.nc"))
-
-
 def test_netcdf_table_with_names(tmp_path):
     table = xr.DataArray(
         MATRIX[:, 1:], dims=("time", "channel"), coords={"time": T, "channel": ["heave", "wave"]}
@@ -132,11 +125,6 @@ def write_hdf5(path, group=""):
         place = file.create_group(group) if group else file
         place["time"], place["heave"], place["wave"] = T, HEAVE, WAVE
         place["heave"].attrs["units"] = "mm"
-
-
-def test_hdf5(tmp_path):
-    write_hdf5(tmp_path / "run.h5")
-    check(read_table(tmp_path / "run.h5"))
 
 
 def test_hdf5_group(tmp_path):
@@ -182,14 +170,6 @@ def test_hdf5_sets_of_several_columns_are_split(tmp_path):
         read_table(tmp_path / "run.h5", columns=["cube"])
 
 
-def test_hdf5_integers_and_float32(tmp_path):
-    with h5py.File(tmp_path / "run.h5", "w") as file:
-        file["time"] = np.arange(5)
-        file["heave"] = np.arange(5, dtype=np.float32)
-    run = read_table(tmp_path / "run.h5")
-    assert run["heave"].dtype == run["time"].dtype == np.float64
-
-
 def test_a_struct_with_its_rate_and_a_note_beside_it(tmp_path):
     path = tmp_path / "run.mat"
     heave = np.sin(np.arange(20.0))
@@ -197,11 +177,3 @@ def test_a_struct_with_its_rate_and_a_note_beside_it(tmp_path):
     table = read_table(path)
     np.testing.assert_array_equal(table["heave"].values, heave)
     assert float(table["time"][1]) == pytest.approx(0.1)
-
-
-def test_cells_of_unlike_vectors_are_left_out(tmp_path):
-    cells = np.empty(2, dtype=object)
-    cells[:] = [np.arange(3.0), np.arange(5.0)]
-    run = {"time": T, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}, "fits": cells}
-    io.savemat(tmp_path / "run.mat", {"run": run, "note": "run 7"})
-    check(read_table(tmp_path / "run.mat"))

@@ -1,9 +1,5 @@
 """ROS 2 bags and MCAP, written by rosbags."""
 
-import builtins
-import sqlite3
-from contextlib import closing
-
 import numpy as np
 import pytest
 
@@ -142,13 +138,6 @@ def test_topics_count_from_one_instant(tmp_path):
     np.testing.assert_array_equal(first, second)
 
 
-def test_an_array_that_varies_in_length(tmp_path):
-    path = save(tmp_path / "bag", rig=lambda i: rig(i, cells=2 + i % 2))
-    assert "cells[1]" in read_table(path, columns=["surge", "cells[1]"])
-    with pytest.raises(DataError, match=r"'cells\[2\]' of the topic '/rig' is in 50 of 100 mess"):
-        read_table(path, columns=["cells[2]"])
-
-
 def test_headers_that_are_not_stamped(tmp_path):
     path = save(tmp_path / "bag", mru=lambda i: imu(i, stamped=False))
     with pytest.warns(SeakeepWarning, match="the headers of the topic '/mru' are not stamped"):
@@ -159,26 +148,6 @@ def test_headers_that_are_not_stamped(tmp_path):
         read_table(path)
 
 
-def test_nothing_recorded(tmp_path):
-    path = save(tmp_path / "bag", note=text)
-    with pytest.raises(DataError, match=r"holds no messages with numbers \(topics: /note\)"):
-        read_table(path)
-    with Writer(tmp_path / "none", version=9, storage_plugin=StoragePlugin.MCAP):
-        pass
-    with pytest.raises(DataError, match=r"holds no messages with numbers \(topics: none\)"):
-        read_table(tmp_path / "none")
-
-
-def test_messages_that_are_missing(tmp_path):
-    """The folder's metadata count more messages than its file holds."""
-    path = save(tmp_path / "bag", StoragePlugin.SQLITE3, mru=imu)
-    with closing(sqlite3.connect(next(path.glob("*.db3")))) as database:
-        database.execute("DELETE FROM messages WHERE id > 60")
-        database.commit()
-    with pytest.raises(DataError, match="announces 100 messages of the topic '/mru' and holds 60"):
-        read_table(path)
-
-
 def test_the_checksum_of_a_bag_follows_its_files(tmp_path):
     path = save(tmp_path / "bag", mru=imu)
     before = checksum(path)
@@ -186,17 +155,3 @@ def test_the_checksum_of_a_bag_follows_its_files(tmp_path):
     file = next(path.glob("*.mcap"))
     file.write_bytes(file.read_bytes() + b"x")
     assert checksum(path) != before
-
-
-def test_without_rosbags_the_extra_is_named(tmp_path, monkeypatch):
-    path = save(tmp_path / "bag", mru=imu)
-    real = builtins.__import__
-
-    def refuse(name, *rest):
-        if name.startswith("rosbags"):
-            raise ImportError(name)
-        return real(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", refuse)
-    with pytest.raises(RequestError, match=r"pip install 'seakeep\[ros\]'"):
-        read_table(path)

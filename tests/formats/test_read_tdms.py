@@ -1,7 +1,5 @@
 """TDMS files, written by nptdms."""
 
-import builtins
-
 import numpy as np
 import pytest
 
@@ -100,15 +98,6 @@ def test_groups(tmp_path):
         read_table(path, FileSettings(group="load"))
 
 
-def test_one_name_in_two_groups(tmp_path):
-    path = save(
-        tmp_path / "run.tdms",
-        channel("z", HEAVE, "bow", wf_increment=STEP),
-        channel("z", WAVE, "stern", wf_increment=STEP),
-    )
-    assert set(read_table(path).data_vars) == {"bow/z", "stern/z"}
-
-
 @pytest.mark.parametrize(
     ("channels", "error", "message"),
     [
@@ -129,31 +118,4 @@ def test_one_name_in_two_groups(tmp_path):
 def test_what_is_no_run(tmp_path, channels, error, message):
     path = save(tmp_path / "run.tdms", *channels)
     with pytest.raises(error, match=message):
-        read_table(path)
-
-
-@pytest.mark.parametrize("more", [10, 40, 200])
-def test_a_second_segment_cut_off(tmp_path, more):
-    """What the first segment holds is not passed off as the run."""
-    path = save(tmp_path / "run.tdms", channel("heave", HEAVE, **WAVEFORM))
-    whole = path.stat().st_size
-    with nptdms.TdmsWriter(path, mode="a") as writer:
-        writer.write_segment([channel("heave", WAVE, **WAVEFORM)])
-    assert read_table(path).sizes["time"] == 400
-    path.write_bytes(path.read_bytes()[: whole + more])
-    with pytest.raises(DataError, match=r"cut off or damaged \((its last|no) segment"):
-        read_table(path)
-
-
-def test_without_nptdms_the_extra_is_named(tmp_path, monkeypatch):
-    path = save(tmp_path / "run.tdms", channel("heave", HEAVE, **WAVEFORM))
-    real = builtins.__import__
-
-    def refuse(name, *rest):
-        if name == "nptdms":
-            raise ImportError(name)
-        return real(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", refuse)
-    with pytest.raises(RequestError, match=r"pip install 'seakeep\[tdms\]'"):
         read_table(path)

@@ -128,40 +128,6 @@ def test_latin_1_is_read_and_said(tmp_path):
     assert read_table(path, FileSettings(encoding="latin-1")).identical(run)
 
 
-@pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "iso8859-15"])
-def test_signs_of_units_are_the_same_in_all_western_encodings(tmp_path, encoding):
-    """Degrees, micro and powers, as loggers write them: nothing to doubt, so no warning."""
-    head = "t [s],turn [°],strain [µm],load [N·m],acc [m/s²]"
-    path = write(tmp_path, head + "\n0,1,2,3,4\n1,2,3,4,5\n", encoding=encoding)
-    run = read_table(path)
-    units = [each.attrs["units"] for each in run.data_vars.values()]
-    assert units == ["°", "µm", "N·m", "m/s²"]
-
-
-def test_quotes_of_windows_are_read(tmp_path):
-    path = write(tmp_path, "t,“Ångström” – x\n0,1\n1,2\n", encoding="cp1252")
-    with pytest.warns(SeakeepWarning, match="Windows-1252"):
-        assert list(read_table(path).data_vars) == ["“Ångström” – x"]
-
-
-@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
-def test_utf16_without_its_mark(tmp_path, encoding):
-    path = write(tmp_path, PLAIN, encoding=encoding)
-    with pytest.raises(
-        DataError, match=rf"seems to be UTF-16 without the mark .* State encoding = '{encoding}'"
-    ):
-        read_table(path)
-    check_plain(read_table(path, FileSettings(encoding=encoding)))
-
-
-@pytest.mark.parametrize(
-    "cell", ["none", "na", "Na", "Null", "NONE", "N/A", "nan ", "\x0c", " \x0b"]
-)
-def test_words_for_missing_values_are_nan(tmp_path, cell):
-    run = read_table(write(tmp_path, f"t,a\n0,1\n1,{cell}\n2,3\n"))
-    np.testing.assert_array_equal(run["a"], [1, np.nan, 3])
-
-
 @pytest.mark.parametrize("row", ["s,mm,deg", "s,-,deg", "s,cm,rad"])
 def test_a_header_and_a_row_that_state_other_units_are_refused(tmp_path, row):
     unit, said = ("cm", row.split(",")[1]) if row.endswith("deg") else ("deg", "rad")
@@ -192,15 +158,6 @@ def test_commas_that_may_divide_thousands_are_refused(tmp_path):
     for cell in ("0,512", ",512", "1,5", "1234,567", "1,2345", "-0,500"):  # decimals for certain
         run = read_table(write(tmp_path, f"t;h\n0;1,234\n1;{cell}\n"))
         np.testing.assert_array_equal(run["h"], [1.234, float(cell.replace(",", "."))])
-
-
-@pytest.mark.parametrize("cell", ["1,234.5", "1,234", "1,234,567", "1'234"])
-def test_marks_of_thousands_are_named(tmp_path, cell):
-    path = write(tmp_path, f"t;h\n0;1.5\n1;{cell}\n")
-    with pytest.raises(
-        DataError, match=r"line 3, column 'h': .* If its mark divides thousands, exp"
-    ):
-        read_table(path)
 
 
 def test_missing_values_are_nan(tmp_path):
@@ -373,82 +330,9 @@ def test_what_is_no_table(tmp_path, text, error, message):
         read_table(path)
 
 
-@pytest.mark.parametrize(
-    ("options", "columns", "error", "message"),
-    [
-        (
-            FileSettings(),
-            ["Haeve"],
-            RequestError,
-            "has no column 'Haeve'. Did you mean 'Heave'. Its columns: Time, Heave, Pitch, WP 1",
-        ),
-        (
-            FileSettings(time="Tme"),
-            None,
-            RequestError,
-            "has no time column 'Tme'. Did you mean 'Time'. Its columns: Time",
-        ),
-        (
-            FileSettings(encoding="utf-9"),
-            None,
-            DataError,
-            "the encoding 'utf-9' is not known. Write 'utf-8'",
-        ),
-        (
-            FileSettings(delimiter=";"),
-            None,
-            RequestError,
-            "has no column with a usual name of times",
-        ),
-    ],
-)
-def test_options_that_do_not_fit(tmp_path, options, columns, error, message):
-    with pytest.raises(error, match=message):
-        read_table(write(tmp_path, PLAIN), options, columns)
-
-
-def test_stated_encoding_that_does_not_fit(tmp_path):
-    path = write(tmp_path, "t,°\n0,1\n1,2\n", encoding="latin-1")
-    with pytest.raises(DataError, match=r"is not utf-8: byte 2 does not fit. Correct 'encoding'"):
-        read_table(path, FileSettings(encoding="utf-8"))
-
-
-def test_file_that_is_not_there(tmp_path):
-    write(tmp_path, PLAIN, "run_1.csv")
-    with pytest.raises(
-        RequestError,
-        match=r"run1\.csv does not exist\. Did you mean 'run_1\.csv'\? Its folder holds run_1\.csv",
-    ):
-        read_table(tmp_path / "run1.csv")
-    with pytest.raises(RequestError, match=r"there is no folder .*nowhere\. Correct the path"):
-        read_table(tmp_path / "nowhere" / "run1.csv")
-    with pytest.raises(
-        RequestError, match=r"is a folder, and only regular files are read\. Give a file\."
-    ):
-        read_table(tmp_path)
-
-
-def test_a_comma_in_words_is_no_decimal_mark(tmp_path):
-    path = write(tmp_path, b"time;h;note\n0;1.5;a,b\n1;2.5;c,d\n")
-    table = read_table(path, columns=["h"])
-    assert list(table["h"].values) == [1.5, 2.5]
-
-
 def test_integers_before_decimal_commas_do_not_hide_them(tmp_path):
     table = read_table(write(tmp_path, b"time;h\n0;1\n1;2\n2;2,5\n"))
     assert list(table["h"].values) == [1.0, 2.0, 2.5]
-
-
-@pytest.mark.parametrize("cell", ["True", "1_0", "１"])
-def test_what_only_a_computer_takes_for_a_number_is_refused(tmp_path, cell):
-    path = write(tmp_path, f"time,h\n0,1\n1,{cell}\n2,3\n".encode())
-    with pytest.raises(DataError, match=r"line 3, column 'h': .* is not a number"):
-        read_table(path, columns=["h"])
-
-
-def test_a_form_feed_breaks_no_line(tmp_path):
-    table = read_table(write(tmp_path, b"time,h,note\n0,1,a\x0cb\n1,2,c\n"), columns=["h"])
-    assert list(table["h"].values) == [1.0, 2.0]
 
 
 HEADS = {
@@ -473,12 +357,6 @@ def test_heads_of_loggers(tmp_path, head):
     np.testing.assert_array_equal(run["WP 1"], [3, 4, 5])
 
 
-def test_a_row_of_dashes_among_the_numbers_is_a_fault(tmp_path):
-    path = write(tmp_path, "t,heave\n0,1\n1,--\n2,3\n")
-    with pytest.raises(DataError, match=r"line 3, column 'heave': '--' is not a number"):
-        read_table(path)
-
-
 def test_comments_and_blank_lines_among_the_numbers(tmp_path):
     path = write(tmp_path, "t,h\n0,1\n# a pause\n1,2\n\n,\n2,x\n3,4\n")
     with pytest.raises(DataError, match=r"line 7, column 'h': 'x' is not a number"):
@@ -490,21 +368,3 @@ def test_comments_and_blank_lines_among_the_numbers(tmp_path):
 def test_exponents_of_fortran(tmp_path):
     run = read_table(write(tmp_path, "t h\n0 1.5D+01\n1 -2d-1\n"))
     np.testing.assert_array_equal(run["h"], [15.0, -0.2])
-
-
-def test_an_open_quotation_mark(tmp_path):
-    path = write(tmp_path, 't,h,note\n0,1,"a\n1,2,b\n')
-    with pytest.raises(DataError, match="Look for a quotation mark that is not closed"):
-        read_table(path)
-
-
-@pytest.mark.parametrize("encoding", ["utf-9", "hex", "a\0b"])
-def test_encodings_that_do_not_exist(tmp_path, encoding):
-    with pytest.raises(DataError, match=r"the encoding .* is not known\. Write 'utf-8'"):
-        read_table(write(tmp_path, PLAIN), FileSettings(encoding=encoding))
-
-
-def test_a_header_without_end(tmp_path):
-    path = write(tmp_path, "t," + "h" * 140_000 + "\n0,1\n1,2\n")
-    with pytest.raises(DataError, match=r"its head cannot be divided into cells \(field larger"):
-        read_table(path)

@@ -48,11 +48,6 @@ def moored_run(
     )
 
 
-def true_load(run: xr.Dataset) -> np.ndarray:
-    """Load of a slack stern line without noise, N."""
-    return np.maximum(FLOOR, 8.0 + 20.0 * run["surge"].values + 4.0 * run["pitch"].values)
-
-
 def moored_runs(count: int = 3, **more) -> dict[str, xr.Dataset]:
     """Several of them."""
     return {f"run{seed}": moored_run(seed, **more) for seed in range(count)}

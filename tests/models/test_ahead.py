@@ -6,7 +6,7 @@ import xarray as xr
 from drifting import INPUTS, STATES, drifting_run
 
 import seakeep
-from seakeep import DataError, HankelDMDc, RequestError
+from seakeep import HankelDMDc, RequestError
 from seakeep.signals import predict_waves
 
 PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
@@ -153,21 +153,3 @@ def test_ensembles_windows_and_arrays_predict_alike(runs, test_run):
     np.testing.assert_allclose(band.mean[:, 0], summary[STATES[0]].sel(statistic="mean"), rtol=1e-9)
     one = ensemble.member(1).forecast_arrays(*given, ahead="predict")
     np.testing.assert_allclose(one[:, 0], members[STATES[0]].sel(member=1), rtol=1e-9)
-
-
-def test_what_cannot_be_predicted_is_refused(runs, test_run):
-    model = model_of(runs)
-    with pytest.raises(RequestError, match="ahead must be 'refuse' or 'predict'; received 'guess'"):
-        model.forecast(test_run, START, STEPS, ahead="guess")
-    x, u = (np.stack([test_run[n].values for n in names], axis=1) for names in (STATES, INPUTS))
-    with pytest.raises(RequestError, match="ahead must be 'refuse' or 'predict'; received 'guess'"):
-        model.forecast_arrays(x, u, u, STEPS, ahead="guess")
-    # A probe that is dead before the start is a gap in the history, and no future.
-    dead = test_run.copy(deep=True)
-    dead[INPUTS[0]].values[round(START / model.dt) - 5 :] = np.nan
-    with pytest.raises(DataError, match=f"channel '{INPUTS[0]}' of .* missing"):
-        model.forecast(dead, START, STEPS, ahead="predict")
-    measured = model_of(runs, alignment=seakeep.ProbeAlignment(mode="dispersion"))
-    short = test_run.isel(time=slice(0, reads_until(measured, test_run)))
-    with pytest.raises(RequestError, match="measured surge, which nothing continues"):
-        measured.forecast(short, START, STEPS, ahead="predict")

@@ -1,6 +1,5 @@
 """Alignment of the wave input in fit and forecast: a vessel that drifts, probes that are moved."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +18,6 @@ from seakeep import (
     estimate_probe_offset,
     load_model,
 )
-from seakeep.models import processes
 
 
 def spec(alignment):
@@ -121,11 +119,6 @@ def test_fit_estimates_and_keeps_what_the_alignment_needs(models):
     assert 0.5 < models["dispersion"].alignment.highest_frequency < 1.0
 
 
-def test_a_celerity_that_is_given_is_taken(runs):
-    alignment = ProbeAlignment(mode="effective", surge="measured", celerity=2.5)
-    assert spec(alignment).fit(runs, STATES, INPUTS).alignment.celerity == 2.5
-
-
 def test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for(runs):
     own = [run.assign_attrs(celerity=c) for run, c in zip(runs, (2.5, 3.0), strict=True)]
     slow = drifting_run(7).assign_attrs(celerity=2.0)
@@ -183,14 +176,6 @@ def test_an_offset_is_found_with_its_spread(models):
     assert corrected < 0.1
 
 
-def test_the_offset_of_the_settings_moves_fit_and_forecast_alike(runs, models):
-    alignment = ProbeAlignment(mode="dispersion", surge="measured", offset=0.3)
-    model = spec(alignment).fit(runs, STATES, INPUTS)
-    # Constant in all runs, it is a constant phase, which the delays learn.
-    assert heave_error(model, drifting_run(7)) < 0.1
-    assert not np.allclose(model.B, models["dispersion"].B)
-
-
 def test_training_reads_nothing_after_its_stop(runs):
     alignment = ProbeAlignment(mode="dispersion", surge="measured")
     run = runs[0]
@@ -209,19 +194,6 @@ def test_a_window_needs_no_more_than_window_and_history(runs):
     assert windowed.fit(gapped, STATES, INPUTS).training.columns == (999,)
     with pytest.raises(DataError, match=r"channel 'surge' of run 1 has 200 missing .* at t = 0 s"):
         spec(alignment).fit(gapped.assign(eta_fwd=runs[0]["eta_fwd"]), ["heave"], INPUTS)
-
-
-def test_a_history_inside_the_window_needs_nothing_before_it(runs):
-    alignment = ProbeAlignment(mode="dispersion", surge="measured")
-    gapped = runs[0].copy(deep=True)
-    before = gapped.sizes["time"] - 1000
-    for name in ("surge", "eta_fwd"):
-        gapped[name].values[:before] = np.nan
-    inside = replace(spec(alignment), window=1000, history="inside")
-    assert inside.fit(gapped, STATES, INPUTS).training.columns == (959,)
-    gapped["eta_fwd"].values[before] = np.nan
-    with pytest.raises(DataError, match=r"channel 'eta_fwd' of run 1 has 1 missing"):
-        inside.fit(gapped, STATES, INPUTS)
 
 
 def test_a_gap_in_the_surge_is_named_in_a_forecast(models):
@@ -269,60 +241,6 @@ def test_aligned_members_equal_the_deterministic_model(runs, alignment):
         alone = model.forecast(run, start=60.0, steps=200)
         for name in STATES:
             np.testing.assert_allclose(forecast[name][number], alone[name], rtol=0, atol=1e-10)
-
-
-def test_what_an_alignment_estimates_is_the_same_for_all_members(runs):
-    few = aligned_ensemble(runs, mode="effective")
-    assert {few.member(number).alignment.celerity for number in range(3)} == {
-        few.alignment.celerity
-    }
-    assert f"celerity {few.alignment.celerity:.4g} m/s in training" in few.summary()
-
-
-def test_a_predicted_surge_gives_the_same_arrays_with_an_executor(runs):
-    ensemble = aligned_ensemble(runs, mode="dispersion", surge="predicted")
-    run = drifting_run(7)
-    alone = ensemble.forecast(run, start=60.0, steps=30)
-    with processes(1) as executor:
-        other = ensemble.forecast(run, start=60.0, steps=30, executor=executor)
-    xr.testing.assert_identical(alone, other)
-
-
-@pytest.mark.parametrize("surge", ["measured", "predicted"])
-def test_an_aligned_ensemble_says_on_what_it_depends_and_comes_back(runs, surge, tmp_path):
-    ensemble = aligned_ensemble(runs, mode="dispersion", surge=surge)
-    run = drifting_run(7)
-    forecast = ensemble.forecast(run, start=60.0, steps=20)
-    assert forecast.attrs.get("conditional_on", "") == ("surge" if surge == "measured" else "")
-    loaded = load_model(ensemble.save(tmp_path / "ens.nc"))
-    xr.testing.assert_identical(loaded.forecast(run, start=60.0, steps=20), forecast)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"mode": "linear"}, "mode must be 'effective' or 'dispersion'; received 'linear'"),
-        ({"surge": True}, "surge must be 'measured', 'predicted' or 'none'; received True"),
-        (
-            {"celerity": -1.0},
-            r"celerity must be a positive number, 'common' or None \(m/s\); received -1.0",
-        ),
-        ({"offset": "3 m"}, "offset must be a number .*; received '3 m'"),
-        ({"mode": "dispersion", "celerity": 2.0}, "celerity = 2.0 belongs to mode = 'effective'"),
-        ({"channels": "eta"}, r"a list of one or more names; .* Write channels = \['eta'\]"),
-    ],
-)
-def test_settings_out_of_range(settings, message):
-    with pytest.raises(RequestError, match=message):
-        ProbeAlignment(**settings)
-
-
-def test_a_table_of_keys_is_taken_and_a_wrong_key_named():
-    assert spec({"surge": "none"}).alignment == ProbeAlignment(surge="none")
-    with pytest.raises(RequestError, match=r"unknown key 'modes'. Did you mean 'mode'\? Keys"):
-        spec({"modes": "effective"})
-    with pytest.raises(RequestError, match=r"unknown key 'kind'"):
-        spec({"kind": "probe_alignment"})
 
 
 def without(run, *names, positions=True):
@@ -385,17 +303,6 @@ def without(run, *names, positions=True):
 def test_runs_that_lack_what_the_alignment_needs(runs, alignment, change, states, inputs, message):
     with pytest.raises(RequestError, match=message):
         spec(alignment).fit(change(runs[0]), states, inputs)
-
-
-def test_offsets_that_cannot_be_estimated(runs, models):
-    with pytest.raises(RequestError, match=r"this one has no alignment\. Fit it with alignment="):
-        estimate_probe_offset(models["none"], runs[0], (0.0, 60.0))
-    with pytest.raises(RequestError, match=r"the span \[0, 4\] s holds 41 samples of run 1; .* 51"):
-        estimate_probe_offset(models["dispersion"], runs[0], (0.0, 4.0))
-    with pytest.raises(RequestError, match=re.escape("bounds must rise; received (1.0, 0.0) (m)")):
-        estimate_probe_offset(models["dispersion"], runs[0], (0.0, 60.0), bounds=(1.0, 0.0))
-    with pytest.warns(UserWarning, match="lies at the end of the distances tried, 0.2 to 0.3 m"):
-        estimate_probe_offset(models["dispersion"], runs[0], (0.0, 60.0), bounds=(0.2, 0.3))
 
 
 def test_the_spread_of_celerities_is_that_between_the_runs():

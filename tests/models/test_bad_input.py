@@ -216,17 +216,6 @@ def test_a_channel_constant_in_one_run_alone_is_told_and_standardised_over_all(m
     assert np.all(model.state_std > 0)
 
 
-def test_names_may_be_an_array(make_run, channels):
-    arrays = {key: np.array(names) for key, names in channels.items()}
-    model = SPEC.fit(make_run(), **arrays)
-    assert model.states == channels["states"]
-
-
-def test_one_of_several_stops_may_be_left_open(make_run, channels):
-    model = SPEC.fit([make_run(), make_run(seed=1)], **channels, stop=[None, 10.0])
-    assert model.training.stop == pytest.approx((19.95, 10.0))
-
-
 def test_a_start_before_the_history_is_full_says_how_many_samples_are_missing(model, run):
     message = (
         r"start = 0\.25 s leaves 6 samples of history .* needs 9 .*: 3 are missing\. "
@@ -243,18 +232,6 @@ def test_a_start_outside_the_run_is_refused(model, run, start):
         RequestError, match=r"start = .* s is outside the run, which runs from 0 to"
     ):
         model.forecast(run, start=start, steps=5)
-
-
-@pytest.mark.parametrize("start", ["5", None, [5.0, 6.0]])
-def test_a_start_that_is_not_one_number_is_refused(model, run, start):
-    with pytest.raises(RequestError, match="start must be an instant in seconds; received"):
-        model.forecast(run, start=start, steps=5)
-
-
-def test_messages_keep_the_digits_of_late_instants(model, run):
-    late = run.assign_coords(time=run.time + 1234567.0)
-    with pytest.raises(RequestError, match=r"start = 1234567\.25 s .* Start at 1234567\.4 s"):
-        model.forecast(late, start=1234567.25, steps=5)
 
 
 def test_messages_tell_samples_apart_whatever_the_times_count_from(run, channels):
@@ -392,13 +369,6 @@ def test_what_is_not_a_run_is_refused(channels, runs, message):
 def test_wrong_settings_are_refused(settings, message):
     with pytest.raises(RequestError, match=message):
         HankelDMDc(**{"state_delays": 3, "input_delays": 8, "ridge": 1.0, **settings})
-
-
-@pytest.mark.parametrize("preset", [HankelDMDc.paper, HankelDMDc.recommended])
-@pytest.mark.parametrize(("period", "dt", "name"), [(0, 0.05, "encounter_period"), (1.6, -1, "dt")])
-def test_presets_ask_for_a_positive_period_and_step(preset, period, dt, name):
-    with pytest.raises(RequestError, match=f"{name} must be a positive number of seconds"):
-        preset(encounter_period=period, dt=dt)
 
 
 def test_a_period_and_a_step_that_were_swapped_are_told():

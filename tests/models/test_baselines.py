@@ -159,21 +159,3 @@ def test_the_recommended_subspace_model_takes_one_state(state):
     model = spec.fit(linear_run(1), [state], INPUTS)
     assert spec.order is None
     assert model.settings.order == len(model.space.A) == 9
-
-
-def test_settings_that_a_baseline_does_not_have_are_refused():
-    with pytest.raises(TypeError, match="state_delays"):
-        FIR(state_delays=3, input_delays=4)
-    with pytest.raises(RequestError, match=r"unknown key 'ridge'"):
-        Mean.from_json({"ridge": 1.0})
-    with pytest.raises(RequestError, match=r"order must be an integer of at least 1"):
-        Subspace(state_delays=3, input_delays=4, order=0)
-    with pytest.raises(RequestError, match=r"order = 40 is more than the 8 values of 4 future"):
-        Subspace(state_delays=3, input_delays=4, order=40).fit(linear_run(1), STATES, INPUTS)
-    with pytest.raises(RequestError, match=r"cannot be aligned to the surge that it predicts"):
-        Subspace(
-            state_delays=3,
-            input_delays=4,
-            order=4,
-            alignment={"mode": "dispersion", "surge": "predicted"},
-        )

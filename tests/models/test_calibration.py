@@ -1,15 +1,12 @@
 """The calibrated band of an ensemble: on windows that no member read, kept in its file."""
 
-import re
-import warnings
-
 import numpy as np
 import pytest
 import xarray as xr
 
 import seakeep
 from seakeep.core.calibration import band_scores, conformal_margin
-from seakeep.errors import RequestError, SeakeepWarning
+from seakeep.errors import RequestError
 from seakeep.models.calibration import held_out, learn_margin
 
 STATES, INPUTS, DT = ["heave", "pitch"], ["eta"], 0.1
@@ -151,21 +148,6 @@ def test_no_window_touches_what_a_member_has_read(ensemble, moved, run):
     np.testing.assert_allclose(calibrated.calibration.conformal.margin, expected.margin, rtol=1e-12)
 
 
-def test_progress_counts_members_over_the_runs(ensemble):
-    told = []
-    runs = {name: sea(3, 500, name) for name in ("other", "third")}
-    runs["short"] = sea(4, 20, "short")
-    ensemble.calibrate(runs, steps=40, progress=lambda *each: told.append(each))
-    assert [done for done, _, _ in told] == list(range(1, 17))
-    assert {total for _, total, _ in told} == {16}
-    assert (told[0][2], told[-1][2]) == ("other, member 1", "third, member 8")
-
-
-def test_another_run_is_used_whole(ensemble):
-    found = ensemble.calibrate({"other": sea(3, 500, "other")}, steps=40).calibration
-    assert found.windows == {"other": (500 - ensemble.history_samples) // 40}
-
-
 def test_windows_leave_room_for_the_look_ahead():
     spec = seakeep.BayesianHankelDMDc(
         encounter_period=1.6,
@@ -186,37 +168,6 @@ def test_windows_leave_room_for_the_look_ahead():
         else:
             with pytest.raises(RequestError, match="no window of 40 steps"):
                 ensemble.calibrate(part, 40)
-
-
-def unnamed(run):
-    plain = run.copy()
-    del plain.attrs["run"]
-    return plain
-
-
-def test_runs_without_names_are_known_by_their_samples(run):
-    spec = seakeep.BayesianHankelDMDc(
-        encounter_period=1.6,
-        window=seakeep.Uniform("10 T", "16 T"),
-        state_delays=seakeep.Fixed("0.5 T"),
-        input_delays=seakeep.Fixed("1.0 T"),
-        ridge=seakeep.Fixed(300.0),
-        n_members=2,
-    )
-    first, second, third = (unnamed(sea(seed, 500)) for seed in (0, 3, 4))
-    ensemble = spec.fit([first, second], STATES, INPUTS)
-    # Up to 256 of its 500 samples and their history were read, so that none of 250 steps is free.
-    # `second` was read under the name "run 2"; alone it is "run", in a list of one "run 1".
-    for again in (second, [second], second.isel(time=slice(0, 300)), {"other": second}):
-        with pytest.raises(RequestError, match="members have read what is left of them"):
-            ensemble.calibrate(again, steps=250)
-    free = (500 - ensemble.history_samples) // 40
-    assert ensemble.calibrate(third, steps=40).calibration.windows == {"run": free}
-    assert ensemble.calibrate([third], steps=40).calibration.windows == {"run 1": free}
-    # A run that has a name and other samples may have been prepared in another way.
-    named = spec.fit(sea(0, 500, "a"), STATES, INPUTS)
-    with pytest.raises(RequestError, match="members have read what is left of them"):
-        named.calibrate(1.001 * sea(0, 500, "a").assign_attrs(run="a"), steps=250)
 
 
 def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(learnt, run):
@@ -347,55 +298,3 @@ def test_members_whose_windows_reach_into_a_third_do_not_forecast_it():
         kept.forecast(other, 10.0, 40)["heave"],
         ensemble.forecast(other, 10.0, 40)["heave"].isel(member=free),
     )
-
-
-def test_the_summary_says_it(calibrated, moved, ensemble):
-    said = calibrated.summary()
-    assert "calibrated for 0.95 on 20 windows of 40 steps: " in said
-    assert re.search(r"7\.\d to 7\.\d times spread and a floor of .* training SD either way", said)
-    assert re.search(r"20 windows of 40 steps: wider by .* training SD either", moved.summary())
-    assert "calibrated" not in ensemble.summary()
-
-
-def test_a_longer_forecast_than_the_calibrated_ones_is_told(calibrated, run):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        calibrated.forecast_summary(run, 112.0, 40, band="calibrated")
-        calibrated.forecast_summary(run, 112.0, 41)
-    for ask in (
-        lambda: calibrated.forecast_summary(run, 112.0, 41, band="calibrated"),
-        lambda: calibrated.summarize_windows(run, [112.0], 41, band="calibrated"),
-    ):
-        with pytest.warns(
-            SeakeepWarning, match="forecast of sea is longer than the 40 instants"
-        ) as told:
-            ask()
-        assert told[0].filename == __file__
-
-
-def test_what_is_refused(ensemble, calibrated, run):
-    with pytest.raises(RequestError, match="the ensemble is not calibrated"):
-        ensemble.forecast_summary(run, 120.0, 30, band="calibrated")
-    with pytest.raises(RequestError, match=r"calibrated for level = 0\.95, and 0\.9 was asked"):
-        calibrated.forecast_summary(run, 120.0, 30, level=0.9, band="calibrated")
-    with pytest.raises(RequestError, match="must be 'members' or 'calibrated'; received 'x'"):
-        calibrated.forecast_summary(run, 120.0, 30, band="x")
-    with pytest.raises(
-        RequestError,
-        match=r"no window of 400 steps .* is free in sea, as given here: members have read",
-    ):
-        ensemble.calibrate(run.sel(time=slice(None, 62.0)), steps=400)
-    with pytest.raises(
-        RequestError, match="steps must be a whole number of at least 1; received 0"
-    ):
-        ensemble.calibrate(run, steps=0)
-    with pytest.raises(RequestError, match="level must lie between 0 and 1"):
-        ensemble.calibrate(run, steps=40, level=95)
-    with pytest.raises(RequestError, match=r"learns from some windows and judges others.* is 1\."):
-        ensemble.calibrate(run.sel(time=slice(60.0, 69.0)), steps=40, scale="learnt")
-    with pytest.raises(
-        RequestError, match="must be 'spread', 'constant' or 'learnt'; received 'x'"
-    ):
-        ensemble.calibrate(run, steps=40, scale="x")
-    with pytest.raises(RequestError, match="folds must be 'run', or None"):
-        ensemble.calibrate(run, steps=40, folds="window")

@@ -1,5 +1,4 @@
 import dataclasses
-import signal
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -14,8 +13,6 @@ from seakeep import (
     Fixed,
     HankelDMDc,
     LogUniform,
-    ProbeAlignment,
-    RequestError,
     SeakeepWarning,
     Uniform,
 )
@@ -110,14 +107,6 @@ def test_members_equal_the_deterministic_model(run, delay_rows, history, ridge_s
         assert member.training.columns == model.training.columns
         assert member.training.stop == pytest.approx(model.training.stop)
         assert member.training.first == pytest.approx(model.training.first)
-
-
-def test_several_runs_are_pooled_as_in_the_deterministic_model(run):
-    both = {"one": run, "two": wave_run(1)}
-    ensemble = small().fit(both, STATES, INPUTS, stop={"one": 60.0, "two": 70.0})
-    model = alone(ensemble, 2).fit(both, STATES, INPUTS, stop={"one": 60.0, "two": 70.0})
-    np.testing.assert_allclose(ensemble.member(2).A, model.A, atol=1e-10)
-    assert ensemble.member(2).training.runs == ("one", "two")
 
 
 def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays(tmp_path):
@@ -235,18 +224,6 @@ def test_priors_that_give_nothing_to_train_with_are_refused(run, changes, text):
         fitted(run, **changes)
 
 
-def test_an_infinite_quantile_is_drawn_again(run):
-    class Rare:
-        def ppf(self, q):
-            return np.inf if q > 0.5 else q
-
-        dist = stats.uniform  # the name that a file gives it
-
-    draws = fitted(run, state_delays=Rare(), n_members=20).draws
-    assert draws.attrs["redrawn"] > 0
-    assert np.all(draws.state_delays <= 0.5)
-
-
 def test_the_seed_may_be_a_sequence_or_a_generator(run):
     sequence = np.random.SeedSequence(3)
     xr.testing.assert_equal(fitted(run).draws, fitted(run, seed=sequence).draws)
@@ -279,23 +256,6 @@ def test_the_summary_is_that_of_the_members(run, monkeypatch):
         for name in STATES:
             np.testing.assert_array_equal(found[name], expected[name])
     assert (found.members, found.diverged, found.level) == (6, 0, 0.9)
-
-
-def test_no_room_for_spilled_members_is_told(run, monkeypatch):
-    resource = pytest.importorskip("resource", reason="file sizes are limited on POSIX alone")
-    monkeypatch.setattr(engine, "HELD", 0)
-    ensemble = fitted(run)
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
-    try:
-        with pytest.raises(seakeep.RequestError) as told:
-            ensemble.forecast_summary(run, start=65.0, steps=77)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        signal.signal(signal.SIGXFSZ, ignored)
-    assert "cannot keep 0 MiB of members in the temporary folder" in str(told.value)
-    assert "Free space there, name a folder on another disk" in str(told.value)
 
 
 def test_windows_side_by_side_equal_single_forecasts(run):
@@ -362,22 +322,6 @@ def test_a_file_gives_back_the_ensemble_to_the_last_bit(run, tmp_path):
     )
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"ridge": Fixed(0.0), "rank": np.int64(5)},
-        {"standardize": np.bool_(True)},
-        {"alignment": ProbeAlignment(surge="none", celerity=np.float32(2.5))},
-        {"alignment": ProbeAlignment(surge="none", celerity=np.int64(2))},
-    ],
-)
-def test_numbers_of_numpy_are_kept_in_a_file(run, tmp_path, changes):
-    ensemble = fitted(run, **changes)
-    back = seakeep.load_model(ensemble.save(tmp_path / "ensemble.nc"))
-    assert back.settings == ensemble.settings
-    assert back.alignment == ensemble.alignment
-
-
 def test_diverged_members_are_counted_and_left_out(run):
     ensemble = fitted(run)
     forecast = ensemble.forecast(run, start=65.0, steps=30)
@@ -390,14 +334,6 @@ def test_diverged_members_are_counted_and_left_out(run):
         np.testing.assert_array_equal(summary[name], rest[name])
     assert summary.attrs["diverged"] == 1
     assert summary.attrs["members"] == 6
-
-
-def test_members_of_whole_numbers_are_summarised():
-    counts = xr.Dataset({"slams": (("member", "time"), [[1, 2, 7], [2, 4, 9]])})
-    summary = seakeep.summarize(counts, level=0.5)
-    expected = seakeep.summarize(counts.astype(float), level=0.5)
-    xr.testing.assert_identical(summary, expected)
-    assert summary.slams.sel(statistic="mean").values.tolist() == [1.5, 3.0, 8.0]
 
 
 def test_members_that_diverge_say_when():
@@ -480,13 +416,6 @@ def test_spectral_radii_are_those_of_the_members_for_any_workers(run, tmp_path):
     np.testing.assert_array_equal(back.spectral_radii(), radii)
 
 
-def test_a_file_does_not_depend_on_what_was_asked_before(run, tmp_path):
-    ensemble = fitted(run, ridge=STABLE)
-    before = ensemble.save(tmp_path / "before.nc").read_bytes()
-    ensemble.summary()
-    assert ensemble.save(tmp_path / "after.nc").read_bytes() == before
-
-
 def test_training_spans_are_those_of_the_members(run):
     runs = {"one": run, "two": wave_run(1)}
     for train_on in ("all", "runs", "windows"):
@@ -537,55 +466,3 @@ def test_all_of_the_runs_train_where_no_length_is_drawn(run):
     assert set(ensemble.draws.window_samples.values) == {-1}
     model = alone(ensemble, 0).fit(run, STATES, INPUTS, stop=60.0)
     np.testing.assert_allclose(ensemble.member(0).A, model.A, atol=1e-10)
-
-
-def test_an_ensemble_without_inputs(run):
-    ensemble = small().fit(run, STATES, [], stop=60.0)
-    forecast = ensemble.forecast(run, start=65.0, steps=40)
-    single = ensemble.member(4).forecast(run, start=65.0, steps=40)
-    np.testing.assert_allclose(arrays(forecast)[4], arrays(single), atol=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"n_members": 0}, "n_members must be an integer of at least 1; received 0"),
-        ({"sampling": "grid"}, "sampling must be 'monte_carlo' or 'sobol'; received 'grid'"),
-        (
-            {"train_on": "half"},
-            "train_on must be 'all', 'runs', 'windows' or 'auto'; received 'half'",
-        ),
-        ({"seed": -1}, "seed must be an integer, zero or more, a SeedSequence or a Generator"),
-        ({"encounter_period": 0}, "encounter_period must be a positive number of seconds"),
-        ({"delay_rows": "none"}, "delay_rows must be 'ridge' or 'exact'"),
-    ],
-)
-def test_settings_out_of_range(changes, text):
-    with pytest.raises(RequestError, match=text):
-        small(**changes)
-
-
-def test_messages_of_forecasts(run):
-    ensemble = fitted(run)
-    with pytest.raises(RequestError, match="level must lie between 0 and 1; received 95"):
-        ensemble.forecast_summary(run, start=65.0, steps=5, level=95)
-    with pytest.raises(RequestError, match="starts is empty"):
-        ensemble.forecast_windows(run, [], steps=5)
-    with pytest.raises(RequestError, match="no member 6: the ensemble has 6, counted from 0 to 5"):
-        ensemble.member(6)
-    with pytest.raises(RequestError, match=r"leaves \d+ samples of history"):
-        ensemble.forecast(run, start=0.5, steps=5)
-    other = dataclasses.replace(small(), dt=0.2)
-    with pytest.raises(DataError, match=r"has a time step of 0.1 s and the model one of 0.2 s"):
-        other.fit(run, STATES, INPUTS)
-
-
-def test_the_spec_is_not_changed_and_the_ensemble_cannot_be(run):
-    spec = small()
-    before = dataclasses.asdict(spec)
-    ensemble = spec.fit(run, STATES, INPUTS, stop=60.0)
-    assert dataclasses.asdict(spec) == before
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        ensemble.dt = 1.0
-    with pytest.raises(ValueError, match="read-only"):
-        ensemble.arrays.states[0][0, 0] = 1.0

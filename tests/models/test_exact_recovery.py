@@ -35,15 +35,6 @@ def test_a_position_only_oscillator_gives_its_arx_coefficients(oscillator, part,
     np.testing.assert_allclose(model.B[1], [0, 0], rtol=0, atol=EXACT)
 
 
-def test_a_free_oscillator_is_recovered_without_input(oscillator):
-    run = oscillator.run(samples=60, forced=False)
-    model = HankelDMDc(1, 0, 0.0, standardize=False).fit(run, states=["heave"], inputs=[])
-    np.testing.assert_allclose(model.A[0], oscillator.arx[:2], rtol=0, atol=EXACT)
-    assert model.B.shape == (2, 0)
-    forecast = model.forecast(run, start=float(run.time[1]), steps=50)
-    np.testing.assert_allclose(forecast.heave, run.heave[2:52], rtol=0, atol=EXACT)
-
-
 def test_a_model_without_input_may_forecast_past_the_end_of_the_run(oscillator):
     run = oscillator.run(samples=80, forced=False)
     model = HankelDMDc(1, 0, 0.0, standardize=False).fit(run, states=["heave"], inputs=[])
@@ -94,12 +85,3 @@ def test_pooled_runs_identify_what_none_of_them_can_alone(oscillator):
     # Six columns of random data: the condition number may reach 1e4, so 1e-12 and a margin.
     np.testing.assert_allclose(top_row(pooled), oscillator.arx, rtol=0, atol=EXACT)
     assert pooled.training.runs == ("a", "b", "c")
-
-
-def test_exact_input_to_output_recovery_survives_the_choice_of_units(oscillator, make_dataset):
-    # Least squares without ridge does not depend on the scale of the channels.
-    run = oscillator.run()
-    scaled = make_dataset(run.time.values, heave=1e3 * run.heave.values, eta_fwd=run.eta_fwd.values)
-    model = HankelDMDc(1, 1, 0.0, standardize=False).fit(scaled, **FORCED)
-    a0, a1, b0, b1 = oscillator.arx
-    np.testing.assert_allclose(top_row(model), [a0, a1, 1e3 * b0, 1e3 * b1], rtol=1e-9)

@@ -1,8 +1,6 @@
 """Who does the work changes no array, and no process or file is left over."""
 
 import os
-import pickle
-import re
 import signal
 import subprocess
 import sys
@@ -100,19 +98,6 @@ def test_blas_has_one_thread_wherever_work_is_done(pool):
             assert set(found) == {1}
 
 
-def test_data_are_pickled_once(ensemble_and_run, pool, monkeypatch):
-    ensemble, run = ensemble_and_run
-    pickled = []
-
-    def counting(self, protocol):
-        pickled.append(protocol)
-        return object.__reduce_ex__(self, protocol)
-
-    monkeypatch.setattr(type(ensemble.arrays), "__reduce_ex__", counting)
-    ensemble.forecast(run, start=31.0, steps=20, executor=pool)
-    assert len(pickled) == 1
-
-
 @posix
 def test_a_process_that_is_killed_at_work_is_reported():
     with (
@@ -120,12 +105,6 @@ def test_a_process_that_is_killed_at_work_is_reported():
         processes(2) as executor,
     ):
         list(in_order(side_work.fall, 5, range(20), executor))
-
-
-def test_an_error_of_an_item_ends_the_work(pool):
-    for executor in (None, pool):
-        with pytest.raises(ValueError, match="item 0"):
-            list(in_order(side_work.refuse, None, range(6), executor))
 
 
 def test_an_error_in_the_block_ends_its_processes():
@@ -211,32 +190,6 @@ def _ends(pid):
     return False
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"workers": 0}, "workers must be a positive integer; received 0"),
-        ({"workers": True}, "workers must be a positive integer; received True"),
-        ({"workers": 2, "scheduler": "tcp://a:1"}, "hands all work to a cluster. Give one"),
-    ],
-)
-def test_workers_that_do_not_exist(arguments, words):
-    with pytest.raises(RequestError, match=words), make_executor(**arguments):
-        pass
-
-
-def test_one_worker_is_this_process():
-    with make_executor(1) as executor:
-        assert executor is None
-
-
-def test_other_versions_are_refused(monkeypatch):
-    here = executors.versions()
-    payload = pickle.dumps((None, here | {"numpy": "1.0"}))
-    words = rf"would not compute the same arrays: it has numpy {re.escape(here['numpy'])} \(here 1"
-    with pytest.raises(RequestError, match=words):
-        executors._work("token", payload, side_work.square, [1])
-
-
 class TestCluster:
     """A real Dask cluster: a scheduler and workers, each a process on loopback."""
 
@@ -289,43 +242,10 @@ class TestCluster:
                 list(in_order(side_work.square, 1, range(4), executor))
             assert time.monotonic() - begin < 120
 
-    @pytest.mark.parametrize(
-        "address", ["nonsense", "http://127.0.0.1:8786", "tcp://host", "tcp://"]
-    )
-    def test_what_is_no_address_is_refused_at_once(self, address):
-        with (
-            pytest.raises(
-                RequestError, match=rf"'{address}' is not the address of a Dask scheduler"
-            ),
-            make_executor(scheduler=address),
-        ):
-            pass
-
     def test_an_address_where_nobody_answers(self, monkeypatch):
         monkeypatch.setattr(executors, "PATIENCE", 0.5)
         with (
             pytest.raises(RequestError, match=r"no Dask scheduler answers at .*`dask scheduler`"),
             make_executor(scheduler="tcp://127.0.0.1:9"),
-        ):
-            pass
-
-    def test_a_scheduler_without_workers(self, start, monkeypatch, distributed):
-        waits = distributed.Client.wait_for_workers
-
-        def briefly(self, count, timeout):  # the time to connect stays long
-            waits(self, count, timeout=0.5)
-
-        monkeypatch.setattr(distributed.Client, "wait_for_workers", briefly)
-        with (
-            pytest.raises(RequestError, match=r"has no workers. Start some with `dask worker tcp"),
-            make_executor(scheduler=start(0).address),
-        ):
-            pass
-
-    def test_the_extra_that_is_missing(self, monkeypatch):
-        monkeypatch.setitem(sys.modules, "distributed", None)
-        with (
-            pytest.raises(RequestError, match=r"needs distributed, which is not installed"),
-            make_executor(scheduler="tcp://127.0.0.1:1"),
         ):
             pass

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import DT, INPUTS, POSITIONS, STATES, drifting_run
+from drifting import DT, INPUTS, STATES, drifting_run
 
 from seakeep import (
     HankelDMDc,
     Powers,
     ProbeAlignment,
     RequestError,
-    SeakeepWarning,
     SlowSquares,
     load_model,
 )
@@ -171,46 +170,11 @@ def test_training_is_the_recursion_on_the_measured_surge(models):
     assert not np.allclose(other.delayed[60:], found.delayed[60:])
 
 
-def test_a_probe_that_was_moved_and_says_so_changes_little(models):
-    run = drifting_run(7, moved=0.5)
-    wrong = heave_error(models["ahead"], run)
-    for name, x in POSITIONS.items():
-        run[name].attrs["x_position"] = x + 0.5
-    assert heave_error(models["ahead"], run) < 0.15 < 0.3 < wrong
-    for name, x in POSITIONS.items():
-        run[name].attrs["x_position"] = x + 300.0
-    with pytest.raises(RequestError, match=r"stands -300 m from where it stood in training, too"):
-        models["ahead"].forecast(run, start=60.0, steps=10)
-
-
 def test_a_file_holds_the_recursion(models, tmp_path):
     model, run = models["ahead"], drifting_run(7)
     again = load_model(model.save(tmp_path / "rom.nc"))
     forecasts = [each.forecast(run, start=60.0, steps=50) for each in (again, model)]
     xr.testing.assert_identical(*forecasts)
-
-
-def test_a_vessel_beyond_the_reach_of_its_carriers_is_said(models):
-    model, run = models["ahead"], drifting_run(7)
-    low, high = model.signature.input_map.follows.reach
-    assert low < -0.6
-    assert high > 0.6  # the drift of training
-    run["surge"].values[:] += high + 0.7
-    with pytest.warns(SeakeepWarning, match=r"from t = 60\.1 s on the slow surge .* lies beyond"):
-        model.forecast(run, start=60.0, steps=20)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"lead": 3}, r"a look-ahead of 3 samples .* takes a probe up-wave: two elevations"),
-        ({"delay_rows": "ridge"}, r"takes delay_rows = 'exact'; received 'ridge'"),
-        ({"alignment": {"surge": "predicted"}}, r"waves by their dispersion; received mode"),
-    ],
-)
-def test_what_cannot_follow_is_refused(change, message):
-    with pytest.raises(RequestError, match=message):
-        replace(SPEC, observables=(), **change).fit(drifting_run(), STATES, ["eta_cog"])
 
 
 def test_models_and_windows_side_by_side_are_each_alone():

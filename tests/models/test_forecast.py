@@ -6,7 +6,6 @@ import xarray as xr
 
 from seakeep import HankelDMDc
 from seakeep.core import embed
-from seakeep.errors import RequestError
 
 DT = 0.05
 S, Z = 3, 8
@@ -119,46 +118,6 @@ def test_arrays_give_the_same_bits_as_a_run_from_the_rows_that_are_needed(model,
     one = model.forecast_arrays(x[:101], u[:101], np.zeros((0, 0)), steps=1)
     alone = model.forecast(test_run, start=5.0, steps=1)
     np.testing.assert_array_equal(one, values(alone, model.states))
-
-
-def test_windows_side_by_side_are_single_forecasts(model, test_run):
-    starts = [2.0, 5.4, 0.41]
-    together = model.forecast_windows(test_run, starts, steps=60)
-    assert dict(together.sizes) == {"window": 3, "lead": 60}
-    np.testing.assert_allclose(together.start, [2.0, 5.4, 0.4], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(together.lead, DT * np.arange(1, 61), rtol=1e-12)
-    assert together.status.values.tolist() == ["ok"] * 3
-    for window, start in enumerate(starts):
-        alone = model.forecast(test_run, start=start, steps=60)
-        for name in model.states:
-            # Three windows are one product: other roundings, over 60 steps of a stable model.
-            np.testing.assert_allclose(together[name][window], alone[name], rtol=0, atol=1e-11)
-            assert together[name].attrs == alone[name].attrs
-        assert together.attrs == {key: alone.attrs[key] for key in ("run", "reads_input_until")}
-    with pytest.raises(RequestError, match=r"starts is empty: name at least one instant"):
-        model.forecast_windows(test_run, [], steps=60)
-    with pytest.raises(RequestError, match=r"starts must be a list of instants; received 5.0"):
-        model.forecast_windows(test_run, 5.0, steps=60)
-    with pytest.raises(RequestError, match=r"start = 0.1 s leaves 3 samples of history"):
-        model.forecast_windows(test_run, [5.0, 0.1], steps=60)
-
-
-def test_a_model_without_input_takes_empty_arrays(make_run):
-    run = make_run()
-    model = HankelDMDc(5, 0, 1.0).fit(run, states=["heave", "pitch"], inputs=[])
-    x = values(run, model.states)
-    empty = np.zeros((0, 0))
-    arrays = model.forecast_arrays(x[:50], empty, empty, steps=30)
-    forecast = model.forecast(run, start=float(run.time[49]), steps=30)
-    np.testing.assert_array_equal(arrays, values(forecast, model.states))
-
-
-def test_shifting_a_run_in_time_shifts_its_forecast(model, test_run):
-    expected = model.forecast(test_run, start=5.0, steps=50)
-    later = test_run.assign_coords(time=test_run.time + 100.0)
-    forecast = model.forecast(later, start=105.0, steps=50)
-    np.testing.assert_array_equal(forecast.heave.values, expected.heave.values)
-    np.testing.assert_allclose(forecast.time, expected.time + 100.0, rtol=0, atol=1e-12)
 
 
 def test_a_forecast_in_other_consistent_units_is_the_same_forecast(make_run, channels):

@@ -1,15 +1,12 @@
 """Members that are held give the ensemble's own numbers, from plain arrays that are checked."""
 
-import warnings
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import seakeep
-from seakeep import RequestError, SeakeepWarning
 
 STATES, INPUTS, DT = ["heave", "pitch"], ["eta"], 0.1
 START, STEPS = 500, 60
@@ -91,49 +88,3 @@ def test_who_identifies_them_makes_no_difference(ensemble, held, arrays):
             np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(ensemble.live().errors.rms, held.live().errors.rms)
     assert told[-1] == (7, 7, "member 7")
-
-
-def test_it_says_what_it_is_and_takes(held):
-    numbers = sum(member.coefficients.size for member in held.identified)
-    assert held.nbytes == 8 * numbers
-    assert "n_members=7, states=['heave', 'pitch'], inputs=['eta'], dt=0.1" in repr(held)
-
-
-def test_members_that_diverge_are_counted_and_left_out(ensemble, arrays):
-    members = list(ensemble.hold().identified)
-    grown = members[2].coefficients.copy()
-    grown[:, :2] = 9.0 * np.eye(2)  # grows by a factor of about nine a step
-    members[2] = replace(members[2], coefficients=grown)
-    held = replace(ensemble, identified=tuple(members))
-    found = held.forecast_arrays(**arrays, steps=STEPS)
-    assert found.diverged == 1
-    others = replace(ensemble, members=tuple(np.delete(ensemble.members, 2)))
-    expected = others.hold().forecast_arrays(**arrays, steps=STEPS)
-    np.testing.assert_array_equal(found.upper, expected.upper)
-
-
-def test_columns_with_names_are_taken_by_name(held, arrays):
-    pandas = pytest.importorskip("pandas")
-    plain = held.forecast_arrays(**arrays, steps=STEPS)
-    turned = arrays["x_history"][:, ::-1]
-    frame = pandas.DataFrame(turned, columns=["pitch", "heave"])
-    frame["clock"] = 0.0
-    array = xr.DataArray(turned, dims=("time", "channel"), coords={"channel": ["pitch", "heave"]})
-    for named in (frame, array):
-        found = held.forecast_arrays(named, arrays["u_history"], arrays["u_future"], STEPS)
-        np.testing.assert_array_equal(found.mean, plain.mean)
-    with pytest.raises(RequestError, match=r"x_history has no column 'pitch'; its columns: heave"):
-        held.forecast_arrays(frame[["heave"]], arrays["u_history"], arrays["u_future"], steps=STEPS)
-
-
-def test_a_band_is_checked_as_in_the_ensemble(held, arrays):
-    with pytest.raises(RequestError, match=r"calibrated for level = 0\.95, and 0\.9 was asked"):
-        held.forecast_arrays(**arrays, steps=STEPS, level=0.9, band="calibrated")
-    run = sea(1)
-    arrays["u_future"] = run["eta"].values[START + 1 :, None]
-    with pytest.warns(SeakeepWarning, match="is longer than the 60 instants") as told:
-        held.forecast_arrays(**arrays, steps=STEPS + 1, band="calibrated")
-    assert told[0].filename == __file__
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        held.forecast_arrays(**arrays, steps=STEPS, band="calibrated")

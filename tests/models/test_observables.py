@@ -1,17 +1,14 @@
 """Observables and lead: from a measured run to the columns that drive a model."""
 
-import json
-
 import numpy as np
 import pytest
 import xarray as xr
 
 from seakeep.core.observables import slow_kernel, slow_squares
-from seakeep.errors import RequestError
 from seakeep.models import HankelDMDc
 from seakeep.models.inputs import InputMap, Regressors
 from seakeep.models.labelled import Span, channel_labels
-from seakeep.models.observables import Expression, Powers, SlowSquares, from_json
+from seakeep.models.observables import Powers, SlowSquares
 
 DT, PERIOD = 0.1, 16  # s, samples
 
@@ -146,43 +143,3 @@ def test_slow_squares_above_those_of_training_grow_by_seven_tenths():
     expected = np.where(2 * inside > top, top + 0.7 * (2 * inside - top), 2 * inside)
     np.testing.assert_allclose(twice, expected, rtol=1e-12)
     assert (2 * inside > top).any()
-
-
-def test_a_map_is_the_same_after_a_round_trip_through_json():
-    run = irregular()
-    chain = fitted(run)
-    again = InputMap.from_json(json.loads(json.dumps(chain.to_json())))
-    assert again.to_json() == chain.to_json()
-    for one, other in zip(rows(chain, run, 300, 400), rows(again, run, 300, 400), strict=True):
-        np.testing.assert_array_equal(one, other)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"kind": "squares"}, r"observables: kind must be 'slow_squares'.*received 'squares'"),
-        ({"kind": "powers", "of": "eta", "power": 2}, r"powers: unknown key 'power'.*'powers'"),
-        ({"kind": "powers", "of": ["a"], "powers": [1]}, r"integers from 2 to 5; received 1"),
-        ({"kind": "slow_squares", "of": ["a"], "cutoff": 0}, r"cutoff must be per encounter"),
-        ({"kind": "slow_squares", "of": ["a"], "lags": [0, 0]}, r"each once; received"),
-        (
-            {"kind": "slow_squares", "of": []},
-            r"list of one or more names; received \[\]",
-        ),
-        ({"kind": "slow_squares"}, r"slow_squares: the key 'of' is missing"),
-    ],
-)
-def test_a_setting_out_of_range_is_refused(settings, message):
-    with pytest.raises(RequestError, match=message):
-        from_json(settings)
-
-
-def test_an_observable_of_an_unknown_input_is_refused():
-    with pytest.raises(RequestError, match=r"powers of 'eta_aft': no such input"):
-        fitted(irregular(), chosen=[Powers("eta_aft")])
-
-
-def test_two_columns_of_one_name_are_refused():
-    chosen = [Expression("eta_fwd", "eta_cog**2")]
-    with pytest.raises(RequestError, match="two inputs or observables make a column 'eta_fwd'"):
-        fitted(irregular(), chosen=chosen)

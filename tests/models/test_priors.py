@@ -1,12 +1,11 @@
 import json
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from seakeep import Fixed, LogUniform, RequestError, Uniform
+from seakeep import Fixed, LogUniform, Uniform
 from seakeep.models.priors import Distribution, prior_json, prior_of
 
 PRIORS = [
@@ -36,28 +35,3 @@ def test_a_table_states_all_of_a_prior(prior):
     assert getattr(back, "unit", "") == getattr(prior, "unit", "")
     for q in (0.025, 0.5, 0.9):
         assert back.ppf(q) == prior.ppf(q)
-
-
-@pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: Uniform(3, 1), "lower bound below the upper one; received 3 and 1. Swap them"),
-        (lambda: Uniform(1, 1), "use seakeep.Fixed for a single value"),
-        (lambda: Uniform("10 T", 1), "Uniform needs one unit; received '10 T' and 1. Write 'T'"),
-        (lambda: LogUniform(0, 1), "positive lower bound; received 0. Logarithms start above zero"),
-        (lambda: LogUniform(1, np.inf), "finite numbers; received 1 and inf"),
-        (lambda: Fixed(np.nan), "Fixed needs finite numbers; received nan"),
-    ],
-)
-def test_messages(make, text):
-    with pytest.raises(RequestError, match=text):
-        make()
-
-
-def test_a_prior_of_another_kind_is_not_written():
-    class Own:
-        def ppf(self, q):
-            return q
-
-    with pytest.raises(RequestError, match=r"cannot be written to a file. Use one of seakeep's"):
-        prior_json(Own())

@@ -11,7 +11,6 @@ import xarray as xr
 
 from seakeep import (
     BayesianHankelDMDc,
-    DataError,
     HankelDMDc,
     LogUniform,
     ProbeAlignment,
@@ -121,15 +120,6 @@ def test_regular_runs_train_beside_irregular_ones_and_help_in_waves_like_theirs(
     assert errors[1] < 0.5 * errors[0]
 
 
-def test_the_step_may_be_that_of_the_runs_and_must_agree_with_it():
-    assert HankelDMDc.recommended(T, runs=runs()) == HankelDMDc.recommended(T, DT)
-    assert BayesianHankelDMDc.recommended(T, runs=runs()).dt == pytest.approx(DT)
-    with pytest.raises(RequestError, match=r"neither dt .* nor runs are given"):
-        HankelDMDc.recommended(T)
-    with pytest.raises(DataError, match="step"):
-        HankelDMDc.recommended(T, 2 * DT, runs())
-
-
 def rig(run: xr.Dataset, depth: float | None, position: float | None) -> xr.Dataset:
     run = run.rename(drift="surge").assign_attrs(encounter_period=T)
     if depth is not None:
@@ -164,34 +154,9 @@ def test_an_optional_alignment_is_left_out_where_the_rig_is_not_known(depth, pos
             needed.fit(given, ["heave", "surge"], ["eta"])
 
 
-def test_what_grows_is_not_chosen():
-    run = runs(1)["run0"]
-    grown = run.assign(heave=("time", np.exp(0.02 * np.arange(700)), {"units": "m"}))
-    with pytest.raises(DataError, match="the model that was chosen grows: its spectral radius is"):
-        HankelDMDc(2, 2, "rollout", delay_rows="exact").fit(grown, ["heave"], INPUTS)
-
-
 def test_columns_are_chosen_at_a_ridge_that_is_stated():
     found = dataclasses.replace(SPEC, ridge=0.02).settled(runs(), STATES, INPUTS)
     assert found.settings.ridge == 0.02
     assert {row["ridge"] for row in found.rows} == {0.02}
     with pytest.raises(RequestError, match="choose at λ above zero, and ridge = 0 is stated"):
         dataclasses.replace(SPEC, ridge=0).settled(runs(), STATES, INPUTS)
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ("yes", r"select must be a seakeep.Select or None; received 'yes'"),
-        ({"observable": True}, r"select: unknown key 'observable'. Did you mean 'observables'\?"),
-        ({"observables": 1}, r"select: observables must be True or False; received 1"),
-        (
-            {"horizon": (15, 0)},
-            r"horizon \(encounter periods\) .* between 1e-6 and 1e6; received 0",
-        ),
-        ({"horizon": ()}, r"select: horizon is empty"),
-    ],
-)
-def test_what_select_is_not(given, message):
-    with pytest.raises(RequestError, match=message):
-        HankelDMDc(2, 2, "rollout", select=given)

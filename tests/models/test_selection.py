@@ -13,9 +13,7 @@ from drifting import drifting_run
 from seakeep import (
     DataError,
     HankelDMDc,
-    Powers,
     ProbeAlignment,
-    RequestError,
     SlowSquares,
     load_model,
     metrics,
@@ -155,28 +153,6 @@ def test_squares_are_chosen_where_the_drift_goes_with_them_and_not_without_it():
         assert row["lower"] <= row["score"] <= row["upper"]
 
 
-def test_what_each_observable_is_worth_is_told_where_they_are_stated_too():
-    squares = SlowSquares("eta", orders=(0,), lags=(0, 1))
-    spec = replace(SPEC, observables=[squares, Powers("eta", powers=(3,))])
-    model = spec.fit(runs(), STATES, INPUTS)
-    assert model.settings.observables == spec.observables
-    every = select(spec, runs(), STATES, INPUTS, vary=["observables"])
-    alone = {
-        kind: min(row["score"] for row in every.rows if row["observables"] == kind)
-        for kind in ("slow_squares", "powers")
-    }
-    assert f"; without slow_squares of eta {alone['powers']:.3f}" in model.summary()
-    assert f"; without powers of eta {alone['slow_squares']:.3f}" in model.summary()
-    assert alone["powers"] > 1.5 * alone["slow_squares"]  # the drift goes with the squares
-    # Nothing is held out where all is stated, so that nothing is known of it.
-    plain = replace(model.settings, select=None).fit(runs(), STATES, INPUTS)
-    assert "  chosen        nothing: all is stated; seakeep tune finds" in plain.summary()
-    assert (
-        "chosen"
-        not in replace(plain.settings, observables=()).fit(runs(), STATES, INPUTS).summary()
-    )
-
-
 def test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone():
     given = {
         name: run.assign(eta_2=run["eta"] + 0.01 * run["heave"]).assign_attrs(sea_state=name)
@@ -227,31 +203,6 @@ def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all():
     fallen = select(SPEC, short, STATES, INPUTS, horizon=(15.0,))
     assert fallen.settings.ridge == 1e-3
     assert "no window of 150 samples can be held out of runs of at most 200" in fallen.note
-
-
-def test_progress_counts_all_that_is_tried_once():
-    told = []
-    vary = ("ridge", "observables", "lead")
-    select(SPEC, runs(), STATES, INPUTS, vary=vary, horizon=(15.0,),
-           progress=lambda *each: told.append(each[:2]))  # fmt: skip
-    done, totals = zip(*told, strict=True)
-    assert list(done) == [*range(1, len(told) + 1)]
-    assert list(totals) == sorted(totals)
-    assert totals[-1] == done[-1]
-
-
-@pytest.mark.parametrize(
-    ("more", "vary", "message"),
-    [
-        ({}, ("rigde",), r"vary names 'rigde'\. Did you mean 'ridge'\?"),
-        ({"delay_rows": "ridge"}, (), r"takes delay_rows = 'exact' and no rank"),
-        ({}, ("rank", "readouts"), "vary names 'rank', and read-outs are chosen by free runs"),
-        ({"ridge": "evidence"}, (), "or the word rollout; received 'evidence'"),
-    ],
-)
-def test_what_cannot_be_chosen_is_refused(more, vary, message):
-    with pytest.raises(RequestError, match=message):
-        select(replace(SPEC, **more), runs(), STATES, INPUTS, vary=vary)
 
 
 def growing(seed: int, samples: int = 120) -> xr.Dataset:

@@ -15,7 +15,6 @@ from seakeep import (
     Uniform,
     load_model,
 )
-from seakeep.models.linear import modes
 
 
 @pytest.fixture
@@ -69,29 +68,6 @@ def test_modes_are_natural_frequency_and_damping_of_the_oscillator(oscillator, i
     assert mode.natural_frequency.attrs["units"] == "Hz"
 
 
-def test_eigenvalues_come_largest_first(run, channels):
-    moduli = np.abs(HankelDMDc(5, 8, 1.0).fit(run, **channels).eigenvalues)
-    assert len(moduli) == 12
-    assert np.all(np.diff(moduli) <= 0)
-
-
-def test_modes_do_not_depend_on_standardisation_of_an_unforced_mean(oscillator):
-    # z-scoring is a similarity of Â; with N = 1 it leaves Â alone, the offset of means apart.
-    run = oscillator.run(samples=4000)
-    model = HankelDMDc(1, 1, 0.0).fit(run, states=["heave"], inputs=["eta_fwd"])
-    mode = model.modes().isel(mode=0)
-    # The offset of the sample means acts as a small error of 1/√4000 of the input.
-    assert float(mode.natural_frequency) == pytest.approx(oscillator.natural_frequency, rel=1e-3)
-
-
-def test_a_stable_model_warns_of_nothing_and_says_so(identified):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert identified.spectral_radius < 1
-    assert "(stable)" in identified.summary()
-    assert "damping ratio" in identified.summary()
-
-
 def test_an_unstable_model_warns_and_says_what_to_do(make_dataset):
     model, _ = fit_growing(make_dataset)
     message = (
@@ -126,19 +102,6 @@ def test_a_forecast_that_diverges_ends_in_nan_with_its_status(make_dataset, fact
     assert instant == pytest.approx(expected, abs=1e-3, rel=0)
 
 
-@pytest.mark.parametrize("standardize", [False, True])
-def test_divergence_of_one_state_ends_all_of_them(make_dataset, standardize):
-    run = growing(make_dataset)
-    run["pitch"] = run.heave + np.random.default_rng(1).standard_normal(run.heave.size)
-    spec = HankelDMDc(0, 0, 1e-9, standardize=standardize)
-    model = spec.fit(run, states=["heave", "pitch"], inputs=["eta_fwd"])
-    x, u = np.array([[1.0, 1.0]]), np.zeros((1, 1))
-    out = model.forecast_arrays(x, u, np.zeros((199, 1)), steps=200)
-    np.testing.assert_array_equal(np.isnan(out[:, 0]), np.isnan(out[:, 1]))
-    assert np.isnan(out[-1, 0])
-    assert np.isfinite(out[0, 0])
-
-
 def test_a_forecast_that_was_lost_does_not_come_back(make_dataset):
     rng = np.random.default_rng(0)
     run = make_dataset(0.1 * np.arange(200), heave=rng.standard_normal(200))
@@ -147,20 +110,6 @@ def test_a_forecast_that_was_lost_does_not_come_back(make_dataset):
     wild = replace(model, coefficients=np.array([[100.0, -1e4]]))
     out = wild.forecast_arrays([[0.0], [1.0]], [], [], steps=3)
     np.testing.assert_array_equal(np.isnan(out[:, 0]), [True, True, True])
-
-
-def test_a_mean_far_from_zero_is_no_divergence_without_standardisation(oscillator):
-    # A heave of 1e7 SDs: counted from zero, its first step would read as lost.
-    run = oscillator.run()
-    run["heave"] = run["heave"] + 1e7 * float(run["heave"].std())
-    model = HankelDMDc(2, 2, 0.0, standardize=False).fit(run, ["heave"], ["eta_fwd"])
-    forecast = model.forecast(run, start=float(run.time[10]), steps=5)
-    assert forecast.attrs["status"] == "ok"
-
-
-def test_a_dead_mode_is_overdamped_and_not_undefined():
-    table = modes(np.array([0.5 + 0j, 0j]), 0.1)
-    assert list(table["damping_ratio"].values) == [1.0, 1.0]
 
 
 class TestStable:

@@ -81,17 +81,6 @@ def test_a_forecast_compares_its_waves_with_those_of_training(checked, monkeypat
     assert asked == [("unseen", 20.0, 40)]
 
 
-def test_a_page_says_what_cannot_be_judged():
-    refused = {"coherence": "all runs are regular.", "response": "the model has no input."}
-    notes = {"measured_response": ("run_3 is left out: it is short.",)}
-    _, response, possible, *_ = check_sections(Checked({}, refused, notes))
-    assert response.notices == (
-        "Cannot be judged: the model has no input.",
-        "run_3 is left out: it is short.",
-    )
-    assert possible.notices == ("Cannot be judged: all runs are regular.",)
-
-
 def test_a_motion_that_swings_farther_than_it_was_moved_is_named():
     left = np.array([[1.0, -0.8, 0.5, -0.3], [1.0, -3.04, 2.0, -0.9]])
     none = ("motion", [np.nan, np.nan])
@@ -136,23 +125,6 @@ def test_the_error_of_a_response_is_shown_with_the_digits_of_its_uncertainty():
     assert "RAO" in section.words[0]
 
 
-@pytest.mark.parametrize(
-    ("change", "section", "words"),
-    [
-        ("regular", "What is possible", r"all runs \(run\) are in regular waves"),
-        ("regular", "Statistics of responses", "takes a run in irregular waves"),
-        ("short", "What is possible", "has 3.5 s, and spectra take a segment of 16 s"),
-        ("short", "Response (RAO)", "no run gives a measured response"),
-        ("dead", "What is possible", r"the inputs \(eta\) hold no energy"),
-        ("dead", "Response (RAO)", "eta holds no energy: it is constant"),
-        ("dead", "Validity", "eta holds no energy: it is constant"),
-    ],
-)
-def test_runs_that_tell_too_little_are_named_on_the_page(judged, change, section, words):
-    found = {each.title: each for each in judged[change]}
-    assert re.search(f"Cannot be judged: .*{words}", " ".join(found[section].notices))
-
-
 def test_several_probes_without_positions_are_not_compared_with_the_vessel():
     run = moored_run(seed=2).assign_attrs(encounter_period=1.0, waves="irregular")
     run["eta_aft"] = run["eta"].shift(time=5, fill_value=0.0)
@@ -162,9 +134,3 @@ def test_several_probes_without_positions_are_not_compared_with_the_vessel():
     assert not response.tables
     with pytest.raises(RequestError, match="run has no channel 'eta_aft'"):
         check_model(model, {"run": run.drop_vars("eta_aft")})
-
-
-def test_a_state_that_stands_still_is_drawn(judged):
-    for each in judged["flat"]:
-        for drawing in each.figures:
-            drawing.draw().canvas.draw()

@@ -19,14 +19,12 @@ from seakeep.report.comparison import (
     write_comparison,
     write_differences,
     write_forecast,
-    write_nowcasts,
 )
 from seakeep.study import (
     Comparison,
     at_full_scale,
     comparison_table,
     difference_table,
-    forecast_at_full_scale,
     in_degrees,
 )
 
@@ -228,17 +226,6 @@ def test_a_lead_time_as_long_as_the_forecast_is_a_bound(lead_time, words):
     assert table.rows[0][:2] == ("heave", words)
 
 
-def test_no_name_is_a_formula_in_what_is_written(tmp_path):
-    name, data = "=1+1", {key: ("channel", [0.5]) for key in ("error", "claimed", "coverage")}
-    made = xr.Dataset(data, {"channel": [name]}).expand_dims(run=[name], lead=[1.0])
-    path = write_nowcasts({name: made.assign(lead_time=("channel", [1.0]))}, tmp_path / "n.csv")
-    assert path.read_text().splitlines()[1] == "'=1+1,'=1+1,'=1+1,1.0,0.5,0.5,0.5,1.0"
-    forecast = xr.Dataset({name: ("time", [1.0])}, {"time": [0.1]})
-    path = write_forecast(forecast, tmp_path / "f.csv")
-    assert path.read_text().splitlines()[0] == "time [s],'=1+1 []"
-    check_output(path, "forecast", header=forecast_header([name]))  # may be replaced
-
-
 def test_a_forecast_says_per_instant_until_when_it_reads_the_waves(tmp_path):
     data, attrs = {"heave": ("time", [1.0, 2.0])}, {"reads_input_until": 0.6}
     forecast = xr.Dataset(data, {"time": [0.1, 0.2]}, attrs)
@@ -252,44 +239,6 @@ def test_a_forecast_says_per_instant_until_when_it_reads_the_waves(tmp_path):
     assert text.splitlines()[0] == "time [s],heave []"
 
 
-def test_statuses_follow_the_clock_of_full_scale():
-    single = comparison(status="diverged at t = 3.5 s")
-    single.forecast.attrs |= {"diverged_at": 3.5, "input_predicted_from": 2.0}
-    words = "diverged at t = 7 s, input predicted from t = 4 s"
-    assert at_full_scale(single, 4.0).status == words
-    assert at_full_scale(comparison(), 4.0).status == "ok"
-    members = xr.Dataset(
-        {
-            "heave": (("member", "time"), np.ones((2, 3)), {"units": "m"}),
-            "status": ("member", np.array(["ok", "diverged at t = 2 s"])),
-        },
-        coords={"time": [1.0, 2.0, 3.0], "diverged_at": ("member", [np.nan, 2.0])},
-        attrs={"status": "1 of 2 members diverged", "start": 0.5, "diverged": 1, "members": 2},
-    )
-    full = forecast_at_full_scale(members, 4.0)
-    assert list(full["status"].values) == ["ok", "diverged at t = 4 s"]
-    np.testing.assert_array_equal(full["diverged_at"], [np.nan, 4.0])
-    assert (full.attrs["status"], full.attrs["start"]) == ("1 of 2 members diverged", 1.0)
-
-
-def test_without_matplotlib_the_message_names_the_extra(monkeypatch):
-    import builtins
-
-    from seakeep.errors import RequestError
-    from seakeep.report.style import figure_style
-
-    real = builtins.__import__
-
-    def without(name, *args, **keywords):
-        if name.startswith("matplotlib"):
-            raise ImportError(name)
-        return real(name, *args, **keywords)
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(RequestError, match=r"pip install 'seakeep\[figures\]'"), figure_style():
-        pass
-
-
 def overlay_figure(compared):
     pytest.importorskip("matplotlib")
     from seakeep.report.figures.histories import overlay_figure as draw
@@ -299,44 +248,6 @@ def overlay_figure(compared):
 
 def words_of(legend):
     return [text.get_text() for text in legend.get_texts()]
-
-
-def test_the_figure_of_an_ensemble_shows_mean_and_band_over_a_thin_measurement():
-    judged = in_degrees(ensemble())
-    figure = overlay_figure(judged)
-    (legend,) = figure.legends
-    assert sorted(words_of(legend)) == ["90 % band", "ensemble mean", "measured"]
-    (fill,) = figure.axes[1].collections
-    heights, pitch = fill.get_paths()[0].vertices[:, 1], judged.band["pitch"]
-    assert heights.min() == pytest.approx(float(pitch.min()))
-    assert heights.max() == pytest.approx(float(pitch.max()))
-    inside = float(row_of(judged)["coverage"].sel(channel="heave"))
-    assert figure.axes[0].get_title("right").endswith(f"{inside:.0f} % in the band")
-    measured, mean = figure.axes[1].lines[:2]
-    assert fill.get_zorder() < measured.get_zorder() <= mean.get_zorder()
-    assert measured.get_linewidth() < mean.get_linewidth()
-    figure.draw_without_rendering()
-    box = legend.get_window_extent()
-    assert box.y1 <= figure.axes[-1].get_tightbbox().y0 + 1  # below the panels, over none
-
-
-def test_figures_of_several_models_name_each_of_them():
-    found = {"ours": [waves_of(1.0, 0.9, "r")], "theirs": [waves_of(1.0, 0.5, "r")]}
-    figure = overlay_figure({name: each[0] for name, each in found.items()})
-    from seakeep.report.figures.errors import error_figure
-
-    words = ["measured", "ours, ANRMSE 0.100", "theirs, ANRMSE 0.500"]
-    assert words_of(figure.legends[0]) == words
-    assert figure.axes[0].get_title(loc="right") == "NRMSE 0.100 · 0.500"
-    assert "ANRMSE" not in figure.get_suptitle()
-    table = difference_table(found)
-    axes = error_figure(table).axes[0]
-    assert axes.get_xticklabels()[0].get_text() == "r\n1 s"
-    points, labels = axes.get_legend_handles_labels()
-    assert labels == list(found)
-    (bar,) = points[1].lines[2][0].get_segments()
-    expected = [table[f"anrmse_{bound}"].values[1, 0] for bound in ("lower", "upper")]
-    np.testing.assert_allclose(bar[:, 1], expected)
 
 
 def test_the_figure_judges_as_the_table_does_where_loads_have_a_prefix(tmp_path):
@@ -400,30 +311,3 @@ def test_each_channel_has_a_panel_and_inputs_share_one_with_those_of_their_unit(
     box, panel = angles.get_legend().get_window_extent(), angles.get_window_extent()
     assert abs(box.x0 - panel.x0) < 20  # pixels, of a panel 700 wide
     assert box.y0 == pytest.approx(panel.y1, abs=12)
-
-
-@pytest.mark.parametrize("make", [comparison, ensemble])
-def test_long_records_get_envelopes_and_an_enlarged_part(make):
-    time, parts = np.arange(1, 6001) * 0.1, {}
-    for key in ("forecast", "measured", "inputs", "band"):
-        if (each := getattr(make(), key)) is not None:
-            parts[key] = each.interp(time=np.mod(time, 39.0) + 0.5).assign_coords(time=time)
-            parts[key].attrs = each.attrs
-    parts["forecast"] = parts["forecast"].where(time < 300.0)  # lost from there on
-    parts["forecast"].attrs = make().forecast.attrs
-    figure = overlay_figure(replace(make(), **parts))
-    whole, part = figure.axes[:2]
-    assert len(figure.axes) == 8
-    assert np.ptp(part.get_xlim()) < 0.4 * 600
-    # Nothing of the whole record is drawn as a line: a step a period, from its least to its most.
-    assert not whole.lines
-    measured, reached = whole.patches[0].get_data(), whole.patches[-1].get_data()
-    heave = parts["measured"]["heave"]
-    assert 80 < len(measured.values) <= 150
-    assert measured.values.max() == pytest.approx(float(heave.max()))
-    assert measured.baseline.min() == pytest.approx(float(heave.min()))
-    low, high = whole.get_ylim()
-    assert low < float(heave.min()) < float(heave.max()) < high  # off the frame
-    known = np.isfinite(reached.values)
-    assert 0.4 < known.mean() < 0.6
-    assert not np.any(known[np.argmin(known) :])

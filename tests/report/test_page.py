@@ -6,18 +6,15 @@ import json
 import re
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from tutorial_study import put_tutorial
 
-from seakeep.errors import RequestError
 from seakeep.files import check_report
-from seakeep.report.sections.data import settings as settings_of
 from seakeep.report.sections.data import test_overlap as overlap_of_tests
-from seakeep.report.sections.data import training_overlap, unequal_training
+from seakeep.report.sections.data import training_overlap
 from seakeep.report.sections.errors import (
     age,
     coverage_table,
@@ -30,10 +27,9 @@ from seakeep.report.sections.summary import (
     glossary,
     summary,
 )
-from seakeep.report.style import LINES, line_of, panels
-from seakeep.report.tables import Table, probability, small_number
+from seakeep.report.tables import probability, small_number
 from seakeep.report.tables import words as known_words
-from seakeep.study import StudyResult, read_result, read_study, run_study
+from seakeep.study import read_result, read_study, run_study
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
@@ -42,8 +38,6 @@ from seakeep.report.figures.errors import FEWEST, draw_box_violin
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Drawing, Section, write_page
 from seakeep.report.sections import write_report
-
-ROOT = Path(__file__).parents[2]
 
 STUDY = """
 [study]
@@ -172,29 +166,6 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result)
     groups = {"statistics/coverage": table, "tests/long": result.groups["tests/unseen"]}
     note = coverage_table(changed(result, groups, tests=tests), "bayesian", calibrated=True).note
     assert "Those are 6 T̂ long; the margin is not made for long (12 T̂)" in note
-
-
-def test_models_that_learn_from_unequal_lengths_are_told(result):
-    assert unequal_training(result) == ""  # the mean of a centred ensemble learns from all
-    result = with_models(result, bayesian__centred=False)
-    said = unequal_training(result)
-    assert said in findings(result)
-    training = result.groups["training"]
-    lengths = (training["end"] - training["begin"]).sum("of_run").values
-    lengths = sorted(lengths / result.attrs["encounter_period"])
-    assert (
-        f"deterministic from all of a training set ({lengths[0]:.0f} to {lengths[-1]:.0f}" in said
-    )
-    assert "Bayesian from a part (uniform, 10 to 20 T̂)" in said
-    assert "(all of it: deterministic)" in settings_of(result).tables[-1].note
-    # In one run both sets begin where its span begins, so that the shorter lies in the longer.
-    one = changed(result, {"training": in_one_run(training)})
-    shares, words = training_overlap(one)
-    assert shares
-    assert "as deterministic reads them, they share" in words
-    for window in (300, None):
-        alike = with_models(result, deterministic__window=window, bayesian__window=window)
-        assert unequal_training(alike) == ""
 
 
 def in_one_run(training):
@@ -328,17 +299,6 @@ def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(result):
     assert small_number(0.0) == "0"
 
 
-@pytest.mark.parametrize(
-    ("channels", "rows"), [(3, [3]), (5, [3, 2]), (6, [3, 3]), (11, [4, 4, 3])]
-)
-def test_panels_fill_their_rows(channels, rows):
-
-    _, axes = panels(None, channels, 4, (2.0, 1.0))
-    places = [each.get_subplotspec().rowspan.start for each in axes]
-    assert [places.count(row) for row in range(len(rows))] == rows
-    assert axes[0].get_subplotspec().get_gridspec().ncols == rows[0]
-
-
 def test_packing_loses_a_step_of_the_range_at_most():
     values = np.array([-1.0, 0.123456, np.nan, 3.0])
     packed = pack(values)
@@ -346,38 +306,6 @@ def test_packing_loses_a_step_of_the_range_at_most():
     step = (packed["high"] - packed["low"]) / 65534
     found = np.where(codes == 65535, np.nan, packed["low"] + step * codes)
     np.testing.assert_allclose(found, values, rtol=0, atol=0.5 * step)
-
-
-def test_the_interactive_lines_have_the_dashes_of_the_figures(result):
-    single, ensemble = history_data(result)["models"]
-    assert single["dash"] == list(LINES["forecast"]["linestyle"][1])
-    assert ensemble["dash"] == list(LINES["ensemble"]["linestyle"][1])
-
-
-@pytest.mark.parametrize("values", [np.zeros(12), -np.arange(12.0), np.arange(12.0)])
-def test_a_logarithmic_axis_shows_what_is_positive_and_warns_of_nothing(values):
-    from matplotlib.figure import Figure
-
-    figure = Figure()
-    axes = figure.subplots()
-    axes.set_yscale("log")
-    draw_box_violin(axes, values, 0.0, 1.0, "black")
-    figure.draw_without_rendering()
-    points = [each.get_offsets()[:, 1] for each in axes.collections if len(each.get_offsets()) > 1]
-    np.testing.assert_array_equal(np.concatenate([[], *points]), values[values > 0])
-
-
-def test_boxes_and_whiskers_are_matplotlibs():
-    from matplotlib.cbook import boxplot_stats
-    from matplotlib.figure import Figure
-
-    values = np.random.default_rng(0).standard_t(2, size=60)
-    axes = Figure().subplots()
-    draw_box_violin(axes, values, 0.0, 1.0, "black")
-    (expected,) = boxplot_stats(values)
-    drawn = {round(float(y), 12) for line in axes.lines for y in line.get_ydata()}
-    for key in ("med", "q1", "q3", "whislo", "whishi"):
-        assert round(float(expected[key]), 12) in drawn
 
 
 def test_a_report_that_was_interrupted_is_written_again(tmp_path):
@@ -393,11 +321,6 @@ def test_a_report_that_was_interrupted_is_written_again(tmp_path):
     assert "not finished" in (tmp_path / "report.html").read_text(encoding="utf-8")
     write_page(tmp_path, "Title", stamp, ())
     assert "not finished" not in (tmp_path / "report.html").read_text(encoding="utf-8")
-
-
-def test_a_folder_without_a_study_has_no_report(tmp_path):
-    with pytest.raises(RequestError, match="holds no finished study"):
-        read_result(tmp_path)
 
 
 @pytest.fixture(scope="module")
@@ -495,82 +418,9 @@ def test_the_time_histories_zoom_choose_and_show_members(opened):
     assert opened.get_log("browser") == []
 
 
-def test_a_table_is_copied_as_text_with_tabs(opened):
-    button = opened.find_element("css selector", "#table-overview button.copy")
-    opened.execute_script("arguments[0].scrollIntoView({block: 'center'})", button)
-    button.click()
-    copied = button.get_attribute("data-copied").splitlines()
-    assert copied[0].split("\t")[:3] == ["test set", "model", "ANRMSE median"]
-    assert len(copied) == 3
-    assert opened.get_log("browser") == []
-
-
-def test_it_prints(opened):
-    pdf = base64.b64decode(opened.print_page())
-    assert pdf.startswith(b"%PDF")
-    # A page without its figures would be a few ten kilobytes.
-    assert len(pdf) > 100_000
-
-
 def test_lost_forecasts_are_named(result):
     cell = {"model": "m", "test": "unseen", "training": "t0", "window": 1, "run": "r", "start": 2.0}
     lost = xr.Dataset({key: ("cell", [value]) for key, value in cell.items()})
     judged = replace(result, groups={**result.groups, "statistics/lost": lost})
     (notice,) = (text for text in summary(judged).notices if "diverged and are left out" in text)
     assert "window 1 of 'unseen' (r from 2 s)" in notice
-
-
-def test_each_of_many_models_has_a_colour_of_its_own():
-    names = ["single", "bayesian", "mean", "hold_last", "fir", "arx", "subspace"]
-    told = {name: {"ensemble": name == "bayesian"} for name in names}
-    result = StudyResult(None, {"models": json.dumps(told)}, {})
-    assert len({line_of(result, name)["color"] for name in names}) == len(names)
-
-
-@pytest.fixture(scope="module")
-def wide_page(tmp_path_factory):
-    """A page with the tables of errors that a check of several baselines prints."""
-    of_runs = ("test", "model", "95 %", "hold_last", "mean", "fir", "arx", "subspace")
-    row = ("mean, regular waves", "0.481", "0.422 to 0.555", *["0.530"] * 5)
-    runs = tuple(f"3102_{number}" for number in range(16))
-    errors = ("mooring_starboard", *["0.284"] * 16)
-    tables = (
-        Table("runs", "Errors of runs", of_runs, (row,), "A note.", tuple(range(1, 8)), heat=1),
-        Table("states", "Errors", ("state", *runs), (errors,), "", tuple(range(1, 17)), heat=1),
-    )
-    stamp = {"description": "", "finished": ""}
-    section = Section("worth", "Worth", tables=tables)
-    return write_page(tmp_path_factory.mktemp("wide"), "A page", stamp, [section])
-
-
-@pytest.mark.parametrize(("width", "table"), [(1440, "runs"), (1440, "states"), (420, "runs")])
-def test_tables_of_errors_show_all_their_columns(browser, wide_page, width, table):
-    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    browser.get(wide_page.as_uri())
-    room = f"document.querySelector('#table-{table} .scroll')"
-    shown, needed = browser.execute_script(f"return [{room}.clientWidth, {room}.scrollWidth]")
-    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-    assert needed <= shown + 1  # widths are rounded to pixels
-
-
-def test_captions_and_notes_are_no_larger_than_their_tables_on_paper(browser, wide_page):
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    browser.get(wide_page.as_uri())
-    size = "return parseFloat(getComputedStyle(document.querySelector(arguments[0])).fontSize)"
-    cell = browser.execute_script(size, "#table-runs td")
-    for words in ("#table-runs .caption", "#table-runs .note"):
-        assert browser.execute_script(size, words) <= cell
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
-
-
-def test_code_in_tables_of_the_docs_breaks_between_words_alone(browser, tmp_path):
-    style = (ROOT / "docs" / "_static" / "style.css").as_uri()
-    words = "what a key of a table of the reference means, in as many words as it needs"
-    (tmp_path / "page.html").write_text(
-        f'<link rel="stylesheet" href="{style}"><div style="width: 12em"><table class="docutils">'
-        f'<tr><td>{words}</td><td></td><td><code>"slow_squares"</code></td></tr></table></div>'
-    )
-    browser.get((tmp_path / "page.html").as_uri())
-    lines = "return document.querySelector('code').getClientRects().length"
-    assert browser.execute_script(lines) == 1

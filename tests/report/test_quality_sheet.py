@@ -92,8 +92,8 @@ class TestShipSection:
 
 
 def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
-    from seakeep.quality.agreement import LATE, Agreement
     from seakeep.quality.faults import FLAGS
+    from seakeep.quality.sensors import LATE, Agreement
     from seakeep.report.figures.runs import quality_figure
     from seakeep.report.quality_sheet import channel_rows
 
@@ -128,17 +128,6 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
     assert list(np.isnan(line.get_ydata())) == [False, False, True, False, False]
     # The scale follows the harmful lag, a thirtieth of a period, and not the lags searched, a half.
     assert lag.get_ylim()[1] == pytest.approx(1.5 * LATE * found.period)
-
-
-def test_a_constant_channel_is_drawn_as_one():
-    from seakeep.report.figures.runs import quality_figure
-
-    # A constant that is not a binary fraction, after a filter: its spread is rounding.
-    still = 0.1 + 1e-16 * np.arange(50)
-    run = xr.Dataset({"eta": ("time", still, {"units": "m"})}, coords={"time": np.arange(50.0)})
-    panel = quality_figure(run, {}).axes[0]
-    assert [each.get_text() for each in panel.texts] == ["constant: 0.1"]
-    assert panel.get_ylim() == pytest.approx((0.09, 0.11))
 
 
 def test_a_channel_with_findings_keeps_its_line_and_shows_its_marks():

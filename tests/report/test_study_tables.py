@@ -11,37 +11,8 @@ from rich.console import Console
 
 from seakeep.report.quality_sheet import clock_rows
 from seakeep.report.sections.data import setting_text
-from seakeep.report.tables import PAGE, Table, number, rich_tables, write_csv, write_latex
+from seakeep.report.tables import Table, number, rich_tables, write_csv
 from seakeep.signals.synchronisation import Clock
-
-
-def latex(tmp_path, rows, **options):
-    table = Table("t", "Title", ("name", "unit", "number"), tuple(rows), **options)
-    return write_latex(table, tmp_path / "t.tex").read_text("utf-8")
-
-
-def test_columns_of_long_text_break_lines_and_those_of_numbers_stand_to_the_right(tmp_path):
-    text = latex(tmp_path, [("a", "m/s²", "1.5"), ("b", "x" * 91, "-2")], numeric=(2,))
-    # 90 characters are a line: 6 go to "name" and 8 to "number", with the space beside them.
-    assert r"\begin{tabular}{lp{0.84\linewidth}r}" in text
-    assert r"a & m/s$^2$ & 1.5 \\" in text
-    assert r"& $-$2 \\" in text
-    assert r"\caption{Title.}" in text
-    two = latex(tmp_path, [("y" * 60, "x" * 40, "1")])
-    assert r"{p{0.55\linewidth}p{0.36\linewidth}l}" in two
-    assert r"{lll}" in latex(tmp_path, [("y" * 30, "x" * 40, "1")])
-
-
-@pytest.mark.parametrize("rows", [PAGE, PAGE + 1])
-def test_a_table_longer_than_a_page_breaks_and_repeats_its_head(tmp_path, rows):
-    text = latex(tmp_path, [(str(n), "", "") for n in range(rows)], averages=(3,))
-    kind = "longtable" if rows > PAGE else "tabular"
-    assert text.count(rf"\begin{{{kind}}}") == text.count(rf"\end{{{kind}}}") == 1
-    assert text.count(r"name & unit & number \\") == (2 if kind == "longtable" else 1)
-    assert ("endhead" in text) == (kind == "longtable")
-    # One rule below each head, and one above the average.
-    assert text.count(r"\midrule") == (3 if kind == "longtable" else 2)
-    assert re.search(r"2 &  &  \\\\\n\\midrule\n3 & ", text)
 
 
 @pytest.mark.parametrize(

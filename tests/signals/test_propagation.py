@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from seas import sea
 
-from seakeep.errors import DataError, RequestError
 from seakeep.signals import carry_by_celerity, carry_by_dispersion, encounter_period
 from seakeep.waves import wavenumber
 
@@ -71,28 +70,3 @@ def test_a_place_outside_the_range_is_taken_to_its_end():
     carried = carry_by_dispersion(WAVES.at(TIME), DT, (0.0, 1.0), DEPTH)
     np.testing.assert_array_equal(carried.at(5.0), carried.at(1.0))
     np.testing.assert_allclose(carried.at(0.4, 100), carried.at(np.full(5, 0.4), slice(98, 103))[2])
-
-
-@pytest.mark.parametrize(
-    ("call", "kind", "message"),
-    [
-        (
-            lambda: carry_by_dispersion(np.ones(100), DT, (0.0, 1.0), DEPTH),
-            DataError,
-            "the elevation is constant: there are no waves in it. Look for a dead probe",
-        ),
-        (
-            lambda: carry_by_celerity(WAVES.at(TIME), DT, (0.0, 1.0), -2.0),
-            RequestError,
-            r"the celerity must be positive \(m/s\); received -2.0",
-        ),
-        (
-            lambda: carry_by_celerity(WAVES.at(TIME), 0.001, (0.0, 20.0), 1.0),
-            RequestError,
-            "span 10000 of the shortest wavelengths .* Resample the elevation to some 30 samples",
-        ),
-    ],
-)
-def test_what_cannot_be_carried(call, kind, message):
-    with pytest.raises(kind, match=message):
-        call()

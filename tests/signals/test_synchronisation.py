@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from seas import sea
 
-from seakeep.errors import DataError, RequestError
 from seakeep.signals import (
     Clock,
     clock_from_correlation,
@@ -151,14 +150,6 @@ def test_a_doubtful_drift_is_not_applied():
     assert error(kept) < 0.7 * error(found)
 
 
-def test_a_certain_drift_and_a_stated_one_are_applied():
-    found = dim_video(900e-6, 0)
-    assert without_doubtful_drift(found) is found
-    stated = Clock(0.1, 1e-6, method="as stated")
-    assert without_doubtful_drift(stated) is stated
-    assert without_doubtful_drift(Clock()) == Clock()
-
-
 def test_the_correlation_at_a_lag_is_that_of_the_samples_in_common():
     a, b = np.random.default_rng(0).standard_normal((2, 40)) + 5.0
     found = _correlation(a, b, np.array([-25, 0, 25]))
@@ -167,27 +158,3 @@ def test_the_correlation_at_a_lag_is_that_of_the_samples_in_common():
 
 
 NOISE, TIMES = np.random.default_rng(0).standard_normal((2, 2000)), np.arange(2000) / 20
-LONG = np.arange(0.0, 270.0, 0.02)
-GAP = np.where(TIMES == 25.0, np.nan, NOISE[0])
-
-
-@pytest.mark.parametrize(
-    ("call", "error", "message"),
-    [
-        (lambda: clock_from_pulses(NOISE[0], TIMES, pulses(TIMES), TIMES), DataError,
-         r"the logger's trigger has no pulses that stand out .* shared .* correlated .* offset"),
-        (lambda: clock_from_pulses(pulses(LONG), 1e3 * LONG, pulses(LONG), LONG), DataError,
-         r"fit together; the former come every 2e\+04 s, the latter every 20 s\. .* unit of both"),
-        (lambda: clock_from_correlation(NOISE[0], TIMES, NOISE[1], TIMES, 20.0, 2.0), DataError,
-         r"0 of \d+ windows correlate by 0\.6 or more"),
-        (lambda: clock_from_correlation(*[NOISE[0], TIMES] * 2, 98.0, 2.0), RequestError,
-         r"the records share 99\.95 s, and a window of 98 s"),
-        (lambda: clock_from_shared(NOISE[0], TIMES, GAP, TIMES), DataError,
-         r"the signal of the reference has 1 missing .*, the first at sample 500\. Bridge"),
-        (lambda: clock_from_correlation(NOISE[0, :9], TIMES, *NOISE, 20.0, 2.0), RequestError,
-         r"the signal of the logger has shape \(9,\) and its"),
-    ],
-)  # fmt: skip
-def test_what_gives_no_clock(call, error, message):
-    with pytest.raises(error, match=message):
-        call()

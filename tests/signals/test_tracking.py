@@ -1,14 +1,12 @@
 """Tracking of a rendered side view, whose motion is known, and what is said of bad videos."""
 
-import builtins
-
 import numpy as np
 import pytest
 import xarray as xr
 
 from seakeep import cli
 from seakeep.campaign import read_table
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, SeakeepWarning
 from seakeep.signals import TrackingSettings, compare_motion, contact_sheet, track_video
 from seakeep.signals.tracking import FLAGS
 
@@ -231,20 +229,6 @@ def test_gaps_are_bridged_only_when_asked_and_only_short_ones(disturbed):
     assert np.rad2deg(rms((out["pitch"] - pitch)[short])) < 0.5
 
 
-def test_a_bright_thing_larger_than_the_panel(tmp_path):
-    def hook(i, lit):
-        lit[60:200, 900:1200] = 240
-        return lit
-
-    path = tmp_path / "window.mp4"
-    place = render(path, hook, frames=10)
-    with pytest.raises(DataError, match=r"not found in any of 10 frames: the largest bright "
-                       r"component measures 30\d × 1[34]\d pixels .* state a region"):  # fmt: skip
-        track_video(path)
-    out = track_video(path, TrackingSettings(region=(200, 220, 800, 300), passband=None))
-    assert rms(centroid_error(out, place)) < 0.2
-
-
 def test_a_second_panel_elsewhere_is_a_jump(tmp_path):
     def hook(i, lit):
         if i == 15:
@@ -326,19 +310,6 @@ def test_a_video_that_ends_early(tmp_path, plain):
     assert 5 < out.time.size < 15
 
 
-def test_without_opencv_the_extra_is_named(plain, monkeypatch):
-    real = builtins.__import__
-
-    def refuse(name, *rest):
-        if name == "cv2":
-            raise ImportError(name)
-        return real(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", refuse)
-    with pytest.raises(RequestError, match=r"pip install 'seakeep\[video\]'"):
-        track_video(plain[0])
-
-
 def test_the_command_writes_what_a_campaign_reads(plain, tracked, tmp_path, monkeypatch, capsys):
     """The example of its help, on a video of that name."""
     monkeypatch.chdir(plain[0].parent)
@@ -409,98 +380,3 @@ def test_frames_that_the_camera_dropped(plain, monkeypatch):
     assert out["picture"][10] == -1
     assert np.isnan(out["surge"][10])
     assert np.isfinite(out["surge"][11])
-
-
-def test_a_varying_frame_rate(plain, monkeypatch):
-    def get(self, key):
-        return (0.4 if key == cv2.CAP_PROP_POS_MSEC else 1.0) * self.inner.get(key)
-
-    opened(monkeypatch, get=get)
-    with pytest.raises(DataError, match=r"so the frame rate varies\. Encode the video again"):
-        track_video(plain[0])
-
-
-@pytest.mark.parametrize(
-    ("lit", "frames", "settings", "message"),
-    [
-        (
-            lambda i: 0.2,
-            8,
-            {},
-            r"the panel \(0\.3 × 0\.1 m\) was not found in any of 8 frames",
-        ),
-        (lambda i: 0.2, 45, {}, r"first 1 s .* was not found in any of 30 frames"),  # early
-        (lambda i: 0.2 if i < 4 else 1.0, 12, {"rest": 0.1}, r"first 0\.1 s \(unless the origin"),
-        (lambda i: 1.0, 1, {}, r"holds one frame; a motion needs at least two"),
-        (
-            lambda i: 1.0,
-            3,
-            {"region": (1000, 0, 400, 100)},
-            r"leaves the picture of .*, 1280 ×",
-        ),
-        (lambda i: 1.0, 3, {"region": (-1, 0, 40, 100)}, r"leaves the picture of .*, 1280 ×"),
-        (lambda i: 1.0, 3, {"lamp": (2000.0, 0.0, 5.0)}, r"the lamp .* lies outside the picture"),
-        (
-            lambda i: 1.0,
-            3,
-            {"passband": 12.0},
-            r"has 30 frames per second, .* stop at 18 Hz",
-        ),
-    ],
-)
-def test_videos_without_a_motion(tmp_path, lit, frames, settings, message):
-    render(tmp_path / "video.mp4", lambda i, frame: lit(i) * frame, frames=frames)
-    with pytest.raises((DataError, RequestError), match=message):
-        track_video(tmp_path / "video.mp4", TrackingSettings(**settings))
-
-
-def test_most_frames_flagged_is_told(tmp_path):
-    path = tmp_path / "gloomy.mp4"
-    render(path, lambda i, lit: lit * (0.2 if i > 3 else 1.0), frames=12)
-    with pytest.warns(SeakeepWarning, match=r"8 of 12 frames are flagged \(4 good, 8 lost\)"):
-        track_video(path)
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (lambda video: video[:-5000], r"was cut off .* Copy or export it again"),
-        (lambda video: b"time,heave", "or is a file of another kind"),
-        (lambda video: b"", r"video\.mp4 is empty \(0 bytes\)"),
-    ],
-)
-def test_files_that_are_no_video(plain, tmp_path, content, message):
-    (tmp_path / "video.mp4").write_bytes(content(plain[0].read_bytes()))
-    with pytest.raises(DataError, match=message):
-        track_video(tmp_path / "video.mp4")
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"panel": (0.1, 0.1)}, r"panel is \(length, height\) in metres, the length at least"),
-        ({"downstream": "up"}, "downstream is 'right' or 'left' in the picture; received 'up'"),
-        ({"metres_per_pixel": -1.0}, r"metres_per_pixel must be positive \(m\); received -1"),
-        ({"passband": -1.0}, r"passband must be positive \(Hz\)"),
-    ],
-)
-def test_wrong_settings(settings, message):
-    with pytest.raises(RequestError, match=message):
-        TrackingSettings(**settings)
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["absent.mp4"], "absent.mp4 does not exist"),
-        (["absent.mp4", "-o", "a.txt"], "a track is written as .csv or .nc"),
-        (["absent.mp4", "--contact-sheet", "a.jpg"], "a contact sheet is written as PNG"),
-        (["video.mp4", "--contact-sheet", "photo.png"], "Choose another name"),
-    ],
-)
-def test_the_command_refuses(words, message, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "photo.png").write_bytes(b"a photo")
-    assert cli.main(["track", *words]) == 2
-    assert message in " ".join(capsys.readouterr().err.split())
-    assert (tmp_path / "photo.png").read_bytes() == b"a photo"

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seakeep.errors import DataError, RequestError
 from seakeep.signals import (
     encounter_period,
     peak_period,
@@ -126,20 +125,3 @@ def test_noise_on_the_waves_is_not_counted_with_hysteresis():
     assert encounter_period(noisy, 0.02, least) == pytest.approx(plain, rel=0.05)
     regular = np.sin(2 * np.pi * np.arange(0, 100, 0.02) / 1.7 + 1)
     assert encounter_period(regular, 0.02, 0.3) == encounter_period(regular, 0.02)
-
-
-@pytest.mark.parametrize(
-    ("call", "kind", "message"),
-    [
-        (lambda: encounter_period(np.zeros(100), 0.05), DataError,
-         r"the record of 5 s crosses its mean upwards 0 time\(s\); at least two .* Give a lo"),
-        (lambda: encounter_period(np.sin(np.arange(100.0)), 0.1, 1.0), RequestError,
-         "hysteresis is a fraction of a standard deviation, 0 or more"),
-        (lambda: peak_period(np.ones(99), 1.0), DataError, "the record is constant: it has no pea"),
-        (lambda: wave_spectrum(np.ones(100), 0.1, segment=200), RequestError,
-         r"segments of 2 to 100 samples .* received segments of 200"),
-    ],
-)  # fmt: skip
-def test_what_has_no_waves(call, kind, message):
-    with pytest.raises(kind, match=message):
-        call()

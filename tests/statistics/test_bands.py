@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from seakeep import metrics, statistics
-from seakeep.errors import RequestError
 
 DT, SPLIT = 0.05, 0.2
 TIME = np.arange(480) * DT
@@ -65,17 +64,6 @@ def test_a_diverged_forecast_is_nan_and_a_slack_channel_left_out():
     lost = statistics.band_error_over_time(**pair, dt=DT, frequency=SPLIT)
     assert np.isnan(lost.low).all()
     assert np.isnan(lost.wave).all()
-
-
-@pytest.mark.parametrize("frequency", [0.0, 10.0, -1.0])
-def test_a_split_outside_the_sampled_band_is_refused(frequency):
-    with pytest.raises(RequestError, match="and half the sampling rate"):
-        statistics.split_bands(np.zeros((50, 1)), DT, frequency)
-
-
-def test_a_series_without_samples_is_refused():
-    with pytest.raises(RequestError, match="at least eight samples"):
-        statistics.split_bands(np.zeros((5, 1)), DT, SPLIT)
 
 
 def test_waves_are_not_forced_to_nothing_at_the_ends():

@@ -12,7 +12,6 @@ from seakeep.core.calibration import (
     spread_floor,
     wave_envelope,
 )
-from seakeep.errors import DataError, RequestError
 from seakeep.models.calibration import Judged, learn_margin
 from seakeep.statistics import band_scores, conformal_margin, coverage
 
@@ -219,28 +218,6 @@ def test_scores_by_hand_and_a_band_that_is_lost():
     scores = np.concatenate([np.zeros((3, 10, 1)), np.full((1, 10, 1), np.inf)])
     assert conformal_margin(scores, 0.9, block_length=1).margin[0] == np.inf
     assert conformal_margin(scores, 0.7, block_length=1).margin[0] == 0.0
-
-
-@pytest.mark.parametrize(
-    ("scores", "settings", "error", "message"),
-    [
-        (np.zeros((5, 2)), {}, RequestError, r"scores has shape \(5, 2\)"),
-        (np.zeros((0, 5, 2)), {}, RequestError, r"scores has shape \(0, 5, 2\)"),
-        (np.zeros((1, 5, 2)), {"level": 1.0}, RequestError, "level must lie between 0 and 1"),
-        (np.zeros((1, 5, 2)), {"block_length": 6}, RequestError, "between 1 and the 5 samples"),
-        (np.full((1, 5, 2), np.nan), {}, DataError, "scores holds NaN"),
-    ],
-)
-def test_what_margins_refuse(scores, settings, error, message):
-    with pytest.raises(error, match=message):
-        conformal_margin(scores, **settings)
-
-
-def test_what_scores_refuse():
-    with pytest.raises(RequestError, match="all must be of the same shape"):
-        band_scores(np.zeros((3, 1)), np.ones((3, 1)), np.zeros((4, 1)))
-    with pytest.raises(DataError, match=r"1 value\(s\) that are NaN or infinite"):
-        band_scores(np.zeros((2, 1)), np.ones((2, 1)), [[0.0], [np.nan]])
 
 
 def test_the_block_is_the_integrated_correlation_time():

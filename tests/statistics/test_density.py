@@ -5,7 +5,6 @@ import pytest
 from scipy.stats import gaussian_kde, norm
 
 from seakeep.core.density import _exact
-from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.statistics import density_grid, density_interval, kernel_bandwidth, kernel_density
 
 RNG = np.random.default_rng(0)
@@ -103,33 +102,3 @@ def test_a_draw_that_happens_to_be_constant_takes_the_bandwidth_of_the_series():
     series = np.concatenate([np.zeros(60), [1.0]])
     found = density_interval(series, block_length=20, rng=np.random.default_rng(0), n_series=20)
     assert np.all(np.isfinite(found.mean))
-
-
-@pytest.mark.parametrize(
-    ("call", "error", "message"),
-    [
-        (lambda: kernel_density(np.ones(9), [0, 1]), DataError, r"series is constant \(1\)"),
-        (lambda: kernel_density(NORMAL, [0, 1, 1]), RequestError, "must increase strictly"),
-        (lambda: kernel_density(NORMAL, [0, 1], 0.0), RequestError, "positive number; received 0"),
-        (
-            lambda: kernel_density(NORMAL, [0, 1], "silvermann"),
-            RequestError,
-            "unknown bandwidth 'silvermann'. Did you mean 'silverman'?",
-        ),
-        (
-            lambda: density_interval(NORMAL, block_length=3, rng=RNG, grid=np.linspace(-1, 1, 50)),
-            RequestError,
-            "the grid runs from -1 to 1 and the series from .*mass outside would be lost",
-        ),
-        (
-            lambda: density_interval(NORMAL, block_length=3, rng=RNG, grid=[-9, 0, 1, 9]),
-            RequestError,
-            "evenly spaced",
-        ),
-    ],
-)
-def test_what_is_refused(call, error, message):
-    with pytest.raises(error, match=message):
-        call()
-    with pytest.warns(SeakeepWarning, match="Look for a forecast that ran away"):
-        density_grid(NORMAL, NORMAL * 1e4)

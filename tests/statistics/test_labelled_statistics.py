@@ -7,8 +7,8 @@ import xarray as xr
 from seakeep import statistics
 from seakeep.core import bootstrap as core_bootstrap
 from seakeep.core import coverage as core_coverage
-from seakeep.core import divergence as core_divergence
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.core import density as core_divergence
+from seakeep.errors import DataError, SeakeepWarning
 
 TIME = np.arange(400) / 32
 HEAVE, PITCH = np.random.default_rng(0).standard_normal((2, 400)).cumsum(axis=1)
@@ -73,22 +73,6 @@ def test_warnings_and_errors_name_the_channel():
         statistics.coverage(PREDICTED - 1, PREDICTED + 1, gap)
 
 
-def test_members_of_a_dataset_are_pooled():
-    both = xr.concat([PREDICTED, 0.8 * MEASURED[["pitch", "heave"]]], dim="window")
-    found = statistics.jsd_interval(
-        both.transpose("time", "window"),
-        MEASURED,
-        block_length=40,
-        rng=np.random.default_rng(2),
-        n_series=10,
-    )
-    alone = statistics.jsd_interval(
-        PREDICTED, MEASURED, block_length=40, rng=np.random.default_rng(2), n_series=10
-    )
-    assert np.all(found["mean"] > alone["mean"])
-    assert found["mean"].dims == ("channel",)
-
-
 def test_coverage_of_each_channel():
     whole = MEASURED[["heave", "pitch"]]
     shift = xr.DataArray([0.0, 50.0], dims="window", coords={"window": ["near", "far"]})
@@ -113,11 +97,3 @@ def test_a_coverage_table_has_parts_channels_and_units():
         np.testing.assert_allclose(found[key], getattr(alone, key), rtol=1e-12)
     assert found["unit"].values.tolist() == [MEASURED[name].attrs["units"] for name in names]
     assert found.attrs["level"] == 0.9
-
-
-def test_what_is_refused():
-    rng = np.random.default_rng(0)
-    with pytest.raises(RequestError, match="predicted: Dataset, measured: ndarray"):
-        statistics.jsd_interval(PREDICTED, HEAVE, block_length=4, rng=rng)
-    with pytest.raises(RequestError, match="leave grid out"):
-        statistics.jsd_interval(PREDICTED, MEASURED, block_length=4, rng=rng, grid=[0, 1])

@@ -18,24 +18,6 @@ def edited(folder, *changes):
     return read_study(path)
 
 
-@pytest.mark.parametrize(
-    ("preset", "stated", "expected"),
-    [
-        ("paper", "", False),
-        ("recommended", "", True),
-        ("paper", "calibrate = true", True),
-        ("recommended", "calibrate = false", False),
-    ],
-)
-def test_the_paper_has_no_calibration_unless_asked(study_folder, preset, stated, expected):
-    study = edited(
-        study_folder,
-        ('preset = "recommended"', f'preset = "{preset}"'),
-        ("n_series = 8", f"n_series = 8\n{stated}"),
-    )
-    assert study.settings.calibrates is expected
-
-
 @pytest.mark.parametrize("scale", ["constant", "spread", "learnt"])
 def test_margins_and_coverage_of_a_study_are_those_of_its_ensembles(study_folder, scale):
     stated = ("n_series = 8", f'n_series = 8\nscale = "{scale}"')

@@ -211,23 +211,6 @@ def test_a_test_that_repeats_its_training_is_warned_of(repeating):
         compare(model, whole)
 
 
-def test_what_another_run_trained_on_is_looked_at_too(repeating):
-    runs = (
-        '[runs.all]\nfile = "run.csv"\nspan = [100.0, 200.0]\nrole = "test"\n'
-        '[runs.first]\nfile = "run.csv"\nspan = [0.0, 100.0]\nrole = "train"\n'
-    )
-    whole = campaign(repeating, EXACT, runs)
-    model = fit_campaign(whole)
-    with pytest.warns(seakeep.SeakeepWarning, match="is what first holds from"):
-        compare(model, whole)
-
-
-def test_regular_waves_are_not_warned_of(repeating):
-    runs = '[runs.all]\nfile = "run.csv"\nwaves = "regular"\ntrain = [0, 100]\ntest = [100, 200]\n'
-    whole = campaign(repeating, EXACT, runs)
-    compare(fit_campaign(whole), whole)  # warnings are errors
-
-
 def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halves):
     path = halves / "run.csv"
     table = np.loadtxt(path, delimiter=",", skiprows=1)
@@ -303,12 +286,6 @@ def test_a_baseline_that_is_left_out_names_what_to_write(halves):
     own = '\n[models.subspace]\nkind = "subspace"\norder = 2\nfuture = 4\nstate_delays = 4\n'
     own += 'input_delays = 4\nstates = ["heave"]\ninputs = ["eta_fwd"]\n'
     assert fit_campaign(campaign(halves, EXACT + own), "subspace").kind == "subspace"
-
-
-def test_waves_of_trained_periods_are_not_warned_of(tmp_path, recwarn):
-    asked = campaign(tmp_path, EXACT, sines(tmp_path, {"a": (1.0, 4.0), "new": (4.0,)}))
-    compare(fit_campaign(asked), asked)
-    assert not [each for each in recwarn if "periods" in str(each.message)]
 
 
 def test_a_lead_reads_waves_ahead_of_time(halves):

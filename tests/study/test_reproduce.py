@@ -11,12 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from markupsafe import escape
 from started import started
-from tutorial_study import put_tutorial
 
 from seakeep.errors import SeakeepWarning
-from seakeep.models.executor import make_executor
 from seakeep.report.acts import write_reproduction
 from seakeep.report.tables import MISSING
 from seakeep.study import read_study
@@ -26,8 +23,6 @@ from seakeep.study.reproduce import (
     HIGH_PASS,
     SLOW,
     Size,
-    prepare_campaigns,
-    read_reproduction,
     reproduce,
     study_text,
 )
@@ -38,7 +33,6 @@ from seakeep.tank.settings import default_settings
 
 SMALL = Size(training=2, tests=2, members=2, series=4)
 RATE = 50.0
-RUNS = ("first", "second", "unseen")
 """Of the tutorial."""
 
 
@@ -224,38 +218,6 @@ def test_every_claim_has_a_figure_and_a_verdict(results):
     assert len({row[0] for row in table.rows}) == len(CLAIMS) == 20
     assert {row[2] for row in table.rows} <= {"holds", "does not", "cannot tell"}
     assert not [row for row in table.rows if "nan" in row[1] or MISSING in row[1]]
-
-
-def test_an_interval_that_few_cells_do_not_give_is_not_printed(results):
-    from seakeep.report.sections.summary import findings
-
-    said = " ".join(findings(results["raw"]))
-    assert "nan" not in said
-    assert "% with too few cells)" in said
-
-
-def test_the_page_over_the_acts_links_to_theirs(played):
-    pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
-    page = write_reproduction(played, read_reproduction(played)).read_text("utf-8")
-    for act in ACTS[:2]:
-        assert f'href="{act.name}/report.html"' in page
-        assert escape(act.title) in page
-    for name in ("short", "acts", "claims", "channels_irregular", "waves", "positions"):
-        assert f'id="table-{name}"' in page
-
-
-def test_runs_that_are_prepared_beside_others_are_counted_one_by_one(tmp_path):
-    campaigns = []
-    for name in ("measured", "detrended"):
-        (tmp_path / name).mkdir()
-        put_tutorial(tmp_path / name, "")
-        campaigns.append(tmp_path / name / "campaign.toml")
-    counted = []
-    with make_executor(2) as executor:
-        prepare_campaigns(campaigns, executor, lambda *each: counted.append(each))
-    assert counted == [(n, 3, f"preparing {run}") for n, run in enumerate(RUNS, 1)]
-    for campaign in campaigns:
-        assert {each.stem for each in (campaign.parent / "prepared").glob("*.nc")} == set(RUNS)
 
 
 def test_the_edge_of_the_drift_lies_between_drift_and_waves():

@@ -1,6 +1,5 @@
 """A study runs, resumes after a kill, and says what is wrong with what it is given."""
 
-import errno
 import json
 import pickle
 import shutil
@@ -15,10 +14,10 @@ import xarray as xr
 from started import started
 from tutorial_study import assert_cells_are_what_the_models_say, put_tutorial
 
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import RequestError
 from seakeep.models.executor import processes
 from seakeep.statistics import band_error_over_time
-from seakeep.study import StorageError, read_result, read_study, run, run_study, store
+from seakeep.study import read_result, read_study, run, run_study, store
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.store import LOCK, UNITS, UnitFolder
@@ -164,16 +163,6 @@ def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished
     same(finished, again)
 
 
-def test_files_of_others_among_the_units_stay(tmp_path):
-    units = UnitFolder(tmp_path, "digest")
-    units.open("study")
-    units.write("one", CELL)
-    (tmp_path / UNITS / "mine").mkdir()
-    units.check()
-    units.clear()
-    assert [each.name for each in (tmp_path / UNITS).iterdir()] == ["mine"]
-
-
 def test_one_process_works_in_a_folder_and_who_waited_takes_its_result(
     study_folder, finished, monkeypatch
 ):
@@ -221,26 +210,6 @@ def test_a_finished_study_is_not_run_again(study_folder, finished):
     same(finished, again)
 
 
-def test_other_words_reach_a_finished_study(study_folder, finished):
-    assert not finished.shows_paper
-    change(study_folder, "seed = 3", 'seed = 3\nname = "renamed"')
-    with (study_folder / "study.toml").open("a", encoding="utf-8") as file:
-        file.write("\n[output]\npaper = true\n")
-    again = run_study(read_study(study_folder / "study.toml"), study_folder / "out")
-    kept = read_result(study_folder / "out")
-    assert again.attrs["study"] == kept.attrs["study"] == "renamed"
-    assert again.shows_paper
-    assert kept.shows_paper
-    same(finished, kept)
-
-
-def test_other_libraries_read_a_result(finished):
-    path = finished.folder / "study.nc"
-    for name, group in finished.groups.items():
-        found = xr.load_dataset(path, group=name, engine="h5netcdf", decode_times=False)
-        xr.testing.assert_equal(found.reset_coords(), group.reset_coords())
-
-
 def test_a_folder_of_another_study_is_refused(study_folder, finished):
     change(study_folder, "seed = 3", "seed = 4")
     with pytest.raises(RequestError, match=r"holds the results of another study.*-o"):
@@ -265,28 +234,6 @@ def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folde
     path.write_text(path.read_text("utf-8") + '[tests.regular]\nwaves = "regular"\n', "utf-8")
     with pytest.raises(RequestError, match=r"not stated: irregular.*State the waves of a run"):
         make_plan(read_study(path))
-
-
-def test_a_write_that_fails_names_its_cause_and_the_remedy(tmp_path):
-    full = pytest.raises(StorageError, match=r"No space left.*Free space")
-    with full as caught, store.storing(tmp_path):
-        raise OSError(errno.ENOSPC, "No space left on device")
-    assert caught.value.exit_status == 1
-
-
-def test_a_result_that_cannot_be_read_is_told(finished, monkeypatch):
-    monkeypatch.setattr(store, "FORMAT", store.FORMAT + 1)
-    with pytest.raises(
-        RequestError, match=rf"written in format {store.FORMAT - 1}.*another folder"
-    ):
-        read_result(finished.folder)
-    monkeypatch.undo()
-    path = finished.folder / "study.nc"
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes(content)
-    with pytest.raises(DataError, match=r"study\.nc was cut off, altered or damaged"):
-        read_result(finished.folder)
 
 
 def test_joined_series_are_the_windows_end_to_end(finished):

@@ -1,13 +1,10 @@
 """The commands tell where training windows hold too few periods of a slow motion."""
 
-import warnings
-
 import numpy as np
 import pytest
 
-from seakeep import SeakeepWarning, read_campaign
+from seakeep import SeakeepWarning
 from seakeep.study import read_study, run_study
-from seakeep.study.fit import fit_campaign
 from seakeep.study.plan import make_plan, warn_of_slow_study
 
 DRIFT = 60.0
@@ -39,16 +36,3 @@ def test_a_study_with_short_windows_is_told_once(drifting_folder, monkeypatch):
     monkeypatch.setattr("seakeep.study.run._compute_all", lambda *_: pytest.fail("told before"))
     with pytest.warns(SeakeepWarning, match="slow motion"), pytest.raises(pytest.fail.Exception):
         run_study(study, drifting_folder / "out")
-
-
-def test_fitting_a_campaign_tells_it(drifting_folder):
-    campaign = read_campaign(drifting_folder / "campaign.toml")
-    with pytest.warns(SeakeepWarning, match=r"hold [34]\.\d periods of the slow motion of heave"):
-        fit_campaign(campaign)
-
-
-def test_the_tutorial_itself_has_no_slow_motion(study_folder):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        fit_campaign(read_campaign(study_folder / "campaign.toml"))
-        warn_of_slow_study(*make_plan(read_study(study_folder / "study.toml")))

@@ -10,7 +10,7 @@ import xarray as xr
 
 from seakeep import statistics
 from seakeep.core import embed
-from seakeep.errors import DataError, SeakeepWarning
+from seakeep.errors import SeakeepWarning
 from seakeep.metrics import nrmse
 from seakeep.models.training import gather
 from seakeep.study import read_study, run_study
@@ -94,17 +94,6 @@ def test_the_truth_is_read_at_the_instants_of_the_windows(found):
         assert float(row["inside"]) == pytest.approx(float(inside.mean()), abs=1e-12)
     # Half a centimetre is a tenth of the wave height: the coverages differ.
     assert table["inside"].sel(channel="heave").diff("against").item() != 0
-
-
-def test_a_truth_that_is_missing_is_named(place, tmp_path):
-    path = place / "study.toml"
-    other = tmp_path / "study.toml"
-    text = path.read_text("utf-8").replace(
-        '"campaign.toml"', f'"{(place / "campaign.toml").as_posix()}"'
-    )
-    other.write_text(text, "utf-8")
-    with pytest.raises(DataError, match=r"truth of true channels, and unseen.nc is not in it"):
-        run_study(read_study(other), tmp_path / "out")
 
 
 def test_results_belong_to_the_truth_that_was_read(place, found, tmp_path):

@@ -5,7 +5,6 @@ import typer
 from typer.testing import CliRunner
 
 from seakeep.cli.tank import tank
-from seakeep.errors import RequestError
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
@@ -52,18 +51,3 @@ def test_one_run_alone(run, tmp_path):
     assert run("--out", out, "--run", "regular", "--raw-format", "nc").exit_code == 0
     assert [p.name for p in (out / "raw").iterdir()] == ["regular"]
     assert (out / "raw" / "regular" / "loads.nc").is_file()
-
-
-def test_a_picture_of_the_user_stays(run, tmp_path):
-    own = tmp_path / "out" / "figures" / "run_sea.png"
-    own.parent.mkdir(parents=True)
-    own.write_text("a photograph")
-    with pytest.raises(RequestError, match=r"run_sea\.png exists and is not a figure that seakeep"):
-        run("--out", tmp_path / "out", "--figures")
-    assert own.read_text() == "a photograph"
-    assert not (tmp_path / "out" / "raw").exists()
-
-
-def test_nothing_to_do_is_said(run):
-    with pytest.raises(RequestError, match="nothing to do: give --out DIR"):
-        run()

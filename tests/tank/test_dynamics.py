@@ -1,11 +1,9 @@
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
 
-import seakeep.tank
 from seakeep.errors import RequestError
 from seakeep.signals import zero_up_crossings
 from seakeep.tank.dynamics import (
@@ -13,7 +11,6 @@ from seakeep.tank.dynamics import (
     assemble_rig,
     drift_coefficient,
     drift_envelopes,
-    linear_response,
     mean_drift,
     sea_losses,
     simulate,
@@ -73,12 +70,6 @@ def test_response_in_time_is_the_loops_own_model(linear_rig):
     assert np.abs(found - expected).max() < 4e-3 * np.abs(expected).max()
 
 
-def test_loops_linear_response_has_the_moorings_in_it(rig):
-    with_lines = linear_response(rig, [0.5])
-    without = response(rig.hydro, [0.5], rig.linear_damping, kernel=rig.kernel)
-    assert np.abs(with_lines[0, 0] - without[0, 0]) > 0.1
-
-
 def test_surge_decays_with_the_period_of_its_springs(ideal_rig, calm):
     start = np.zeros((2, 5))
     start[0, 0] = 0.05
@@ -103,12 +94,6 @@ def test_mean_offset_beyond_the_slack_limit(rig):
     assert offset > 1.1 / 1.33  # its pretension over its stiffness
     # The bow line is level to (heave / length)² = 1e-4, and the slow swing is down to millimetres.
     assert offset == pytest.approx((force - 1.1) / 1.89, rel=0.02)
-
-
-def test_calm_water_leaves_the_vessel_at_rest(rig, calm):
-    motion = simulate(rig, calm, 20.0)
-    # The level lines balance to rounding.
-    assert np.abs(motion.position).max() < 1e-12
 
 
 def energy(rig, motion):
@@ -212,15 +197,6 @@ def slow_force(signs, envelopes, sea, time):
     return signs @ np.abs(envelopes @ at_vessel) ** 2
 
 
-def test_full_transfer_function_has_the_mean_force_on_its_diagonal(rig):
-    rig = replace(rig, drift=DriftSettings(law="qtf"))
-    sea = small_sea(np.linspace(1.8, 7.1, 60), 0.01)
-    signs, envelopes = drift_envelopes(rig, sea)
-    mean = drift_coefficient(rig, sea)[0] * sea.amplitude**2
-    # Envelopes below a millionth of the greatest are left out.
-    assert signs @ np.abs(envelopes) ** 2 == pytest.approx(mean, abs=1e-5 * mean.max())
-
-
 def test_full_transfer_function_of_two_waves(rig):
     """Against the pairs of components, written out."""
     rig = replace(rig, drift=DriftSettings(law="qtf"))
@@ -243,17 +219,6 @@ def test_full_transfer_function_of_two_waves(rig):
             expected += np.real(z[:, m].conj() * pair * z[:, n])
     found = slow_force(*drift_envelopes(rig, sea), sea, time)
     assert found == pytest.approx(expected, abs=1e-5 * expected.max())
-
-
-def test_laws_agree_where_a_group_of_waves_is_long(rig):
-    sea = small_sea(np.linspace(3.0, 3.3, 8), 0.02)
-    time = np.linspace(0.0, 200.0, 2000)
-    newman = slow_force(*drift_envelopes(rig, sea), sea, time)
-    full = replace(rig, drift=DriftSettings(law="qtf"))
-    # Newman's law is the limit of small differences; 0.3 rad/s change a motion's phase by degrees.
-    assert slow_force(*drift_envelopes(full, sea), sea, time) == pytest.approx(
-        newman, abs=0.03 * newman.max()
-    )
 
 
 @pytest.mark.parametrize("law", ["newman", "qtf"])
@@ -323,13 +288,6 @@ def test_depth_and_density_must_be_those_of_the_file(settings, hydro):
         assemble_rig(with_settings(settings, facility={"density": 1025.0}), hydro)
 
 
-def test_too_large_a_step_is_refused(settings, hydro):
-    with pytest.raises(
-        RequestError, match=r"step = 0\.2 s is too large: .* up to 0\.05 s .*Take a smaller"
-    ):
-        assemble_rig(with_settings(settings, simulation={"step": 0.2}), hydro)
-
-
 def test_a_stiff_line_asks_for_a_smaller_step(settings, hydro):
     stiff = settings.moorings["bow"].model_copy(update={"stiffness": 2e7})
     changed = settings.model_copy(update={"moorings": {"bow": stiff}})
@@ -358,14 +316,6 @@ def test_other_vessels_need_no_code(settings, hydro):
     assert motion.names == ("surge", "heave", "pitch")
     assert tensions(rig, motion.position, motion.velocity).shape == (1, motion.time.size)
     assert 0.01 < motion.position[1].std() < 0.1
-
-
-def test_missing_numba_names_the_extra(monkeypatch, rig, calm):
-    monkeypatch.setitem(sys.modules, "numba", None)
-    monkeypatch.delitem(sys.modules, "seakeep.tank._loop", raising=False)
-    monkeypatch.delattr(seakeep.tank, "_loop", raising=False)
-    with pytest.raises(RequestError, match=r"needs numba .* pip install 'seakeep\[tank\]'"):
-        simulate(rig, calm, 1.0)
 
 
 def test_wave_drift_damping_is_aranhas(rig):

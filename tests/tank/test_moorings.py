@@ -3,9 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seakeep.errors import RequestError
 from seakeep.tank.dynamics import tensions
-from seakeep.tank.moorings import KINDS, LineSettings, line_table, mooring_stiffness
+from seakeep.tank.moorings import KINDS, line_table, mooring_stiffness
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
@@ -54,14 +53,6 @@ def test_stiffness_is_the_slope_of_the_forces(rig):
     # Central differences of step 1e-6: rounding of 1e-10.
     assert mooring_stiffness(rig.lines) == pytest.approx(-np.array(slopes).T, abs=1e-8)
     assert mooring_stiffness(rig.lines)[0, 0] == pytest.approx(1.89 + 1.33, rel=1e-9)
-
-
-def test_a_line_stretched_to_nothing_is_refused():
-    line = LineSettings(stiffness=1.0, pretension=5.0, eye=(-0.7, 0.06), pole=(48.4, 0.06))
-    with pytest.raises(
-        RequestError, match=r"moorings\.bow has no length left: .* 5\.000 m\. Lower"
-    ):
-        line_table({"bow": line}, 52.09, 0.03)
 
 
 def test_another_kind_of_line_is_one_entry(rig, settings, monkeypatch):

@@ -70,12 +70,6 @@ def test_other_seed_other_waves_and_noise(short, rig):
     assert draws[0] != draws[1]
 
 
-def test_a_run_does_not_depend_on_its_neighbours(short, settings, rig):
-    alone = play_run(short.model_copy(update={"runs": {"regular_2": short.runs["regular_2"]}}),
-                     "regular_2", rig)  # fmt: skip
-    assert np.array_equal(alone.sea.phase, play_run(settings, "regular_2", rig).sea.phase)
-
-
 def test_raw_csv_reads_back(short, tmp_path):
     files = play(short, tmp_path, names=["irregular_1"])["irregular_1"]
     probes = pd.read_csv(files["wave_probes"])
@@ -141,24 +135,6 @@ def test_one_loggers_campaign_can_be_prepared(short, tmp_path):
     middle = slice(100, -100)
     assert float((run["heave_rate"] - rate)[middle].std()) < 0.15 * float(rate[middle].std())
     assert run["eta_fwd"].attrs["x_position"] == 48.42
-
-
-def test_progress_counts_the_runs(short, tmp_path):
-    told = []
-    play(short, tmp_path, progress=lambda *each: told.append(each))
-    assert told == [(0, 2, "irregular_1"), (1, 2, "regular_2"), (2, 2, "done")]
-
-
-def test_wrong_requests_write_nothing(short, tmp_path):
-    with pytest.raises(RequestError, match=r"no run 'regular_3'\. Did you mean 'regular_2'\? The"):
-        play(short, tmp_path / "out", names=["regular_3"])
-    with pytest.raises(RequestError, match="raw files are 'csv' or 'nc'; received 'mat'"):
-        play(short, tmp_path / "out", kind="mat")
-    run = short.runs["regular_2"].model_copy(update={"wavelength": 0.4})
-    bad = short.model_copy(update={"runs": {**short.runs, "short": run}})
-    with pytest.raises(RequestError, match=r"runs\.short asks for waves of"):
-        play(bad, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
 
 
 def test_nothing_that_the_tank_has_not_written_is_replaced(short, tmp_path):

@@ -13,7 +13,7 @@ from seakeep.tank.seas import (
     spectral_density,
 )
 from seakeep.tank.settings import RunPlan, SpectrumSettings
-from seakeep.waves import wavelength_to_frequency, wavenumber
+from seakeep.waves import wavenumber
 
 
 def rng():
@@ -95,12 +95,6 @@ def test_a_moving_place_sees_the_doppler_shift():
     t = np.linspace(0, 20, 400)
     moving = sea.elevation(0.5 * t, t)
     assert moving == pytest.approx(0.1 * np.cos((0.5 * k - omega) * t + 0.3), abs=1e-13)
-
-
-def test_steady_regular_waves_have_their_height():
-    sea = regular_sea(2.1, 0.105, 0.0, 3.6, rng())
-    assert sea.omega == pytest.approx([wavelength_to_frequency(2.1, 3.6)])
-    assert sea.amplitude == pytest.approx([0.0525])
 
 
 def test_unsteadiness_spreads_the_heights():

@@ -1,7 +1,6 @@
 import pytest
 
 from seakeep.errors import RequestError
-from seakeep.tank.hydrodynamics import load_hydrodynamics
 from seakeep.tank.settings import default_settings, read_tank
 
 
@@ -20,13 +19,6 @@ def test_a_file_changes_what_it_states_and_keeps_the_rest(tmp_path):
     assert settings.instruments.clocks["mru"].offset == 0.1
     assert settings.instruments.clocks["mru"].rate == 50.0
     assert settings.vessel == default_settings().vessel
-
-
-def test_hydrodynamics_file_is_found_beside_the_settings(tmp_path):
-    settings = read(tmp_path, '[vessel]\nhydrodynamics = "mine.nc"\n')
-    assert settings.vessel.hydrodynamics == str(tmp_path / "mine.nc")
-    with pytest.raises(RequestError, match=r"mine\.nc does not exist\..*Correct vessel"):
-        load_hydrodynamics(settings.vessel.hydrodynamics)
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import print_table, progress_bar, say, show
-from seakeep.cli.options import (
+from seakeep.cli.console import (
     DEFAULT_LEVEL,
     CampaignFile,
     Level,
@@ -20,7 +19,11 @@ from seakeep.cli.options import (
     Scheduler,
     Workers,
     member_executor,
+    print_table,
+    progress_bar,
     read_files,
+    say,
+    show,
 )
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import check_output, check_place, check_report, make_folder

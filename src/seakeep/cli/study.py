@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import print_table, progress_bar, show
-from seakeep.cli.options import Scheduler, checked_count
+from seakeep.cli.console import Scheduler, checked_count, print_table, progress_bar, show
 
 if TYPE_CHECKING:
     from seakeep.study import StudyResult
