@@ -78,26 +78,19 @@ def test_the_result_is_the_same_for_any_number_of_workers():
     assert alone.table.identical(other.table)
 
 
-@pytest.mark.parametrize("vary", ["lead", "rank"])
-def test_the_figure_has_a_line_per_candidate_and_units(vary):
+def test_the_figure_has_a_line_per_candidate_and_units():
     pyplot = pytest.importorskip("matplotlib.pyplot")
-    result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=[vary], horizon=(15,))
+    result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["lead"], horizon=(15,))
     table = result.table.isel(trial=np.flatnonzero(result.table["chosen"].values))
-    assert (table["ridge"].item(), table["rank"].item()) == (result.spec.ridge, 0)
+    assert (table["ridge"].item(), table["memory"].item()) == (result.spec.ridge, 0)
     assert "(chosen)" in result.describe()
     before = pyplot.get_fignums()
-    axes, *others = result.figure().axes
+    (axes,) = result.figure().axes
     assert pyplot.get_fignums() == before  # pyplot keeps what it makes until it is closed
     assert axes.get_xlabel() == "ridge per snapshot pair (1)"
     words = [text.get_text() for text in axes.get_legend().get_texts()]
-    if vary == "lead":
-        leads = np.unique(result.table["lead"].values)
-        assert (words, others) == ([*(f"lead {lead}" for lead in leads), "chosen"], [])
-        return
-    (rank,) = others
-    assert rank.get_xlabel() == "singular values kept (1)"
-    np.testing.assert_array_equal(rank.lines[0].get_xdata(), [23, 16])
-    assert "rank 23" in result.describe() or "rank 16" in result.describe()
+    leads = np.unique(result.table["lead"].values)
+    assert words == [*(f"lead {lead}" for lead in leads), "chosen"]
 
 
 @pytest.fixture
@@ -179,7 +172,7 @@ states = ["a"]  # kept
     assert "ridge = 0.001 # chosen by seakeep tune" in kept
 
 
-def test_a_tuned_file_holds_rank_and_alignment():
+def test_a_tuned_file_holds_memory_and_alignment():
     before = """[model]
 preset = "recommended"
 rank = 3
@@ -192,19 +185,20 @@ celerity = 2.0
 """
     aligned = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
     slow = seakeep.SlowSquares("eta", lead=1.0)
-    spec = replace(SPEC, ridge=0.0, rank=64, alignment=aligned, observables=[slow])
-    varied = ["rank", "alignment", "observables"]
+    spec = replace(SPEC, ridge=0.1, memory=64, alignment=aligned, observables=[slow])
+    varied = ["memory", "alignment", "observables"]
     read = tomllib.loads(tuned_campaign(before, None, spec, varied, "recommended", 20.0))
     assert read["model"]["observables"] == [{"kind": "slow_squares", "of": ["eta"], "lead": 1.0}]
     assert read["model"]["alignment"] == {
         "mode": "dispersion",
         "surge": "predicted",
     }
-    assert (read["model"]["rank"], read["model"]["ridge"]) == (64, 0.0)
+    assert (read["model"]["memory"], read["model"]["ridge"]) == ("3.2 T", 0.1)
     assert "next" in read
     spec = replace(SPEC, ridge=1e-3)
     read = tomllib.loads(tuned_campaign(before, None, spec, varied, "recommended", 20.0))
     assert not {"rank", "alignment", "preset"} & set(read["model"])
+    assert read["model"]["memory"] == "0 T"
     text = tuned_campaign(before, None, spec, ["ridge"], "recommended", 20.0)
     kept = tomllib.loads(text)["model"]
     assert kept["alignment"] == {"mode": "effective", "celerity": 2.0}

@@ -26,7 +26,7 @@ from seakeep.toml import Length
 if TYPE_CHECKING:
     from seakeep.report.style import Figure
 
-LENGTHS = ("state_delays", "input_delays", "lead")
+LENGTHS = ("state_delays", "input_delays", "lead", "memory")
 FIRST = "# seakeep_file: tuned campaign\n"
 COLUMNS = {
     "state_delays": "state delays",
@@ -34,8 +34,8 @@ COLUMNS = {
     "lead": "lead",
     "observables": "observables",
     "alignment": "alignment",
+    "memory": "memory",
     "ridge": "λ per snapshot pair",
-    "rank": "number of singular values kept; 0 for all",
     "score": "mean NRMSE of free runs",
     "lower": "lower bound of the 95 % interval of the score",
     "upper": "upper bound of the 95 % interval of the score",
@@ -71,8 +71,8 @@ class TuneResult(Selected[HankelDMDc]):
         """What was tried, a Dataset over ``trial``.
 
         ``state_delays``, ``input_delays``, ``lead`` (samples), ``observables`` (their kinds),
-        ``alignment``, ``ridge`` (per snapshot pair) or ``rank`` (0 for none), ``score`` (mean
-        NRMSE of free runs), the bounds ``lower`` and ``upper`` of its 95 % interval, ``chosen``.
+        ``alignment``, ``memory`` (samples), ``ridge`` (per snapshot pair), ``score`` (mean NRMSE of
+        free runs), the bounds ``lower`` and ``upper`` of its 95 % interval, ``chosen``.
         """
         return xr.Dataset(
             {
@@ -122,18 +122,20 @@ def tune(
     Parameters
     ----------
     spec : HankelDMDc
-        Where the search starts, with exact delay rows; what `vary` does not name stays, but that
-        observables are chosen where ``spec.select`` says so. Its period is that of the lengths.
+        Where the search starts, with exact delay rows: with what `fit` would choose of what
+        ``spec.select`` leaves open. What `vary` does not name stays, and the start is left only
+        for what errs less by more than a standard error over what is held out. The period of
+        ``spec.select`` is that of the lengths.
     runs : Dataset, sequence of Dataset, or mapping of names to Datasets
         Training runs.
     states, inputs : sequence of str
         Channels of the model.
     vary : sequence of str, optional
         Out of "ridge" (always chosen), "observables" (none, slow squares, powers, both; or those of
-        the spec), "lead", "input_delays", "state_delays", "rank" (truncated singular values instead
-        of the ridge), "alignment" (none, dispersion or one celerity, to the surge that is
-        predicted or to the place at rest: what the runs allow) and "readouts" (none or by the
-        wave at the line, for those of the spec or for every load).
+        the spec), "lead", "input_delays", "state_delays", "memory" (none, or eight periods),
+        "alignment" (none, dispersion or one celerity, to the surge that is predicted or to the
+        place at rest: what the runs allow) and "readouts" (none or by the wave at the line, for
+        those of the spec or for every load).
     horizon : sequence of float, optional
         Lengths of the free runs, encounter periods.
     folds : {"auto", "run", "sea_state"} or int, optional
@@ -170,8 +172,6 @@ def tune(
             f"{folds!r}."
         )
     check_names(states, inputs)
-    if spec.select is not None and spec.select.observables:
-        vary = list(dict.fromkeys([*vary, "observables"]))
     named = until(as_runs(runs), stop)
     known: MutableMapping[str, Any] = {}
     if resume is not None:
@@ -183,6 +183,7 @@ def tune(
         list(states),
         list(inputs),
         vary=vary,
+        opened=() if spec.select is None else spec.select.opened,
         horizon=horizon,
         folds=folds,
         period=None if spec.select is None else spec.select.period,
@@ -285,7 +286,7 @@ def tuned_campaign(
     for key, value in values.items():
         if table.get(key) != value:
             table[key] = value
-            if key in ("ridge", "rank", *LENGTHS):
+            if key in ("ridge", *LENGTHS):
                 table[key].comment("chosen by seakeep tune, by free runs on held-out training runs")
     if between:
         _end(table).extend(between)
@@ -311,8 +312,6 @@ def _choice(
     for key in (each for each in LENGTHS if each in stated):
         count: int = getattr(spec, key)
         values[key] = count if isinstance(table.get(key), int) else _in_periods(count, period)
-    if spec.rank is not None:
-        values["rank"] = spec.rank
     if "observables" in stated:
         values["observables"] = [{"kind": o.kind} | _stated(o) for o in spec.observables]
     if "alignment" in stated and spec.alignment is not None:

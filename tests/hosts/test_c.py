@@ -18,6 +18,9 @@ NAMES = ["full", "short", "arx", "autonomous", "unstable", "following", "followi
 FINITE, REFUSED, LOST = 0, 1, 2
 
 
+DOUBLES = ctypes.POINTER(ctypes.c_double)
+
+
 class Host:
     """A program that runs a model; its struct begins with the states."""
 
@@ -94,6 +97,19 @@ def test_what_is_copied_goes_on_as_the_original_to_the_last_bit(host, cases):
     for row, expected in zip(case.u[case.rows :][20:], once, strict=True):
         run.step(run.memory, pointer(row))
         np.testing.assert_array_equal(run.x, expected)
+
+
+@pytest.mark.parametrize("name", ["full", "short", "following"])
+def test_the_derivative_of_a_step_is_that_of_the_jacobian(name, host, library, cases):
+    case, run = cases[name], host(name)
+    _, on_inputs = case.model.jacobian(case.x_history, case.u[: case.rows + 1])
+    change, found = np.array([0.3, -0.7]), np.empty(len(case.model.states))
+    derivative = getattr(library, f"{name}_derivative")
+    derivative(
+        run.memory, pointer(case.u[case.rows]), pointer(change), found.ctypes.data_as(DOUBLES)
+    )
+    # Differences of numbers of the order of ten over 1e-3, which cubes of waves bend by 1e-6.
+    np.testing.assert_allclose(found, on_inputs[:, -1] @ change, rtol=1e-5, atol=1e-9)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

@@ -115,6 +115,26 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
     np.testing.assert_allclose(forecast, expected, **close)
 
 
+def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
+    model, make_run, tmp_path
+):
+    roles = {"eta_cog": "constant"}
+    write_estimator(model, tmp_path, "rom", roles=roles)
+    subprocess.run(
+        ["cc", *FLAGS, "-o", "rom.so", "rom.c", "rom_estimator.c", "-lm"], cwd=tmp_path, check=True
+    )
+    found, live = Estimator(ctypes.CDLL(str(tmp_path / "rom.so")), "rom"), model.live(roles=roles)
+    u, y = samples(make_run, True)
+    for at in range(460):  # u[450] is lost
+        found.step(u[at], y[at])
+        live.step(u[at], y[at])
+    plan = np.full((29, 2), np.nan)
+    plan[3:, 1] = np.linspace(0, 1, 26)
+    expected = live.forecast(30, {"eta_cog": plan[:, 1]}).sel(statistic="mean")
+    expected = np.stack([expected[each] for each in STATES], axis=1)
+    np.testing.assert_allclose(found.forecast(30, plan)[1], expected, rtol=0, atol=1e-12)
+
+
 def test_a_probe_that_stands_still_is_predicted_to(library, model):
     live, found = model.live(), Estimator(library, "exact")
     for at in range(12):

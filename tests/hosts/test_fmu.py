@@ -147,6 +147,18 @@ def test_a_reset_starts_from_the_means_again(slave, cases):
     np.testing.assert_allclose(slave.getReal([2, 3]), case.model.state_mean, rtol=1e-15)
 
 
+def test_directional_derivatives_are_those_of_the_jacobian(slave, cases):
+    case = cases["full"]
+    _, on_inputs = case.model.jacobian(case.x_history, case.u[: case.rows + 1])
+    slave.setReal([0, 1], list(case.u[case.rows]))
+    found = slave.getDirectionalDerivative([3, 2], [1], [2.0])
+    # Cubes of waves bend the differences.
+    np.testing.assert_allclose(found, 2.0 * on_inputs[::-1, -1, 1], rtol=1e-5)
+    for unknown, known in ((0, 1), (2, 2)):
+        with pytest.raises(Exception, match="fmi2GetDirectionalDerivative failed with status 3"):
+            slave.getDirectionalDerivative([unknown], [known], [1.0])
+
+
 class TestWhatIsRefused:
     def test_another_step(self, slave, capsys):
         with pytest.raises(Exception, match="fmi2DoStep failed with status 3"):

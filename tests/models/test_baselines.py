@@ -10,6 +10,7 @@ import seakeep
 from seakeep.baselines import ARX, FIR, HoldLast, Mean, Subspace
 from seakeep.errors import RequestError
 from seakeep.models import KINDS
+from seakeep.models.selection import select
 
 DT = 0.1
 STATES, INPUTS = ["heave", "pitch"], ["eta_fwd", "eta_aft"]
@@ -132,6 +133,48 @@ def test_fir_finds_a_known_impulse_response():
     assert model.spectral_radius == 0.0
     with pytest.raises(RequestError, match=r"FIR model is a filter of its inputs and has none"):
         FIR(input_delays=15).fit(run, STATES, [])
+
+
+def test_length_and_ridge_of_a_filter_are_those_that_forecast_runs_held_out_best():
+    """Every score is the mean NRMSE of filters fitted to the other run, window after window."""
+    period, stated = 2.0, 40
+    given = [linear_run(seed, 500, noise=0.3).assign_attrs(encounter_period=period)
+             for seed in (1, 2)]  # fmt: skip
+    named = {run.attrs["run"]: run for run in given}
+    spec = FIR(input_delays=stated, ridge="rollout")
+    found = select(spec, named, STATES, INPUTS, vary=["input_delays"], horizon=(5.0, 15.0))
+    assert {row["input_delays"] for row in found.rows} == {40, 24, 16}
+    best = min(found.rows, key=lambda row: row["score"])
+    assert 1e-5 < best["ridge"] < 0.3  # noise asks for some, and the edges are not chosen
+    rows = [best, found.rows[0]]
+    for row in rows:
+        own = FIR(input_delays=row["input_delays"], ridge=row["ridge"])
+        scores = []
+        for learnt, held_out in (given, given[::-1]):
+            part = learnt.isel(time=slice(stated - row["input_delays"], None))  # the same pairs
+            model = own.fit(part, STATES, INPUTS)
+            for periods in (5, 15):
+                steps, errors = round(periods * period / DT), []
+                for start in range(stated, 499 - steps + 1, steps):
+                    forecast = model.forecast(held_out, start * DT, steps)
+                    each = seakeep.metrics.nrmse(predicted=forecast, measured=held_out)
+                    errors.append(np.mean([min(float(each[name]), 1.0) for name in STATES]))
+                scores.append(np.mean(errors))
+        # Moments of the part, and of the whole run.
+        assert row["score"] == pytest.approx(np.mean(scores), rel=2e-3)
+    model = spec.fit(given, STATES, INPUTS)
+    (chosen,) = (row for row in found.rows if row["chosen"])
+    assert (model.settings.input_delays, model.settings.ridge) == (
+        chosen["input_delays"], chosen["ridge"],
+    )  # fmt: skip
+    assert chosen["score"] <= 1.03 * best["score"]
+    assert f"ridge {chosen['ridge']:g}" in model.selection
+    # What a window leaves out decides nothing.
+    other = given[0].copy(deep=True)
+    other["heave"][:200] += 1.0
+    window = dataclasses.replace(spec, window=250)
+    few = [window.fit(run, STATES, INPUTS) for run in (given[0], other)]
+    np.testing.assert_array_equal(few[0].coefficients, few[1].coefficients)
 
 
 @pytest.mark.parametrize("kind", ["fir", "arx", "subspace"])

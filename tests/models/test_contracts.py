@@ -288,6 +288,22 @@ class TestWaves:
         assert told == "a mean surge of -3 m, upstream of the trained -1 to 1 m"
         assert outside_training(model, 1.5 * run, 20.0, 90) == []  # four waves are no sea
 
+    def test_a_forecast_says_by_how_much_and_reads_its_own_surge(self):
+        run = self.regular(2.0).rename(heave="surge")
+        high = 1.5 * run
+        high["surge"].values[high["time"].values > 20.0] = np.nan
+        words = "eta: a height of 3, trained up to 2; eta: a steepness in deep water of 0.48, "
+        for spec in (HankelDMDc(2, 8, 1.0), ensemble(window=None)):
+            model = spec.fit(run, ["surge"], ["eta"])
+            forecasts = [model.forecast(high, 20.0, 600)]
+            if spec.is_ensemble:
+                forecasts.append(model.forecast_summary(high, 20.0, 600))
+            for forecast in forecasts:
+                assert forecast.attrs["status"] == "ok, outside training"
+                assert forecast.attrs["outside_training"].startswith(words)
+            inside = model.forecast(run, 20.0, 600).attrs
+            assert (inside["status"], "outside_training" in inside) == ("ok", False)
+
 
 class TestUnitsAndNumbers:
     """Units of pooled runs, and values that no standard deviation holds."""

@@ -4,6 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+import xarray as xr
 from drifting import INPUTS, STATES, drifting_run
 from scipy import signal, stats
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -423,11 +424,11 @@ def test_what_cannot_be_is_refused(models, ensemble, runs, run):
         live.forecast(5)
     with pytest.raises(RequestError, match="Start with at least 4 samples of all of u"):
         live.step()
-    with pytest.raises(RequestError, match="noise names 'roll', which is not a state"):
+    with pytest.raises(RequestError, match="noise names 'roll', which the model does not know"):
         model.live(noise={"roll": 1.0})
     live = started(model, run, 20)
-    with pytest.raises(RequestError, match="future holds values that are not finite"):
-        live.forecast(5, np.full((5, len(INPUTS)), np.nan))
+    with pytest.raises(RequestError, match="future holds an infinite value"):
+        live.forecast(5, np.full((5, len(INPUTS)), np.inf))
 
 
 def test_a_model_without_inputs_serves_too(make_dataset):
@@ -441,3 +442,82 @@ def test_a_model_without_inputs_serves_too(make_dataset):
     np.testing.assert_array_equal(
         live.forecast(20)["heave"].sel(statistic="mean"), expected["heave"]
     )
+
+
+@pytest.fixture(scope="module")
+def thrusted():
+    """Surge that answers a wave and a thruster: x' = .9 x + .3 u + .5 thrust, exactly."""
+
+    def run(seed):
+        rng, samples = np.random.default_rng(seed), 1200
+        wave = np.sin(0.3 * np.arange(samples) + rng.uniform(0, 6)) + rng.normal(0, 0.3, samples)
+        thrust = np.repeat(rng.uniform(-1, 1, samples // 30), 30)
+        surge = np.zeros(samples)
+        for k in range(samples - 1):
+            surge[k + 1] = 0.9 * surge[k] + 0.3 * wave[k] + 0.5 * thrust[k]
+        channels = {"surge": surge, "eta": wave, "thrust": thrust}
+        return xr.Dataset(
+            {name: ("time", each, {"units": "m"}) for name, each in channels.items()},
+            coords={"time": 0.1 * np.arange(samples)},
+        )
+
+    model = HankelDMDc(0, 0, 1e-9, delay_rows="exact").fit(
+        {str(seed): run(seed) for seed in (1, 2)}, ["surge"], ["eta", "thrust"]
+    )
+    return model, run(3)
+
+
+def test_a_known_actuator_follows_its_plan_whatever_the_probe_does(thrusted):
+    model, run = thrusted
+    live = model.live(roles={"thrust": "known"})
+    u, y = matrix(run, ["eta", "thrust"]), matrix(run, ["surge"])
+    for at in range(300):
+        live.step(u[at], y[at])
+    for at in range(300, 320):
+        live.step([np.nan, u[at, 1]], y[at])  # the probe is dead; the thrust is known
+        assert live._known_inputs()[-1, 1] == u[at, 1]
+    live.step({"eta": u[320, 0]}, y[320])  # the thrust was not measured
+    assert live._known_inputs()[-1, 1] == u[319, 1]
+    plan, steps = np.sin(np.arange(40)), 40
+    still, moved = (live.forecast(steps, {"thrust": each}) for each in (0 * plan, plan))
+    answer = signal.lfilter([0.5], [1, -0.9], np.concatenate([[0.0], plan[:-1]]))
+    for statistic in ("mean", "lower", "upper"):
+        both = [each.surge.sel(statistic=statistic) for each in (still, moved)]
+        # The ridge moves the answer by a millionth.
+        np.testing.assert_allclose(both[1] - both[0], answer, rtol=0, atol=1e-5)
+    with pytest.raises(RequestError, match=r"'thrust' is a known input, and future gives 3 of"):
+        live.forecast(steps, {"thrust": plan[:3]})
+    with pytest.raises(RequestError, match="roles names 'eat', which the model does not know"):
+        model.live(roles={"eat": "known"})
+    # A constant stays; waves that are given count though the other column is not.
+    constant = model.live(roles={"thrust": "constant"})
+    for at in range(300):
+        constant.step(u[at], y[at])
+    known = u[300:340].copy()
+    known[:, 1] = u[299, 1]
+    expected = model.forecast_arrays(y[:300], u[:300], known, steps)
+    given = constant.forecast(steps, {"eta": u[300:340, 0]})
+    np.testing.assert_allclose(given.surge.sel(statistic="mean"), expected[:, 0], atol=1e-12)
+    assert given.attrs["known_input"] == 39
+
+
+def test_the_jacobian_of_a_known_system_is_its_coefficients(thrusted, models, run):
+    model, other = thrusted
+    u, y = matrix(other, ["eta", "thrust"]), matrix(other, ["surge"])
+    on_states, on_inputs = model.jacobian(y[:9], u[:9])
+    np.testing.assert_allclose(on_states, [[[0.9]]], atol=1e-6)
+    np.testing.assert_allclose(on_inputs, [[[0.3, 0.5]]], atol=1e-6)
+    # Of a model with squares and a place: along its rows, what a forecast changes by.
+    model, rng = models["aligned"], np.random.default_rng(0)
+    count = model.history_samples
+    x = matrix(run, STATES)[300 - model.signature.state_samples : 300]
+    u = matrix(run, INPUTS)[300 - count : 300 + model.lead_samples]
+    change = [1e-4 * rng.standard_normal(each.shape) for each in (x, u)]
+
+    def after(side):
+        rows = u + side * change[1]
+        return model.forecast_arrays(x + side * change[0], rows[:count], rows[count:], 1)[0]
+
+    derivatives = model.jacobian(x, u)
+    along = sum(np.tensordot(d, c, 2) for d, c in zip(derivatives, change, strict=True))
+    np.testing.assert_allclose(along, 0.5 * (after(1) - after(-1)), rtol=1e-4, atol=1e-9)

@@ -19,7 +19,7 @@ from seakeep import (
     metrics,
 )
 from seakeep.models.labelled import mean_period
-from seakeep.models.selection import RIDGES, WORST, default_observables, groups_of, select
+from seakeep.models.selection import RIDGES, default_observables, groups_of, select
 
 DT, PERIOD = 0.1, 10  # s, samples
 STATES, INPUTS = ["heave", "drift"], ["eta"]
@@ -231,36 +231,6 @@ def test_what_grows_is_never_chosen():
         stable.append(bool(np.abs(np.linalg.eigvals(model.A)).max() < 1))
     assert not stable[0]  # over ten steps the truth itself is best
     assert found.settings.ridge == ranked[stable.index(True)]["ridge"]
-
-
-def test_ranks_are_judged_as_plain_fits_are_and_one_may_be_chosen():
-    given = {
-        name: run.assign(eta_rate=run["eta"].differentiate("time").assign_attrs(units="m/s"))
-        for name, run in runs().items()
-    }
-    inputs, spec = ["eta", "eta_rate"], replace(SPEC, readouts="auto")  # no state is a load
-    found = select(spec, given, STATES, inputs, vary=("rank", "observables"), horizon=(15.0,))
-    # The wave is squared, and its rate not.
-    assert {each.of for each in found.settings.observables} == {("eta",)}
-    plain = select(SPEC, given, STATES, inputs, vary=("rank",), horizon=(15.0,))
-    rows = [row for row in plain.rows if row["rank"]]
-    assert [row["rank"] for row in rows] == [32, 23, 16]  # of 7 × 2 + 13 × 2, half an octave apart
-    for row in rows:
-        assert row["ridge"] == 0.0
-        errors = []
-        for held in given:
-            spec = replace(SPEC, ridge=0.0, rank=row["rank"])
-            others = [run for name, run in given.items() if name != held]
-            model = spec.fit(others, STATES, inputs)
-            for start in range(12, 550, 150):
-                forecast = model.forecast(given[held], start=start * DT, steps=150)
-                measured = given[held].isel(time=slice(start + 1, start + 151))
-                each = [metrics.nrmse(predicted=forecast[n], measured=measured[n]) for n in STATES]
-                errors.append(np.minimum(each, WORST).mean())
-        # Squared singular values: half of the digits of the smallest that is kept.
-        assert row["score"] == pytest.approx(np.mean(errors), rel=1e-6)
-    only = [row for row in plain.rows if row["chosen"]]
-    assert plain.settings.rank == (only[0]["rank"] or None)
 
 
 def test_a_vessel_that_drifts_gets_an_alignment_and_the_measured_surge_is_no_choice():

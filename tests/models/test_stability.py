@@ -181,4 +181,4 @@ def test_an_answer_to_waves_thirty_times_as_high_is_not_lost(make_run, channels)
     reach = np.abs(run.heave - run.heave.mean()).max()
     # In waves as those of training ten times is the limit.
     assert np.abs(found.heave - run.heave.mean()).max() > 12 * reach
-    assert found.attrs["status"] == "ok"
+    assert found.attrs["status"] == "ok, outside training"

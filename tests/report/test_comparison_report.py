@@ -16,6 +16,7 @@ from seakeep.report.comparison import (
     forecast_header,
     model_blocks,
     nowcast_blocks,
+    winner,
     write_comparison,
     write_differences,
     write_forecast,
@@ -171,13 +172,10 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
         name: comparison_table([comparison(factor)])
         for name, factor in {"ours": 0.9, "hold_last": 0.8, "arx": 0.95, "fir": 0.7}.items()
     }
-    references = {"hold last": ["hold_last"], "best linear": ["arx", "fir"]}
-    averages, skill, channels, extremes = model_blocks(tables, references)
+    averages, channels, extremes = model_blocks(tables)
     assert extremes.title.endswith("extremes of ours")
     low, high = (float(tables["ours"][f"anrmse_{each}"][0]) for each in ("lower", "upper"))
     assert averages.rows[0][:3] == ("ours", "0.100", f"{low:.3f} to {high:.3f}")
-    assert skill.columns == ("model", "from hold last", "from best linear")
-    assert skill.rows == [("ours", "−50 %", "2 times")]  # errors of 0.1 against 0.2 and 0.05
     assert channels.rows[0] == ("heave", "0.100", "0.200", "0.050", "0.300")
     rows = lines_of(write_comparison(tables, tmp_path / "t.csv"))
     assert [row["model"] for row in rows[::3]] == list(tables)
@@ -205,6 +203,11 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
     assert changes.rows[0] == ("ours", "0.100", "", "", "")
     # Twice the error at every instant, in every draw.
     assert changes.rows[1] == ("theirs", "0.200", "2 times", "2 to 2 times", "worse")
+    assert winner(table, {"theirs": "fir"}) == "Least error: ours, ANRMSE 0.100."
+    turned = difference_table(dict(reversed(found.items())))
+    told = winner(turned, {})
+    assert told == "Least error: ours, ANRMSE 0.100, −50 % [−50 to −50 %] from theirs."
+    assert "[models.fir]" in winner(turned, {"ours": "fir"})
     rows = lines_of(write_differences(table, tmp_path / "d.csv"))
     assert [(row["run"], row["model"]) for row in rows] == [
         *((run, model) for model in found for run in runs),

@@ -773,7 +773,7 @@ def attributes_of(
         "frame": rig.frame,
         "encounter_period": general.encounter_period,
         "probe_offset": settings.probe_offset,
-        "celerity": celerity_of(run, dt, campaign),
+        "celerity": celerity_of(run.isel(time=inside(time, used_span(settings), dt)), dt, campaign),
     }
     whole = (float(time[0]), float(time[-1]))
     for use in ("train", "test"):
@@ -798,7 +798,7 @@ def attributes_of(
 
 
 def celerity_of(run: xr.Dataset, dt: float, campaign: CampaignSettings) -> float | None:
-    """Effective celerity of the waves of a run that was cut, m/s; None where it is not known."""
+    """Effective celerity of the waves in the part of a run that is used, m/s; None if unknown."""
     channels, depth = campaign.celerity_channels, campaign.rig.water_depth
     if channels is None or depth is None or any(name not in run for name in channels):
         return None

@@ -42,7 +42,7 @@ from seakeep.toml import in_seconds, lengths, parse_length
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
 
-FORMAT = 10
+FORMAT = 11
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 
 

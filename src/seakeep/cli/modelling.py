@@ -261,7 +261,12 @@ def compare(
     """
     from seakeep.campaign import read_campaign
     from seakeep.models import load_model
-    from seakeep.report.comparison import difference_blocks, write_comparison, write_differences
+    from seakeep.report.comparison import (
+        difference_blocks,
+        winner,
+        write_comparison,
+        write_differences,
+    )
     from seakeep.study import compare_models, comparison_table, difference_table
     from seakeep.study.nowcast import served
 
@@ -304,13 +309,14 @@ def compare(
         n: [_displayed(each, scale, degrees) for each in of] for n, of in comparisons.items()
     }
     tables = {name: comparison_table(of) for name, of in comparisons.items()}
-    _print_comparison(tables, {name: each.kind for name, each in fitted.items()})
+    _print_comparison(tables)
     written = [write_comparison(tables, out / TABLE)]
     differences = None
     if len(comparisons) > 1:
         differences = difference_table(comparisons)
         for block in difference_blocks(differences):
             print_table(block)
+        show(winner(differences, {n: each.kind for n, each in fitted.items() if n not in names}))
         written.append(write_differences(differences, out / DIFFERENCES))
     written += _draw({name: comparisons[name] for name in names}, figures, differences)
     say("Wrote " + ", ".join(map(str, written)))
@@ -385,13 +391,11 @@ def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str
     return {**fitted, **{names[kind]: each for kind, each in baselines.items()}}
 
 
-def _print_comparison(tables: Mapping[str, xr.Dataset], kinds: Mapping[str, str]) -> None:
+def _print_comparison(tables: Mapping[str, xr.Dataset]) -> None:
     from seakeep.report.comparison import band_findings, comparison_blocks, model_blocks
-    from seakeep.study.judge import references_of
 
     several = len(tables) > 1
-    known = {name.replace("_", " "): names for name, names in references_of(kinds).items()}
-    blocks = model_blocks(tables, known) if several else comparison_blocks(*tables.values())
+    blocks = model_blocks(tables) if several else comparison_blocks(*tables.values())
     for block in blocks:
         print_table(block)
     for name, table in tables.items():

@@ -29,7 +29,7 @@ def tune(
         list[str] | None,
         typer.Option(
             help="What to choose beside the ridge: observables, lead, input_delays, state_delays, "
-            "rank, alignment, readouts. Repeat it for several. Default: observables, which are "
+            "memory, alignment, readouts. Repeat it for several. Default: observables, which are "
             "chosen too where the file leaves them open.",
         ),
     ] = None,
@@ -83,14 +83,14 @@ def tune(
     period = read.encounter_period() if counts_in_periods(settings) else None
     scores = target.with_suffix(".scores.json")
     chosen = spec.select or Select(period=period)
-    varied = {*(vary or ["observables"]), *(["observables"] if chosen.observables else [])}
+    vary = vary or ["observables"]
     with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
         search_result = search(
             replace(spec, select=chosen),
             runs,
             list(settings.states),
             list(settings.inputs),
-            vary=sorted(varied),
+            vary=sorted({*vary}),
             horizon=chosen.horizon,
             folds=chosen.folds,
             stop=stop,
@@ -102,6 +102,7 @@ def tune(
     samples = None if period is None else period / labelled.common_step(runs)
     before = campaign.read_text(encoding="utf-8")
     with replacing(target) as place:
+        varied = {*vary, *chosen.opened}
         text = tuned_campaign(
             before, model, search_result.spec, varied, preset_of(settings), samples
         )

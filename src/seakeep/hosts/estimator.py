@@ -12,7 +12,11 @@ from seakeep.signals.prediction import MEMORY
 
 
 def write_estimator(
-    model: Model, folder: str | Path, name: str = "rom", noise: Mapping[str, float] | None = None
+    model: Model,
+    folder: str | Path,
+    name: str = "rom",
+    noise: Mapping[str, float] | None = None,
+    roles: Mapping[str, str] | None = None,
 ) -> list[Path]:
     """Write a model and its estimator as C99: the files of ``write_c``, and ``NAME_estimator.…``.
 
@@ -22,8 +26,8 @@ def write_estimator(
         As for :func:`seakeep.hosts.write_c`.
     folder, name
         As for :func:`seakeep.hosts.write_c`.
-    noise : mapping of str to float, optional
-        As for ``model.live``.
+    noise, roles : mapping, optional
+        As for ``model.live``; a known input stays at its last value where no plan is given.
 
     Returns
     -------
@@ -36,7 +40,7 @@ def write_estimator(
         If the model cannot be exported, or a file is there that seakeep did not write.
     """
     linear, name = exportable(model), identifier(name)
-    content = content_of(linear, name) | linear.live(noise=noise).equations
+    content = content_of(linear, name) | linear.live(noise=noise, roles=roles).equations
     content |= {"begins": linear.history_samples, "memory": MEMORY}
     files = ("estimator.h", "estimator.c")
     more = {f"{name}_{file}": rendered(file, **content) for file in files}

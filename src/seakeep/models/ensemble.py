@@ -38,6 +38,7 @@ from seakeep.models.forecasts import (
     label_channels,
     lost_instants,
     one_run,
+    outside,
     statuses,
     verdict,
     window_coords,
@@ -396,7 +397,8 @@ class HankelEnsemble(Forecaster, store.Saved):
         """
         windows = self.read_windows(*one_run(run, [start]), steps, ahead)
         with member_series(self, windows, executor, progress) as (series, lost):
-            variables = label_channels(self.signature, np.array(series[:, 0]), ("member", "time"))
+            values = np.array(series[:, 0])
+        variables = label_channels(self.signature, values, ("member", "time"))
         variables["status"] = ("member", statuses(lost[:, 0], windows, 0, self.dt))
         return xr.Dataset(
             variables,
@@ -406,7 +408,7 @@ class HankelEnsemble(Forecaster, store.Saved):
                 "time": windows.time[0],
             },
             attrs=self._notes(windows)
-            | verdict(lost, windows, self.dt)
+            | verdict(lost, windows, self.dt, outside(self, run, windows, values))
             | {"start": windows.places[0][1]},
         )
 
@@ -451,7 +453,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         variables = label_channels(self.signature, values[0], ("statistic", "time"))
         variables["status"] = ("member", statuses(lost[:, 0], windows, 0, self.dt))
         counts = {"start": windows.places[0][1]} | self._counts(level, band)
-        counts |= verdict(lost, windows, self.dt)
+        counts |= verdict(lost, windows, self.dt, outside(self, run, windows, values[0, 0]))
         return xr.Dataset(
             variables,
             coords={
@@ -650,7 +652,11 @@ class HankelEnsemble(Forecaster, store.Saved):
         return BandForecast(mean, std, lower, upper, int(np.count_nonzero(lost >= 0)))
 
     def live(
-        self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
+        self,
+        *,
+        like: xr.Dataset | None = None,
+        noise: Mapping[str, float] | None = None,
+        roles: Mapping[str, str] | None = None,
     ) -> Live:
         """Put the members into service; arguments and errors as :meth:`HankelDMDcModel.live`.
 
@@ -658,7 +664,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         errors on what they learnt from are found here; a forecast runs all of them.
         """
         members = self if self.identified else self.hold()
-        return Live(members, members._means, members.errors, like=like, noise=noise)
+        return Live(members, members._means, members.errors, like=like, noise=noise, roles=roles)
 
     @property
     def _means(self) -> list[Dynamics]:

@@ -19,6 +19,7 @@ from seakeep.models.html import text_html
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import ChannelLabel, run_name
 from seakeep.models.training import Training
+from seakeep.models.validity import outside_training
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import instant_text, span_text
 
@@ -182,8 +183,10 @@ class SingleModel(Forecaster):
             instant taken, ``attrs["status"]`` "ok" or from when on the forecast diverged (NaN
             from there; also ``attrs["diverged_at"]``, s), ``attrs["reads_input_until"]`` how long
             after the last instant the last input that was read lies, s: negative where it lies
-            before. Where input was predicted, the status ends in ", input predicted from t = … s",
+            before. Where input was predicted, the status says ", input predicted from t = … s",
             the first instant that depends on it, which ``attrs["input_predicted_from"]`` holds too.
+            Where waves or drift lie outside the training, it ends in ", outside training", and
+            ``attrs["outside_training"]`` says by how much: period, height, steepness, mean surge.
 
         Raises
         ------
@@ -197,7 +200,10 @@ class SingleModel(Forecaster):
         signature = self.signature
         _warn_of_reach(signature, windows, values[0])
         variables = label_channels(signature, values[0], ("time",))
-        facts = outcome(windows, 0, int(first_lost(values)[0]))
+        facts = {
+            **outcome(windows, 0, int(first_lost(values)[0])),
+            **outside(self, run, windows, values[0]),
+        }
         attrs = {**forecast_notes(signature, windows), "start": windows.places[0][1], **facts}
         attrs["status"] = status_text(facts, signature.dt)
         # The instants stand among the variables: given as coords, xarray would merge twice.
@@ -250,6 +256,13 @@ class SingleModel(Forecaster):
             coords=window_coords(windows, signature.dt),
             attrs=forecast_notes(signature, windows),
         )
+
+
+def outside(model: Any, run: xr.Dataset, windows: Windows, values: FloatArray) -> dict[str, str]:
+    """Attribute that says in what a forecast, shape (…, steps, N), lies outside the training."""
+    surge = values[..., model.states.index("surge")] if "surge" in model.states else None
+    reasons = outside_training(model, run, windows.places[0][1], windows.steps, surge)
+    return {"outside_training": "; ".join(reasons)} if reasons else {}
 
 
 def _warn_of_reach(signature: Signature, windows: Windows, values: FloatArray) -> None:
@@ -342,7 +355,8 @@ def status_text(facts: Mapping[str, Any], dt: float) -> str:
     Parameters
     ----------
     facts : mapping
-        What :func:`outcome` found, and of an ensemble how many of its ``members`` ``diverged``.
+        What :func:`outcome` and :func:`outside` found, and of an ensemble how many of its
+        ``members`` ``diverged``.
     dt : float
         Time step, s.
     """
@@ -351,9 +365,10 @@ def status_text(facts: Mapping[str, Any], dt: float) -> str:
         said = f"diverged at t = {instant_text(facts['diverged_at'], dt)} s"
     elif facts.get("diverged"):
         said = f"{facts['diverged']} of {facts['members']} members diverged"
-    if "input_predicted_from" not in facts:
-        return said
-    return f"{said}, input predicted from t = {instant_text(facts['input_predicted_from'], dt)} s"
+    if "input_predicted_from" in facts:
+        instant = instant_text(facts["input_predicted_from"], dt)
+        said += f", input predicted from t = {instant} s"
+    return said + ", outside training" * ("outside_training" in facts)
 
 
 def statuses(lost: IntArray, windows: Windows, window: int, dt: float) -> npt.NDArray[np.str_]:
@@ -369,10 +384,12 @@ def lost_instants(lost: IntArray, windows: Windows) -> xr.Variable:
     return xr.Variable(("member",), instants, words)
 
 
-def verdict(lost: IntArray, windows: Windows, dt: float) -> dict[str, Any]:
-    """Attributes that count the members that were lost, of a single window."""
-    counts = {"diverged": int(np.count_nonzero(lost >= 0)), "members": len(lost)}
-    return {"status": status_text(counts | outcome(windows, 0), dt), **counts}
+def verdict(
+    lost: IntArray, windows: Windows, dt: float, facts: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Attributes of a single window: facts, and the number of members that were lost."""
+    facts = {"diverged": int(np.count_nonzero(lost >= 0)), "members": len(lost), **facts}
+    return {"status": status_text(facts | outcome(windows, 0), dt), **facts}
 
 
 def counted(number: int, thing: str) -> str:

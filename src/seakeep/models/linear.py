@@ -15,10 +15,10 @@ import xarray as xr
 from seakeep.arrays import ComplexArray, FloatArray, as_real
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
-from seakeep.models import export, labelled, store
+from seakeep.models import engine, export, labelled, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
-from seakeep.models.forecasts import SingleModel, check_arrays, counted, one_run
+from seakeep.models.forecasts import SingleModel, check_arrays, counted, one_run, rows_by_name
 from seakeep.models.growth import LeadErrors, training_errors
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
@@ -292,14 +292,61 @@ class HankelDMDcModel(SingleModel, store.Saved):
         values: FloatArray = self.free_runs([windows])[0][0, 0]
         return values
 
+    def jacobian(
+        self, x_history: npt.ArrayLike, u_history: npt.ArrayLike
+    ) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of the next states with respect to all that they depend on.
+
+        Parameters
+        ----------
+        x_history : array_like, shape (at least ``signature.state_samples``, N)
+            States up to and including instant k, as in :meth:`forecast_arrays`.
+        u_history : array_like, shape (rows, Q)
+            Inputs up to and including instant k + ``lead_samples``; rows as
+            :func:`seakeep.hosts.start_rows` cuts them, and one more.
+
+        Returns
+        -------
+        on_states : ndarray, shape (N, signature.state_samples, N)
+            ∂x(k+1)/∂x, the last axes being those of the rows at the end of `x_history`.
+        on_inputs : ndarray, shape (N, rows, Q)
+            ∂x(k+1)/∂u in the same way.
+
+        Notes
+        -----
+        Central differences over 10⁻³ training SDs: exact but for rounding where the step is linear
+        or quadratic in its rows. A model that follows its surge takes a run for each number.
+        """
+        signature = self.signature
+        rows = signature.input_map.history(self.input_delays) + 1 + signature.lead_samples
+        x = rows_by_name(
+            "x_history", x_history, signature.state_samples, self.states, "of the states"
+        )[-signature.state_samples :]
+        u = rows_by_name("u_history", u_history, rows, self.inputs, "of the inputs")[-rows:]
+        spreads = signature.state_scale.spread, signature.input_scale.spread[: len(self.inputs)]
+        parts = []
+        for values, spread in ((x, spreads[0]), (u, spreads[1])):
+            steps = 1e-3 * np.tile(spread, len(values))
+            near = np.concatenate([np.diag(steps), -np.diag(steps)]).reshape(-1, *values.shape)
+            both = [np.broadcast_to(each, (len(near), *each.shape)) for each in (x, u)]
+            both[values is u] = values + near
+            windows = engine.array_windows(signature, both[0], both[1], 1)
+            high, low = np.split(self.free_runs([windows])[0][0, :, 0], 2)
+            parts.append(((high - low) / (2 * steps[:, None])).T.reshape(-1, *values.shape))
+        return parts[0], parts[1]
+
     def live(
-        self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
+        self,
+        *,
+        like: xr.Dataset | None = None,
+        noise: Mapping[str, float] | None = None,
+        roles: Mapping[str, str] | None = None,
     ) -> Live:
         """Put the model into service: samples in one at a time, estimates and forecasts out.
 
         Parameters
         ----------
-        like, noise
+        like, noise, roles
             As in :class:`seakeep.models.Live`.
 
         Returns
@@ -310,9 +357,9 @@ class HankelDMDcModel(SingleModel, store.Saved):
         Raises
         ------
         RequestError
-            If the model holds no errors of its training, or a noise is out of range.
+            If the model holds no errors of its training, or an argument is out of range.
         """
-        return Live(self, [self.dynamics], self.errors, like=like, noise=noise)
+        return Live(self, [self.dynamics], self.errors, like=like, noise=noise, roles=roles)
 
     def to_state_space(self) -> signal.StateSpace:
         """Discrete state-space system in physical deviations from the means.

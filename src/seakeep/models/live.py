@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -37,6 +37,7 @@ from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import load_sealed, write_sealed_array
 from seakeep.models import engine, store
 from seakeep.models.alignment import FittedAlignment
+from seakeep.models.checks import check_choice
 from seakeep.models.engine import Dynamics, Runs, Windows
 from seakeep.models.executor import one_blas_thread
 from seakeep.models.forecasts import label_channels, rows_by_name
@@ -60,6 +61,8 @@ CONSISTENCY = 256
 lasts, at least, where it is that of free runs."""
 SPIKE = 100.0
 """What a single sample adds to the consistency at most: a spike tells of a sensor, for a while."""
+SMALL = 0.5
+"""Part of the training SD below which an error stays over the lead time."""
 RIG = ("water_depth", "celerity", "probe_offset")
 """Attributes of a run that an alignment reads."""
 
@@ -68,7 +71,11 @@ class Servable(Runs, Protocol):
     """A model that can go into service."""
 
     def live(
-        self, *, like: xr.Dataset | None = None, noise: Mapping[str, float] | None = None
+        self,
+        *,
+        like: xr.Dataset | None = None,
+        noise: Mapping[str, float] | None = None,
+        roles: Mapping[str, str] | None = None,
     ) -> Live:
         """Put the model into service."""
 
@@ -136,11 +143,15 @@ class Live:
         Standard deviations of the measurement noise of some states, in their units. Without them
         all residuals of training are process noise, which is what least squares makes of them:
         a measured state is taken as it is.
+    roles : mapping of str to {"wave", "known", "constant"}, optional
+        Of inputs. A wave, which is the default, is predicted where it is not measured. A known
+        input is a plan, of a thrust, a towing speed or a valve: each forecast is given it. A
+        constant one, and a known one that was not measured, stays at its last value.
 
     Raises
     ------
     RequestError
-        If the model holds no errors, or a noise is out of range.
+        If the model holds no errors, a noise is out of range, or there is no such role or input.
     """
 
     def __init__(
@@ -151,6 +162,7 @@ class Live:
         *,
         like: xr.Dataset | None = None,
         noise: Mapping[str, float] | None = None,
+        roles: Mapping[str, str] | None = None,
     ) -> None:
         if errors is None:
             raise RequestError(
@@ -162,6 +174,8 @@ class Live:
         signature = self.signature
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
+        self._roles = _roles(signature, roles)
+        self._waves = [at for at, name in enumerate(signature.inputs) if name not in self._roles]
         self._follows = signature.input_map.follows
         aligned = signature.input_map.alignment
         if aligned is not None and self._follows is None and aligned.carries_in(self._rig):
@@ -171,6 +185,7 @@ class Live:
                 "which carries them in each step, or without alignment."
             )
         self._places, self._depth = _places(signature, aligned, self._rig)
+        self._places[[name in self._roles for name in signature.inputs]] = math.nan
         self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
         count, s = len(signature.states), signature.state_delays
         size, variances = count * (s + 1), self._noise**2
@@ -281,12 +296,22 @@ class Live:
         runs by lead, and what inputs are predicted from: samples of their records, means, and
         filters of a model that follows its own surge.
         """
-        scale, noises = self.signature.state_scale, {"process": self._filter.process}
-        noises |= {"noise": self._filter.noise, "errors": self.errors.rms}
-        moments = {"centre": scale.centre, "spread": scale.spread, "record": self._record}
-        inputs = {"means": self.signature.input_scale.mean, "foresight": self._foresight}
-        parts = {"a": self._a, "b": self._b, "d": self._d, "offset": self._offset}
-        return parts | noises | moments | inputs
+        scale = self.signature.state_scale
+        return {
+            "a": self._a,
+            "b": self._b,
+            "d": self._d,
+            "offset": self._offset,
+            "process": self._filter.process,
+            "noise": self._filter.noise,
+            "errors": self.errors.rms,
+            "centre": scale.centre,
+            "spread": scale.spread,
+            "record": self._record,
+            "means": self.signature.input_scale.mean,
+            "foresight": self._foresight,
+            "waves": self._waves,
+        }
 
     def _rows(self, name: str, first: int, stop: int) -> FloatArray:
         """A view of some samples, by their numbers."""
@@ -382,22 +407,27 @@ class Live:
 
     def _expected(self, known: FloatArray, count: int) -> FloatArray:
         """Inputs of the next samples: in waves as those of training, or from each record."""
-        if self._foresight is None or not self.ready:
-            return predict_waves(known, count)
-        taps, placed = self._foresight
-        means = self.signature.input_scale.mean[: known.shape[1]]
-        out = np.repeat(known[-1:], count, axis=0)
-        last = known[len(known) - taps.shape[3] :, placed] - means[list(placed)]
-        out[:, placed] = np.einsum("cqpt,tp->cq", taps[:count], last) + means[list(placed)]
-        others = [each for each in range(known.shape[1]) if each not in placed]
-        if others:
-            out[:, others] = predict_waves(known[:, others], count)
+        out, waves = np.repeat(known[-1:], count, axis=0), self._waves
+        if self._foresight is not None and self.ready:
+            taps, placed = self._foresight
+            means = self.signature.input_scale.mean[list(placed)]
+            last = known[len(known) - taps.shape[3] :, placed] - means
+            out[:, placed] = np.einsum("cqpt,tp->cq", taps[:count], last) + means
+            waves = [each for each in waves if each not in placed]
+        if waves:
+            out[:, waves] = predict_waves(known[:, waves], count)
         return out
 
     def _drawn(self, known: FloatArray, count: int, pairs: int, seed: int) -> FloatArray:
-        """Futures of the waves, shape (2 pairs, count, Q)."""
-        rng, dt = np.random.default_rng(seed), self.signature.dt
-        return draw_sea(known, count, pairs, rng, dt=dt, positions=self._places, depth=self._depth)
+        """Futures of the inputs, shape (2 pairs, count, Q)."""
+        out = np.tile(known[-1:], (2 * pairs, count, 1))
+        if self._waves:
+            rng, places = np.random.default_rng(seed), self._places[self._waves]
+            series, dt = known[:, self._waves], self.signature.dt
+            out[..., self._waves] = draw_sea(
+                series, count, pairs, rng, dt=dt, positions=places, depth=self._depth
+            )
+        return out
 
     def _known_inputs(self) -> FloatArray:
         """Inputs that waves are predicted from: the last ones, always as many once there are."""
@@ -553,10 +583,9 @@ class Live:
     def forecast(
         self,
         steps: int,
-        future: npt.ArrayLike | None = None,
+        future: npt.ArrayLike | Mapping[str, npt.ArrayLike] | None = None,
         *,
         level: float = 0.95,
-        share: float = 0.5,
     ) -> xr.Dataset:
         """Forecast from the estimate of the last sample on.
 
@@ -564,23 +593,21 @@ class Live:
         ----------
         steps : int
             Number of instants.
-        future : array_like, shape (rows, Q), optional
-            Inputs at the instants after :attr:`time`, if they are known; columns with names are
-            taken by name. Where they end before ``steps − 1 + lead_samples`` rows, the waves are
-            predicted from the record, and from what probes up-wave have seen where positions and
-            depth are known (`like`, or the model's alignment); futures drawn about the prediction
-            widen the band.
+        future : array_like, shape (rows, Q), or mapping of names to arrays, optional
+            Inputs at the instants after :attr:`time`, as far as they are known: NaN, or left out
+            of a mapping, where they are not. Where waves end before ``steps − 1 + lead_samples``
+            rows, they are predicted from the record, and from what probes up-wave have seen where
+            positions and depth are known (`like`, or the model's alignment); futures drawn about
+            the prediction widen the band.
         level : float, optional
             Probability of the band.
-        share : float, optional
-            Part of the training SD below which the error is to stay over the lead time.
 
         Returns
         -------
         Dataset
             States with dimensions (statistic, time): ``mean``, ``std``, ``lower``, ``upper``.
             Each channel's ``attrs["lead_time"]`` is the time after :attr:`time` up to which its
-            ``std`` stays below ``attrs["share"]`` of its SD in training, s; where it is as long as
+            ``std`` stays below half of its SD in training, s; where it is as long as
             the forecast, it is at least that. ``std`` holds the errors of free runs in training,
             those of the estimate, the spread of the members and that of the waves that are not
             known. ``attrs["predictable"]`` is the time for which
@@ -593,7 +620,7 @@ class Live:
             If there is too little history yet, or an argument does not fit.
         """
         signature, count = self.signature, whole_number(steps, "steps")
-        level, share = fraction(level, "level"), positive(share, "share", "training SD")
+        level = fraction(level, "level")
         if not self.ready:
             needed = signature.history_samples
             raise RequestError(
@@ -614,12 +641,12 @@ class Live:
             half = _quantile(level, spread, table[1] ** 2, len(futures) > 1) * table[1]
             table[2:] = table[0] - half, table[0] + half
         variables = label_channels(signature, table, ("statistic", "time"))
-        inside = table[1] <= share * signature.state_scale.spread
+        inside = table[1] <= SMALL * signature.state_scale.spread
         for label, samples in zip(signature.state_labels, held_samples(inside), strict=True):
             variables[label.name][2]["lead_time"] = int(samples) * signature.dt
         words = "the mean minus and plus a quantile times std"
         time = self._time + signature.dt * np.arange(1, count + 1)
-        attrs = {"start": self._time, "level": level, "share": share, "known_input": known}
+        attrs = {"start": self._time, "level": level, "known_input": known}
         attrs |= {"diverged": len(values) - len(complete) // values.shape[1]}
         attrs |= {"predictable": self._predictable()}
         return xr.Dataset(
@@ -639,25 +666,31 @@ class Live:
         apart = float(np.ptp(self._places[order]))
         return predictable_time(record, self.signature.dt, apart, self._depth)
 
-    def _futures(self, steps: int, future: npt.ArrayLike | None) -> tuple[list[FloatArray], int]:
+    def _futures(self, steps: int, future: Any) -> tuple[list[FloatArray], int]:
         """Inputs of the record and after it, of each future, and how many rows were given."""
         names, record = self.signature.inputs, self._known_inputs()
         if not names:
             return [record], 0
-        wanted = steps - 1 + self._ahead
-        given = np.zeros((0, len(names)))
-        if future is not None and np.size(future):
-            given = rows_by_name("future", future, 0, names, "any number")[:wanted]
-            if not np.all(np.isfinite(given)):
+        given = _plan(future, names, steps - 1 + self._ahead)
+        for column in sorted(set(range(len(names))) - set(self._waves)):
+            lost = np.isnan(given[:, column])
+            if self._roles[names[column]] == "known" and lost.any():
                 raise RequestError(
-                    "future holds values that are not finite. End it before the first gap: what "
-                    "follows is predicted."
+                    f"'{names[column]}' is a known input, and future gives {np.sum(~lost)} of the "
+                    f"{len(given)} samples that {steps} steps need. Give its plan: future = "
+                    f"{{'{names[column]}': …}}, or the role 'constant'."
                 )
-        known = np.concatenate([record, given])
-        if len(given) == wanted:
-            return [known], len(given)
-        drawn = self._drawn(known, wanted - len(given), PAIRS, self._count.taken)
-        return [np.concatenate([known, each]) for each in drawn], len(given)
+            whole = np.append(record[-1, column], given[:, column])
+            at = np.where(np.isfinite(whole), np.arange(whole.size), 0)
+            given[:, column] = whole[np.maximum.accumulate(at)][1:]
+        gaps = np.isnan(given).any(axis=1)
+        count = int(gaps.argmax()) if gaps.any() else len(given)
+        known, rest = np.concatenate([record, given[:count]]), given[count:]
+        if not len(rest):
+            return [known], count
+        drawn = self._drawn(known, len(rest), PAIRS, self._count.taken)
+        drawn = np.where(np.isnan(rest), drawn, rest)
+        return [np.concatenate([known, each]) for each in drawn], count
 
     def _windows(self, steps: int, futures: Sequence[FloatArray]) -> Windows:
         """What a forecast reads, for each future."""
@@ -700,12 +733,14 @@ class Live:
         RequestError
             If the file cannot be written, or another one is there.
         """
+        noises = zip(self.signature.states, self._noise.tolist(), strict=True)
         words = {
             "counts": asdict(self._count),
             "as_it_is": [each is self._as_it_is for each in self._pending()],
             "time": self._time,
             "rig": [self._rig.attrs, {name: each.attrs for name, each in self._rig.items()}],
-            "noise": self._noise.tolist(),
+            "noise": {name: each for name, each in noises if each},
+            "roles": self._roles,
         }
         attrs = {"settings": json.dumps(words), "model": self._identity}
         values = np.concatenate([each.ravel() for each in self._parts()])
@@ -777,12 +812,9 @@ def load_live(model: Servable, path: str | Path) -> Live:
     """
     dataset = load_sealed(path, STATE)
     content = store.content(dataset, "settings")
-    (attrs, probes), noise = (
-        content["rig"],
-        zip(model.signature.states, content["noise"], strict=False),
-    )
+    attrs, probes = content["rig"]
     like = xr.Dataset({name: ((), 0.0, each) for name, each in probes.items()}, attrs=attrs)
-    live = model.live(like=like, noise={name: each for name, each in noise if each})
+    live = model.live(like=like, noise=content["noise"], roles=content["roles"])
     if dataset.attrs["model"] != live._identity:
         raise RequestError(
             f"{path} is the state of another model. Load the model that was in service, or start "
@@ -872,17 +904,46 @@ def _places(
     return np.array(places, dtype=float), depth  # None becomes NaN
 
 
-def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArray:
-    out, names = np.zeros(len(signature.states)), signature.states
-    units = [label.units for label in signature.state_labels]
-    for name, value in ({} if noise is None else as_table(noise, "noise")).items():
+def _named(what: str, given: object, names: Sequence[str]) -> Iterator[tuple[int, Any]]:
+    """Values of a mapping, with the places of their names."""
+    for name, value in ({} if given is None else as_table(given, what)).items():
         if name not in names:
             raise RequestError(
-                f"noise names '{name}', which is not a state.{did_you_mean(name, names)} States: "
-                f"{', '.join(names)}."
+                f"{what} names '{name}', which the model does not know."
+                f"{did_you_mean(str(name), names)} It takes: {', '.join(names) or 'none'}."
             )
-        place = names.index(name)
-        out[place] = positive(value, f"noise of {name}", units[place])
+        yield list(names).index(name), value
+
+
+def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArray:
+    out, labels = np.zeros(len(signature.states)), signature.state_labels
+    for place, value in _named("noise", noise, signature.states):
+        out[place] = positive(value, f"noise of {labels[place].name}", labels[place].units)
+    return out
+
+
+def _roles(signature: Signature, roles: Mapping[str, str] | None) -> dict[str, str]:
+    """Roles of the inputs that are no waves."""
+    out, names = dict[str, str](), signature.inputs
+    for place, role in _named("roles", roles, names):
+        check_choice(f"role of {names[place]}", role, ("wave", "known", "constant"))
+        if role != "wave":
+            out[names[place]] = role
+    return out
+
+
+def _plan(future: Any, names: Sequence[str], count: int) -> FloatArray:
+    """Rows of inputs to come, shape (count, Q), NaN where they are not given."""
+    out = np.full((count, len(names)), np.nan)
+    if isinstance(future, Mapping):
+        for place, values in _named("future", future, names):
+            given = as_real(values, f"future of {names[place]}").ravel()[:count]
+            out[: len(given), place] = given
+    elif future is not None and np.size(future):
+        given = rows_by_name("future", future, 0, names, "any number")[:count]
+        out[: len(given)] = given
+    if np.isinf(out).any():
+        raise RequestError("future holds an infinite value. Give NaN for what is not known.")
     return out
 
 
@@ -891,12 +952,7 @@ def _sample(name: str, value: object, names: Sequence[str]) -> FloatArray:
     if value is None:
         return np.full(len(names), np.nan)
     if isinstance(value, Mapping):
-        for key in value:
-            if key not in names:
-                raise RequestError(
-                    f"{name} names '{key}', which the model does not know."
-                    f"{did_you_mean(str(key), names)} It takes: {', '.join(names) or 'none'}."
-                )
+        list(_named(name, value, names))
         value = [value.get(each, math.nan) for each in names]
     array = as_real(value, name)
     if array.shape != (len(names),):

@@ -2,15 +2,26 @@ r"""Settings chosen by free runs on training runs that are held out.
 
 A candidate is a complete set of settings but for λ. It is fitted to all training runs but one and
 judged by its free runs on that one, in windows of one or two lengths; the mean over folds, windows
-and channels of the NRMSE decides. The regressors of all candidates are made once; one Gram matrix
-of a candidate and a fold gives the whole path of λ (:mod:`seakeep.core.gram`).
+and channels of the NRMSE decides. The noise is the standard error, over what is held out, of the
+difference between two candidates. Of what settings leave open, the simplest candidate is taken that
+is as good as the best but for the noise; what a search starts from is left for nothing less. The
+regressors of all candidates are made once; one Gram matrix of a candidate and a fold gives the
+whole path of λ (:mod:`seakeep.core.gram`).
 """
 
 from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Iterable, Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Iterator,
+    Mapping,
+    MutableMapping,
+    Sequence,
+)
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -21,7 +32,8 @@ import xarray as xr
 from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
-from seakeep.core.gram import Piece, primal_system, ridge_path, truncated_path
+from seakeep.core.embedding import block_means, spread_means
+from seakeep.core.gram import Piece, primal_system, ridge_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
@@ -35,7 +47,8 @@ from seakeep.models.observables import Observable, Powers, SlowSquares, named
 from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
 from seakeep.models.training import TrainingData, gather, scales_of
-from seakeep.signals import repeated_waves
+from seakeep.signals import encounter_period, repeated_waves
+from seakeep.signals.waves import is_regular
 
 RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-10, -1))
 """λ per snapshot pair that are tried, half a decade apart.
@@ -48,8 +61,10 @@ Given = tuple[Mapping[str, xr.Dataset], Sequence[str], Sequence[str]]
 """Training runs, states and inputs."""
 Changes = dict[str, Any]
 """Settings of a candidate that differ from those of the best so far."""
-Columns = tuple[ProbeAlignment | None, int | None]
-"""An alignment, and the look-ahead in samples where it is part of it: columns of their own."""
+Columns = tuple[ProbeAlignment | None, int | None, bool]
+"""An alignment, the look-ahead in samples where it is part of that, and whether there is any."""
+Step = Callable[[Any], list[Any]]
+"""Candidates that differ from one in a setting; it is among them."""
 Scores = tuple[FloatArray, FloatArray]
 """Scores, shape (level, window), and weights of the windows, which sum to one in a fold."""
 Known = MutableMapping[str, list[list[Any]]]
@@ -60,16 +75,22 @@ ALIKE = 0.03
 On the virtual tank the error falls by that much over the last decade of λ: less than from one
 seed to the next. Free runs of a larger λ decay sooner. Where sea states are held out the lowest
 error decides: slow loads of other seas suffer most from a large λ."""
+SAME = 1.03
+"""Ratio of two periods of regular waves up to which they count as the same."""
+HYSTERESIS = 0.1
+"""Part of the wave amplitude that noise does not pass where the period of a run is counted."""
 FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
-RANKS = tuple(round(2 ** (exponent / 2)) for exponent in range(18, 7, -1))
-"""Numbers of singular values that are tried, half an octave apart: 512 to 16."""
 DELAYS = {"input_delays": (2.0, 3.0, 5.0), "state_delays": (0.5, 1.0, 1.5)}
 """Delays that are tried, encounter periods."""
+LENGTHS = (1.0, 0.6, 0.4)
+"""Lengths of a filter that are tried, in parts of the one that is stated."""
 LEADS = (0.0, 0.5, 0.75, 1.0)
 """Look-aheads that are tried, encounter periods."""
+MEMORY = 8.0
+"""Memory that is tried, encounter periods."""
 VARIED = (
-    *("ridge", "rank", "observables", "lead", "input_delays", "state_delays", "alignment"),
+    *("ridge", "observables", "lead", "input_delays", "state_delays", "alignment", "memory"),
     "readouts",
 )
 """Settings that can be chosen."""
@@ -88,22 +109,47 @@ class Trial:
     Parameters
     ----------
     levels : tuple of float
-        λ, or numbers of singular values.
+        λ.
     scores : ndarray, shape (level, window)
         NRMSE averaged over the channels, by window of all folds and horizons.
     weights : ndarray, shape (window,)
         They sum to one; folds count alike, and the horizons of a fold.
+    groups : ndarray of int, shape (window,)
+        What is held out with each window: folds that repeat each other are one group.
     """
 
     levels: tuple[float, ...]
     scores: FloatArray
     weights: FloatArray
+    groups: IntArray
 
     @property
     def means(self) -> FloatArray:
         """Score at each level."""
         result: FloatArray = self.scores @ self.weights
         return result
+
+    @property
+    def best(self) -> float:
+        """Score at the best level."""
+        return float(self.means.min())
+
+    def is_as_good_as(self, other: Trial) -> bool:
+        """Whether it errs no more than another, but for a standard error over the groups."""
+        scores, weights = zip(*(each._by_group() for each in (self, other)), strict=True)
+        judged = np.logical_and(*weights)
+        worse = scores[0][judged] - scores[1][judged]
+        doubt = worse.std(ddof=1) / len(worse) ** 0.5 if len(worse) > 1 else 0.0
+        return bool(worse.mean() <= doubt)
+
+    def _by_group(self) -> tuple[FloatArray, FloatArray]:
+        """Scores at the best level in each group, and the weights of the groups."""
+        best = self.scores[np.argmin(self.means)]
+        sums, total = (
+            np.bincount(self.groups, self.weights * each).astype(float)
+            for each in (best, np.ones(best.size))
+        )
+        return sums / np.where(total > 0, total, 1.0), total
 
 
 class FreeRuns(NamedTuple):
@@ -167,14 +213,6 @@ class Problem:
         states = np.ones(len(self.data.state_labels), dtype=bool)
         return states, np.array(delayed, dtype=bool), np.array(direct, dtype=bool)
 
-    def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
-        """What is tried of a candidate: the λ, or ranks below its number of columns."""
-        if candidate.rank is None:
-            return self.ridges
-        states, delayed, direct = (np.count_nonzero(part) for part in self.parts(candidate))
-        size = states * (candidate.state_delays + 1) + delayed * (candidate.input_delays + 1)
-        return tuple(rank for rank in RANKS if rank < size + direct)
-
     def models(
         self, candidate: HankelSettings, levels: Sequence[float], runs: Sequence[int]
     ) -> tuple[Dynamics, FloatArray]:
@@ -204,7 +242,12 @@ class Problem:
             [scale.deviations(each[:, part]) for each in group]
             for group, scale, part in zip(series, scales, parts, strict=True)
         ]
-        there = [number for number, part in enumerate(parts) if part.any()]
+        blocks, count = candidate.blocks, len(data.state_labels)
+        groups[2] = [
+            np.concatenate([direct, block_means(states, blocks)], axis=1)
+            for direct, states in zip(groups[2], groups[0], strict=True)
+        ]
+        there = [n for n, group in enumerate(groups) if group[0].shape[1]][candidate.is_filter :]
         system = primal_system(
             [
                 Piece(
@@ -217,15 +260,15 @@ class Problem:
             ],
             [delays[number] for number in there],
         )
-        if candidate.rank is not None:
-            ranks = [int(level) for level in levels]
-            path = truncated_path(system.gram, system.right, ranks)
-        else:
-            pairs = sum(window.columns for window in windows)
-            factor = pairs if candidate.ridge_scale == "per_snapshot" else 1
-            path = ridge_path(system.gram, system.right, [factor * level for level in levels])
+        pairs = sum(window.columns for window in windows)
+        factor = pairs if candidate.ridge_scale == "per_snapshot" else 1
+        path = ridge_path(system.gram, system.right, [factor * level for level in levels])
+        path = spread_means(path, count, candidate.state_delays, blocks)
+        reach = candidate.state_reach, candidate.input_delays
         x, u, w = scales
-        return Dynamics(path[0], *delays[:2], x, u, w, data.input_map.follows), path
+        if candidate.is_filter:
+            path = np.pad(path, ((0, 0), (0, 0), (len(x.mean), 0)))
+        return Dynamics(path[0], *reach, x, u, w, data.input_map.follows), path
 
     def grows(self, candidate: HankelSettings, level: float) -> bool:
         """Whether the model that a candidate gives of all runs grows."""
@@ -273,9 +316,8 @@ class Problem:
 
     def judge(self, candidate: HankelSettings, fold: int) -> Scores:
         """Judge free runs on a run that is held out, over all horizons that fit."""
-        levels = self.levels(candidate)
-        scores = [np.empty((len(levels), 0))]
-        for predicted, measured, spread in self.free_runs(candidate, levels, fold, self.horizons):
+        scores, ridges = [np.empty((len(self.ridges), 0))], self.ridges
+        for predicted, measured, spread in self.free_runs(candidate, ridges, fold, self.horizons):
             with np.errstate(over="ignore", invalid="ignore"):
                 errors = metrics.nrmse(predicted=predicted, measured=measured, training_std=spread)
             judged = ~metrics.is_slack(predicted=measured, measured=measured, training_std=spread)
@@ -294,33 +336,27 @@ class Problem:
 
 
 def _problem(
-    settings: HankelSettings,
+    candidates: Sequence[HankelSettings],
+    observables: tuple[Observable, ...],
     given: Given,
     folds: Mapping[str, str] | int,
     ridges: Iterable[float],
     horizons: tuple[int, ...],
-    tried: Mapping[str, Sequence[int]],
 ) -> Problem | None:
-    """The columns of settings with all that is tried; None where the runs are too short for them.
+    """The columns of all candidates; None where the runs are too short for them.
 
-    `folds` holds the group of each run, or the number of parts that runs are split into, and
-    `tried` delays and look-aheads.
+    `folds` holds the group of each run, or the number of parts that runs are split into.
     """
-    state_delays, input_delays, leads = (
-        [getattr(settings, name), *tried.get(name, ())]
-        for name in ("state_delays", "input_delays", "lead")
-    )
-    widest = replace(
-        settings,
-        state_delays=max(state_delays),
-        input_delays=max(input_delays) + max(leads) - min(leads),
-        lead=max(leads),
-        ridge=1.0,
-        standardize=True,
-    )
+    most = {
+        name: max(getattr(each, name) for each in candidates)
+        for name in ("state_delays", "input_delays", "lead", "memory")
+    }
+    settings = candidates[0]
+    most["input_delays"] += most["lead"] - min(each.lead for each in candidates)
+    widest = settings.having(**most, observables=observables, ridge=1.0, standardize=True)
     runs, states, inputs = given
     chain = widest.input_map(dict(runs), states, inputs, settings.window)
-    before = max(widest.state_delays, chain.history(widest.input_delays))
+    before = max(widest.state_reach, chain.history(widest.input_delays))
     after = max(chain.lead_samples - 1, 0)
     pieces = dict(runs)
     if isinstance(folds, int):  # with what their pairs read, so that each pair is in one part
@@ -337,11 +373,25 @@ def _problem(
     return Problem(pieces, groups, data, widest, tuple(ridges), horizons)
 
 
+def _lacking(settings: HankelSettings, given: Given) -> str:
+    """What an optional alignment goes without, in words."""
+    aligned = settings.alignment
+    return aligned.missing(*given) if aligned is not None and aligned.optional else ""
+
+
 def _columns_of(candidate: HankelSettings) -> Columns:
-    """What makes columns of their own: the alignment, and the look-ahead if it is part of that."""
-    aligned = candidate.alignment
-    follows = aligned is not None and aligned.surge == "predicted"
-    return aligned, candidate.lead if follows else None
+    """What makes columns of their own."""
+    aligned, lead = candidate.alignment, int(candidate.lead)
+    if aligned is not None and aligned.surge == "predicted":
+        return aligned, lead, True
+    squares = (getattr(each, "lead", 0.0) for each in candidate.observables)
+    return aligned, None, bool(lead) or any(squares)
+
+
+def _problem_of(problems: Mapping[Columns, Problem], candidate: HankelSettings) -> Problem | None:
+    """The columns that hold those of a candidate; without a look-ahead, at best none has one."""
+    aligned, lead, ahead = _columns_of(candidate)
+    return problems.get((aligned, lead, ahead)) or problems.get((aligned, lead, True))
 
 
 def _judge(
@@ -354,7 +404,8 @@ def _judge(
     later: int = 0,
 ) -> None:
     """Add trials of candidates that are not among them; `later` more are to come at most."""
-    folds = next(iter(problems.values())).folds()
+    problem = next(iter(problems.values()))
+    folds, firsts = problem.folds(), list(dict.fromkeys(problem.groups))
     new = [each for each in dict.fromkeys(candidates) if each not in trials]
     before, after = len(trials) * len(folds), later * len(folds)
 
@@ -371,9 +422,10 @@ def _judge(
         parts = [map(np.array, known[keys[candidate, fold]]) for fold in folds]
         scores, weights = zip(*parts, strict=True)
         joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
-        levels = problems[_columns_of(candidate)].levels(candidate)
+        places = [firsts.index(problem.groups[fold]) for fold in folds]
+        groups = np.repeat(places, [len(each) for each in weights])
         every = np.concatenate(scores, axis=1)
-        trials[candidate] = Trial(levels, every, joined / joined.sum())
+        trials[candidate] = Trial(problem.ridges, every, joined / joined.sum(), groups)
 
 
 def _key(candidate: HankelSettings, fold: int) -> str:
@@ -381,7 +433,9 @@ def _key(candidate: HankelSettings, fold: int) -> str:
 
 
 def _unit(problems: Mapping[Columns, Problem], item: tuple[HankelSettings, int]) -> Scores:
-    return problems[_columns_of(item[0])].judge(*item)
+    problem = _problem_of(problems, item[0])
+    assert problem is not None
+    return problem.judge(*item)
 
 
 @dataclass(frozen=True, eq=False)
@@ -409,20 +463,18 @@ class Selected(Generic[Chosen]):
     def describe(self) -> str:
         """Text: how the choice was made, and the best λ of each candidate."""
         keys = ["observables", "lead", "state_delays", "input_delays"]
-        if len({row["alignment"] for row in self.rows}) > 1:
-            keys.append("alignment")
+        keys += [k for k in ("alignment", "memory") if len({row[k] for row in self.rows}) > 1]
 
         def candidate(row: dict[str, Any]) -> tuple[Any, ...]:
-            return (*(row[key] for key in keys), row["rank"] > 0)
+            return tuple(row[key] for key in keys)
 
         lines = [self.note]
         for values, part in itertools.groupby(self.rows, candidate):
             best = min(part, key=lambda row: (not row["chosen"], row["score"]))
-            what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=False))
-            level = f"rank {best['rank']}" if best["rank"] else f"ridge {best['ridge']:g}"
+            what = ", ".join(f"{key} {value}" for key, value in zip(keys, values, strict=True))
             lines.append(
-                f"  {best['score']:.3f} [{best['lower']:.3f}, {best['upper']:.3f}]  {level}, "
-                f"{what}{'  (chosen)' if best['chosen'] else ''}"
+                f"  {best['score']:.3f} [{best['lower']:.3f}, {best['upper']:.3f}]  "
+                f"ridge {best['ridge']:g}, {what}{'  (chosen)' if best['chosen'] else ''}"
             )
         return "\n".join(lines)
 
@@ -458,8 +510,7 @@ def settle(
     RequestError
         As :func:`select`; if λ is stated as zero and something is to be chosen.
     """
-    alignment = settings.alignment
-    lacking = alignment.missing(runs, states, inputs) if alignment and alignment.optional else ""
+    lacking = _lacking(settings, (runs, states, inputs))
     without = f"not aligned to the surge: {lacking}" if lacking else ""
     stated = not isinstance(settings.ridge, str)
     if stated and chosen is None:
@@ -470,13 +521,13 @@ def settle(
             "remove select."
         )
     asked = chosen or Select()
-    vary = ["observables"] * asked.observables + ["readouts"] * (settings.readouts == "auto")
     selected = select(
         settings,
         runs,
         states,
         inputs,
-        vary=vary,
+        vary=["readouts"] * (settings.readouts == "auto"),
+        opened=asked.opened,
         ridges=(float(settings.ridge),) if stated else None,
         horizon=asked.horizon,
         folds=asked.folds,
@@ -494,6 +545,7 @@ def select(
     inputs: Sequence[str],
     *,
     vary: Sequence[str] = (),
+    opened: Sequence[str] = (),
     ridges: Sequence[float] | None = None,
     horizon: Sequence[float] = (15.0, 45.0),
     folds: Folds | int = "auto",
@@ -505,9 +557,11 @@ def select(
 ) -> Selected[Settings]:
     """Choose settings by free runs on training runs that are held out in turn.
 
-    One setting after the other is chosen, each candidate with the whole path of λ. Of the best
-    columns the largest λ (or the smallest rank) is taken that is as good as the best. Where that
-    model grows, it is the best of all that were tried and do not.
+    One setting after the other is chosen, each candidate with the whole path of λ: first what the
+    settings leave open, of which the simplest is taken that is as good as the best but for the
+    noise; then what is varied from there, which is left for what is better by more than the noise.
+    Of the λ the largest is taken that is as good as the best. Where that model grows, it is the
+    best of all that were tried and do not.
 
     Parameters
     ----------
@@ -519,6 +573,9 @@ def select(
         Channels.
     vary : sequence of str
         Names out of ``VARIED``; λ is always chosen.
+    opened : sequence of str
+        Names that the settings leave open: delays, "observables", "memory", and "alignment" and
+        "lead", each with what is stated and without it.
     ridges : sequence of float, optional
         λ to try in ascending order, as the settings count it; by default ``RIDGES`` per snapshot
         pair.
@@ -551,7 +608,7 @@ def select(
     given = runs, states, inputs
     labels = labelled.common_labels(runs, states)
     readouts = readouts_asked(settings.readouts, labels)
-    _check_asked(settings, vary, readouts)
+    _check_asked(settings, vary)
     if "readouts" in vary:
         asked = readouts or readouts_asked("auto", labels)
         readouts = tuple(replace(each, kind="auto") for each in asked)
@@ -559,102 +616,283 @@ def select(
         folds = 3 if len(runs) == 1 else folds
     step = labelled.common_step(runs)
     samples = labelled.mean_period(runs, inputs) if period is None else period / step
+    stated = None
     if ridges is None:
+        ridges = RIDGES
+        if settings.ridge_scale == "per_snapshot" and not isinstance(settings.ridge, str):
+            stated = float(settings.ridge)
+            ridges = sorted({*RIDGES, stated} - {0.0})
         settings = replace(settings, ridge=FALLBACK, ridge_scale="per_snapshot")
-    offered = [settings.observables]
-    if "observables" in vary and not settings.observables:
-        offered = _defaults(settings, given, samples * step, folds == "sea_state")
-    variants = list(_variants(settings, given, vary, samples))
+    by_sea = folds == "sea_state"
     apart = folds if isinstance(folds, int) else groups_of(runs, folds, inputs)
     horizons = tuple(max(round(each * samples), 1) for each in horizon)
-    base = replace(settings, readouts=(), **variants[0])
-    for observables in offered:  # runs may be too short for the longest
-        steps = [*_steps(observables, vary, samples, variants)]
-        every = replace(base, observables=observables)
-        problems = _problems(every, steps, given, apart, ridges or RIDGES, horizons)
-        if len(problems) == len(variants):
+    aligned = None if _lacking(settings, given) else settings.alignment
+    # One that reads the measured surge is no choice.
+    first = _alignments(aligned, given)[0] if "alignment" in vary else aligned
+    base = settings.having(readouts=(), alignment=first)
+    for search in _Search(base, given, samples, step, vary, opened, by_sea).shorter():
+        problems = search.problems(apart, ridges, horizons)
+        if problems:
             break
-    else:
+    else:  # runs are too short for the shortest
         longest = max(run.sizes["time"] for run in runs.values())
         note = (
             f"{settings.ridge_text(float(settings.ridge))}: no window of "
             f"{round(min(horizon) * samples)} samples can be held out of runs of at most {longest}"
         )
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
-        complete = replace(settings, readouts=_asked(settings, fitted, vary))
+        complete = settings.having(readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
     trials: dict[Settings, Trial] = {}
     work = ({} if known is None else known), executor, progress
-    best, later = base, sum(len(changes) - 1 for changes in steps)  # the best is among them
-    for changes in ([{}], *steps):
-        later -= len(changes) - 1
-        tried = [replace(best, **change) for change in changes]
-        _judge(problems, trials, tried, *work, later)
-        best = min(trials, key=lambda each: float(trials[each].means.min()))
-    taken, level = _best(problems, trials, best, 0.0 if folds == "sea_state" else ALIKE)
+    left, varied = search.left_open(), search.varied()
+    later = sum(len(step_of(base)) - 1 for step_of in (*left, *varied))  # the best is among them
+
+    def searched(best: Settings, steps: Sequence[Step]) -> Settings:
+        nonlocal later
+        for step_of in steps:
+            tried = step_of(best)
+            later -= len(tried) - 1
+            sound = [each for each in tried if _problem_of(problems, each)]
+            _judge(problems, trials, sound, *work, later)
+            best = min(trials, key=lambda each: trials[each].best)
+        return best
+
+    _judge(problems, trials, [base], *work, later)
+    best = searched(base, left)
+    alike = [each for each in trials if trials[each].is_as_good_as(trials[best])]
+    start = min(alike, key=lambda each: (_parts_of(each), trials[each].best)) if left else base
+    best = searched(start, varied)
+    taken = start if trials[start].is_as_good_as(trials[best]) else best
+    level = _level(trials[taken], 0.0 if by_sea else ALIKE, stated if taken == start else None)
+    taken, level = _stable(problems, trials, taken, level)
     without = {
-        left: replace(taken, observables=tuple(o for o in taken.observables if o != left))
-        for left in taken.observables
+        left_out: replace(taken, observables=tuple(o for o in taken.observables if o != left_out))
+        for left_out in taken.observables
     }
     _judge(problems, trials, without.values(), *work)
     worth = "".join(
-        f"; without {named(left)} {trials[less].means.min():.3f}" for left, less in without.items()
+        f"; without {named(left_out)} {trials[less].best:.3f}" for left_out, less in without.items()
     )
-    problem = problems[_columns_of(taken)]
+    problem = _problem_of(problems, taken)
+    assert problem is not None
+    if taken != best or (varied and taken == start):
+        worth += (
+            "; what it starts from: nothing that was tried is better by more than the noise"
+            if varied
+            else f"; the simplest that is as good as the best ({trials[best].best:.3f})"
+        )
     fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
-    if taken.rank is None:
-        complete = replace(taken, ridge=level, readouts=_asked(settings, fitted, vary))
-    else:
-        complete = replace(taken, rank=int(level))
     return Selected(
-        complete,
+        taken.having(ridge=level, readouts=_asked(settings, fitted, vary)),
         tuple(_rows_of(trials, taken, level, seed)),
-        _note(problem, trials, taken, level, worth, vary, folds == "sea_state"),
+        _note(
+            problem,
+            trials,
+            taken,
+            level,
+            worth,
+            {*vary, *opened},
+            by_sea,
+            regular_periods(runs, inputs),
+        ),
         fitted,
     )
 
 
-def _problems(
-    base: HankelSettings,
-    steps: Sequence[Sequence[Changes]],
-    given: Given,
-    folds: Mapping[str, str] | int,
-    ridges: Sequence[float],
-    horizons: tuple[int, ...],
-) -> dict[Columns, Problem]:
-    """A problem per variant, of which the last step is made, if something can be held out."""
-    tried = {
-        name: [change[name] for changes in steps[:-1] for change in changes if name in change]
-        for name in ("state_delays", "input_delays", "lead")
-    }
-    problems = {}
-    for variant in steps[-1]:
-        start = replace(base, **variant)
-        lengths = tried | ({"lead": []} if "lead" in variant else {})
-        problem = _problem(start, given, folds, ridges, horizons, lengths)
-        if problem is not None and problem.folds():
-            problems[_columns_of(start)] = problem
-    return problems
+@dataclass(frozen=True)
+class _Search:
+    """What is tried of the settings that a search starts from.
+
+    Parameters
+    ----------
+    base : HankelSettings
+        Where it starts.
+    given : (runs, states, inputs)
+        Training runs, and channels.
+    period, step : float
+        Encounter period, samples, and time step, s.
+    vary, opened : sequence of str
+        As for :func:`select`.
+    unseen : bool
+        Whether what is chosen must hold in sea states that no run holds.
+    cut : int
+        How many of the observables are left out that could be offered.
+    remembers : bool
+        Whether a memory is tried.
+    """
+
+    base: Any
+    given: Given
+    period: float
+    step: float
+    vary: Sequence[str]
+    opened: Sequence[str]
+    unseen: bool
+    cut: int = 0
+    remembers: bool = True
+
+    def shorter(self) -> Iterator[_Search]:
+        """The same with less and less that needs long runs."""
+        for cut, remembers in itertools.product(range(3), (True, False)):
+            yield replace(self, cut=cut, remembers=remembers)
+
+    def offered(self, candidate: HankelSettings) -> tuple[Observable, ...]:
+        """Observables to choose among beside the other settings of a candidate."""
+        if self.base.observables or "observables" not in {*self.vary, *self.opened}:
+            return self.base.observables  # type: ignore[no-any-return]
+        aligned, lead = candidate.alignment, None
+        if aligned is not None and aligned.surge == "predicted":
+            lead = int(candidate.lead)
+        found = default_observables(self.given[2], self.period * self.step, self.unseen, lead)
+        if lead is None and candidate.lead < self.base.lead and not candidate.lead:
+            found = tuple(replace(o, lead=0.0) if isinstance(o, SlowSquares) else o for o in found)
+        return found[self.cut :]
+
+    def left_open(self) -> list[Step]:
+        """Steps through what the settings leave open."""
+        steps = self._delays(self.opened)
+        if "observables" in self.opened:
+            steps.append(self._subsets)
+        if {"alignment", "lead"} & {*self.opened}:
+            steps.append(self._with_and_without)
+        if "memory" in self.opened and self.remembers:
+            steps.append(self._remembering)
+        return steps
+
+    def varied(self) -> list[Step]:
+        """Steps through what is varied."""
+        vary = {*self.vary} - ({"observables", "memory"} & {*self.opened})
+        follows = _columns_of(self.base)[1] is not None
+        steps: list[Step] = []
+        if "observables" in vary:
+            steps.append(self._subsets)
+        if "lead" in vary and not follows:
+            steps.append(self._lengths("lead", LEADS))
+        steps += self._delays(vary)
+        if "memory" in vary and self.remembers:
+            steps.append(self._remembering)
+        if "alignment" in vary or ("lead" in vary and follows):
+            steps.append(self._variants)
+        return steps
+
+    def _delays(self, names: Collection[str]) -> list[Step]:
+        """Delays in periods, or the length of a filter in parts of its own."""
+        if self.base.is_filter and "input_delays" in names:
+            own = self.base.input_delays / self.period
+            return [self._lengths("input_delays", [own * part for part in LENGTHS])]
+        return [self._lengths(n, periods) for n, periods in DELAYS.items() if n in names]
+
+    def _subsets(self, best: Any) -> list[Any]:
+        every = self.offered(best)
+        subsets = dict.fromkeys([(), *((each,) for each in every), every])
+        return [replace(best, observables=each) for each in subsets]
+
+    def _remembering(self, best: Any) -> list[Any]:
+        return [best, replace(best, memory=round(MEMORY * self.period))]
+
+    def _lengths(self, name: str, periods: Sequence[float]) -> Step:
+        return lambda best: [replace(best, **{name: round(p * self.period)}) for p in periods]
+
+    def _with_and_without(self, best: Any) -> list[Any]:
+        """Alignment and look-ahead as stated, without one of them, and with nothing at all."""
+        absent = {"alignment": None, "lead": 0}
+        without = {name: absent[name] for name in absent if name in self.opened}
+        pairs = itertools.product(
+            *(dict.fromkeys([getattr(self.base, name), value]) for name, value in without.items())
+        )
+        changes = [dict(zip(without, pair, strict=True)) for pair in pairs]
+        plain = replace(best, **without, observables=self.base.observables)
+        return [*(self._fitting(best, each) for each in changes), plain]
+
+    def _variants(self, best: Any) -> list[Any]:
+        """Alignments, with each look-ahead that is tried where the model follows its own surge."""
+        leads = [self.base.lead]
+        leads += [round(p * self.period) for p in LEADS if p > LEAD and "lead" in self.vary]
+        alignments = [self.base.alignment]
+        if "alignment" in self.vary:
+            alignments = _alignments(self.base.alignment, self.given)
+        candidates = []
+        for each in alignments:
+            changes: list[Changes] = [{"alignment": each}]
+            if each is not None and each.surge == "predicted":
+                changes = [{"alignment": each, "lead": lead} for lead in dict.fromkeys(leads)]
+            candidates += [self._fitting(best, change) for change in changes]
+        return candidates
+
+    def _fitting(self, best: Any, changes: Changes) -> Any:
+        """A candidate with the observables of the same kinds that go with its other settings."""
+        candidate, kinds = replace(best, **changes), {each.kind for each in best.observables}
+        if self.base.observables:
+            return candidate
+        fitting = tuple(each for each in self.offered(candidate) if each.kind in kinds)
+        return replace(candidate, observables=fitting)
+
+    def problems(
+        self,
+        folds: Mapping[str, str] | int,
+        ridges: Sequence[float],
+        horizons: tuple[int, ...],
+    ) -> dict[Columns, Problem]:
+        """The columns of all that is tried; none where what it starts from is too long."""
+        candidates = [self.base]
+        for step_of in (*self.left_open(), *self.varied()):
+            candidates += step_of(self.base)
+        starts: dict[Columns, list[Any]] = {}
+        names = ("state_delays", "input_delays", "memory")
+        longest = {name: max(getattr(each, name) for each in candidates) for name in names}
+        for each in candidates:
+            aligned, lead, ahead = _columns_of(replace(each, observables=self.offered(each)))
+            is_without = "lead" in self.opened and each.lead == 0 < self.base.lead
+            mine = starts.setdefault((aligned, lead, ahead or not is_without), [])
+            mine.append(each.having(**longest))
+        problems: dict[Columns, Problem] = {}
+        for number, (key, mine) in enumerate(starts.items()):  # that of the base is the first
+            every = tuple(dict.fromkeys(o for each in mine for o in self.offered(each)))
+            try:
+                problem = _problem(mine, every, self.given, folds, ridges, horizons)
+            except RequestError:
+                if not number:
+                    raise
+                continue  # a look-ahead of nothing takes a probe up-wave
+            if problem is not None and problem.folds():
+                problems[key] = problem
+            elif not number:
+                return {}
+        return problems
 
 
-def _best(
+def _parts_of(candidate: HankelSettings) -> int:
+    """What a candidate has beside delays: the fewer, the simpler."""
+    parts = candidate.alignment, candidate.lead, candidate.memory
+    return sum(map(bool, parts)) + len(candidate.observables)
+
+
+def _level(trial: Trial, alike: float, stated: float | None) -> float:
+    """The largest λ that is as good as the best, or the stated one if that is."""
+    near = trial.means <= (1.0 + alike) * trial.best
+    levels = [level for level, is_near in zip(trial.levels, near, strict=True) if is_near]
+    return stated if stated in levels else levels[-1]
+
+
+def _stable(
     problems: Mapping[Columns, Problem],
     trials: Mapping[Settings, Trial],
-    best: Settings,
-    alike: float,
+    taken: Settings,
+    level: float,
 ) -> tuple[Settings, float]:
-    """The best columns and the largest λ that is as good; if that grows, the best that does not."""
-    means = trials[best].means
-    largest = int(np.flatnonzero(means <= (1.0 + alike) * means.min())[-1])
+    """A candidate and λ; where that grows, the best of all that do not."""
     every = [
-        (float(score), candidate, level)
+        (float(score), candidate, ridge)
         for candidate, trial in trials.items()
-        for score, level in zip(trial.means, trial.levels, strict=True)
+        for score, ridge in zip(trial.means, trial.levels, strict=True)
     ]
-    wanted = [(best, trials[best].levels[largest])]
-    wanted += [each[1:] for each in sorted(every, key=lambda each: each[0])]
-    sound = (each for each in wanted if not problems[_columns_of(each[0])].grows(*each))
-    return next(sound, wanted[0])
+    wanted = [(taken, level), *(each[1:] for each in sorted(every, key=lambda each: each[0]))]
+    for candidate, ridge in wanted:
+        problem = _problem_of(problems, candidate)
+        if problem is not None and not problem.grows(candidate, ridge):
+            return candidate, ridge
+    return taken, level
 
 
 def _note(
@@ -663,25 +901,33 @@ def _note(
     taken: Settings,
     level: float,
     worth: str,
-    vary: Sequence[str],
+    tried: Collection[str],
     by_sea: bool,
+    periods: Mapping[str, float],
 ) -> str:
     """How the choice was made, in words."""
     count = sum(len(trial.levels) for trial in trials.values())
     score = trials[taken].means[trials[taken].levels.index(level)]
-    chosen = taken.ridge_text(level) if taken.rank is None else f"rank {level:g}"
     note = (
-        f"{chosen}: out of {count} settings (below, the best λ of each kind) in free runs on "
-        f"{len(problem.folds())} parts held out in turn, mean NRMSE {score:.3f}{worth}"
+        f"{taken.ridge_text(level)}: out of {count} settings (below, the best λ of each kind) "
+        f"in free runs on {len(problem.folds())} parts held out in turn, mean NRMSE "
+        f"{score:.3f}{worth}"
     )
-    if {"lead", "input_delays", "state_delays", "alignment"} & {*vary}:
+    if {"lead", "input_delays", "state_delays", "alignment", "memory"} & {*tried}:
         note += "; over instants that all of these can forecast"
+    if periods:
+        low, high = min(periods.values()), max(periods.values())
+        note += (
+            "; all runs are of regular waves: forecasts at periods other than "
+            f"{low:.3g}{f' to {high:.3g}' if high > SAME * low else ''} s extrapolate"
+        )
     seas = len(set(problem.groups))
     if 1 < seas < len(problem.groups):
         if by_sea:
             alike = f"the runs of its sea state, of which there are {seas}"
         else:
-            alike = f"the runs that repeat its waves; {seas} waves differ"
+            what = "of its period" if periods else "that repeat its waves"
+            alike = f"the runs {what}; {seas} waves differ"
         note += f"; held out with each: {alike}"
     elif by_sea or seas == 1:
         shared = "no two runs share a sea state" if seas > 1 else "all runs have the same sea state"
@@ -689,9 +935,7 @@ def _note(
     return note
 
 
-def _check_asked(
-    settings: HankelSettings, vary: Sequence[str], readouts: Sequence[ReadOut]
-) -> None:
+def _check_asked(settings: HankelSettings, vary: Sequence[str]) -> None:
     """Refuse what cannot be chosen."""
     for name in vary:
         if name not in VARIED:
@@ -704,11 +948,6 @@ def _check_asked(
             "choosing by free runs takes delay_rows = 'exact' and no rank; received delay_rows = "
             f"'{settings.delay_rows}', rank = {settings.rank}. Change them, or fit without a "
             "choice: state ridge, and no select."
-        )
-    if "rank" in vary and (readouts or "readouts" in vary):
-        raise RequestError(
-            "vary names 'rank', and read-outs are chosen by free runs of ridge regressions. Leave "
-            "out 'rank', or the read-outs: readouts = {} in a campaign file."
         )
 
 
@@ -782,7 +1021,7 @@ def readouts_for(
         settings = replace(settings, window=None)
     apart = 3 if len(runs) == 1 else groups_of(runs, "auto", inputs)
     given = runs, states, inputs
-    problem = _problem(settings, given, apart, (ridge,), (steps,), {})
+    problem = _problem([settings], settings.observables, given, apart, (ridge,), (steps,))
     return _learnt(readouts, problem, settings, ridge, steps, given)
 
 
@@ -812,60 +1051,6 @@ def default_observables(
     elif unseen and len(at_vessel) > 1:
         slow = replace(slow, orders=(0,), lead=0.0)
     return slow, Powers(elevations)
-
-
-def _defaults(
-    settings: HankelSettings,
-    given: Given,
-    period: float,
-    unseen: bool,
-) -> list[tuple[Observable, ...]]:
-    """Observables to choose among, and fewer of them for runs that are too short."""
-    aligned, lead = settings.alignment, None
-    if aligned is not None and aligned.surge == "predicted":
-        is_left_out = aligned.optional and aligned.missing(*given)
-        lead = None if is_left_out else int(settings.lead)
-    defaults = default_observables(given[2], period, unseen, lead)
-    return list(dict.fromkeys([defaults, defaults[1:], ()]))
-
-
-def _steps(
-    every: tuple[Observable, ...],
-    vary: Sequence[str],
-    period: float,
-    variants: Sequence[Changes],
-) -> Iterator[Sequence[Changes]]:
-    """Changes to try of one setting after the other."""
-    if "observables" in vary:
-        subsets = dict.fromkeys([(), *((each,) for each in every), every])
-        yield [{"observables": each} for each in subsets]
-    if "lead" in vary and "lead" not in variants[0]:
-        yield [{"lead": round(each * period)} for each in LEADS]
-    for name, periods in DELAYS.items():
-        if name in vary:
-            yield [{name: round(each * period)} for each in periods]
-    if "rank" in vary:
-        yield [{}, {"rank": RANKS[0], "ridge": 0.0}]
-    yield variants
-
-
-def _variants(
-    settings: HankelSettings,
-    given: Given,
-    vary: Sequence[str],
-    period: float,
-) -> Iterator[Changes]:
-    """Alignments, with each look-ahead that is tried where the model follows its own surge."""
-    leads = [settings.lead]
-    leads += [round(part * period) for part in LEADS if part > LEAD and "lead" in vary]
-    alignments = [settings.alignment]
-    if "alignment" in vary:
-        alignments = _alignments(settings.alignment, given)
-    for each in alignments:
-        if each is None or each.surge != "predicted":
-            yield {"alignment": each}
-        else:
-            yield from ({"alignment": each, "lead": lead} for lead in dict.fromkeys(leads))
 
 
 def _alignments(
@@ -904,7 +1089,8 @@ def groups_of(
     """Name, by run, of the group of runs that are held out together.
 
     With "sea_state", runs that state the same; with "auto", runs whose waves are the same, as the
-    channel that periods are counted in recorded them; with "run", each is alone.
+    channel that periods are counted in recorded them, or runs of the same period where all are of
+    regular waves; with "run", each is alone.
     """
     if folds == "sea_state":
         return {name: str(run.attrs.get("sea_state") or name) for name, run in runs.items()}
@@ -912,7 +1098,30 @@ def groups_of(
     if folds == "run" or None in waves.values():
         return {name: name for name in runs}
     records = {name: runs[name][wave].to_numpy() for name, wave in waves.items()}
-    return repeated_waves(records, labelled.common_step(runs))
+    periods = regular_periods(runs, inputs)
+    firsts: list[str] = []
+    for name in sorted(periods, key=lambda each: periods[each]):
+        if not firsts or periods[name] > SAME * periods[firsts[-1]]:
+            firsts.append(name)
+    if len(firsts) < 2:
+        return repeated_waves(records, labelled.common_step(runs))
+    return {
+        name: next(each for each in firsts[::-1] if periods[each] <= period)
+        for name, period in periods.items()
+    }
+
+
+def regular_periods(runs: Mapping[str, xr.Dataset], inputs: Sequence[str]) -> dict[str, float]:
+    """Wave period of each run, s, where all are of regular waves; else empty."""
+    periods, step = {}, labelled.common_step(runs)
+    for name, run in runs.items():
+        wave = labelled.wave_channel(run, inputs, name)
+        series = np.full(1, np.nan) if wave is None else run[wave].to_numpy()
+        stated = run.attrs.get("waves") == "regular"
+        if not np.isfinite(series).all() or not (stated or is_regular(series)):
+            return {}
+        periods[name] = encounter_period(series, step, HYSTERESIS)
+    return periods
 
 
 def _rows_of(
@@ -925,7 +1134,7 @@ def _rows_of(
         drawn = rng.integers(count, size=(DRAWS, count))
         weights = trial.weights[drawn]
         totals = (trial.scores[:, drawn] * weights).sum(axis=2) / weights.sum(axis=1)
-        aligned, is_rank = candidate.alignment, candidate.rank is not None
+        aligned = candidate.alignment
         bounds = np.quantile(totals, [0.025, 0.975], axis=1)
         for own, score, low, high in zip(trial.levels, trial.means, *bounds, strict=True):
             yield {
@@ -934,8 +1143,8 @@ def _rows_of(
                 "lead": candidate.lead,
                 "observables": ", ".join(each.kind for each in candidate.observables) or "none",
                 "alignment": "none" if aligned is None else f"{aligned.mode}, {aligned.surge}",
-                "ridge": 0.0 if is_rank else own,
-                "rank": int(own) if is_rank else 0,
+                "memory": candidate.memory,
+                "ridge": own,
                 "score": float(score),
                 "lower": float(low),
                 "upper": float(high),

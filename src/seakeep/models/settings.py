@@ -159,6 +159,10 @@ FOLDS: tuple[Folds, ...] = get_args(Folds)
 """What may be held out at a time; :func:`seakeep.models.selection.groups_of` tells them apart."""
 
 
+OPENED = ("observables", "alignment", "lead", "memory")
+"""Settings that may be left open beside λ, in the order in which they are chosen."""
+
+
 @dataclass(frozen=True)
 class Select:
     """What free runs on held-out training runs choose, beside λ.
@@ -168,6 +172,10 @@ class Select:
     observables : bool, optional
         Whether they choose among the observables: those that are stated, or slow squares and
         powers of the wave elevations, none, one, or all of them.
+    alignment, lead : bool, optional
+        Whether they choose between the alignment, or the look-ahead, that is stated and none.
+    memory : bool, optional
+        Whether they choose between the memory that is stated and one of eight encounter periods.
     horizon : float or sequence of float, optional
         Lengths of the free runs, encounter periods.
     period : float, optional
@@ -183,13 +191,17 @@ class Select:
     """
 
     observables: bool = False
+    alignment: bool = False
+    lead: bool = False
+    memory: bool = False
     horizon: tuple[float, ...] = (15.0, 45.0)
     period: float | None = None
     folds: Folds = "auto"
 
     def __post_init__(self) -> None:
         check_choice("select: folds", self.folds, FOLDS)
-        check_flag("select: observables", self.observables)
+        for name in OPENED:
+            check_flag(f"select: {name}", getattr(self, name))
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
             what = "select: horizon (encounter periods) and period (s)"
@@ -197,6 +209,11 @@ class Select:
         if not given:
             raise RequestError("select: horizon is empty. Write horizon=(15, 45).")
         object.__setattr__(self, "horizon", tuple(float(each) for each in given))
+
+    @property
+    def opened(self) -> tuple[str, ...]:
+        """Settings that are left open beside λ."""
+        return tuple(name for name in OPENED if getattr(self, name))
 
     @classmethod
     def of(cls, value: object) -> Self | None:
@@ -219,6 +236,8 @@ class HankelSettings:
     role: ClassVar[Role] = "reference"
     is_ensemble: ClassVar[bool] = False
     may_choose: ClassVar[bool] = False
+    is_filter: ClassVar[bool] = False
+    """Whether no state is a regressor."""
     lengths: ClassVar[Mapping[str, int]] = {
         "window": 2,
         "state_delays": 0,
@@ -357,6 +376,11 @@ class HankelSettings:
     def state_reach(self) -> int:
         """Longest delay of the states: s, or the memory."""
         return max(self.state_delays, self.memory)
+
+    def having(self, **changes: Any) -> Self:
+        """These settings with others, as far as their kind has them."""
+        own = {each.name for each in fields(self) if each.init}
+        return replace(self, **{name: changes[name] for name in own & set(changes)})
 
     @property
     def radius(self) -> float | None:

@@ -23,8 +23,15 @@ from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.observables import Observable
 from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
 from seakeep.models.readouts import FittedReadOut
-from seakeep.models.selection import Selected, default_observables, readouts_for, settle
+from seakeep.models.selection import (
+    MEMORY,
+    Selected,
+    default_observables,
+    readouts_for,
+    settle,
+)
 from seakeep.models.settings import (
+    OPENED,
     HankelSettings,
     Select,
     in_samples,
@@ -146,8 +153,12 @@ class HankelDMDc(HankelSettings):
 
     def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that it asks of its runs, whichever observables are chosen."""
-        stated = None if self.select is None else self.select.period
-        return super().needs(dt, encounter_period or stated)
+        select, period = self.select, encounter_period
+        if select is None:
+            return super().needs(dt, period)
+        needs, period = super().needs(dt, period or select.period), period or select.period
+        most = round(MEMORY * period / dt) if select.memory and period else 0
+        return replace(needs, history=max(needs.history, most))
 
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
@@ -207,10 +218,11 @@ class HankelDMDc(HankelSettings):
             All of the runs, exact delay rows, s one period, z three periods, waves carried by
             dispersion to the surge that the model predicts step by step, where surge is a state
             and the runs state water depth and positions of the probes.
-            Observables (none, slow squares and powers of the elevations, or both), λ, and read-outs
+            Observables (none, slow squares and powers of the elevations, or both), whether waves
+            are carried and read ahead at all, a memory of eight periods or none, λ, and read-outs
             of the loads are chosen by free runs of 15 and 45 periods on training runs that are held
-            out in turn; where nothing can be held out there are none, and λ is 1e-3 per snapshot
-            pair.
+            out in turn: the simplest that is as good as the best but for the noise. Where nothing
+            can be held out there are no observables, and λ is 1e-3 per snapshot pair.
         """
         step = _step_of(dt, runs)
 
@@ -226,7 +238,7 @@ class HankelDMDc(HankelSettings):
             alignment=ALIGNMENT,
             lead=samples(look_ahead),
             readouts="auto",
-            select=Select(observables=True, period=encounter_period),
+            select=Select(True, True, True, True, period=encounter_period),
         )
 
     def central(self, dt: float) -> HankelDMDc:
@@ -601,7 +613,7 @@ class BayesianHankelDMDc(HankelSettings):
             readouts="auto",
             train_on="auto",
             centred=True,
-            select=Select(observables=True, period=encounter_period),
+            select=Select(True, True, True, True, period=encounter_period),
         )
 
     def settled(
@@ -647,8 +659,7 @@ class BayesianHankelDMDc(HankelSettings):
             self,
             ridge=ridge,
             ridge_scale=scale,
-            observables=choice.settings.observables,
-            readouts=choice.settings.readouts,
+            **{name: getattr(choice.settings, name) for name in (*OPENED, "readouts")},
             select=None,
         )
         return Selected(spec, choice.rows, choice.note, choice.readouts)

@@ -140,7 +140,9 @@ class Coverage:
         return cls(tuple(signature.inputs), first, *(store.numbers(dataset, key) for key in keys))
 
 
-def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) -> list[str]:
+def outside_training(
+    model: Model, run: xr.Dataset, start: float, steps: int, surge: FloatArray | None = None
+) -> list[str]:
     """Say in what a forecast lies outside the training: period, height, steepness, mean surge.
 
     Parameters
@@ -153,6 +155,8 @@ def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) ->
         Instant of the last measured state, s.
     steps : int
         Instants forecast.
+    surge : ndarray, optional
+        Surge that is forecast, m; by default the one that was measured.
 
     Returns
     -------
@@ -172,8 +176,9 @@ def outside_training(model: Model, run: xr.Dataset, start: float, steps: int) ->
     duration, units = steps * model.dt, [label.units for label in model.signature.input_labels]
     waves = list(coverage.compare(values, model.dt, duration, units))
     texts = ["; ".join(filter(None, of)) for of in zip(*waves, strict=True)]
-    if waves and "surge" in model.states and "surge" in run:
+    if surge is None and "surge" in run:
         surge = run["surge"].values[(time > start) & (time <= start + duration + 1e-6)]
+    if waves and "surge" in model.states and surge is not None:
         scale, at = model.signature.state_scale, model.states.index("surge")
         low, high = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
         mean = float(np.mean(surge[np.isfinite(surge)])) if np.isfinite(surge).any() else low

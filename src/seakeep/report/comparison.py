@@ -128,9 +128,7 @@ def _note(at: xr.Dataset) -> str:
     return "; ".join(filter(None, said))
 
 
-def model_blocks(
-    tables: Mapping[str, xr.Dataset], references: Mapping[str, Sequence[str]]
-) -> Iterator[Table]:
+def model_blocks(tables: Mapping[str, xr.Dataset]) -> Iterator[Table]:
     """Several models beside each other, a table of averages and one of channels per run."""
     first, *_ = tables.values()
     heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
@@ -151,7 +149,6 @@ def model_blocks(
         texts += [f"{name} {words}" for name, words in ahead.items() if words]
         title = f"{run}: models against measurement"
         yield Table(f"models_{run}", title, heads, rows, "; ".join(texts))
-        yield from _skill(of_run, references, str(run))
         name, at = next(iter(of_run.items()))
         every = (("model", "channel"), [each["nrmse"].values for each in of_run.values()])
         yield _by_channel(
@@ -162,23 +159,6 @@ def model_blocks(
             lambda one: numbers(one["every"]),
         )
         yield _extremes(at, f"extremes of {name}")
-
-
-def _skill(
-    of_run: Mapping[str, xr.Dataset], references: Mapping[str, Sequence[str]], run: str
-) -> Iterator[Table]:
-    """Change of the ANRMSE to each model from the best of some references, which have no row."""
-    errors = {name: float(at["anrmse"]) for name, at in of_run.items()}
-    best = [min((errors[each] for each in names), default=np.nan) for names in references.values()]
-    known = {each for names in references.values() for each in names}
-    rows = [
-        (name, *(change(error / each) for each in best))
-        for name, error in errors.items()
-        if name not in known
-    ]
-    if rows and references:
-        heads = ("model", *(f"from {each}" for each in references))
-        yield Table(f"skill_{run}", f"{run}: change of ANRMSE from the baselines'", heads, rows)
 
 
 def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
@@ -211,6 +191,26 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
     note = "Paired intervals over redrawn blocks of the forecast; they hold for these runs."
     heads = ("model", "ANRMSE", "change", "95 %", "verdict")
     yield Table("differences", f"{of}: change of ANRMSE from {models[0]}", heads, changes, note)
+
+
+def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
+    """Which model errs least over all runs, and how to get it where it was fitted as a baseline.
+
+    The table is that of :func:`seakeep.study.difference_table`; `baselines` are kinds by name.
+    """
+    best = table.isel(model=int(np.argmin(table["all_anrmse"].fillna(np.inf).values)))
+    name, first = (str(each["model"].values) for each in (best, table.isel(model=0)))
+    said = f"Least error: {name}, ANRMSE {number(best['all_anrmse'])}"
+    if name != first:
+        low, high = (1 + float(best[f"all_{bound}"]) for bound in ("lower", "upper"))
+        said += f", {change(1 + best['all_change'])} [{change(low, high)}] from {first}"
+    if kind := baselines.get(name):
+        said += (
+            f". To use it, give the campaign file a table [models.{kind}] with kind = '{kind}' and "
+            f"the lead, alignment and observables of {first}, and run seakeep fit with --model "
+            f"{kind}"
+        )
+    return f"{said}."
 
 
 def write_differences(table: xr.Dataset, path: Path) -> Path:

@@ -25,7 +25,6 @@ from seakeep.core.bands import split_bands
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.metrics import over_channels, paired, root_mean_square
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
-from seakeep.models import KINDS
 from seakeep.models.executor import in_order
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
@@ -39,8 +38,6 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "paper": {"block_length": "carlstein", "bandwidth": "paper", "joins": True},
     "recommended": {"block_length": "politis_white", "bandwidth": "silverman", "joins": False},
 }
-CONSTANT = ("hold_last", "mean")
-"""Kinds of references that read nothing after the start."""
 SHOWN = 5
 """Lost forecasts that a warning names."""
 DIFFERENCES = 500
@@ -262,15 +259,6 @@ def verdict(lower: float, upper: float) -> Literal["better", "worse", "cannot te
     if upper < 0:
         return "better"
     return "worse" if lower > 0 else "cannot tell"
-
-
-def references_of(kinds: Mapping[str, str]) -> dict[str, list[str]]:
-    """Names of the references among models of some kinds, those of one sort together."""
-    out: dict[str, list[str]] = {}
-    for model, kind in sorted(kinds.items(), key=lambda each: each[1] not in CONSTANT):
-        if KINDS[kind].role == "reference":
-            out.setdefault(kind if kind in CONSTANT else "best_linear", []).append(model)
-    return out
 
 
 BOX = (

@@ -34,6 +34,8 @@ enum {
 {{ array("spread", spread) }}
 /* Errors of free runs in training, a row per sample after the start. */
 {{ array("errors", errors) }}
+/* Inputs that are predicted; the others stay at their last value. */
+static const int waves[] = { {% for q in range(Q) %}{{ 1 if q in waves else 0 }}, {% endfor %}0 };
 {% if foresight %}
 /* Weights that predict placed probes from one another: row, probe, probe, sample, oldest first. */
 {{ array("foresight", foresight[0]) -}}
@@ -253,9 +255,10 @@ static void expect({{ name }}_estimator *e, int rows)
         if (place < PLACED && e->taken >= BEGINS)
             continue;
 {% endif %}
-        identify(e, q, 0);
+        if (waves[q])
+            identify(e, q, 0);
         for (int row = 0; row < rows; row++)
-            out[row * Q + q] = continued(e, q);
+            out[row * Q + q] = waves[q] ? continued(e, q) : input(e, 0)[q];
     }
 }
 
@@ -411,39 +414,38 @@ double {{ name }}_deviation(const {{ name }}_estimator *e, int state)
     return sqrt(P(OLD + state, OLD + state));
 }
 
-/* Inputs of the instant so many after the first one to come. */
+/* From the inputs of an instant those of the next one, which is so many after the first to come. */
 static void coming({{ name }}_estimator *e, const double *future, int at, double *u)
 {
-    for (int q = 0; q < Q; q++)
-        u[q] = future      ? future[at * Q + q]
-               : at < FORE ? e->inputs[(RECORD + at) * Q + q]
-                           : continued(e, q);
+    for (int q = 0; q < Q; q++) {
+        double next = u[q];
+        if (waves[q])
+            next = at < FORE ? e->inputs[(RECORD + at) * Q + q] : continued(e, q);
+        u[q] = future && !isnan(future[at * Q + q]) ? future[at * Q + q] : next;
+    }
 }
 
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x)
 {
+    double u[Q + 1];
     int begins = {{ upper }}_U_ROWS - {{ lead_samples }};
     if (e->taken < BEGINS)
         return 1;
-    if (!future)
-        expect(e, FORE);
+    expect(e, FORE);
 {% if foresight %}
-    for (int p = 0; !future && p < PLACED; p++)
+    for (int p = 0; p < PLACED; p++)
         identify(e, placed[p], FORE);
 {% endif %}
     memcpy(e->u_history, input(e, begins), begins * Q * sizeof(double));
+    memcpy(u, input(e, 0), Q * sizeof(double));
     for (int at = 0; at < {{ lead_samples }}; at++) {
-        double *row = e->u_history + (begins + at) * Q;
-        if (at == 0)
-            memcpy(row, input(e, 0), Q * sizeof(double));
-        else
-            coming(e, future, at - 1, row);
+        if (at > 0)
+            coming(e, future, at - 1, u);
+        memcpy(e->u_history + (begins + at) * Q, u, Q * sizeof(double));
     }
     if ({{ name }}_start(&e->model, e->x + (X_ROWS - {{ upper }}_X_ROWS) * N, e->u_history))
         return 1;
     for (int step = 0; step < n; step++) {
-        double u[Q + 1];
-        memcpy(u, input(e, 0), Q * sizeof(double));
         if (step + {{ lead_samples }} > 0)
             coming(e, future, step + {{ lead_samples }} - 1, u);
         if ({{ name }}_step(&e->model, u))

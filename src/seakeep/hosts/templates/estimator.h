@@ -62,7 +62,8 @@ const double *{{ name }}_estimated(const {{ name }}_estimator *e);
 double {{ name }}_deviation(const {{ name }}_estimator *e, int state);
 
 /* Forecast n instants after the last sample into x, a row for each. `future` holds the inputs of
- * the n - 1 + {{ upper }}_LEAD instants after it, or is NULL: they are predicted then.
+ * the n - 1 + {{ upper }}_LEAD instants after it, or is NULL. Waves that are NaN there are
+ * predicted from the samples up to now; other inputs stay at their last value.
  * Returns 0; 1 if there are fewer than {{ begins }} samples; 2 if the run is lost, as a step is. */
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x);
 

@@ -239,11 +239,25 @@ EXPORT Status FMI(fmi2DeSerializeFMUstate)(void *c, const char bytes[], size_t s
     return OK;
 }
 
+/* Of the outputs after the next step, along a change of the inputs that it takes. */
 EXPORT Status FMI(fmi2GetDirectionalDerivative)(void *c, const Reference unknown[], size_t unknowns,
                                                 const Reference known[], size_t knowns,
                                                 const double change[], double response[])
 {
-    return ERROR;
+    Instance *instance = c;
+    double along[Q + 1] = { 0.0 }, found[N];
+    for (size_t i = 0; i < knowns; i++) {
+        if (known[i] >= Q)
+            return report(instance, ERROR, "derivatives are those with respect to inputs");
+        along[known[i]] = change[i];
+    }
+    {{ name }}_derivative(&instance->state.model, instance->state.values, along, found);
+    for (size_t i = 0; i < unknowns; i++) {
+        if (unknown[i] < OUTPUTS || unknown[i] >= X_HISTORY)
+            return report(instance, ERROR, "derivatives are those of outputs");
+        response[i] = found[unknown[i] - OUTPUTS];
+    }
+    return OK;
 }
 
 EXPORT Status FMI(fmi2SetRealInputDerivatives)(void *c, const Reference at[], size_t count,

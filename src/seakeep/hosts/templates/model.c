@@ -295,3 +295,20 @@ int {{ name }}_step({{ name }}_model *m, const double *u)
 {% endfor %}
     return lost ? 2 : 0;
 }
+
+void {{ name }}_derivative(const {{ name }}_model *m, const double *u, const double *change, double *response)
+{
+    {{ name }}_model sides[2];
+    double most = 0.0, row[Q + 1];
+    for (int q = 0; q < Q; q++)
+        most = fmax(most, fabs(change[q]) / delayed_std[q]);
+    most = most > 0.0 ? {{ 1e-3 | hex }} / most : 0.0;
+    for (int side = 0; side < 2; side++) {
+        for (int q = 0; q < Q; q++)
+            row[q] = u[q] + (side ? most : -most) * change[q];
+        sides[side] = *m;
+        {{ name }}_step(&sides[side], row);
+    }
+    for (int i = 0; i < N; i++)
+        response[i] = most > 0.0 ? (sides[1].x[i] - sides[0].x[i]) / (2.0 * most) : 0.0;
+}

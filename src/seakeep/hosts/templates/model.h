@@ -59,6 +59,10 @@ int {{ name }}_start({{ name }}_model *m, const double *x_history, const double 
  * training, in proportion to the waves of late. All states are NaN from then on. */
 int {{ name }}_step({{ name }}_model *m, const double *u);
 
+/* Derivative of the states after a step with inputs u along a `change` of these, by central
+ * differences: exact but for rounding where no square, cube or place of the vessel enters. */
+void {{ name }}_derivative(const {{ name }}_model *m, const double *u, const double *change, double *response);
+
 /* What drives the step from an instant, in physical units: of the {{ upper }}_WINDOW rows of inputs
  * around it{{ ", and of the last " ~ past ~ " surges, newest first" if follows }}. */
 void {{ name }}_regressors(const double *inputs, const double *surge, double *delayed, double *direct);

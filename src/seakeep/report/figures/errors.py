@@ -417,32 +417,25 @@ def tuning_figure(table: xr.Dataset) -> Figure:
     Figure
         One line per candidate with its 95 % intervals; the choice is marked.
     """
-    truncated = table["rank"].values > 0
-    kinds = [("ridge", "ridge per snapshot pair (1)", ~truncated)]
-    if truncated.any():
-        kinds.append(("rank", "singular values kept (1)", truncated))
-    keys = ("observables", "lead", "state_delays", "input_delays", "alignment")
+    keys = ("observables", "lead", "state_delays", "input_delays", "alignment", "memory")
     varied = [key for key in keys if len(np.unique(table[key].values)) > 1]
     names = [
         ", ".join(f"{key.replace('_', ' ')} {table[key].values[row]}" for key in varied) or "error"
         for row in range(table.sizes["trial"])
     ]
     figure = new_figure(7.0, 4.2)
-    places = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
-    for axes, (key, words, rows) in zip(places, kinds, strict=True):
-        for number, name in enumerate(dict.fromkeys(names)):
-            part = table.isel(trial=np.flatnonzero((np.array(names) == name) & rows))
-            if part.sizes["trial"]:
-                line = {**SERIES[number % len(SERIES)], "linestyle": "-"}
-                axes.semilogx(part[key], part["score"], **line, markersize=4, label=name)
-                band = {"color": line["color"], "alpha": 0.12}
-                axes.fill_between(part[key], part["lower"], part["upper"], **band)
-        best = table.isel(trial=np.flatnonzero(table["chosen"].values & rows))
-        if best.sizes["trial"]:
-            ring = {"markersize": 11, "fillstyle": "none", "color": "k"}
-            axes.semilogx(best[key], best["score"], "o", **ring, label="chosen")
-        axes.set_xlabel(words)
-        axes.set_ylim(bottom=0.0)
-        axes.legend(fontsize="small")
-    places[0].set_ylabel("mean NRMSE of free runs (1)")
+    axes = figure.subplots()
+    for number, name in enumerate(dict.fromkeys(names)):
+        part = table.isel(trial=np.flatnonzero(np.array(names) == name))
+        line = {**SERIES[number % len(SERIES)], "linestyle": "-"}
+        axes.semilogx(part["ridge"], part["score"], **line, markersize=4, label=name)
+        band = {"color": line["color"], "alpha": 0.12}
+        axes.fill_between(part["ridge"], part["lower"], part["upper"], **band)
+    best = table.isel(trial=np.flatnonzero(table["chosen"].values))
+    ring = {"markersize": 11, "fillstyle": "none", "color": "k"}
+    axes.semilogx(best["ridge"], best["score"], "o", **ring, label="chosen")
+    axes.set_xlabel("ridge per snapshot pair (1)")
+    axes.set_ylim(bottom=0.0)
+    axes.legend(fontsize="small")
+    axes.set_ylabel("mean NRMSE of free runs (1)")
     return figure

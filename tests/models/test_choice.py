@@ -1,0 +1,125 @@
+"""Which candidate is taken: the simplest within the noise, and a start unless it is beaten."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from seakeep import HankelDMDc, Select, SlowSquares, tune
+from seakeep.models.selection import Trial, groups_of, select
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from test_long_memory import remembering
+from test_selection import DT, INPUTS, PERIOD, STATES, runs, sea
+
+T = PERIOD * DT
+OPEN = Select(True, True, True, True, period=T, horizon=10)
+SPEC = replace(HankelDMDc.recommended(T, DT), select=OPEN)
+
+
+def trial(*by_group):
+    """Two windows of each group, at a worse λ and at the better one."""
+    scores = np.repeat(by_group, 2) + np.tile([-0.05, 0.05], len(by_group))
+    weights = np.full(scores.size, 1 / scores.size)
+    groups = np.repeat(np.arange(len(by_group)), 2)
+    return Trial((1e-3, 1e-2), np.stack([scores + 1.0, scores]), weights, groups)
+
+
+@pytest.mark.parametrize(
+    ("other", "is_as_good"),
+    [
+        ((0.31, 0.21, 0.11), False),  # worse by as much everywhere: no noise
+        ((0.34, 0.22, 0.06), True),  # by .01 in the mean, with a standard error of .026
+        ((0.33, 0.21, 0.10), False),  # by .0133, with one of .0088
+        ((0.32, 0.20, 0.10), True),  # by .0067, with one of as much
+        ((0.20, 0.20, 0.10), True),
+    ],
+)
+def test_the_noise_is_a_standard_error_over_what_is_held_out(other, is_as_good):
+    best = trial(0.3, 0.2, 0.1)
+    assert trial(*other).is_as_good_as(best) == is_as_good
+    assert best.is_as_good_as(best)
+
+
+def test_a_group_that_repeats_counts_once():
+    # The second and the third fold repeat each other: worse in two of three, and in one of two.
+    one, other = trial(0.3, 0.2, 0.2), trial(0.29, 0.23, 0.23)
+    assert not other.is_as_good_as(one)
+    pair = np.array([0, 0, 1, 1, 1, 1])
+    assert replace(other, groups=pair).is_as_good_as(replace(one, groups=pair))
+
+
+def test_what_brings_nothing_is_not_recommended():
+    given = {name: run.drop_vars("drift") for name, run in runs().items()}
+    model = SPEC.fit(given, ["heave"], INPUTS)
+    settings = model.settings
+    assert (settings.alignment, settings.observables, settings.memory) == (None, (), 0)
+    assert settings.lead == 0
+    assert "lead 0" in model.selection
+    spec = replace(SPEC, select=None, ridge=1e-3, lead=0, alignment=None, readouts=())
+    assert model.lead_samples == spec.fit(given, ["heave"], INPUTS).lead_samples == 0
+
+
+def test_squares_that_bring_much_are_recommended_without_a_look_ahead_that_brings_none():
+    settings = SPEC.fit(runs(), STATES, INPUTS).settings
+    assert "slow_squares" in [each.kind for each in settings.observables]
+    assert settings.memory == 0
+
+
+def test_a_memory_is_recommended_where_the_vessel_has_one_and_kept_in_the_file():
+    given = {f"run{seed}": remembering(seed, samples=500) for seed in range(3)}
+    given = {name: run.assign_attrs(encounter_period=0.2) for name, run in given.items()}
+    spec = HankelDMDc(
+        2, 0, "rollout", delay_rows="exact", select=Select(memory=True, period=0.2, horizon=(20,))
+    )
+    assert spec.needs(0.1).history == 16
+    model = spec.fit(given, ["heave"], ["eta"])
+    assert (model.settings.memory, model.settings.state_delays) == (16, 2)
+    assert "memory 16  (chosen)" in model.selection
+    tuned = tune(
+        replace(spec, select=None), given, ["heave"], ["eta"], vary=["memory"], horizon=[20.0]
+    )
+    # Of the same windows, and without a period of its own.
+    assert tuned.spec.memory == round(8 * 0.2 / 0.1)
+    single = replace(model.settings, memory=0).fit(given, ["heave"], ["eta"])
+    run = remembering(9)
+    errors = [
+        float(np.abs(each.forecast(run, 5.0, 100).heave - run.heave[51:151].values).mean())
+        for each in (model, single)
+    ]
+    assert errors[0] < 0.7 * errors[1]
+
+
+def test_a_start_is_left_only_for_what_is_better_beyond_the_noise():
+    given = {name: run.drop_vars("drift") for name, run in runs().items()}
+    start = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot")
+    found = select(start, given, ["heave"], INPUTS, vary=("observables",), horizon=(10.0,))
+    assert replace(found.settings, ridge=start.ridge) == start
+    assert "; what it starts from: nothing that was tried is better by more than" in found.note
+    late = {name: run.assign(eta=run["eta"].roll(time=5)) for name, run in given.items()}
+    left = select(start, late, ["heave"], INPUTS, vary=("lead",), horizon=(10.0,))
+    assert left.settings.lead >= 5  # the wave is recorded half a period after it acts
+
+
+def test_regular_waves_are_held_out_by_period_and_others_are_said_to_be_extrapolation():
+    periods = {"a": 1.0, "b": 1.25, "again": 1.01, "c": 0.8}
+    given = {name: sea(n, frequency=1 / p) for n, (name, p) in enumerate(periods.items())}
+    assert groups_of(given, "auto", INPUTS) == {"a": "a", "b": "b", "again": "a", "c": "c"}
+    assert groups_of(given, "run", INPUTS)["again"] == "again"
+    model = replace(SPEC, select=replace(OPEN, horizon=(5,))).fit(given, STATES, INPUTS)
+    said = "forecasts at periods other than 0.8 to 1.25 s extrapolate"
+    assert f"all runs are of regular waves: {said}" in model.selection
+    assert "held out with each: the runs of its period; 3 waves differ" in model.selection
+    mixed = given | {"irregular": sea(9)}
+    assert groups_of(mixed, "auto", INPUTS) == {name: name for name in mixed}
+
+
+def test_stated_squares_are_no_look_ahead_that_is_left_out():
+    squares = SlowSquares("eta", orders=(0,), lags=(0, 1))
+    spec = replace(SPEC, observables=(squares,))
+    assert SlowSquares("eta", orders=(0,), lags=(0, 1)) == squares
+    chosen = spec.fit(runs(), STATES, INPUTS).settings.observables
+    assert set(chosen) <= {squares}
