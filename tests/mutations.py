@@ -158,7 +158,7 @@ CHANGES = (
     ("models/live.py", "self._squares[:, taken] *= self._fade[taken]", "self._squares[:, taken] *= 1.0", "models/test_live.py::test_a_spike_is_forgotten_by_the_consistency"),
     ("models/live.py", "table[1] = np.sqrt(spread + self._error_variances(count))", "table[1] = np.sqrt(self._error_variances(count))", "models/test_live.py::test_waves_that_are_not_known_widen_the_band"),
     ("models/live.py", "white = update.whitening @ np.where(", "white = 1.0 * np.where(", "models/test_live.py::test_a_spike_is_forgotten_by_the_consistency"),
-    ("models/selection.py", "(1.0 + alike) * means.min()", "means.min()", "models/test_selection.py::test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone"),
+    ("models/selection.py", "(1.0 + alike) * trial.best", "trial.best", "models/test_selection.py::test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone"),
     ("models/selection.py", "factor * level for level in levels", "level for level in levels", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
     ("models/selection.py", "joined / joined.sum()", "joined / len(folds)", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
     ("models/selection.py", "measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])", "measured = np.stack([states[at : at + steps] for at in starts])", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
