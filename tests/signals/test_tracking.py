@@ -6,7 +6,7 @@ import xarray as xr
 
 from seakeep import cli
 from seakeep.campaign import read_table
-from seakeep.errors import DataError, SeakeepWarning
+from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.signals import TrackingSettings, compare_motion, contact_sheet, track_video
 from seakeep.signals.tracking import FLAGS
 
@@ -242,6 +242,12 @@ def test_a_second_panel_elsewhere_is_a_jump(tmp_path):
     out = track_video(path)
     assert list(np.flatnonzero(out["flag"])) == [15]
     assert out["flag"][15] == FLAGS["jump"]
+
+
+@pytest.mark.parametrize("region", [(1, 2), (1000, 0, 400, 100), (-1, 0, 40, 100)])
+def test_a_region_has_four_numbers_within_the_picture(plain, region):
+    with pytest.raises(RequestError, match=r"no part of the picture .* 1280 × 720 .* left, top"):
+        track_video(plain[0], TrackingSettings(region=region))
 
 
 def test_video_against_mru(tracked):
