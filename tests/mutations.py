@@ -238,7 +238,7 @@ CHANGES = (
     ("study/comparison.py", "if first < end - 0.5 * model.dt and last > begin:", "if last > begin:", "study/test_fit.py::test_the_test_starts_in_the_test_span_with_history_from_before_it"),
     ("study/comparison.py", "lead = max(model.signature.lead_samples for model in models.values())", "lead = 0", "study/test_fit.py::test_a_dead_probe_in_a_test_run_is_told"),
     ("study/fit.py", "slice(None, end + 1e-6)", "slice(None, None)", "study/test_fit.py::test_a_dead_probe_in_a_test_run_is_told"),
-    ("study/full_scale.py", 'run["time"] * clock', 'run["time"]', "signals/test_rigid_body.py::test_full_scale_run"),
+    ("study/comparison.py", 'run["time"] * clock', 'run["time"]', "signals/test_rigid_body.py::test_full_scale_run"),
     ("study/judge.py", "answer[:, window] = (own[:, 1] - 1j * own[:, 2])", "answer[:, window] = (own[:, 1] + 1j * own[:, 2])", "study/test_response.py::test_the_parts_are_what_the_forecast_was_made_of"),
     ("study/judge.py", "low, high = np.maximum(count - 1, 0) // 2, count // 2", "low, high = count // 2, count // 2", "study/test_statistics.py::test_medians_leave_out_what_is_not_judged"),
     ("study/judge.py", "parts = inside[:, 0], inside[:, 1:].sum(axis=1), total - inside.sum(axis=1)", "parts = inside[:, 0], inside[:, 1:].sum(axis=1), total", "study/test_response.py::test_the_parts_are_what_the_forecast_was_made_of"),
