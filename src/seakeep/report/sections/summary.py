@@ -112,7 +112,7 @@ def _heat(result: StudyResult) -> Table:
     median = result.groups["statistics/boxes"]["median"].sel(measure="nrmse")
 
     def cells(channel: str) -> Iterator[str]:
-        return (number(median.sel(at, channel=channel), 2) for at in places.values())
+        return (number(median.sel({**at, "channel": channel}), 2) for at in places.values())
 
     return by_channel(result, "heat", cells, columns=places, more=conditional(result))
 
