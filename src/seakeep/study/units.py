@@ -127,7 +127,8 @@ def compute(
     dict of str to Dataset
         ``tests/NAME``: ``mean``, and its ``error`` and ``error_over_time``; of an ensemble
         ``bands/NAME``, the other statistics of its members and what became of each; ``chosen``;
-        ``calibration``; ``regularisation``. Of the first training set ``eigenvalues`` and ``draws``.
+        ``calibration``; ``regularisation``. Of the first training set ``eigenvalues`` and
+        ``draws``.
     """
     training, settings = plan.training[unit.training], plan.settings
     with _named_after(plan, unit):
