@@ -84,7 +84,6 @@ class Servable(Runs, Protocol):
         roles: Mapping[str, str] | None = None,
     ) -> Live:
         """Put the model into service."""
-        ...
 
 
 class _Update(NamedTuple):
