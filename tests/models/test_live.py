@@ -381,6 +381,7 @@ def test_a_restarted_process_goes_on_bit_for_bit(models, run, tmp_path, key):
     for name in ("state", "covariance", "innovation", "time", "consistency_by_state"):
         np.testing.assert_array_equal(getattr(again, name), getattr(live, name))
     assert again.consistency == live.consistency
+    assert again.conditions.surge == live.conditions.surge
     np.testing.assert_array_equal(mean(again.forecast(20)), mean(live.forecast(20)))
     with pytest.raises(RequestError, match="is the state of another model"):
         load_live(models["lead"], path)
@@ -400,7 +401,7 @@ def test_what_is_kept_does_not_grow_and_does_not_count(models, run, tmp_path):
     assert tracemalloc.get_traced_memory()[0] - before < 8 * 4 * 500
     tracemalloc.stop()
     kept = LEAST_RECORD * 8 * len(INPUTS)  # waves to come are predicted from; the rest is short
-    assert kept < size < kept + 12_000
+    assert kept < size < kept + 18_000
 
 
 BAD = {
