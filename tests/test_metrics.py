@@ -100,15 +100,6 @@ def test_a_diverged_forecast_and_a_gap_are_nan_and_not_left_out():
     np.testing.assert_array_equal(np.isnan(over_time), [False, False, True, True])
 
 
-def test_a_forecast_that_ends_in_nan_has_no_interval():
-    measured = np.random.default_rng(0).standard_normal((200, 2))
-    predicted = 0.9 * measured
-    predicted[-1, 1] = np.nan
-    bounds = metrics.nrmse(predicted=predicted, measured=measured, interval=0.95)
-    np.testing.assert_array_equal(np.isfinite(bounds), [[True, False]] * 2)
-    assert np.isnan(metrics.anrmse(predicted=predicted, measured=measured, interval=0.95)).all()
-
-
 # Members
 
 
