@@ -17,7 +17,9 @@ def test_lines_and_tests_of_all_changes_exist():
         for place, name in (test.split("::") for test in tests.split()):
             if place not in names:
                 body = ast.parse((HERE / place).read_text("utf-8")).body
-                names[place] = {each.name for each in body if isinstance(each, ast.FunctionDef)}
+                names[place] = {
+                    each.name for each in body if isinstance(each, ast.FunctionDef | ast.ClassDef)
+                }
             if name not in names[place]:
                 stale.append((place, name))
     assert not stale, f"correct the table of tests/mutations.py: {stale}"

@@ -225,14 +225,6 @@ def test_every_mistake_is_named_at_once(edited):
         assert key in message
 
 
-def test_file_that_is_not_there(tank):
-    message = refusal(tank / "campain.toml")
-    assert "campain.toml does not exist. Did you mean 'campaign.toml'?" in message
-    assert "A campaign file is expected here. Draft one with 'seakeep init FILE…'." in message
-    assert "is a folder, and only regular files are read" in refusal(tank)
-    assert "does not exist" in refusal(tank / "no" / "campaign.toml")
-
-
 def test_names_that_no_file_or_variable_can_hold(edited):
     """Names with '/', control characters, or of 300 characters failed after all the work."""
     for name in ("a/b", "a\\u0000b", "x" * 300):

@@ -1,7 +1,5 @@
 """Drafts of campaign files: they must be read and prepared as they are."""
 
-import re
-
 import numpy as np
 import pytest
 from scipy import io
@@ -12,7 +10,6 @@ from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
 from seakeep.errors import SeakeepWarning
-from seakeep.quality import findings_of
 
 ASSUMED = "{} is taken as .*, which is assumed: no file states its unit"
 
@@ -98,22 +95,6 @@ def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path):
     rate = campaign.settings.preparation.sampling_rate
     assert rate == pytest.approx(200 / 3, rel=1e-5)  # 40 samples in 0.6 s; each fourth made 30
     assert "# Hz; guessed: about 32 samples per wave of 0.6 s, the shortest" in text
-
-
-def test_files_without_time_or_with_odd_names(tmp_path):
-    for name in ("1.run of today.csv", "1.other.csv"):
-        (tmp_path / name).write_text("heave [m],heave,`x`\n1,2,3\n2,3,4\n3,4,6\n")
-    text, campaign = drafted(tmp_path, sorted(tmp_path.glob("*.csv")))
-    assert "sampling_rate = 100.0 # ASSUMED: the files have no time column. Correct it" in text
-    assert campaign.runs == ["1", "1_2"]
-    rated = pytest.warns(SeakeepWarning, match="1: time is sampled at 100 Hz, which is assumed")
-    with rated, pytest.warns(SeakeepWarning, match=ASSUMED.format("heave_2")):
-        runs = campaign.prepare()
-    assert len(runs) == 2
-    assert ("time", "rate") in {(each.channel, each.kind.word) for each in findings_of(runs["1"])}
-    confirmed = re.sub("(unit|sampling_rate)_assumed = true", "", text)
-    (tmp_path / "campaign.toml").write_text(confirmed)
-    assert read_campaign(tmp_path / "campaign.toml").prepare()
 
 
 def named(t):
@@ -208,21 +189,6 @@ def test_files_of_several_loggers(tmp_path, pattern, runs):
     assert abs(prepared["a1"].attrs["clock_mru_offset"]) == pytest.approx(0.5, abs=0.01)
 
 
-def test_loggers_without_a_trigger_or_a_file(tmp_path):
-    files = []
-    for i, run in enumerate(("a", "b", "c")):
-        files += loggers(tmp_path, run, i, "{run}/{logger}.csv")
-    for path in files:
-        path.write_text(
-            path.read_text().replace("trig [V]", "volts [V]" if "mru" in str(path) else "v2 [V]")
-        )
-    text, campaign = drafted(tmp_path, files[:-1])
-    assert "# no trigger was found in all files: clocks are taken as they are." in text
-    assert 'role = "unused" # it has no file of mru' in text
-    assert campaign.runs == ["a", "b"]
-    assert set(campaign.prepare()) == {"a", "b"}
-
-
 @pytest.mark.parametrize("lost", [20, 200])  # of 1001 samples: a channel with gaps, and none
 def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
     columns = tank_columns() | {"WP 2 [mm]": tank_columns()["WP fwd [mm]"]}
@@ -299,17 +265,6 @@ def test_the_draft_of_regular_waves_holds_out_what_the_others_surround(tmp_path)
         "b": "waves of b", "b_2": "waves of b", "d": "waves of d", "d_2": "waves of d"
     }  # fmt: skip
     assert text.count("# guessed: the same waves come again\n") == 4
-
-
-def test_waves_that_all_repeat_are_held_out_together(tmp_path):
-    series = {"a": 1.0, "a_2": 1.0, "b": 1.3, "b_2": 1.3, "c": 1.7, "c_2": 1.7}
-    files = [
-        rigged(tmp_path, name, period, 20, seed)
-        for seed, (name, period) in enumerate(series.items())
-    ]
-    assert drafted(tmp_path, files)[1].test_runs == ["b", "b_2"]
-    # Of one wave alone, nothing else is left to hold out.
-    assert drafted(tmp_path, files[:2])[1].test_runs == ["a_2"]
 
 
 def test_init_takes_what_the_message_asks_for(tmp_path, capsys):

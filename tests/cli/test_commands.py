@@ -160,71 +160,6 @@ def test_forecast_goes_beyond_the_waves_when_it_may_predict_them(run):
     )
 
 
-def test_forecast_writes_the_band_of_an_ensemble_as_netcdf_and_csv(run, place):
-    for name in ("band.nc", "band.csv"):
-        status, _, err = run(f"forecast ensemble.nc {FROM_20} --level 0.9 -o {name}")
-        assert status == 0
-        assert "mean, std and 90 % band of 8 members at 50 instants after t = 20 s" in err
-    campaign = seakeep.read_campaign(place / CAMPAIGN)
-    unseen = campaign.prepare(names=["unseen"])["unseen"]
-    ensemble = seakeep.load_model(place / "ensemble.nc")
-    expected = ensemble.forecast_summary(unseen, 20.0, 50, 0.9)
-    with xr.open_dataset(place / "band.nc", engine="h5netcdf") as stored:
-        written = stored.load()
-        # The file says what it is, so that a repeated command may replace it.
-        assert written.attrs.pop("seakeep_file") == "forecast"
-        xr.testing.assert_identical(written, expected)
-        assert "0.05 and 0.95 of the members" in stored["statistic"].attrs["comment"]
-    table = np.genfromtxt(place / "band.csv", delimiter=",", names=True, deletechars="")
-    assert list(table.dtype.names[:6]) == [
-        *("time_[s]", "heave_[m]", "heave_std_[m]", "heave_lower_[m]", "heave_upper_[m]"),
-        "pitch_[rad]",
-    ]
-    for column, statistic in (("_", "mean"), ("_std_", "std"), ("_upper_", "upper")):
-        found = table[f"heave{column}[m]"]
-        np.testing.assert_array_equal(found, expected["heave"].sel(statistic=statistic))
-
-
-def test_compare_judges_the_mean_of_an_ensemble_and_its_band(run, place):
-    status, out, err = run(f"compare ensemble.nc {CAMPAIGN} -o judged --level 0.8")
-    assert status == 0, err
-    assert "unseen: forecast against measurement, 80 % band" in out
-    assert re.search(r"unseen: the 80 % band of 8 members holds \d+ % of the measured", out)
-    heave = judged_rows(place / "judged")["heave"]
-    unseen = seakeep.read_campaign(place / CAMPAIGN).prepare(names=["unseen"])["unseen"]
-    ensemble = seakeep.load_model(place / "ensemble.nc")
-    start = float(unseen.time[ensemble.history_samples - 1])
-    band = ensemble.forecast_summary(unseen, start, level=0.8)["heave"]
-    measured = unseen["heave"].sel(time=band["time"])
-    lower, upper = (band.sel(statistic=key) for key in ("lower", "upper"))
-    inside = float(((measured >= lower) & (measured <= upper)).mean())
-    # The same arithmetic, summed in another order.
-    assert float(heave["coverage"]) == pytest.approx(100 * inside, rel=1e-12)
-    assert float(heave["band_width"]) == pytest.approx(float((upper - lower).mean()), rel=1e-12)
-    assert (heave["members"], heave["diverged"]) == ("8", "0")
-    mean = band.sel(statistic="mean", drop=True).to_dataset()
-    expected = seakeep.metrics.nrmse(predicted=mean, measured=measured.to_dataset())
-    assert float(heave["nrmse"]) == pytest.approx(float(expected["heave"]), rel=1e-12)
-
-
-def test_calibrate_takes_an_unread_part_of_a_run_that_trains(run, place):
-    text = (place / CAMPAIGN).read_text("utf-8").replace('role = "test"', "train = [0, 40]")
-    assert "train = [0, 40]" in text
-    (place / CAMPAIGN).with_name("half.toml").write_text(text, "utf-8")
-    half = str(CAMPAIGN).replace("campaign.toml", "half.toml")
-    calibrate = f"calibrate ensemble.nc {half} --run unseen --steps 200 -o half.nc"
-    spans = {}
-    for options in ("", "--stop 100", "--start 50 --stop inf"):
-        status, _, err = run(f"{calibrate} {options}")
-        assert status == 0, err
-        spans[options] = seakeep.load_model(place / "half.nc").calibration.spans["unseen"]
-        assert re.search(r"Note: errors that last .* \d+ windows? would support \d\d %", err)
-    assert spans[""][1] <= 40 < spans["--stop 100"][1] <= 100
-    # 200 steps of 0.08 s end to end: less than one window is left before the end of 120 s.
-    assert 50 <= spans["--start 50 --stop inf"][0] < 60
-    assert spans["--start 50 --stop inf"][1] > 104
-
-
 def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
     calibrate = f"calibrate ensemble.nc {CAMPAIGN} --run unseen --stop 60 --steps 200 -o wide.nc"
     status, out, err = run(f"{calibrate} --level 0.9 --scale constant")
@@ -261,17 +196,6 @@ def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
         np.testing.assert_array_equal(
             stored["heave"].sel(statistic="upper"), band.sel(statistic="upper") + margin[0]
         )
-
-
-def test_calibrate_scales_by_the_spread_and_folds_over_the_runs_that_train(run, place):
-    calibrate = f"calibrate ensemble.nc {CAMPAIGN} --steps 200 --folds run -o folds.nc"
-    status, out, err = run(calibrate)
-    assert status == 0, err
-    assert "Factor k and floor f, ±k·√(σ² + f²), of the 95 % band, from" in out
-    found = seakeep.load_model(place / "folds.nc").calibration
-    assert (found.scale, found.folds) == ("spread", "run")
-    k, floor = found.conformal.margin[0], found.floor[0]
-    assert re.search(rf"heave +m +{k:.2f} +{floor:.4g} ".replace(".", r"\."), out)
 
 
 def rows_of(path):

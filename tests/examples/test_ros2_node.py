@@ -124,32 +124,6 @@ def test_what_is_lost_is_estimated_and_counted(model, run):
     assert set(np.flatnonzero(differs)) == {20, 25, 35, 40}
 
 
-@pytest.mark.parametrize("jump", [-100.0, 100.0])
-def test_a_clock_that_is_set_starts_it_anew_as_it_was_started(model, run, jump):
-    first, then = messages(model, run), messages(model, run, range(60, 120))
-    moved = [(arrival + jump, channel, stamp + jump, v) for arrival, channel, stamp, v in then]
-    starts = []
-    follower = Follower(lambda: starts.append(0) or model.live(noise={"heave": 0.01}))
-    found = play(follower, first)
-    # By arrival, and not by the clock.
-    found += play(follower, moved)
-    assert len(found) == 2 * COUNT
-    assert found[COUNT][0] == pytest.approx(CLOCK + 60 * DT + jump)
-    assert [key[0] for key in follower.lost] == ["all"]
-    assert len(starts) == 2
-    assert follower.live.covariance[0, 0] > 0  # a measured state has noise, as at the start
-
-
-def test_it_follows_a_gap_of_inputs_and_starts_anew_after_a_long_one(model, run):
-    follower, end = Follower(model.live, longest=2.0), CLOCK + COUNT * DT
-    assert len(play(follower, messages(model, run))) == COUNT
-    blind = follower.advance(end + 1.5)
-    assert len(blind) == 28  # those that are over: half a step and patience ago
-    assert follower.advance(end + 2.5) == []
-    assert np.isnan(follower.live.time)
-    assert len(play(follower, messages(model, run, range(120, 140)))) == 20
-
-
 @pytest.fixture
 def node(monkeypatch):
     pytest.importorskip("rosbags")

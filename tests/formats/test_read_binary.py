@@ -8,7 +8,7 @@ from scipy import io
 
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import DataError
 
 T = np.arange(200) * 0.05
 HEAVE, WAVE = np.sin(T), np.cos(T)
@@ -55,37 +55,6 @@ def test_matlab_headers_with_units(tmp_path):
     names = np.array(["Time [s]", "heave [mm]", "wave (m)"], dtype=object)
     io.savemat(path, {"data": MATRIX, "labels": names})
     check(read_table(path))
-
-
-@pytest.mark.parametrize(
-    ("content", "error", "message"),
-    [
-        (
-            {"time": T, "heave": HEAVE[:-3]},
-            DataError,
-            r"the channels differ in length \(time 200, heave 197\)\. Save channels of one clock",
-        ),
-        (
-            {"data": MATRIX.T, "names": NAMES},
-            DataError,
-            r"'data' has shape \(3, 200\), which looks transposed; expected \(time, channel\) = "
-            r"\(200, 3\)\. Save it transposed: nothing is turned silently",
-        ),
-        ({"data": MATRIX.T}, DataError, r"'data' has shape \(3, 200\), which looks transposed"),
-        ({"data": MATRIX}, DataError, r"the matrix 'data' \(200, 3\) has no names for its columns"),
-        (
-            {"data": MATRIX, "names": NAMES[:2]},
-            DataError,
-            r"lists 2 channel names, and no matrix has as many columns \(matrices: data \(200, 3\)",
-        ),
-        ({"comment": "nothing"}, DataError, "holds no channels; found comment. Save one vector"),
-        ({"heave": HEAVE}, RequestError, "has no column with a usual name of times"),
-    ],
-)
-def test_what_is_no_matlab_run(tmp_path, content, error, message):
-    io.savemat(tmp_path / "run.mat", content)
-    with pytest.raises(error, match=message):
-        read_table(tmp_path / "run.mat")
 
 
 def dataset():

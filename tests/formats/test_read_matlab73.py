@@ -8,7 +8,6 @@ import pytest
 import scipy
 
 from seakeep.campaign import read_table
-from seakeep.errors import DataError
 from seakeep.formats import read_columns
 
 T = np.arange(200) * 0.05
@@ -128,21 +127,3 @@ def test_classes_that_are_left_out(tmp_path):
         phasor = np.zeros((200, 1), [("real", "f8"), ("imag", "f8")])
         file.file.create_dataset("phasor", data=phasor).attrs["MATLAB_class"] = np.bytes_("double")
     assert set(read_table(path).data_vars) == {"heave"}
-
-
-@pytest.mark.parametrize(
-    ("content", "error", "message"),
-    [
-        (
-            {"data": MATRIX.T, "names": NAMES},
-            DataError,
-            r"'data' has shape \(3, 200\), which looks transposed; expected \(time, channel\)",
-        ),
-        ({"time": T, "heave": HEAVE[:-3]}, DataError, r"differ in length \(heave 197, time 200\)"),
-        ({}, DataError, r"holds no channels; found nothing"),
-    ],
-)
-def test_what_is_no_run(tmp_path, content, error, message):
-    path = save(tmp_path / "run.mat", **content)
-    with pytest.raises(error, match=message):
-        read_table(path)

@@ -5,7 +5,7 @@ import pytest
 
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import RequestError
 
 nptdms = pytest.importorskip("nptdms")
 
@@ -96,26 +96,3 @@ def test_groups(tmp_path):
     assert read_table(path, FileSettings(group="loads")).sizes["time"] == 2000
     with pytest.raises(RequestError, match=r"no group 'load'\. Did you mean 'loads'\? Its groups"):
         read_table(path, FileSettings(group="load"))
-
-
-@pytest.mark.parametrize(
-    ("channels", "error", "message"),
-    [
-        ([], DataError, "holds no channels of numbers with at least two samples"),
-        (
-            [channel("heave", HEAVE), channel("wave", WAVE[:-3])],
-            DataError,
-            r"differ in length \(heave 200, wave 197\)\. Put channels of one clock into one group",
-        ),
-        (
-            [channel("a", HEAVE, wf_increment=0.1), channel("b", WAVE, wf_increment=0.2)],
-            DataError,
-            r"the channels are sampled differently \(a 0\.1 s from 0 s, b 0\.2 s from 0 s\)",
-        ),
-        ([channel("heave", HEAVE)], RequestError, "has no column with a usual name of times"),
-    ],
-)
-def test_what_is_no_run(tmp_path, channels, error, message):
-    path = save(tmp_path / "run.tdms", *channels)
-    with pytest.raises(error, match=message):
-        read_table(path)

@@ -59,21 +59,12 @@ def test_dialects(tmp_path, text):
     check_plain(read_table(write(tmp_path, text)))
 
 
-def test_utf16(tmp_path):
-    check_plain(read_table(write(tmp_path, PLAIN, encoding="utf-16")))
-
-
 def test_blanks(tmp_path):
     text = "  Time [s]   Heave [mm]  Pitch\n  0.0   1.5  -2\n 0.1  1  2\n"
     run = read_table(write(tmp_path, text, "run.txt"))
     assert list(run.data_vars) == ["Heave", "Pitch"]
     assert run["Heave"].attrs["units"] == "mm"
     np.testing.assert_array_equal(run["Pitch"], [-2, 2])
-
-
-def test_no_header(tmp_path):
-    run = read_table(write(tmp_path, "0,5\n0.1,6\n"), FileSettings(time="1"))
-    np.testing.assert_array_equal(run["2"], [5, 6])
 
 
 def test_options(tmp_path):
@@ -170,11 +161,6 @@ def test_a_column_by_its_full_header(tmp_path):
     run = read_table(write(tmp_path, "t,WP [m],WP [mm]\n0,1,2\n1,1,2\n"), columns=["WP [mm]"])
     assert list(run.data_vars) == ["WP [mm]"]
     assert run["WP [mm]"].attrs == {"long_name": "WP [mm]", "units": "mm"}
-
-
-def test_a_fault_in_a_column_that_nobody_wants(tmp_path):
-    path = write(tmp_path, "t,a,state,b,b\n0,1,ok,1,2\n1,2,ok,1,2\n")
-    assert list(read_table(path, columns=["a"]).data_vars) == ["a"]
 
 
 @settings(
@@ -330,11 +316,6 @@ def test_what_is_no_table(tmp_path, text, error, message):
         read_table(path)
 
 
-def test_integers_before_decimal_commas_do_not_hide_them(tmp_path):
-    table = read_table(write(tmp_path, b"time;h\n0;1\n1;2\n2;2,5\n"))
-    assert list(table["h"].values) == [1.0, 2.0, 2.5]
-
-
 HEADS = {
     "a mark": "#Time [s],Heave [mm],Pitch (deg),WP 1\n",
     "a mark and units": "# Time\tHeave\tPitch\tWP 1\n# s\tmm\tdeg\t-\n",
@@ -355,16 +336,3 @@ def test_heads_of_loggers(tmp_path, head):
     assert run["Heave"].attrs["units"] == "mm"
     assert run["Pitch"].attrs["units"] == "deg"
     np.testing.assert_array_equal(run["WP 1"], [3, 4, 5])
-
-
-def test_comments_and_blank_lines_among_the_numbers(tmp_path):
-    path = write(tmp_path, "t,h\n0,1\n# a pause\n1,2\n\n,\n2,x\n3,4\n")
-    with pytest.raises(DataError, match=r"line 7, column 'h': 'x' is not a number"):
-        read_table(path)
-    path.write_text(path.read_text().replace("x", "3"))
-    np.testing.assert_array_equal(read_table(path)["h"], [1, 2, 3, 4])
-
-
-def test_exponents_of_fortran(tmp_path):
-    run = read_table(write(tmp_path, "t h\n0 1.5D+01\n1 -2d-1\n"))
-    np.testing.assert_array_equal(run["h"], [15.0, -0.2])

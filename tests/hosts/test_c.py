@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seakeep import BayesianHankelDMDc, Fixed, ProbeAlignment, RequestError
-from seakeep.baselines import Subspace
+from seakeep import ProbeAlignment
 from seakeep.hosts import write_c
 from seakeep.hosts.c import identifier
-from seakeep.models import OBSERVABLES, Bound, ChannelLabel, HankelDMDc
+from seakeep.models import HankelDMDc
 
 NAMES = ["full", "short", "arx", "autonomous", "unstable", "following", "following_now"]
 FINITE, REFUSED, LOST = 0, 1, 2
@@ -130,18 +129,6 @@ def test_a_start_from_what_is_not_finite_is_refused(library, cases):
     assert not any(run.memory)
 
 
-def test_names_and_units_are_text_of_c(tmp_path, make_run):
-    names = ["η_fwd 1", 'a"b\\n?', "größe", "ñ\n", "三7"]
-    run = make_run()
-    runs = run.assign({name: run["heave"] + np.sin(at * run.time) for at, name in enumerate(names)})
-    runs[names[1]].attrs["units"] = "m·s⁻¹"
-    model = HankelDMDc(2, 2, 1.0).fit(runs, names, ["eta_fwd"])
-    found = compiled({"rom": model}, tmp_path)
-    texts = (ctypes.c_char_p * len(names)).in_dll
-    assert [each.decode() for each in texts(found, "rom_state_names")] == names
-    assert texts(found, "rom_state_units")[1].decode() == "m·s⁻¹"
-
-
 def test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python(tmp_path, make_run):
     """A state grows by itself, and a spike a hundred times as high as training is before it."""
     model = HankelDMDc(0, 0, 1.0, delay_rows="exact").fit(make_run(), ["heave"], ["eta_fwd"])
@@ -177,36 +164,3 @@ def test_an_alignment_that_was_left_out_leaves_nothing_to_be_carried(tmp_path, m
         for number, each in enumerate((optional, None))  # the runs state no depth
     )
     assert [path.read_text() for path in made] == [path.read_text() for path in plain]
-
-
-class TestWhatCannotBeExported:
-    def test_an_ensemble(self, tmp_path, make_run, channels):
-        lengths = dict.fromkeys(("state_delays", "input_delays"), Fixed(1.0))
-        spec = BayesianHankelDMDc(
-            encounter_period=0.2, window=None, ridge=Fixed(1.0), n_members=2, **lengths
-        )
-        ensemble = spec.fit(make_run(), **channels)
-        with pytest.raises(RequestError, match="Export one of them: --member 0"):
-            write_c(ensemble, tmp_path)
-        write_c(ensemble.member(0), tmp_path)
-
-    def test_a_subspace_model(self, tmp_path, make_run, channels):
-        model = Subspace(2, 2, order=2).fit(make_run(), **channels)
-        with pytest.raises(RequestError, match="kind 'subspace' cannot be exported"):
-            write_c(model, tmp_path)
-
-    def test_an_observable_in_python_alone(self, tmp_path, make_run, channels, monkeypatch):
-        class Rectified:
-            kind = "rectified"
-
-            def reach(self, dt):
-                return 0, 0
-
-            def bind(self, inputs, period, dt):
-                label = ChannelLabel("rectified", "m", "rectified")
-                return Bound((label,), True, 0, 0, lambda values: np.abs(values[:, :1]))
-
-        monkeypatch.setitem(OBSERVABLES, "rectified", Rectified)
-        model = HankelDMDc(2, 2, 1.0, observables=[Rectified()]).fit(make_run(), **channels)
-        with pytest.raises(RequestError, match="'rectified' is Python code from outside seakeep"):
-            write_c(model, tmp_path)

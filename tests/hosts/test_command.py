@@ -50,21 +50,3 @@ def test_an_fmu_without_a_compiler_is_announced(run, monkeypatch, tmp_path):
     status, said = run("--fmu", "rom.fmu")
     assert status == 0
     assert "rom.fmu holds sources alone: no C compiler was found" in said
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ((), "nothing to write. Give --c DIR"),
-        (("--c", "library", "--steps", "5"), "--steps belongs to --onnx"),
-        (("--fmu", "rom.fmu", "--estimator"), "--estimator belongs to --c"),
-        (("--fmu", "rom.zip"), "rom.zip ends in '.zip'"),
-        (("--c", "library", "--member", "0"), "--member is for ensembles"),
-        (("--mat", "rom.zip"), "rom.zip ends in '.zip'"),
-    ],
-)
-def test_wrong_requests_are_refused_and_write_nothing(words, message, run, tmp_path):
-    status, said = run(*words)
-    assert status == 2
-    assert message in " ".join(said.split())
-    assert [path.name for path in tmp_path.iterdir()] == ["my-model.nc"]

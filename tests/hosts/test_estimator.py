@@ -51,7 +51,7 @@ class Estimator:
         self.memory = (ctypes.c_double * 200_000)()  # more than the struct
         self.calls = {
             verb: getattr(library, f"{name}_{verb}")
-            for verb in ("estimate", "estimated", "deviation", "forecast")
+            for verb in ("estimate", "estimated", "deviation", "forecast", "validity")
         }
         self.calls["estimated"].restype = ctypes.POINTER(ctypes.c_double)
         self.calls["deviation"].restype = ctypes.c_double
@@ -202,6 +202,32 @@ def measured(run, model):
     y[:8], y[150:200, 0], y[230:245] = np.nan, np.nan, np.nan
     u[[30, 160, 161, 162], 1:], u[235:240] = np.nan, np.nan
     return u, y
+
+
+@pytest.mark.parametrize("name", ["full", "following"])
+@pytest.mark.parametrize(
+    ("factor", "slow", "away"), [(1, False, 0), (2.5, False, 0), (1, True, 0), (1, False, 9)]
+)
+def test_what_lies_outside_the_training_is_that_of_the_live_model(
+    cases, name, factor, slow, away, tmp_path
+):
+    model = cases[name].model
+    write_estimator(model, tmp_path, "rom")
+    subprocess.run(
+        ["cc", *FLAGS, "-o", "rom.so", "rom.c", "rom_estimator.c", "-lm"], cwd=tmp_path, check=True
+    )
+    found, live = Estimator(ctypes.CDLL(str(tmp_path / "rom.so")), "rom"), model.live()
+    every = cases[name].run.to_dataframe()
+    u, y = (every[names].to_numpy(copy=True) for names in (model.inputs, model.states))
+    if slow:  # a swell of 0.24 Hz; noise trained one of these models at all periods
+        u[:] = 0.02 * np.sin(0.15 * np.arange(len(u)))[:, None]
+    for at in range(300):
+        row = factor * u[at], y[at] + away * (np.array(model.states) == "surge")
+        found.step(*row)
+        live.step(*row)
+    validity = live.conditions.validity
+    assert found.calls["validity"](found.memory) == validity
+    assert bool(validity) == ((factor, slow, away) != (1, False, 0))
 
 
 @pytest.mark.parametrize("name", ["full", "short", "autonomous", "following", "following_now"])

@@ -137,16 +137,6 @@ def test_another_process_goes_on_from_a_state_to_the_last_bit(
     np.testing.assert_array_equal(found, expected)
 
 
-def test_a_reset_starts_from_the_means_again(slave, cases):
-    case = cases["full"]
-    run(slave, case, 0, 5)
-    slave.reset()
-    slave.setupExperiment(startTime=0.0)
-    slave.enterInitializationMode()
-    slave.exitInitializationMode()
-    np.testing.assert_allclose(slave.getReal([2, 3]), case.model.state_mean, rtol=1e-15)
-
-
 def test_directional_derivatives_are_those_of_the_jacobian(slave, cases):
     case = cases["full"]
     _, on_inputs = case.model.jacobian(case.x_history, case.u[: case.rows + 1])
@@ -157,36 +147,6 @@ def test_directional_derivatives_are_those_of_the_jacobian(slave, cases):
     for unknown, known in ((0, 1), (2, 2)):
         with pytest.raises(Exception, match="fmi2GetDirectionalDerivative failed with status 3"):
             slave.getDirectionalDerivative([unknown], [known], [1.0])
-
-
-class TestWhatIsRefused:
-    def test_another_step(self, slave, capsys):
-        with pytest.raises(Exception, match="fmi2DoStep failed with status 3"):
-            slave.doStep(0.0, 0.2)
-        assert "the communication step must be 0.1 s" in capsys.readouterr().out
-
-    def test_a_gap_in_the_input_which_leaves_the_state(self, slave, cases):
-        case = cases["full"]
-        before = run(slave, case, 0, 3)
-        slave.setReal([0], [np.nan])
-        with pytest.raises(Exception, match="fmi2DoStep failed with status 2"):
-            slave.doStep(0.3, 0.1)
-        assert slave.getReal([2, 3]) == list(before[-1])
-        expected = case.expected[3:10]
-        np.testing.assert_allclose(run(slave, case, 3, 10), expected, rtol=1e-12, atol=1e-12)
-
-    def test_an_output_or_a_history_set_in_service(self, slave):
-        for reference in (2, 4, 10**6):
-            with pytest.raises(Exception, match="fmi2SetReal failed with status 3"):
-                slave.setReal([reference], [0.0])
-
-    def test_a_state_of_another_fmu(self, slave):
-        state = slave.getFMUstate()
-        content = slave.serializeFMUstate(state)
-        slave.freeFMUstate(state)
-        for wrong in (b"another one" + content[11:], content[:-1]):
-            with pytest.raises(Exception, match="fmi2DeSerializeFMUstate failed with status 3"):
-                slave.deSerializeFMUstate(wrong)
 
 
 @pytest.mark.parametrize("wave", ["eta", 'wave <1> & "2"', "c\\d'e", "η */ x"])

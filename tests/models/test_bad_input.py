@@ -61,13 +61,6 @@ def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run, channe
         model.forecast(bad, start=5.0, steps=5)
 
 
-@pytest.mark.parametrize("kind", ["datetime64[ns]", "timedelta64[ns]"])
-def test_times_that_are_not_seconds_are_refused(run, channels, kind):
-    stamps = (1e9 * run.time.values).astype("int64").astype(kind)
-    with pytest.raises(DataError, match=r"times of run must be real numbers; received .* of type"):
-        SPEC.fit(run.assign_coords(time=stamps), **channels)
-
-
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize("name", ["heave", "eta_cog"])
 def test_gaps_in_the_window_are_refused(run, channels, name, value):
@@ -92,15 +85,6 @@ def test_gaps_in_what_a_forecast_reads_are_refused(model, run):
     run.eta_fwd[150] = np.nan
     with pytest.raises(DataError, match=r"'eta_fwd' .* the first at t = 7\.5 s"):
         model.forecast(run, start=6.0, steps=40)
-
-
-def test_a_variable_with_two_dimensions_is_refused(run, channels, model):
-    both = run.assign(heave=(("time", "sensor"), np.zeros((400, 2)), {"units": "m"}))
-    message = r"'heave' of run has the dimensions \('time', 'sensor'\) and shape \(400, 2\)"
-    with pytest.raises(DataError, match=message):
-        SPEC.fit(both, **channels)
-    with pytest.raises(DataError, match=r"has the dimensions .* \('time',\) is expected"):
-        model.forecast(both, start=5.0, steps=5)
 
 
 @pytest.mark.parametrize(
@@ -232,22 +216,6 @@ def test_a_start_outside_the_run_is_refused(model, run, start):
         RequestError, match=r"start = .* s is outside the run, which runs from 0 to"
     ):
         model.forecast(run, start=start, steps=5)
-
-
-def test_messages_tell_samples_apart_whatever_the_times_count_from(run, channels):
-    late = run.assign_coords(time=run.time + 1.7e9)
-    model = SPEC.fit(late, **channels)
-    message = r"start = 1700000000\.13 s \(nearest sample 1700000000\.15 s\) .* at 1700000000\.4 s"
-    with pytest.raises(RequestError, match=message):
-        model.forecast(late, start=1700000000.13, steps=5)
-    with pytest.raises(RequestError, match=r"from 1700000010 s .* ends at 1700000019\.95 s"):
-        model.forecast(late, start=1700000010.0, steps=201)
-    gap = late.isel(time=[*range(50), *range(57, 400)])
-    with pytest.raises(DataError, match=r"1 gap\(s\): after t = 1700000002\.45 s, 7 sample"):
-        model.forecast(gap, start=1700000010.0, steps=5)
-    with pytest.raises(RequestError, match=r"runs from 1700000000 to 1700000019\.95 s"):
-        model.forecast(late, start=30.0, steps=5)
-    assert "run: 391 pairs, 1700000000 to 1700000019.95 s" in model.summary()
 
 
 @pytest.mark.parametrize(

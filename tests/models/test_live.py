@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import seakeep
 from seakeep import HankelDMDc, ProbeAlignment, RequestError, load_live
 from seakeep.models.live import LEAST_RECORD
+from seakeep.models.validity import Validity
 from seakeep.signals import predict_waves
 from seakeep.waves import group_speed
 
@@ -236,7 +237,33 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     # At a lead of 64: 0.49 (1 − .98⁶⁴)² / .02² of the push over (1 − .98¹²⁸) / .0396 of w.
     surge, heave = found[0.7][1][1]
     assert surge > 5 > 2.2 > heave > 0.2
-    assert found[0.7][0] == pytest.approx((1.49 + 1.0) / 2, abs=0.4)
+    assert found[0.7][0] == pytest.approx(found[0.7][1].mean())
+
+
+def test_outside_the_training_the_band_widens_and_says_why(models, run):
+    model, higher = models["plain"], run.copy(deep=True)
+    for name in (*STATES, *INPUTS):
+        higher[name].values *= 1.7
+    stds = []
+    for each in (run, higher):
+        live = started(model, each)
+        made = live.forecast(STEPS, matrix(each, INPUTS)[START:])
+        stds.append(np.stack([made[name].sel(statistic="std") for name in STATES], axis=1))
+    assert Validity.HEIGHT in live.conditions.validity
+    assert "height" in made.attrs["validity"]
+    waves = matrix(higher, INPUTS)[:START]
+    waves = waves - waves.mean(axis=0)
+    heights = 4 * np.sqrt(np.mean(waves**4, axis=0) / (3 * np.mean(waves**2, axis=0)))
+    np.testing.assert_allclose(made.attrs["height"], heights, rtol=1e-12)
+    ratio = np.max(heights / made.attrs["trained_height"])
+    of_late = np.maximum(live.consistency_by_state[1], ratio**2)
+    # Beside the rounding, nothing but the two reasons widens the band.
+    np.testing.assert_allclose(stds[1], np.sqrt(of_late) * stds[0], rtol=1e-12)
+    assert ratio > 1.3
+    drifted = model.live()
+    play(drifted, run.assign(surge=run.surge + 5), 0, START)
+    assert drifted.conditions.validity == Validity.SURGE
+    assert started(model, run).forecast(1).attrs["validity"] == "inside"
 
 
 @pytest.mark.parametrize("value", [9.97e36, 1e200])

@@ -152,11 +152,3 @@ def test_an_optional_alignment_is_left_out_where_the_rig_is_not_known(depth, pos
     if depth is None:
         with pytest.raises(RequestError, match="needs the water depth"):
             needed.fit(given, ["heave", "surge"], ["eta"])
-
-
-def test_columns_are_chosen_at_a_ridge_that_is_stated():
-    found = dataclasses.replace(SPEC, ridge=0.02).settled(runs(), STATES, INPUTS)
-    assert found.settings.ridge == 0.02
-    assert {row["ridge"] for row in found.rows} == {0.02}
-    with pytest.raises(RequestError, match="choose at λ above zero, and ridge = 0 is stated"):
-        dataclasses.replace(SPEC, ridge=0).settled(runs(), STATES, INPUTS)

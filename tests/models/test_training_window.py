@@ -110,16 +110,6 @@ def test_history_before_reads_the_delays_and_nothing_earlier(run, channels):
     np.testing.assert_array_equal(spec.fit(scrambled, **channels).A, spec.fit(run, **channels).A)
 
 
-def test_samples_after_the_stop_are_not_read(run, channels):
-    spec = HankelDMDc(3, 8, 1.0, window=100)
-    scrambled = run.copy(deep=True)
-    for name in scrambled.data_vars:
-        scrambled[name][201:] = np.nan
-    np.testing.assert_array_equal(
-        spec.fit(scrambled, stop=10.0, **channels).A, spec.fit(run, stop=10.0, **channels).A
-    )
-
-
 def test_without_standardisation_channels_are_taken_as_they_are(run, channels):
     model = HankelDMDc(3, 8, 1.0, standardize=False).fit(run, **channels)
     np.testing.assert_array_equal(model.state_mean, 0.0)
@@ -217,17 +207,3 @@ def test_standardising_and_back_returns_the_values(mean, std, values):
     series = np.array(values)[:, None]
     # Numbers up to 2e3 are subtracted and added: rounding of these.
     np.testing.assert_allclose(scale.physical(scale.deviations(series)), series, rtol=0, atol=1e-12)
-
-
-def test_the_same_data_give_the_same_bits(make_run, channels):
-    models = [HankelDMDc(3, 8, 1.0).fit(make_run(), **channels) for _ in range(2)]
-    np.testing.assert_array_equal(models[0].A, models[1].A)
-    np.testing.assert_array_equal(models[0].B, models[1].B)
-
-
-def test_no_run_takes_the_name_of_another(make_run, channels):
-    runs = [make_run(seed=seed) for seed in range(4)]
-    for run, name in zip(runs, ["a", "a (3)", "a", "a (3)"], strict=True):
-        run.attrs["run"] = name
-    trained = HankelDMDc(3, 8, 1.0).fit(runs, **channels).training
-    assert trained.runs == ("a", "a (3)", "a (4)", "a (3) (4)")

@@ -1,19 +1,14 @@
 """Faults of samples of every length are found, and sound series are left alone."""
 
-import shutil
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.campaign import read_campaign
 from seakeep.campaign.pipeline import flag_samples
-from seakeep.quality import Record, findings_of
+from seakeep.quality import Record
 from seakeep.quality.faults import find_held, find_outliers, noise_share, saturated
 from seakeep.quality.samples import constant, flagged, level_drift, levels, noise
 
-TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
 DT = 0.04
 T = DT * np.arange(3000)
 PERIOD = 1.6
@@ -98,16 +93,6 @@ def test_a_sound_series_is_left_alone(noisy):
     assert abs(change) < 0.5 * noisy.std() or certain < 5
 
 
-@pytest.mark.parametrize("share", [0.05, 0.3, 0.6])
-def test_quantised_noise_holds_no_reading(share):
-    """Readings that repeat by chance, up to 60 % of them: their longest run is expected."""
-    random = np.random.default_rng(1)
-    repeats = random.random(100_000) < share
-    fresh = np.where(repeats, 0, np.arange(100_000))
-    x = random.standard_normal(100_000)[np.maximum.accumulate(fresh)]
-    assert not find_held(x, DT).any()
-
-
 @pytest.mark.parametrize("size", [1.5, 3.0, -40.0])
 def test_spikes_of_harmful_size(noisy, size):
     at = [100, 700, 1500, 2980]
@@ -123,14 +108,6 @@ def test_a_probe_that_dies_has_no_drift_besides():
     group = flag_samples(xr.Dataset({"eta": ("time", x, {"units": "m"})}, {"time": T}), False)
     assert list(levels(Record("r", group, {"": group}))) == []
     assert [each.kind.name for each in flagged(Record("r", group, {"": group}))] == ["STUCK"]
-
-
-def test_a_line_that_sticks_and_slips_has_no_outliers():
-    random = np.random.default_rng(0)
-    load = np.repeat(np.cumsum(random.normal(0, 1, 150)), 20) + random.normal(0, 1e-3, T.size)
-    assert not find_outliers(load).any()
-    load[1007] += 30.0
-    assert np.flatnonzero(find_outliers(load)).tolist() == [1007]
 
 
 def test_at_rest_around_the_waves_is_not_held(noisy):
@@ -151,14 +128,6 @@ def test_a_coarse_sensor_stays_at_crests_and_holds_nothing(steps):
     assert not find_held(x[: 3000 - np.argmax(np.diff(x[::-1]) != 0)], DT).any()  # ends at a crest
 
 
-def test_a_camera_that_repeats_frames_holds_none():
-    x = np.repeat(waves()[::10], 10)
-    assert not find_held(x, DT).any()
-    between = np.interp(np.arange(3000), np.arange(0, 3000, 10), waves()[::10])
-    between[1000:1020] = between[1000]  # one frame is dropped
-    assert not find_held(between, DT).any()
-
-
 def test_saturation_recurs_at_the_end_of_the_range():
     x = np.clip(waves(), -4.0, 4.0)
     edges = np.abs(x) == 4.0
@@ -170,28 +139,3 @@ def test_saturation_recurs_at_the_end_of_the_range():
     x[top : top + 12] = x[top]  # once, at its highest
     assert not saturated(x, find_held(x, DT)).any()
     assert reported(x) == {"STUCK"}
-
-
-@pytest.mark.filterwarnings("ignore:first. heave leaves its mean")
-@pytest.mark.parametrize(
-    ("length", "values", "kind"),
-    [
-        (3, [-99.9], "OUTLIERS"),
-        (10, [900.0, -700.0, 500.0, -300.0, 800.0], "OUTLIERS"),
-        (300, None, "STUCK"),
-        (2200, [900.0, -700.0, 500.0, -300.0, 800.0], "NOISE"),
-    ],
-)
-def test_findings_of_the_tutorial_s_heave(tmp_path, length, values, kind):
-    """In the file's unit; 300 samples are 12 s."""
-    shutil.copytree(TUTORIAL, tmp_path / "t")
-    path = tmp_path / "t" / "run1.csv"
-    header, *lines = path.read_text(encoding="utf-8").splitlines()
-    table = [line.split(";") for line in lines]
-    for row in range(600, 600 + length):
-        table[row][3] = table[599][3] if values is None else str(values[row % len(values)])
-    path.write_text("\n".join([header, *map(";".join, table)]), encoding="utf-8")
-    run = read_campaign(tmp_path / "t" / "campaign.toml").prepare(["first"])["first"]
-    found = {(each.channel, each.kind.name) for each in findings_of(run)}
-    assert ("heave", kind) in found
-    assert {channel for channel, _ in found} == {"heave"}

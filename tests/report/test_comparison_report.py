@@ -10,7 +10,6 @@ import xarray as xr
 
 from seakeep.files import check_output
 from seakeep.report.comparison import (
-    band_findings,
     comparison_blocks,
     difference_blocks,
     forecast_header,
@@ -110,61 +109,6 @@ def test_the_band_of_an_ensemble_is_judged_by_hand():
     degrees = row_of(in_degrees(ensemble()))
     np.testing.assert_array_equal(table["coverage"], degrees["coverage"])
     assert float(degrees["band_width"].sel(channel="pitch")) == pytest.approx(np.degrees(0.4))
-
-
-def test_tables_and_words_of_a_band(tmp_path):
-    table = comparison_table([ensemble()])
-    shown, *_ = comparison_blocks(table)
-    mean = float(table["mean_coverage"][0])
-    assert shown.title == "r1: forecast against measurement, 90 % band"
-    assert shown.columns[-2:] == ("in band %", "width in SD")
-    assert shown.rows[-1][-2] == f"{mean:.1f}"
-    lost = replace(ensemble(diverged=5), forecast=ensemble().forecast * np.nan)
-    lost.forecast.attrs = ensemble(diverged=5).forecast.attrs
-    lost = replace(lost, band=ensemble().band * np.nan)
-    assert not lost.complete
-    assert [*band_findings(table), *band_findings(comparison_table([lost]))] == [
-        f"r1: the 90 % band of 4 members holds {mean:.0f} % of the measured instants, not what "
-        "it claims. It carries the spread of the members, and no noise or model error; 1 of 5 "
-        "members diverged and are left out.",
-        "r1: there is no band to judge; 5 of 5 members diverged and are left out.",
-    ]
-    rows = lines_of(write_comparison({"m": table}, tmp_path / "t.csv"))
-    assert float(rows[0]["coverage"]) == float(table["coverage"][0, 0])
-    assert (rows[0]["level"], rows[0]["members"], rows[0]["diverged"]) == ("0.9", "5", "1")
-    single = comparison_table([comparison()])
-    assert band_findings(single) == []
-    assert "coverage" not in write_comparison({"m": single}, tmp_path / "s.csv").read_text()
-
-
-def test_blocks_of_a_model_and_its_rows_with_all_digits(tmp_path):
-    judged = comparison(slack=True, status="diverged at t = 3 s")
-    notes = {"conditional_on": "surge", "probe_offset": 38.8, "probe_offset_spread": 1.2}
-    judged.forecast.attrs.update(notes, reads_input_until=3.24)
-    table = comparison_table([judged])
-    errors, intervals, extremes = comparison_blocks(table)
-    assert errors.note == (
-        "1 still channel left out of the average; diverged at t = 3 s; conditional on measured "
-        "surge; reads the waves up to 3.24 s after each instant; probe offset 38.8 ± 1.2 m"
-    )
-    assert errors.rows[2][1] == "–"
-    # Its error in training SD says something all the same, and counts.
-    at = table.isel(run=0)
-    for mean, each, names in (
-        ("anrmse", "nrmse", ["heave", "pitch"]),
-        ("training_anrmse", "training_nrmse", list(UNITS)),
-    ):
-        expected = float(at[each].sel(channel=names).mean())
-        assert float(at[mean]) == pytest.approx(expected, rel=1e-12)
-    assert intervals.rows[-1][0] == "average"
-    assert extremes.rows[0][2] == f"{float(at['measured_min'][0]):.4g}"
-    rows = lines_of(write_comparison({"m": table}, tmp_path / "t.csv"))
-    assert [row["channel"] for row in rows] == list(UNITS)
-    assert float(rows[0]["nrmse"]) == float(table["nrmse"][0, 0])
-    assert (rows[0]["status"], rows[0]["conditional_on"]) == ("diverged at t = 3 s", "surge")
-    assert (float(rows[0]["probe_offset_spread"]), float(rows[0]["look_ahead"])) == (1.2, 3.24)
-    plain, *_ = comparison_blocks(comparison_table([comparison()]))
-    assert plain.note == ""
 
 
 def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path):

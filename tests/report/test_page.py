@@ -1,6 +1,5 @@
 """The report of a study: complete, self-contained, and at work in a real browser."""
 
-import base64
 import csv
 import json
 import re
@@ -13,28 +12,21 @@ import xarray as xr
 from tutorial_study import put_tutorial
 
 from seakeep.files import check_report
-from seakeep.report.sections.data import test_overlap as overlap_of_tests
-from seakeep.report.sections.data import training_overlap
 from seakeep.report.sections.errors import (
-    PUBLISHED,
     age,
     coverage_table,
     divergence_table,
-    error_table,
 )
-from seakeep.report.sections.histories import history_data, pack
 from seakeep.report.sections.summary import (
-    findings,
-    glossary,
     summary,
 )
 from seakeep.report.tables import probability, small_number
+from seakeep.report.tables import words as known_words
 from seakeep.study import read_result, read_study, run_study
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
 
-from seakeep.report.figures.errors import FEWEST, draw_box_violin
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Drawing, Section, write_page
 from seakeep.report.sections import write_report
@@ -168,24 +160,6 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result)
     assert "Those are 6 T̂ long; the margin is not made for long (12 T̂)" in note
 
 
-def in_one_run(training):
-    """The same windows, in one run."""
-    edges = {key: training[key].max("of_run").values for key in ("begin", "end")}
-    moved = training.drop_dims("of_run").assign_coords(of_run=["a"])
-    return moved.assign(
-        {key: (("training", "of_run"), values[:, None]) for key, values in edges.items()}
-    )
-
-
-def with_models(result, **values):
-    """The same study with other settings of models, MODEL__KEY."""
-    models = json.loads(result.attrs["models"])
-    for place, value in values.items():
-        model, _, key = place.partition("__")
-        models[model]["settings"][key]["value"] = value
-    return replace(result, attrs={**result.attrs, "models": json.dumps(models)})
-
-
 def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
     ((test, training, window), *_) = shown_cells(result)
     figure = history_figure(result, test, training, window)
@@ -207,86 +181,18 @@ def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):
     assert "calibrated" not in [text.get_text() for text in plain.legends[0].get_texts()]
 
 
-def test_tables_say_what_the_campaign_calls_a_channel(result):
-    channels = result.groups["channels"]
-    words = [
-        "Trim angle (MRU-5)" if name == "pitch" else "free" if name == "heave" else str(old)
-        for name, old in zip(channels["name"].values, channels["long_name"].values, strict=True)
-    ]
-    told = channels.assign(long_name=("name", words))
-    other = replace(result, groups={**result.groups, "channels": told})
-    assert ("Trim angle (MRU-5)",) in [row[:1] for row in error_table(other, "unseen").rows]
-    assert "θ Trim angle (MRU-5); " in dict(glossary(other).terms)["in figures"]
-    labels = [each["label"] for each in history_data(other)["channels"]]
-    assert "Trim angle (MRU-5)" in labels
-    # A free name has no symbol: it is said once.
-    lone = replace(result, groups={**result.groups, "channels": _renamed(channels)})
-    assert "kraft bug; " in dict(glossary(lone).terms)["in figures"]
-    assert "kraft bug kraft bug" not in dict(glossary(lone).terms)["in figures"]
-
-
-def _renamed(channels):
-    """A channel of a free name in place of heave."""
-    names = [name if name != "heave" else "kraft_bug" for name in channels["name"].values]
-    states = [name if name != "heave" else "kraft_bug" for name in channels["channel"].values]
-    words = [
-        "kraft bug" if name == "kraft_bug" else str(old)
-        for name, old in zip(names, channels["long_name"].values, strict=True)
-    ]
-    return channels.assign_coords(name=names).assign(
-        channel=("channel", states), long_name=("name", words)
-    )
-
-
 def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(result):
     columns = divergence_table(result, "bayesian", "paper").columns
     assert not any("paper" in each for each in columns)
     asked = changed(result, output={**result.settings["output"], "paper": True})
     table = divergence_table(asked, "bayesian", "paper")
     assert table.columns[-4:] == ("paper: EV", "paper: q0.025", "paper: q0.975", "paper: U")
-    assert [row[-4:] for row in table.rows if row[0] == "heave"] == [PUBLISHED["heave"]]
+    published = known_words()["published"]
+    rows = [row[-4:] for row in table.rows if row[0] == "heave"]
+    assert rows == [tuple(published["heave"])]
     # U is the distance of the quantiles, to the rounding of the last digit.
-    for _, low, high, width in PUBLISHED.values():
+    for _, low, high, width in published.values():
         assert float(high) - float(low) == pytest.approx(float(width), abs=1.01e-4)
-
-
-def test_few_cells_are_told_and_drawn_without_a_density(page, result):
-    from matplotlib.figure import Figure
-
-    count = int(result.tests["unseen"]["judged"].sum())
-    assert count < FEWEST
-    assert any(f": n = {count})" in notice for notice in summary(result).notices)
-    assert "Few cells (a &amp; b" in page.read_text("utf-8")
-    for size, violins in ((FEWEST - 1, 0), (FEWEST, 1)):
-        axes = Figure().subplots()
-        draw_box_violin(axes, np.arange(float(size)), 0.0, 1.0, "black")
-        bodies = [each for each in axes.collections if each.get_alpha() == 0.18]
-        assert len(bodies) == violins
-
-
-def test_windows_that_overlap_or_do_not_fit_are_told(page, result):
-    test = result.tests["unseen"]
-    length, start = float(test["time"].values[-1]), test["start"]
-    for apart, words in ((1.5 * length, ""), (0.5 * length, " 67 %")):
-        moved = test.assign(start=start.copy(data=apart * np.arange(start.size)))
-        # Three windows each half over the next: shares of 1/2, 1 and 1/2.
-        told = overlap_of_tests(changed(result, {"tests/unseen": moved}))
-        assert (words in told) if words else told == ""
-    assert not any("asked for" in text for text in findings(result))
-    many = changed(result, training={**result.settings["training"], "windows": 30})
-    assert findings(many)[-1].startswith("2 training windows were used of the 30 asked for")
-    notices = re.findall(r'<p class="notice">(.*?)</p>', page.read_text("utf-8"), flags=re.S)
-    assert training_overlap(result)[0] == any("A training window" in n for n in notices)
-    # Without a window, or as a centre, a model reads from the start.
-    part = with_models(result, deterministic__window=300, bayesian__centred=False)
-    length = float(result.attrs["longest_training"])
-    one = in_one_run(result.groups["training"])
-    for apart, overlaps in ((2.0, False), (0.5, True)):
-        ends = length * (1 + apart * np.arange(one.sizes["training"]))
-        moved = one.assign(end=one["end"].copy(data=ends[:, None]))
-        shares, words = training_overlap(changed(part, {"training": moved}))
-        assert shares == overlaps
-        assert ("do not overlap" in words) != overlaps
 
 
 def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(result):
@@ -295,15 +201,6 @@ def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(result):
         assert not [cell for cell in cells if re.search(r"\b0\.0000\b", cell)]
     assert (probability(0.0004), probability(0.0386)) == ("< 0.001", "0.039")
     assert small_number(0.0) == "0"
-
-
-def test_packing_loses_a_step_of_the_range_at_most():
-    values = np.array([-1.0, 0.123456, np.nan, 3.0])
-    packed = pack(values)
-    codes = np.frombuffer(base64.b64decode(packed["data"]), dtype="<u2")
-    step = (packed["high"] - packed["low"]) / 65534
-    found = np.where(codes == 65535, np.nan, packed["low"] + step * codes)
-    np.testing.assert_allclose(found, values, rtol=0, atol=0.5 * step)
 
 
 def test_a_report_that_was_interrupted_is_written_again(tmp_path):

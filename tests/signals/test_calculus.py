@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seakeep.errors import RequestError
 from seakeep.signals import (
     band_pass,
     complementary_filter,
@@ -47,19 +46,6 @@ def test_gain_of_the_band(frequency, gain):
     assert np.sqrt(2) * out.std() == pytest.approx(gain, abs=0.03)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (((0.0, 5.0), 1), r"needs 0 < low < high.*received \(0, 5\) Hz"),
-        (((2.0, 1.0), 1), r"received \(2, 1\) Hz"),
-        (((0.3, 60.0), 1), r"at most the Nyquist frequency \(50 Hz\)"),
-    ],
-)
-def test_bands_that_are_none(arguments, message):
-    with pytest.raises(RequestError, match=message):
-        integrate(T, DT, *arguments)
-
-
 def test_derivative_of_a_quartic_is_exact():
     # Fourth order, at the ends too; rounding of T⁴ = 4e7 over dt.
     t = np.arange(0, 2, 0.1)
@@ -80,20 +66,6 @@ def test_envelope_of_a_group():
     # The kernel of the Hilbert transform falls as 1/(π t): a kink at an end, 25 s away, leaks
     # about 1/(π ω t) = 0.002 of its size, twice an amplitude of 1.4, into a square of 2.
     np.testing.assert_allclose(out[INNER], (slow**2)[INNER], atol=0.03)
-
-
-def test_channels_side_by_side():
-    both = np.column_stack([np.sin(5 * T), np.cos(3 * T)])
-    for function in (
-        lambda x: integrate(x, DT, (0.3, 5.0)),
-        lambda x: differentiate(x, DT),
-        lambda x: envelope_squared(x, DT),
-    ):
-        together = function(both)
-        assert together.shape == both.shape
-        for i in range(2):
-            # Rounding of the mean, which the prediction of a pure sine magnifies at the ends.
-            np.testing.assert_allclose(together[:, i], function(both[:, i]), atol=1e-6)
 
 
 def test_a_complementary_rate_keeps_the_steady_drift():

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from seas import sea
 
-from seakeep.errors import DataError, RequestError
 from seakeep.signals import correlation_peak, effective_celerity, phase_celerity
 from seakeep.waves import phase_speed
 
@@ -69,29 +68,3 @@ def test_a_peak_between_samples(lag, period):
     # at their ends by lag/210 s.
     assert found == pytest.approx(lag, abs=0.02 * DT)
     assert height == pytest.approx(1.0, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("call", "kind", "message"),
-    [
-        (
-            lambda a, b: effective_celerity(a, a, DT, 0.1, DEPTH),
-            DataError,
-            r"not later than the upstream one \(lag -?0\.0000 s, correlation 1\.000\).* same",
-        ),
-        (
-            lambda a, b: correlation_peak(a, b, DT, (0.0, 200.0)),
-            RequestError,
-            r"lags from 0 to 200 s cannot be sought in records of 209\.92 s: give a rising range",
-        ),
-        (
-            lambda a, b: correlation_peak(a, b, DT, (0.5, 0.7)),
-            DataError,
-            "has no peak between lags of 0.5 and 0.7 s .* Check which probe stands upstream",
-        ),
-    ],
-)
-def test_what_has_no_celerity(call, kind, message):
-    (a, b), _ = probes()
-    with pytest.raises(kind, match=message):
-        call(a, b)

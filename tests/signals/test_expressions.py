@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import RequestError
 from seakeep.signals.expressions import parse
 
 A, B = np.array([1.0, 2.0, 6.0]), np.array([4.0, -1.0, 0.5])
@@ -63,19 +63,3 @@ def test_refused(text, position, what):
         parse(text)
     assert f"is not allowed: at character {position}, {what}" in str(caught.value)
     assert "Allowed are numbers, channel names" in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("1 + 2", r"the expression '1 \+ 2' names no channel, so it would"),
-        (" ", "the expression ' ' is empty"),
-        ("a + c", r"uses the channel 'c'.* Channels: a, b, short"),
-        ("a + short", r"channels of one length; .* a: \(3,\), short: \(2,\)"),
-        ("1 / (a - 2)", r"1 value\(s\) that are not finite, the first at sample 1"),
-        ("b ** 0.5", r"1 value\(s\) that are not finite, the first at sample 1"),
-    ],
-)
-def test_what_has_no_value(text, message):
-    with pytest.raises((RequestError, DataError), match=message):
-        parse(text).evaluate({"a": A, "b": B, "short": B[:2]})

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from seakeep.errors import DataError
 from seakeep.signals import bridge, inspect_times, onto_uniform
 
 
@@ -45,10 +44,3 @@ def test_short_gaps_are_bridged_and_long_ones_marked():
     assert np.max(np.abs(result.values - x)[100:115]) < 0.03
     there = np.isfinite(holed)
     np.testing.assert_array_equal(result.values[there], x[there])
-
-
-def test_words():
-    with pytest.raises(DataError, match=r"the run misses 9\d+ samples and has 10"):
-        onto_uniform(np.append(np.arange(9), 1000.0), np.zeros(10))
-    with pytest.raises(DataError, match=r"the series has 1 value\(s\) in 4 samples"):
-        bridge([np.nan, 1.0, np.nan, np.nan], 0.1, 1.0)

@@ -6,7 +6,7 @@ import xarray as xr
 
 from seakeep import cli
 from seakeep.campaign import read_table
-from seakeep.errors import DataError, SeakeepWarning
+from seakeep.errors import DataError, RequestError
 from seakeep.signals import TrackingSettings, compare_motion, contact_sheet, track_video
 from seakeep.signals.tracking import FLAGS
 
@@ -190,14 +190,6 @@ def test_a_camera_on_the_other_side(plain, tmp_path, tracked):
         assert rms(out[name] - tracked[name]) < 5e-4, name
 
 
-def test_the_binary_mask_of_the_paper(plain):
-    out = track_video(plain[0], TrackingSettings(refine=False, passband=None))
-    assert rms(centroid_error(out, plain[1])) < 0.5
-    _, _, pitch = motion(out.time)
-    # A panel nearly level shows one step or none: up to 0.7 degree in single frames.
-    assert np.rad2deg(rms(out["pitch"] - pitch)) < 0.2
-
-
 def test_flags_of_bad_frames(disturbed):
     path, place = disturbed
     out = track_video(path)
@@ -229,19 +221,10 @@ def test_gaps_are_bridged_only_when_asked_and_only_short_ones(disturbed):
     assert np.rad2deg(rms((out["pitch"] - pitch)[short])) < 0.5
 
 
-def test_a_second_panel_elsewhere_is_a_jump(tmp_path):
-    def hook(i, lit):
-        if i == 15:
-            there = lit[250:430, 380:640].copy()
-            lit[250:430, 380:640] = 80
-            lit[40:220, 980:1240] = there
-        return lit
-
-    path = tmp_path / "jump.mp4"
-    render(path, hook, frames=30)
-    out = track_video(path)
-    assert list(np.flatnonzero(out["flag"])) == [15]
-    assert out["flag"][15] == FLAGS["jump"]
+@pytest.mark.parametrize("region", [(1, 2), (1000, 0, 400, 100), (-1, 0, 40, 100)])
+def test_a_region_has_four_numbers_within_the_picture(plain, region):
+    with pytest.raises(RequestError, match=r"no part of the picture .* 1280 × 720 .* left, top"):
+        track_video(plain[0], TrackingSettings(region=region))
 
 
 def test_video_against_mru(tracked):
@@ -295,19 +278,6 @@ def test_a_contact_sheet_shows_bad_frames_too(disturbed, tmp_path):
     render(tmp_path / "short.mp4", frames=5)
     with pytest.raises(DataError, match="it is not the video that was tracked"):
         contact_sheet(tmp_path / "short.mp4", track_video(path))
-
-
-def test_a_video_that_ends_early(tmp_path, plain):
-    """A container that says how many frames there are at its head, cut off."""
-    path = tmp_path / "cut.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), RATE, (1280, 720))
-    for i in range(20):
-        writer.write(np.clip(lit_frame(i / RATE), 0, 255).astype(np.uint8))
-    writer.release()
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    with pytest.warns(SeakeepWarning, match=r"announces 20 frames and ends after \d+: it was cut"):
-        out = track_video(path)
-    assert 5 < out.time.size < 15
 
 
 def test_the_command_writes_what_a_campaign_reads(plain, tracked, tmp_path, monkeypatch, capsys):

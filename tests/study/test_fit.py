@@ -16,7 +16,6 @@ from seakeep.models import KINDS
 from seakeep.study import (
     compare,
     comparison_table,
-    fit_baselines,
     fit_campaign,
 )
 
@@ -66,14 +65,6 @@ def test_the_test_starts_in_the_test_span_with_history_from_before_it(halves):
     # state, and a model of deviations has no constant term (the ends of the window over its
     # length, some 1e-4 here).
     assert judged.anrmse < 1e-3
-
-
-def test_the_history_of_a_window_may_come_from_before_the_training_span(halves):
-    runs = '[runs.all]\nfile = "run.csv"\ntrain = [100.0, 150.0]\ntest = [150.0, 200.0]\n'
-    given = "state_delays = 2\ninput_delays = 60\nridge = 1e-9\nwindow = 501"
-    assert fit_campaign(campaign(halves, given, runs)).training.columns == (500,)
-    without = given.replace("\nwindow = 501", "")
-    assert fit_campaign(campaign(halves, without, runs)).training.columns == (440,)
 
 
 @pytest.mark.filterwarnings("ignore:all. eta_fwd stuck")  # what its preparation finds
@@ -276,16 +267,6 @@ def test_a_setting_has_one_score_whether_fit_or_tune_chose_it(halves, capsys):
         chosen = fit_campaign(asked)
         assert main(["tune", str(asked.path), "--vary", "ridge"]) == 0
     assert capsys.readouterr().out.startswith(chosen.selection)
-
-
-def test_a_baseline_that_is_left_out_names_what_to_write(halves):
-    asked = campaign(halves, EXACT + "\n[campaign]\nencounter_period = 0.8")
-    with pytest.warns(SeakeepWarning, match=r"'subspace' is left out: .*the key order, or raise.*"
-                      r"\[models\.subspace\], fit it with --model subspace"):  # fmt: skip
-        fit_baselines(asked, ["heave"], ["eta_fwd"])
-    own = '\n[models.subspace]\nkind = "subspace"\norder = 2\nfuture = 4\nstate_delays = 4\n'
-    own += 'input_delays = 4\nstates = ["heave"]\ninputs = ["eta_fwd"]\n'
-    assert fit_campaign(campaign(halves, EXACT + own), "subspace").kind == "subspace"
 
 
 def test_a_lead_reads_waves_ahead_of_time(halves):

@@ -55,25 +55,6 @@ def finished(study_folder, finished_once):
     return replace(finished_once, folder=folder)
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("study.json", "damaged or belongs to no study"),
-        ("units/mine.npz", "units holds files, and .* does not say of which study"),
-        ("tables/mine.csv", "tables holds files that no report of seakeep wrote"),
-        ("histories/mine.js", "histories holds files that no report of seakeep wrote"),
-        ("report.html", "exists and is not a report that seakeep wrote"),
-    ],
-)
-def test_files_of_others_in_the_folder_stay(name, words, tmp_path):
-    path = tmp_path / name
-    path.parent.mkdir(exist_ok=True)
-    path.write_text("mine", encoding="utf-8")
-    with pytest.raises(RequestError, match=words):
-        UnitFolder(tmp_path, "0" * 64).check()
-    assert path.read_text(encoding="utf-8") == "mine"
-
-
 def test_cells_are_what_the_models_say(study_folder, finished):
     planned = make_plan(read_study(study_folder / "study.toml"))
     # Windows side by side are one product: sums in another order, about 1e-13.

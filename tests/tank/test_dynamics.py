@@ -129,32 +129,6 @@ def test_energy_goes_into_radiated_waves_alone(ideal_rig, calm, dof, size):
     assert slack == (size == 1.0)
 
 
-def test_halving_the_step_changes_little(settings, rig, hydro):
-    fine = assemble_rig(
-        settings.model_copy(
-            update={"simulation": settings.simulation.model_copy(update={"step": 0.005})}
-        ),
-        hydro,
-    )
-    sea = small_sea(np.linspace(2.0, 7.0, 12), 0.01)
-    coarse, halved = simulate(rig, sea, 60.0), simulate(fine, sea, 60.0)
-    difference = coarse.position - halved.position[:, ::2]
-    # The page's bound; the error of the memory's quadrature is of second order in the step.
-    assert np.all(difference.std(axis=1) < 0.002 * coarse.position.std(axis=1))
-
-
-def test_wave_forces_at_the_slow_position_feign_no_mean(linear_rig):
-    sea = regular_sea(2.8, 0.1, 0.0, 3.6, np.random.default_rng(0))
-    motion = simulate(linear_rig, sea, 400.0)
-    late = motion.time > 300.0
-    swing = np.ptp(motion.position[0, late])
-    assert swing > 0.05
-    # No drift, no mean. Forces at the full surge would push with ½·k·X·x ≈ 1 N: 0.3 m.
-    assert abs(motion.position[0, late].mean()) < 0.01 * swing
-    # What the linear response leaves of the fast surge is lines' geometry and drifting phases.
-    assert motion.slow_surge[late].std() < 0.02 * motion.position[0, late].std()
-
-
 def viscous_power(rig, motion, late):
     """Mean power that all viscous losses take in the time domain, W."""
     v = motion.velocity[:, late]
@@ -286,13 +260,6 @@ def test_depth_and_density_must_be_those_of_the_file(settings, hydro):
         assemble_rig(with_settings(settings, facility={"water_depth": 2.0}), hydro)
     with pytest.raises(RequestError, match=r"density is 1025 .* made for 1000\."):
         assemble_rig(with_settings(settings, facility={"density": 1025.0}), hydro)
-
-
-def test_a_stiff_line_asks_for_a_smaller_step(settings, hydro):
-    stiff = settings.moorings["bow"].model_copy(update={"stiffness": 2e7})
-    changed = settings.model_copy(update={"moorings": {"bow": stiff}})
-    with pytest.raises(RequestError, match="too large: the integration is stable"):
-        assemble_rig(changed, hydro)
 
 
 def test_other_vessels_need_no_code(settings, hydro):

@@ -54,31 +54,6 @@ def test_rates_and_columns_are_the_contract(records):
     assert units["trigger"] == "V"
 
 
-def pulse_times(time, values):
-    """Centres of the trigger pulses of one logger by its own clock."""
-    high = values > 0.3 * values.max()
-    starts = np.flatnonzero(high[1:] & ~high[:-1])
-    centres = []
-    for start in starts:
-        window = slice(max(0, start - 40), start + 400 if time[1] < 0.01 else start + 40)
-        weight = np.clip(values[window], 0.1 * values.max(), None) - 0.1 * values.max()
-        centres.append(np.average(time[window], weights=weight))
-    return np.array(centres)
-
-
-def test_triggers_tell_the_clocks(records, short):
-    reference = pulse_times(
-        records["wave_probes"]["time"].values, records["wave_probes"]["trigger"].values
-    )
-    assert reference == pytest.approx([10.0, 30.0], abs=2e-3)
-    for name, column in (("mru", "trigger"), ("video", "lamp"), ("loads", "trigger")):
-        record, clock = records[name], short.instruments.clocks[name]
-        found = pulse_times(record["time"].values, record[column].values)
-        expected = clock.offset + (1 + 1e-6 * clock.drift) * np.array([10.0, 30.0])
-        # The lamp's noise of 0.02 on fifteen frames a pulse: a few milliseconds.
-        assert found == pytest.approx(expected, abs=8e-3)
-
-
 def test_trigger_is_a_smooth_pulse():
     t = np.arange(0.0, 60.0, 1e-3)
     pulse = trigger(t, 20.0, 0.5)

@@ -1,12 +1,8 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from seakeep.report.figures.runs import tank_spectrum_figure
 from seakeep.tank.play import play_run
-from seakeep.tank.realised import comparison, matrix_rows, paper_peak, realise
-from seakeep.tank.settings import SpectrumSettings
+from seakeep.tank.realised import comparison, matrix_rows, realise
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
@@ -57,20 +53,3 @@ def test_test_matrix_is_the_papers_first_table(settings, realised):
     assert phase == pytest.approx([1.811, 2.090, 2.560], abs=1.5e-3)
     assert group == pytest.approx([0.905, 1.045, 1.280], abs=1.5e-3)
     assert rows[1]["realised h [m]"].startswith("0.105 ± 0.00")
-
-
-def test_seas_of_other_lengths_and_of_a_table_are_listed_and_drawn(settings, rig, realised):
-    pytest.importorskip("matplotlib")
-    run = settings.runs["irregular_1"]
-    table = SpectrumSettings(kind="table", frequencies=(0.3, 0.5, 1.0), densities=(0.0, 1e-2, 0.0))
-    tabled = run.model_copy(update={"spectrum": table, "nominal_height": None})
-    runs = {"tabled": tabled, **settings.runs}
-    short = replace(realised[1], elevation=realised[1].elevation[: int(40 / realised[1].dt)])
-    seas = [replace(realised[0], run="tabled"), short]
-    given = settings.model_copy(update={"runs": runs})
-    assert [row["h [m]"] for row in matrix_rows(given, seas)] == ["", "0.15"]
-    lines = tank_spectrum_figure(given, seas).axes[0].get_lines()
-    (rough,) = [line for line in lines if "paper's" in str(line.get_label())]
-    each = [paper_peak(sea.elevation, sea.dt)[1:] for sea in seas]
-    middle = np.mean([np.interp(each[0][0], *of) for of in each], axis=0)
-    np.testing.assert_allclose(rough.get_ydata(), middle, rtol=1e-12)  # summed in another order

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import print_table, progress_bar, show
-from seakeep.cli.options import Scheduler, checked_count
+from seakeep.cli.console import Scheduler, checked_count, print_table, progress_bar, show
 
 if TYPE_CHECKING:
     from seakeep.study import StudyResult
@@ -45,12 +43,13 @@ def study(
 
     Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
     """
+    from seakeep.models.executor import make_executor
     from seakeep.report.sections.summary import findings, overview_table
     from seakeep.study import read_study, run_study
 
     asked = read_study(study_file)
     folder = out or study_file.parent / f"{study_file.stem}-results"
-    with _working(folder, workers, scheduler) as executor:
+    with make_executor(checked_count(workers, scheduler), scheduler) as executor:
         with progress_bar("Study") as tell:
             result = run_study(asked, folder, executor=executor, progress=tell)
         page = _write_study(result)
@@ -91,7 +90,7 @@ def reproduce(
 
     Example: seakeep reproduce --quick --out quick
     """
-    from seakeep.models.executor import on_this_machine, submitting
+    from seakeep.models.executor import make_executor, on_this_machine, submitting
     from seakeep.report.acts import finding, short_table
     from seakeep.study.reproduce import ACTS, Size
     from seakeep.study.reproduce import reproduce as reproduce_study
@@ -100,7 +99,7 @@ def reproduce(
     pictured = _pictured([act.name for act in ACTS if preset in (None, act.preset)])
 
     pages = []
-    with _working(out, workers, scheduler) as executor:
+    with make_executor(checked_count(workers, scheduler), scheduler) as executor:
         with progress_bar("Study") as tell:
             play = partial(
                 reproduce_study, out, preset, size=size, seed=seed, executor=executor, progress=tell
@@ -170,18 +169,3 @@ def _write_act(_: None, item: tuple[StudyResult, bool]) -> None:
     from seakeep.report.sections import write_report
 
     write_report(item[0], pictures=item[1])
-
-
-@contextmanager
-def _working(folder: Path, workers: int | None, scheduler: str | None) -> Iterator[Executor | None]:
-    """What does the work; interrupted work is kept."""
-    from seakeep.models.executor import make_executor
-
-    try:
-        with make_executor(checked_count(workers, scheduler), scheduler) as executor:
-            yield executor
-    except KeyboardInterrupt as stop:
-        stop.add_note(
-            f"What was finished is kept in {folder}; the same command continues where it stopped."
-        )
-        raise

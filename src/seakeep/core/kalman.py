@@ -72,7 +72,7 @@ class DelayFilter:
         rows[:, newest] = self.covariance[newest, newest] * np.outer(factor, factor)
         self.covariance[newest], self.covariance[:, newest] = rows, rows.T  # exactly symmetric
 
-    def measure(self, seen: BoolArray) -> tuple[FloatArray, FloatArray]:
+    def measure(self, seen: BoolArray) -> FloatArray:
         """Update by the rows that were measured.
 
         Parameters
@@ -84,21 +84,16 @@ class DelayFilter:
         -------
         gain : ndarray, shape (N(s+1), N)
             What a unit of innovation adds to the state; zero columns for rows not measured.
-        whitening : ndarray, shape (N, N)
-            Inverse of the Cholesky factor of the innovation's covariance, which makes an
-            innovation white: its square is the Mahalanobis distance squared. Zero for rows not
-            measured.
         """
         count, size = self.a.shape
-        gain, whitening = np.zeros((size, count)), np.zeros((count, count))
+        gain = np.zeros((size, count))
         rows = np.flatnonzero(seen)
         if not rows.size:
-            return gain, whitening
+            return gain
         places = size - count + rows
         cross = self.covariance[:, places]
         innovation = cross[places] + np.diag(self.noise[rows])
-        factor = linalg.cholesky(innovation, lower=True)
-        weights = linalg.cho_solve((factor, True), cross.T).T
+        weights = linalg.cho_solve(linalg.cho_factor(innovation, lower=True), cross.T).T
         self.covariance -= weights @ cross.T
         self.covariance += self.covariance.T.copy()
         self.covariance *= 0.5
@@ -106,10 +101,7 @@ class DelayFilter:
         self.covariance[exact] = 0.0
         self.covariance[:, exact] = 0.0
         gain[:, rows] = weights
-        whitening[np.ix_(rows, rows)] = linalg.solve_triangular(
-            factor, np.eye(rows.size), lower=True
-        )
-        return gain, whitening
+        return gain
 
     def ahead(self, steps: int) -> FloatArray:
         """Variances that today's errors alone leave after 1 … `steps` steps, shape (steps, N)."""

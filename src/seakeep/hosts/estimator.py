@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
+from seakeep.conventions import is_elevation
+from seakeep.core.bands import PER_OCTAVE
 from seakeep.hosts.c import content_of, identifier, rendered, sources, write_sources
 from seakeep.hosts.program import exportable
 from seakeep.models import Model
+from seakeep.models.validity import CYCLES, TRAINED
 from seakeep.signals.prediction import MEMORY
+from seakeep.waves import GRAVITY
 
 
 def write_estimator(
@@ -41,7 +46,9 @@ def write_estimator(
     """
     linear, name = exportable(model), identifier(name)
     content = content_of(linear, name) | linear.live(noise=noise, roles=roles).equations
-    content |= {"begins": linear.history_samples, "memory": MEMORY}
+    content |= {"begins": linear.history_samples, "memory": MEMORY, "pi": math.pi}
+    content |= {"coverage": linear.coverage, "trained": TRAINED, "cycles": CYCLES}
+    content |= {"gravity": GRAVITY, "per_octave": PER_OCTAVE, "is_elevation": is_elevation}
     files = ("estimator.h", "estimator.c")
     more = {f"{name}_{file}": rendered(file, **content) for file in files}
     return write_sources(sources(linear, name) | more, folder)

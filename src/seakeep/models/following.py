@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, IntArray
 from seakeep.core.recursion import Place
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
@@ -182,18 +182,10 @@ class Following:
         placed : tuple of int
             Elevations at stated positions, by their places among the inputs.
         """
-        rig = self._rig(run)
-        placed, at = self._probes(rig)
-        taps, _ = carriers(
-            *self._waves,
-            rig.depth,
-            self.dt,
-            targets=np.tile(at, count),
-            probes=at,
-            back=self.back,
-            ahead=0,
-            leads=np.repeat(np.arange(1, count + 1), len(at)),
-        )
+        rig, placed = self._rig(run), self._placed
+        at = [rig.positions[column] or 0.0 for column in placed]
+        leads = np.repeat(np.arange(1, count + 1), len(at))
+        taps, _ = self._carriers(rig, placed, np.tile(at, count), 0, leads)
         return taps.reshape(count, len(at), *taps.shape[1:]), placed
 
     def lines(
@@ -217,15 +209,26 @@ class Following:
         """
         return _lines(self, self._rig(run), places)
 
-    def _probes(self, rig: Rig) -> tuple[tuple[int, ...], list[float]]:
-        """Elevations at stated positions, or the first, by their places among inputs; positions."""
-        placed = self.alignment.placed or tuple(np.flatnonzero(self.alignment.carried).tolist()[:1])
-        return placed, [rig.positions[column] or 0.0 for column in placed]
-
     @property
-    def _waves(self) -> tuple[FloatArray, FloatArray]:
-        """Frequencies and powers that filters are designed for."""
-        return np.linspace(*self.band, len(self.power)), np.array(self.power)
+    def _placed(self) -> tuple[int, ...]:
+        """Elevations at stated positions, or the first, by their places among the inputs."""
+        return self.alignment.placed or tuple(np.flatnonzero(self.alignment.carried).tolist()[:1])
+
+    def _carriers(
+        self, rig: Rig, columns: Sequence[int], targets: FloatArray, ahead: int, leads: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Filters of these probes; see :func:`seakeep.signals.carriers.carriers`."""
+        return carriers(
+            np.linspace(*self.band, len(self.power)),
+            np.array(self.power),
+            rig.depth,
+            self.dt,
+            targets=targets,
+            probes=[rig.positions[column] or 0.0 for column in columns],
+            back=self.back,
+            ahead=ahead,
+            leads=leads,
+        )
 
     def _rig(self, run: xr.Dataset | None) -> Rig:
         """Offsets, positions and depth of a run; those of training without one."""
@@ -282,17 +285,9 @@ def _banks(following: Following, rig: Rig) -> tuple[Bank, ...]:
     for column in np.flatnonzero(aligned.carried).tolist():
         own = rig.positions[column]
         columns = [column] if own is None else list(aligned.placed)
-        places = [rig.positions[c] or 0.0 for c in columns]
-        taps, errors = carriers(
-            *following._waves,
-            rig.depth,
-            following.dt,
-            targets=following.place.grid + rig.offsets[column] + (own or 0.0),
-            probes=places,
-            back=following.back,
-            ahead=following.ahead,
-            leads=np.full(following.place.count, following.lead),
-        )
+        targets = following.place.grid + rig.offsets[column] + (own or 0.0)
+        leads = np.full(len(targets), following.lead)
+        taps, errors = following._carriers(rig, columns, targets, following.ahead, leads)
         out.append(Bank(column, tuple(columns), taps, errors))
     return tuple(out)
 
@@ -302,18 +297,10 @@ def _lines(
     following: Following, rig: Rig, places: tuple[float, ...]
 ) -> tuple[FloatArray, tuple[int, ...]]:
     """Filters of :meth:`Following.lines`."""
-    placed, probes = following._probes(rig)
-    last = placed[int(np.argmax(probes))]
-    taps, _ = carriers(
-        *following._waves,
-        rig.depth,
-        following.dt,
-        targets=np.repeat(places, 3) + rig.offsets[last] + max(probes),
-        probes=probes,
-        back=following.back,
-        ahead=following.ahead,
-        leads=np.tile([0, 1, 2], len(places)),
-    )
+    placed, leads = following._placed, np.tile([0, 1, 2], len(places))
+    last = max(placed, key=lambda column: rig.positions[column] or 0.0)
+    targets = np.repeat(places, 3) + rig.offsets[last] + (rig.positions[last] or 0.0)
+    taps, _ = following._carriers(rig, placed, targets, following.ahead, leads)
     before, now, after = taps.reshape(len(places), 3, *taps.shape[1:]).swapaxes(0, 1)
     filters = np.stack([now, (after - before) / (2.0 * following.dt)], axis=1)
     return filters.reshape(-1, *taps.shape[1:]), placed

@@ -46,6 +46,7 @@ from seakeep.models.inputs import Drive
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import Span
 from seakeep.models.summaries import statistic_coordinate
+from seakeep.models.validity import Conditions, Coverage
 from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
 STATE = "live state"
@@ -70,6 +71,11 @@ RIG = ("water_depth", "celerity", "probe_offset")
 class Servable(Runs, Protocol):
     """A model that can go into service."""
 
+    @property
+    def coverage(self) -> Coverage:
+        """Waves that it was trained in."""
+        ...
+
     def live(
         self,
         *,
@@ -78,18 +84,15 @@ class Servable(Runs, Protocol):
         roles: Mapping[str, str] | None = None,
     ) -> Live:
         """Put the model into service."""
-        ...
 
 
 class _Update(NamedTuple):
     """What the filter makes of one sample.
 
-    Gain, shape (N(s+1), N); whitening of its innovation, shape (N, N); and standard deviations of
-    that, shape (N,).
+    Gain, shape (N(s+1), N), and standard deviations of the innovation, shape (N,).
     """
 
     gain: FloatArray
-    whitening: FloatArray
     deviations: FloatArray
 
 
@@ -194,7 +197,6 @@ class Live:
         self._filter = DelayFilter(self._a, process, variances, np.zeros((size, size)))
         self._as_it_is = _Update(  # of a complete sample after complete ones
             np.eye(size, count, count - size),
-            np.linalg.inv(np.linalg.cholesky(process)),
             np.sqrt(np.diagonal(process) + variances),
         )
         self._time = math.nan
@@ -220,10 +222,10 @@ class Live:
         self._updates: deque[_Update] = deque(maxlen=self._ahead + 2)
         self._history = np.tile(signature.state_scale.centre, (s + 1, 1))
         self._innovation = np.full(count, np.nan)
-        # Of squares that fade: sums, and weights; of all states, of each, and of each in free runs.
-        self._squares = np.zeros((2, 2 * count + 1))
-        self._fade = np.full(2 * count + 1, 1.0 - 1.0 / CONSISTENCY)
-        self._fade[count + 1 :] = 1.0 - 1.0 / max(CONSISTENCY, 2 * len(errors.rms))
+        # Of squares that fade: sums, and weights; of each state, and of each in free runs.
+        self._squares = np.zeros((2, 2, count))
+        free = max(CONSISTENCY, 2 * len(errors.rms))
+        self._fade = 1.0 - 1.0 / np.array([[CONSISTENCY], [free]])
         self._free = self._history.copy()
 
     def __repr__(self) -> str:
@@ -265,29 +267,39 @@ class Live:
 
     @property
     def consistency(self) -> float:
-        """Running mean of the normalised innovation squared, per measured state.
+        """Mean of :attr:`consistency_by_state`, NaN before the first prediction.
 
-        One where the innovations are as large as the residuals of training, over the last few
-        hundred samples. Well above one for longer than that, the model no longer fits the vessel,
-        or a sensor its channel; NaN before the first prediction.
+        One where errors are as in training, over the last few hundred samples. Well above one for
+        longer than that, the model no longer fits the vessel, or a sensor its channel.
         """
-        return float(self._mean_squares()[0])
+        each = self.consistency_by_state
+        return float(each[np.isfinite(each)].mean()) if np.isfinite(each).any() else math.nan
 
     @property
     def consistency_by_state(self) -> FloatArray:
-        """The same for each state, shape (2, N): one step ahead, and in free runs.
+        """Running mean of squared errors over those of training, shape (2, N).
 
-        Free runs start again and again from the estimate, are driven by the waves as they were
-        measured, and last as long as those of training, whose errors at each lead they are compared
-        with. A small error of each step that is always the same, as in waves outside the training,
-        shows in the second row long before the first. NaN where there is none yet.
+        One step ahead, where errors are innovations, and in free runs. These start again and again
+        from the estimate, are driven by the waves as they were measured, and last as long as those
+        of training, whose errors at each lead they are compared with. A small error of each step
+        that is always the same, as in waves outside the training, shows in the second row long
+        before the first. NaN where there is none yet.
         """
-        return self._mean_squares()[1:].reshape(2, -1)
-
-    def _mean_squares(self) -> FloatArray:
         with np.errstate(invalid="ignore"):  # 0/0 before the first
-            squares: FloatArray = self._squares[0] / self._squares[1]
-        return squares
+            means: FloatArray = self._squares[0] / self._squares[1]
+        return means
+
+    @property
+    def conditions(self) -> Conditions | None:
+        """Waves and mean surge of the record against the training; None before 4 samples."""
+        taken = self._count.taken
+        if taken < 4 or not self.signature.inputs:
+            return None
+        surge = None
+        if "surge" in self.signature.states:
+            rows = self._rows("x", max(taken - self._record, 0), taken)
+            surge = rows[:, self.signature.states.index("surge")]
+        return self.model.coverage.conditions(self._known_inputs(), self.signature, surge)
 
     @property
     def equations(self) -> dict[str, Any]:
@@ -448,7 +460,7 @@ class Live:
                 limit = self.errors.at(count.since + 1) ** 2
                 self._filter.limit(limit, exactly=not (count.partly or seen.any()))
             deviations = np.sqrt(np.diagonal(self.covariance) + self._noise**2)
-            update = _Update(*self._filter.measure(seen), deviations)
+            update = _Update(self._filter.measure(seen), deviations)
         self._updates.append(update)
         count.complete = count.complete + 1 if is_exact else 0
         if count.complete > self.signature.state_delays:
@@ -534,23 +546,17 @@ class Live:
     def _judge(self, at: int, update: _Update, innovation: FloatArray) -> None:
         """Take a sample into the running squares, NaN for what was not measured."""
         self._innovation, lead = innovation, self._count.lead
-        measured, seen = self._rows("y", at, at + 1)[0], np.isfinite(innovation)
-        squares = np.full(2 * seen.size + 1, np.nan)
-        with np.errstate(over="ignore", invalid="ignore"):
-            if seen.any():
-                # A sum of squares: it may overflow, and is never negative.
-                white = update.whitening @ np.where(seen, innovation, 0.0)
-                squares[0] = np.fmin(np.sum(white**2) / np.count_nonzero(seen), SPIKE)
-                squares[1 : seen.size + 1] = (innovation / update.deviations) ** 2
+        measured = self._rows("y", at, at + 1)[0]
+        squares = np.full((2, measured.size), np.nan)
+        with np.errstate(over="ignore"):
+            squares[0] = (innovation / update.deviations) ** 2
             if lead:
                 predicted = self._predicted(self._free, at - 1)
                 self._free[:-1], self._free[-1] = self._free[1:], predicted
-                free = (measured - predicted) / self.errors.at(lead)
-                squares[seen.size + 1 :] = free**2
-        taken = ~np.isnan(squares)
-        self._squares[:, taken] *= self._fade[taken]
-        self._squares[0, taken] += np.minimum(squares[taken], SPIKE)
-        self._squares[1, taken] += 1.0
+                squares[1] = ((measured - predicted) / self.errors.at(lead)) ** 2
+        self._squares *= np.where(np.isnan(squares), 1.0, self._fade)
+        self._squares[0] += np.fmin(np.nan_to_num(squares, posinf=SPIKE), SPIKE)
+        self._squares[1] += ~np.isnan(squares)
         lead = (lead + 1) % (len(self.errors.rms) + 1) if lead else 0
         if not lead and (update is self._as_it_is or self._noise.any()):
             self._free[:], lead = self._history, 1
@@ -611,7 +617,10 @@ class Live:
             ``std`` stays below half of its SD in training, s; where it is as long as
             the forecast, it is at least that. ``std`` holds the errors of free runs in training,
             those of the estimate, the spread of the members and that of the waves that are not
-            known. ``attrs["predictable"]`` is the time for which
+            known. Where waves or mean surge of late lie outside the training, the errors are
+            raised to those of late and by the square of the height: ``attrs["validity"]`` names
+            what does (:class:`seakeep.models.validity.Validity`), beside the numbers and
+            ``trained_`` ones. ``attrs["predictable"]`` is the time for which
             the waves at the probe farthest down-wave are known from the one farthest up-wave, s
             (:func:`seakeep.signals.prediction.predictable_time`); 0 without positions and depth.
 
@@ -632,13 +641,16 @@ class Live:
         windows = self._windows(count, futures)
         with engine.member_series(self.model, windows) as (values, lost):
             complete = values[lost.max(axis=1) < 0].reshape(-1, *values.shape[2:])
+        conditions, wider = self.conditions, np.ones(len(signature.states))
+        if conditions is not None and conditions.validity:
+            wider = np.fmax(conditions.beyond**2, np.fmax(self.consistency_by_state[1], 1.0))
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(complete):
             spread = (
                 complete.var(axis=0, ddof=1) if len(complete) > 1 else np.zeros(table.shape[1:])
             )
             table[0] = complete.mean(axis=0) if len(complete) > 1 else complete[0]
-            table[1] = np.sqrt(spread + self._error_variances(count))
+            table[1] = np.sqrt(spread + wider * self._error_variances(count))
             half = _quantile(level, spread, table[1] ** 2, len(futures) > 1) * table[1]
             table[2:] = table[0] - half, table[0] + half
         variables = label_channels(signature, table, ("statistic", "time"))
@@ -650,6 +662,8 @@ class Live:
         attrs = {"start": self._time, "level": level, "known_input": known}
         attrs |= {"diverged": len(values) - len(complete) // values.shape[1]}
         attrs |= {"predictable": self._predictable()}
+        if conditions is not None:
+            attrs |= conditions.attrs()
         return xr.Dataset(
             variables,
             coords={

@@ -19,8 +19,9 @@ from seakeep.models.training import TrainingData
 
 PERIODS = 15.0
 """Length of the free runs that judge a read-out, encounter periods."""
-COARSE = 4
-"""Places of the carriers' grid between two of the first scan for a line."""
+STEP, REACH = 2, PER_WAVE // 2
+"""Step of the scan for a line, in places of the carriers' grid, and steps to either side: a length
+of the peak's wave. Half of the gain is lost 0.3 m off the line, on tanks with waves of 4 m."""
 WORST = 10.0
 """NRMSE at which a window counts no worse."""
 SURE = 2.0
@@ -81,7 +82,10 @@ def fit_readouts(
     states = [data.state_scale.physical(values) for values in data.states]
     windows = zip(states, data.windows, strict=True)
     seen = np.concatenate([values[window.samples] for values, window in windows])
-    waves, follows, out = _Waves(data, runs, {}), data.input_map.follows, []
+    follows, out = data.input_map.follows, []
+    spacing = 0.0 if follows is None else follows.place.spacing
+    places: FloatArray = STEP * spacing * np.arange(-REACH, REACH + 1.0)
+    waves = [_waves(data, runs, number, places) for number in range(len(states) * bool(follows))]
     for each in readouts:
         column, columns = names.index(each.channel), [names.index(name) for name in each.of]
         floor, units = floor_of(seen, seen[:, column], columns), data.state_labels[column].units
@@ -90,9 +94,9 @@ def fit_readouts(
         load = None
         if follows is not None:
             columns = [follows.column, *(c for c in columns if c != follows.column)]
-            line = _Line(waves, states, column, columns)
+            line = _Line(data, states, waves, places, column, columns)
             if each.kind == "auto":
-                kind, scores = line.chosen(judged, floor)
+                kind, scores = _chosen(line, judged, floor)
             if kind == "wave":
                 load = line.map(range(len(states)))
         elif kind == "wave":
@@ -105,155 +109,123 @@ def fit_readouts(
     return tuple(out)
 
 
-@dataclass(frozen=True, eq=False)
-class _Waves:
-    """Waves at places about the vessel, at the samples of the training arrays.
+def _waves(
+    data: TrainingData, runs: Mapping[str, xr.Dataset], number: int, places: FloatArray
+) -> FloatArray:
+    """Elevation and rate at places about the vessel at the training samples of a run.
 
-    Parameters
-    ----------
-    data, runs
-        As for :func:`fit_readouts`.
-    at : dict
-        Elevation and rate in each run, shape (time, 2), by place in steps of the carriers' grid.
+    Shape (time, place, 2); NaN where the record does not tell them.
     """
-
-    data: TrainingData
-    runs: Mapping[str, xr.Dataset]
-    at: dict[int, list[FloatArray]]
-
-    @property
-    def spacing(self) -> float:
-        """Step of the places, m."""
-        assert self.data.input_map.follows is not None
-        return self.data.input_map.follows.place.spacing
-
-    def find(self, places: Sequence[int]) -> None:
-        """Make those of some places known."""
-        new = [place for place in places if place not in self.at]
-        every = [self._in_run(run, new) for run in range(len(self.data.names))] if new else []
-        for number, place in enumerate(new):
-            self.at[place] = [values[:, number] for values in every]
-
-    def _in_run(self, number: int, places: Sequence[int]) -> FloatArray:
-        """Waves of a run, shape (time, place, 2); NaN where its record does not tell them."""
-        data, name = self.data, self.data.names[number]
-        follows, run = data.input_map.follows, self.runs[name]
-        assert follows is not None
-        values = labelled.channel_matrix(run, [label.name for label in data.input_labels], name)
-        time = np.asarray(run["time"].values, dtype=float)
-        begin = data.first_instants[number] - data.windows[number].first * data.dt
-        # The row of a sample is the wave an instant after the step that leads to it starts.
-        offset = labelled.nearest_sample(time, begin, name) - 1
-        count = len(data.states[number])
-        first = max(offset, follows.back)
-        stop = min(offset + count, len(values) - follows.ahead)
-        out = np.full((count, len(places), 2), np.nan)
-        drive = data.input_map.drive(values, [], run=run)
-        at = tuple(place * self.spacing for place in places)
-        out[first - offset : stop - offset] = drive.waves(at, first, stop)
-        return out
+    name, follows = data.names[number], data.input_map.follows
+    assert follows is not None
+    run = runs[name]
+    values = labelled.channel_matrix(run, [label.name for label in data.input_labels], name)
+    time = np.asarray(run["time"].values, dtype=float)
+    begin = data.first_instants[number] - data.windows[number].first * data.dt
+    # The wave of a sample is that an instant after the one from which the step to it starts.
+    offset = labelled.nearest_sample(time, begin, name) - 1
+    count = len(data.states[number])
+    first = max(offset, follows.back)
+    stop = min(offset + count, len(values) - follows.ahead)
+    out = np.full((count, len(places), 2), np.nan)
+    drive = data.input_map.drive(values, [], run=run)
+    out[first - offset : stop - offset] = drive.waves(tuple(places.tolist()), first, stop)
+    return out
 
 
 class _Line:
-    """A load, and the sums of its regressions at the places that were looked at.
+    """A load, and the sums of its regressions at all places.
 
     Parameters
     ----------
-    waves : _Waves
-        Waves of training.
+    data : TrainingData
+        As for :func:`fit_readouts`.
     states : sequence of ndarray, each of shape (time, N)
-        States of training.
+        States of training, physical units.
+    waves : sequence of ndarray, each of shape (time, place, 2)
+        Waves of training.
+    places : ndarray, shape (place,)
+        Where they are, m.
     column : int
-        Place of the load among them.
+        Place of the load among the states.
     columns : list of int
         Places of surge and other motions.
     """
 
     def __init__(
-        self, waves: _Waves, states: Sequence[FloatArray], column: int, columns: list[int]
+        self,
+        data: TrainingData,
+        states: Sequence[FloatArray],
+        waves: Sequence[FloatArray],
+        places: FloatArray,
+        column: int,
+        columns: list[int],
     ) -> None:
-        self.waves, self.states, self.column, self.columns = waves, states, column, columns
-        self.sums: dict[int, FloatArray] = {}
-        self._scan(range(-PER_WAVE, PER_WAVE + 1, COARSE))
-        best = self._best(range(len(states)))
-        self._scan(range(best - COARSE + 1, best + COARSE))
-
-    def _pieces(self, place: int) -> list[FloatArray]:
-        """Motions, wave and load of each run, shape (sample, len(columns) + 3)."""
-        out = []
-        for window, states, wave in zip(
-            self.waves.data.windows, self.states, self.waves.at[place], strict=True
-        ):
-            parts = [states[:, self.columns], wave, states[:, [self.column]]]
-            every = np.concatenate(parts, axis=1)[window.first_column + 1 : window.last + 1]
-            out.append(every[np.isfinite(every).all(axis=1)])
-        return out
-
-    def _moments(self, place: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Means and standard deviations of motions and wave, and knots of the surge."""
-        pooled = np.concatenate(self._pieces(place))[:, :-1]
-        mean, std = pooled.mean(axis=0), pooled.std(axis=0, ddof=1)
-        return mean, std, np.quantile((pooled[:, 0] - mean[0]) / std[0], KNOTS)
-
-    def _scan(self, places: Sequence[int]) -> None:
-        """Take sums at some places, of each run."""
-        self.waves.find(places)
-        for place in places:
-            mean, std, knots = self._moments(place)
-            self.sums[place] = np.stack(
+        self.waves, self.places, self.column, self.columns = waves, places, column, columns
+        self.spread = data.state_scale.spread[[column]]
+        self.pieces = []  # motions, wave and load of each run, shape (place, sample, …)
+        for window, x, wave in zip(data.windows, states, waves, strict=True):
+            inside = slice(window.first_column + 1, window.last + 1)
+            known = x[inside, [*columns, column]], wave[inside].swapaxes(0, 1)
+            motions = np.broadcast_to(known[0], (len(places), *known[0].shape))
+            every = np.concatenate([motions[..., :-1], known[1], motions[..., -1:]], axis=2)
+            self.pieces.append(every[:, np.isfinite(every).all(axis=(0, 2))])
+        pooled = np.concatenate(self.pieces, axis=1)[..., :-1]
+        self.mean, self.std = pooled.mean(axis=1), pooled.std(axis=1, ddof=1)
+        self.knots = np.quantile((pooled[0, :, 0] - self.mean[0, 0]) / self.std[0, 0], KNOTS)
+        self.sums = np.array(
+            [
                 [
-                    sums((each[:, :-1] - mean) / std, each[:, -1], knots)
-                    for each in self._pieces(place)
+                    sums((each[at, :, :-1] - mean) / std, each[at, :, -1], self.knots)
+                    for each in self.pieces
                 ]
-            )
-
-    def _best(self, runs: Sequence[int]) -> int:
-        """Place of the line as some runs tell it."""
-        every = np.stack(list(self.sums.values()))
-        return list(self.sums)[best_place(every[:, list(runs)])]
+                for at, (mean, std) in enumerate(zip(self.mean, self.std, strict=True))
+            ]
+        )
 
     def map(self, runs: Sequence[int]) -> LoadMap:
         """The load as some runs tell it."""
-        place = self._best(runs)
-        mean, std, knots = self._moments(place)
-        pieces = self._pieces(place)
-        seen = np.concatenate([pieces[run] for run in runs])
+        products = self.sums[:, list(runs)]
+        at = best_place(products)
+        seen = np.concatenate([self.pieces[run][at] for run in runs])
         low, high = seen.min(axis=0), seen.max(axis=0)
         margin = MARGIN * (high[-1] - low[-1])
         return LoadMap(
-            place * self.waves.spacing,
+            float(self.places[at]),
             self.column,
             self.columns,
-            mean,
-            std,
+            self.mean[at],
+            self.std[at],
             low[:-1],
             high[:-1],
-            knots,
-            weights_of(self.sums[place][list(runs)].sum(axis=0)),
+            self.knots,
+            weights_of(products[at].sum(axis=0)),
             np.array([low[-1] - margin, high[-1] + margin]),
         )
 
-    def chosen(self, windows: Sequence[Held], floor: float) -> tuple[ReadOutKind, dict[str, float]]:
-        """The kind that is best on each run in turn, as the other runs teach it, and the scores."""
-        errors: dict[str, list[FloatArray]] = {"none": [], "wave": []}
-        for each in windows if len(windows) > 1 else ():
-            load = self.map([run for run in range(len(self.states)) if run != each.run])
-            wave = self.waves.at[round(load.place / self.waves.spacing)][each.run]
-            at = each.starts[:, None] + np.arange(1, each.measured.shape[1] + 1)
-            linear = each.predicted[..., self.column]
-            for kind, read in (("none", linear), ("wave", load(each.predicted, wave[at]))):
-                error = metrics.nrmse(
-                    predicted=np.maximum(read, floor)[..., None],
-                    measured=each.measured[..., [self.column]],
-                    training_std=self.waves.data.state_scale.spread[[self.column]],
-                )
-                errors[kind].append(np.minimum(error[:, 0], WORST))
-        none, wave = (np.concatenate([np.empty(0), *each]) for each in errors.values())
-        sound = np.isfinite(none) & np.isfinite(wave)
-        if not sound.any():
-            return "none", {}
-        scores = {"none": float(none[sound].mean()), "wave": float(wave[sound].mean())}
-        gain = (none - wave)[sound]
-        doubt = float(gain.std(ddof=1)) / len(gain) ** 0.5 if len(gain) > 1 else np.inf
-        least = max(SURE * doubt, LEAST * scores["none"])
-        return ("wave" if gain.mean() > least else "none"), scores
+
+def _chosen(
+    line: _Line, judged: Sequence[Held], floor: float
+) -> tuple[ReadOutKind, dict[str, float]]:
+    """The kind that is best on each run in turn, as the other runs teach it, and the scores."""
+    errors = []
+    for each in judged if len(judged) > 1 else ():
+        load = line.map([run for run in range(len(line.waves)) if run != each.run])
+        at = each.starts[:, None] + np.arange(1, each.measured.shape[1] + 1)
+        wave = line.waves[each.run][at, int(np.argmin(np.abs(line.places - load.place)))]
+        both = np.stack([each.predicted[..., line.column], load(each.predicted, wave)])
+        error = metrics.nrmse(
+            predicted=np.maximum(both, floor)[..., None],
+            measured=np.broadcast_to(each.measured[..., line.column], both.shape)[..., None],
+            training_std=line.spread,
+        )
+        errors.append(np.minimum(error[..., 0], WORST))
+    none, wave = np.concatenate([np.empty((2, 0)), *errors], axis=1)
+    sound = np.isfinite(none) & np.isfinite(wave)
+    if not sound.any():
+        return "none", {}
+    scores = {"none": float(none[sound].mean()), "wave": float(wave[sound].mean())}
+    gain = (none - wave)[sound]
+    doubt = float(gain.std(ddof=1)) / len(gain) ** 0.5 if len(gain) > 1 else np.inf
+    least = max(SURE * doubt, LEAST * scores["none"])
+    return ("wave" if gain.mean() > least else "none"), scores

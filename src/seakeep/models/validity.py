@@ -5,15 +5,16 @@ Slow motions of which a training window holds too few cycles to estimate mean an
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntFlag
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from scipy import fft
 
-from seakeep.arrays import BoolArray, FloatArray
+from seakeep.arrays import BoolArray, FloatArray, IntArray
 from seakeep.conventions import is_elevation
 from seakeep.core.bands import PER_OCTAVE, band_edges, band_energy, split_bands
 from seakeep.errors import warn
@@ -26,6 +27,114 @@ TRAINED = 0.01
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
 CYCLES = 5.0
 """Periods from which on a spectrum shows which waves it holds."""
+
+
+class Validity(IntFlag):
+    """What of the waves, or of the mean surge, lies outside the training; 0 where nothing does."""
+
+    PERIOD = 1
+    HEIGHT = 2
+    STEEPNESS = 4
+    SURGE = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Waves and mean surge against those of training.
+
+    Parameters
+    ----------
+    trained : Coverage
+        The training.
+    periods : ndarray, shape (band,)
+        Middle of each band, s.
+    peak : ndarray of int, shape (channel,)
+        Band with the most energy.
+    unseen : ndarray, shape (channel,)
+        Part of the energy at periods that did not train.
+    heights, steepnesses : ndarray, shape (channel,)
+        As those of :class:`Coverage`.
+    reasons : ndarray of bool, shape (3, channel)
+        Whether period, height and steepness lie outside.
+    surge : float or None
+        Mean, m.
+    reach : ndarray, shape (2,)
+        Lowest and highest surge in training, m.
+    """
+
+    trained: Coverage
+    periods: FloatArray
+    peak: IntArray
+    unseen: FloatArray
+    heights: FloatArray
+    steepnesses: FloatArray
+    reasons: BoolArray
+    surge: float | None
+    reach: FloatArray
+
+    @property
+    def validity(self) -> Validity:
+        """What lies outside the training."""
+        drifts = self.surge is not None and not self.reach[0] <= self.surge <= self.reach[1]
+        yes = np.append(self.reasons.any(axis=1), drifts)
+        return Validity(int(yes @ 2 ** np.arange(4)))
+
+    @property
+    def beyond(self) -> float:
+        """Height over the trained one where it lies outside; the largest, 1 or more."""
+        ratio = self.heights / np.maximum(self.trained.heights, np.finfo(float).tiny)
+        return float(np.max(ratio, where=self.reasons[1], initial=1.0))
+
+    def attrs(self) -> dict[str, Any]:
+        """Attributes of a forecast: validity by name, numbers of each input, and those trained."""
+        out: dict[str, Any] = {
+            "validity": str(self.validity.name or "INSIDE").lower().replace("|", ", "),
+            "height": self.heights,
+            "trained_height": self.trained.heights,
+            "steepness": self.steepnesses,
+            "trained_steepness": self.trained.steepnesses,
+            "period": self.periods[self.peak],
+            "unseen_energy": self.unseen,
+        }
+        if self.surge is not None:
+            out |= {"mean_surge": self.surge, "trained_surge": self.reach}
+        return out
+
+    def sentences(self, units: Sequence[str]) -> list[str]:
+        """A sentence for each reason: periods, heights, steepnesses, mean surge."""
+        told: list[list[str]] = [[], [], []]
+        for at, (channel, unit) in enumerate(zip(self.trained.channels, units, strict=True)):
+            peak, taught = self.peak[at], self.trained.shares[at] >= TRAINED
+            known, trained = self.trained.known[at], np.flatnonzero(taught)
+            if self.reasons[0, at]:
+                low, high, where, word, nothing = trained[0], trained[-1], "outside", "to", ""
+                if low < peak < high and not known[peak]:
+                    low, high = trained[trained < peak][-1], trained[trained > peak][0]
+                    where, word, nothing = "between", "and", ", with none between"
+                told[0].append(
+                    f"{channel}: the dominant period of {self.periods[peak]:.3g} s lies {where} "
+                    f"the periods that trained the model ({self.periods[high]:.3g} {word} "
+                    f"{self.periods[low]:.3g} s{nothing}); {100 * self.unseen[at]:.0f} % of the "
+                    "energy is at periods it has not seen"
+                )
+            for group, what, values, most, of in (
+                (1, "height", self.heights, self.trained.heights, f" {unit}" if unit else ""),
+                (2, "steepness in deep water", self.steepnesses, self.trained.steepnesses, ""),
+            ):
+                if self.reasons[group, at]:
+                    told[group].append(
+                        f"{channel}: a {what} of {values[at]:.3g}{of}, trained up to "
+                        f"{most[at]:.3g}{of}"
+                    )
+        lines = ["; ".join(each) for each in told if each]
+        if Validity.SURGE in self.validity:
+            assert self.surge is not None
+            side = "downstream" if self.surge > self.reach[1] else "upstream"
+            lines.append(
+                f"a mean surge of {self.surge:.3g} m, {side} of the trained {self.reach[0]:.3g} to "
+                f"{self.reach[1]:.3g} m"
+            )
+        return lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +170,15 @@ class Coverage:
         most = np.max([_heights(each, dt) for each in series], axis=0)
         return cls(tuple(channels), first, _shares(energy), *most)
 
+    @property
+    def known(self) -> BoolArray:
+        """Bands that were trained, and those beside them: the leakage of a taper reaches there."""
+        taught = self.shares >= TRAINED
+        known = taught.copy()
+        known[:, 1:] |= taught[:, :-1]
+        known[:, :-1] |= taught[:, 1:]
+        return known
+
     def is_trained(self, frequency: FloatArray) -> BoolArray:
         """Whether frequencies (Hz) lie in bands that were trained, or beside one.
 
@@ -71,55 +189,45 @@ class Coverage:
         edges = band_edges(self.first, self.shares.shape[1])
         band = np.searchsorted(edges, frequency, side="right") - 1
         inside = (band >= 0) & (band < self.shares.shape[1])
-        known = _with_neighbours(self.shares >= TRAINED)
-        result: BoolArray = inside & known[:, np.clip(band, 0, self.shares.shape[1] - 1)]
+        result: BoolArray = inside & self.known[:, np.clip(band, 0, self.shares.shape[1] - 1)]
         return result
 
-    def compare(
-        self, inputs: FloatArray, dt: float, duration: float, units: Sequence[str]
-    ) -> Iterator[tuple[str, str, str]]:
-        """Say in what the inputs (time, channel) of a forecast differ from those of training.
+    def conditions(
+        self,
+        inputs: FloatArray,
+        signature: Signature,
+        surge: FloatArray | None = None,
+        duration: float | None = None,
+    ) -> Conditions:
+        """Compare inputs (time, channel) with those of training, over a `duration` in s.
 
-        Yields sentences on period, height and steepness of each input that moves for five periods
-        or more of a `duration` in s; empty where it was trained. The height of n irregular waves
-        scatters by about 0.85/√n (one SD): two of that, and a tenth, are no reason.
+        The height of n irregular waves scatters by about 0.85/√n (one SD): two of that, and a
+        tenth, are no reason. What moves for five periods or less is not judged.
         """
-        shares = _shares(band_energy(inputs, dt, self.first, self.shares.shape[1]))
+        dt = signature.dt
+        own = _shares(band_energy(inputs, dt, self.first, self.shares.shape[1]))
         edges = band_edges(self.first, self.shares.shape[1])
+        taught, peak = self.shares >= TRAINED, own.argmax(axis=1)
         periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])
-        rows = zip(self.channels, units, self.shares, shares, strict=True)
-        measures = zip(*_heights(inputs, dt), self.heights, self.steepnesses, strict=True)
-        for (channel, unit, taught, own), numbers in zip(rows, measures, strict=True):
-            trained, known = np.flatnonzero(taught >= TRAINED), _with_neighbours(taught >= TRAINED)
-            peak = int(np.argmax(own))
-            repeats = duration / periods[peak]
-            if not trained.size or not own.any() or repeats <= CYCLES:
-                continue  # a constant has no period
-            period = height = steepness = ""
-            low, high, where, word, nothing = trained[0], trained[-1], "outside", "to", ""
-            if low < peak < high and not known[peak]:
-                low, high = trained[trained < peak][-1], trained[trained > peak][0]
-                where, word, nothing = "between", "and", ", with none between"
-            if (outside := own[~known].sum()) > 0.5:
-                period = (
-                    f"{channel}: the dominant period of {periods[peak]:.3g} s lies {where} the "
-                    f"periods that trained the model ({periods[high]:.3g} {word} "
-                    f"{periods[low]:.3g} s{nothing}); {100 * outside:.0f} % of the energy is at "
-                    "periods it has not seen"
-                )
-            margin, (high_here, steep_here, highest, steepest) = 1.1 + 1.7 / repeats**0.5, numbers
-            if high_here > margin * highest:
-                unit = f" {unit}" if unit else ""
-                height = (
-                    f"{channel}: a height of {high_here:.3g}{unit}, trained up to "
-                    f"{highest:.3g}{unit}"
-                )
-            if is_elevation(channel) and steep_here > margin * steepest:
-                steepness = (
-                    f"{channel}: a steepness in deep water of {steep_here:.3g}, trained up to "
-                    f"{steepest:.3g}"
-                )
-            yield period, height, steepness
+        lasts = len(inputs) * dt if duration is None else duration
+        repeats = lasts / periods[peak]
+        heights, steepnesses = _heights(inputs, dt)
+        elevations = np.array([is_elevation(each) for each in self.channels], dtype=bool)
+        margin = 1.1 + 1.7 / repeats**0.5
+        unseen = np.where(self.known, 0.0, own).sum(axis=1)
+        reasons = np.array(
+            [
+                unseen > 0.5,
+                heights > margin * self.heights,
+                elevations & (steepnesses > margin * self.steepnesses),
+            ]
+        )
+        reasons &= taught.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
+        mean, reach, scale = None, np.array([-np.inf, np.inf]), signature.state_scale
+        if surge is not None and "surge" in signature.states and np.isfinite(surge).any():
+            at, mean = signature.states.index("surge"), float(np.nanmean(surge))
+            reach = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
+        return Conditions(self, periods, peak, unseen, heights, steepnesses, reasons, mean, reach)
 
     def to_variables(self) -> dict[str, Any]:
         """Variables of a file."""
@@ -173,29 +281,11 @@ def outside_training(
     values = labelled.channel_matrix(run, model.inputs, name, slice(first, at + steps))
     if len(values) < 2 or not np.all(np.isfinite(values)):
         return []
-    duration, units = steps * model.dt, [label.units for label in model.signature.input_labels]
-    waves = list(coverage.compare(values, model.dt, duration, units))
-    texts = ["; ".join(filter(None, of)) for of in zip(*waves, strict=True)]
+    duration = steps * model.dt
     if surge is None and "surge" in run:
         surge = run["surge"].values[(time > start) & (time <= start + duration + 1e-6)]
-    if waves and "surge" in model.states and surge is not None:
-        scale, at = model.signature.state_scale, model.states.index("surge")
-        low, high = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
-        mean = float(np.mean(surge[np.isfinite(surge)])) if np.isfinite(surge).any() else low
-        if not low <= mean <= high:
-            side = "downstream" if mean > high else "upstream"
-            texts.append(
-                f"a mean surge of {mean:.3g} m, {side} of the trained {low:.3g} to {high:.3g} m"
-            )
-    return [each for each in texts if each]
-
-
-def _with_neighbours(is_trained: BoolArray) -> BoolArray:
-    """Bands (…, band) and those beside them: the leakage of a taper reaches there."""
-    known = is_trained.copy()
-    known[..., 1:] |= is_trained[..., :-1]
-    known[..., :-1] |= is_trained[..., 1:]
-    return known
+    conditions = coverage.conditions(values, model.signature, surge, duration)
+    return conditions.sentences([label.units for label in model.signature.input_labels])
 
 
 def _shares(energy: FloatArray) -> FloatArray:

@@ -10,14 +10,22 @@ from pathlib import Path
 import numpy as np
 
 from seakeep.arrays import Progress
-from seakeep.report.claims import REGULAR, SEA, SINGLE, claims_table, error_of
+from seakeep.report.claims import (
+    ENSEMBLE,
+    REGULAR,
+    SEA,
+    SINGLE,
+    Interval,
+    claims_table,
+    error_of,
+)
 from seakeep.report.figures.histories import acts_figure
 from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.errors import divergence_table
 from seakeep.report.sections.summary import heat_table
 from seakeep.report.style import judged_models, model_words
-from seakeep.report.tables import Number, Table, number, numbers, table
+from seakeep.report.tables import Number, Table, number, numbers, percent, short, table
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import average_of
@@ -86,7 +94,7 @@ def _summary(results: Results) -> Section:
     repeats = [result.groups.get("repeats") for result in results.values()]
     return section(
         "summary",
-        more=(finding(results), NOTE),
+        more=(finding(results), against_filter(results), NOTE),
         points=[f"{act.title}. {act.sentence}" for act in _played(results)],
         figures=(drawing("acts", partial(acts_figure, results)),),
         tables=(replace(short, note=f"{short.note} {still_water(results)}"),),
@@ -133,16 +141,42 @@ def finding(results: Results) -> str:
     """The conclusion on irregular waves in one sentence, with 95 % intervals."""
     errors = {act: error_of(results[act], SEA, model=SINGLE).text() for act in results}
     still = error_of(list(results.values())[-1], SEA, model="hold_last").text()
-    parts = [
-        words.format(errors[act])
-        for act, words in {
-            "recommended": "the recommended model errs {} SD of the measurement",
-            "raw": "the paper's procedure {} on the same channels and windows",
-            "paper": "and {} without the slow drift",
-        }.items()
-        if act in errors
-    ]
+    words = {
+        "recommended": "the recommended model errs {} SD of the measurement",
+        "raw": "the paper's procedure errs {} on the channels as measured",
+        "paper": "and {} without the slow drift",
+    }
+    parts = [each.format(errors[act]) for act, each in words.items() if act in errors]
     return f"In irregular waves {', '.join(parts)}; the last measured state errs {still}."
+
+
+def against_filter(results: Results) -> str:
+    """How the error differs between models and the filter beside them, in one sentence."""
+    parts = []
+    for act in _played(results):
+        at = (
+            results[act.name]
+            .groups["statistics/differences"]
+            .sel(test=SEA[0], model=SINGLE, other="fir", measure="nrmse", channel="average")
+        )
+        ratio = Interval(*(1.0 + float(at[key]) for key in ("change", "lower", "upper")))
+        parts.append(f"{ratio.change()} in {act.letter}")
+    return (
+        "From the filter with the same data, look-ahead and input map (FIR, its length and λ "
+        "chosen by validation) to the single model, the median error there changes by "
+        f"{', '.join(parts)}."
+    )
+
+
+def band_sentence(results: Results) -> str:
+    """How much the calibrated band of the recommended ensemble holds; empty without one."""
+    if (result := results.get("recommended")) is None:
+        return ""
+    table = result.groups["statistics/coverage"]["calibrated_inside"]
+    at = table.sel(model=ENSEMBLE, against="measured", channel="average")
+    seas = (f"{percent(at.sel(test=test))} % ({result.label_of(test)})" for test in result.tests)
+    level = short(100 * float(result.settings["statistics"]["level"]))
+    return f"Of the instants, the calibrated {level} % band of (c) holds {', '.join(seas)}."
 
 
 def still_water(results: Results) -> str:

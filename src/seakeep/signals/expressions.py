@@ -75,8 +75,6 @@ class Expression:
 
         Raises
         ------
-        RequestError
-            If a channel that the expression uses is not among `values`.
         DataError
             If the value is not finite somewhere (a division by zero, the root of a negative).
 
@@ -85,22 +83,11 @@ class Expression:
         >>> parse("2 * a - mean(a)").evaluate({"a": [1.0, 2.0, 3.0]})
         array([0., 2., 4.])
         """
-        for name in self.channels:
-            if name not in values:
-                raise RequestError(
-                    f"the expression {self.text!r} uses the channel '{name}', which does not "
-                    f"exist.{did_you_mean(name, values)} Channels: {', '.join(values)}."
-                )
         arrays = {name: as_real(values[name], f"'{name}'") for name in self.channels}
-        shapes = {array.shape for array in arrays.values()}
-        if len(shapes) > 1 or () in shapes:
-            raise RequestError(
-                f"the expression {self.text!r} needs channels of one length; received shapes "
-                f"{', '.join(f'{name}: {array.shape}' for name, array in arrays.items())}."
-            )
         with np.errstate(all="ignore"):
             out = self.of(arrays.__getitem__)
-        result: FloatArray = np.array(np.broadcast_to(out, shapes.pop()))
+        # Of means alone it is one number.
+        result: FloatArray = np.array(np.broadcast_to(out, arrays[self.channels[0]].shape))
         if not np.all(np.isfinite(result)):
             bad = np.flatnonzero(~np.isfinite(result))
             raise DataError(

@@ -288,11 +288,6 @@ def onto_uniform(
     """
     report = inspect_times(time, name)
     t, x = check_order(time, name), as_real(series, f"the series of {name}")
-    if x.shape[:1] != t.shape:
-        raise RequestError(
-            f"the series of {name} has shape {x.shape} and its times {t.shape}; one value per "
-            "instant is needed. Time runs along the first axis."
-        )
     if report.missing > t.size:
         raise DataError(
             f"{name} misses {report.missing} samples and has {t.size}: its times do not make a "
@@ -396,8 +391,6 @@ def bridge(series: npt.ArrayLike, dt: float, longest: float) -> Bridged:
     """
     x = as_real(series, "the series")
     time_step(dt)
-    if x.ndim != 1:
-        raise RequestError(f"one series at a time is bridged; received shape {x.shape}.")
     missing = ~np.isfinite(x)
     short, long = np.zeros_like(missing), np.zeros_like(missing)
     if not missing.any():

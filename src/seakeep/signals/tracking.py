@@ -276,11 +276,11 @@ def track_video(
 def _check_fit(video: _Video, how: TrackingSettings) -> None:
     width, height = video.size
     if how.region is not None:
-        left, top, wide, high = how.region
+        left, top, wide, high = how.region if len(how.region) == 4 else (0, 0, 0, 0)
         if min(left, top) < 0 or not (0 < wide <= width - left and 0 < high <= height - top):
             raise RequestError(
-                f"the region {how.region} (left, top, width, height) leaves the picture of "
-                f"{video.path}, {width} × {height} pixels. Make it smaller."
+                f"region = {how.region} is no part of the picture of {video.path}, {width} × "
+                f"{height} pixels. State left, top, width and height of one."
             )
     if how.lamp is not None:
         x, y, radius = how.lamp

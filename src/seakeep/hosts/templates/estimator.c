@@ -1,4 +1,4 @@
-{% from "facts.jinja" import N, Q, z, past, upper, follows, late, fore, lead_samples, array with context %}
+{% from "facts.jinja" import N, Q, z, signature, past, upper, follows, late, fore, lead_samples, array with context %}
 /* {{ mark }} C source; see {{ name }}_estimator.h */
 #include "{{ name }}_estimator.h"
 
@@ -44,6 +44,14 @@ static const int placed[] = { {{ foresight[1] | join(", ") }} };
 enum { PLACED = {{ foresight[1] | length }}, TAPS = {{ foresight[0].shape[3] }} };
 
 {% endif %}
+/* Waves of training: shares of energy by band, heights and steepnesses. */
+{{ array("shares", coverage.shares) -}}
+{{ array("heights", coverage.heights) -}}
+{{ array("steepnesses", coverage.steepnesses) }}
+static const int elevations[] = { {% for each in signature.inputs %}{{ 1 if is_elevation(each) else 0 }}, {% endfor %}0 };
+#define TRAINED {{ trained | hex }}
+enum { BANDS = {{ coverage.shares.shape[1] }} };
+
 #define P(i, j) e->covariance[(i) * M + (j)]
 
 static const double *input(const {{ name }}_estimator *e, int back)
@@ -403,8 +411,88 @@ int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *
         e->partly = e->partly || count;
     }
     settle(e);
+{% if "surge" in signature.states %}
+    memmove(e->surge, e->surge + 1, (RECORD - 1) * sizeof(double));
+    e->surge[RECORD - 1] = newest[{{ signature.states.index("surge") }}];
+{% endif %}
     e->taken += e->taken < BEGINS;
     return 0;
+}
+
+/* Power of a tapered input at each frequency, into `power`; the taper ends `beyond` the record. */
+static void spectrum(const {{ name }}_estimator *e, int q, double mean, int beyond, double *power)
+{
+    const double pi = 3.14159265358979323846;
+    int size = e->filled;
+    for (int k = 0; k <= size / 2; k++) {
+        double rate = 2.0 * cos(2.0 * pi * k / size), one = 0.0, two = 0.0;
+        for (int t = 0; t < size; t++) {
+            double taper = 0.5 - 0.5 * cos(2.0 * pi * (t + beyond) / (size - 1 + 2 * beyond));
+            double next = (input(e, size - 1 - t)[q] - mean) * taper + rate * one - two;
+            two = one;
+            one = next;
+        }
+        power[k] = one * one + two * two - rate * one * two;
+    }
+}
+
+int {{ name }}_validity({{ name }}_estimator *e)
+{
+    int size = e->filled, found = 0;
+    for (int q = 0; size >= 4 && q < Q; q++) {
+        double mean = 0.0, square = 0.0, fourth = 0.0, sum = 0.0, grown = 0.0;
+        double energy[BANDS] = { 0.0 }, total = 0.0, unseen = 0.0, height, steepness, repeats, margin;
+        const double *taught = shares + q * BANDS;
+        int peak = 0, moves = 0;
+        for (int t = 0; t < size; t++)
+            mean += input(e, t)[q] / size;
+        for (int t = 0; t < size; t++) {
+            double away = pow(input(e, t)[q] - mean, 2.0);
+            square += away / size;
+            fourth += away * away / size;
+        }
+        height = 4.0 * sqrt(fourth / (3.0 * fmax(square, DBL_MIN)));
+        spectrum(e, q, mean, 0, e->forward);
+        for (int k = 0; k <= size / 2; k++) {
+            sum += e->forward[k];
+            grown += e->forward[k] * k / (size * {{ upper }}_STEP);
+        }
+        grown /= fmax(sum, DBL_MIN);
+        steepness = {{ (2 * pi / gravity) | hex }} * height * grown * grown;
+        spectrum(e, q, mean, 1, e->forward);
+        for (int k = 1; k <= size / 2; k++) {
+            int band = (int)floor({{ per_octave }} * log2(k / (size * {{ upper }}_STEP))) - ({{ coverage.first }});
+            if (band >= 0 && band < BANDS)
+                energy[band] += e->forward[k];
+        }
+        for (int band = 0; band < BANDS; band++) {
+            int beside = taught[band] >= TRAINED || (band > 0 && taught[band - 1] >= TRAINED)
+                         || (band + 1 < BANDS && taught[band + 1] >= TRAINED);
+            total += energy[band];
+            unseen += beside ? 0.0 : energy[band];
+            peak = energy[band] > energy[peak] ? band : peak;
+            moves = moves || taught[band] >= TRAINED;
+        }
+        repeats = size * {{ upper }}_STEP * pow(2.0, ({{ coverage.first }} + peak + 0.5) / {{ per_octave }});
+        if (!moves || !(total > 0.0) || !(repeats > {{ cycles }}))
+            continue;
+        margin = 1.1 + 1.7 / sqrt(repeats);
+        if (unseen > 0.5 * total)
+            found |= {{ upper }}_PERIOD;
+        if (height > margin * heights[q])
+            found |= {{ upper }}_HEIGHT;
+        if (elevations[q] && steepness > margin * steepnesses[q])
+            found |= {{ upper }}_STEEPNESS;
+    }
+{% if "surge" in signature.states %}
+    double surge = 0.0, away;
+    for (int t = 0; t < size; t++)
+        surge += e->surge[RECORD - 1 - t] / size;
+    away = surge - centre[{{ signature.states.index("surge") }}];
+    if (size >= 4 && Q > 0 && fabs(away) > {{ signature.state_scale.reach[signature.states.index("surge")] | hex }})
+        found |= {{ upper }}_SURGE;
+{% endif %}
+    return found;
 }
 
 const double *{{ name }}_estimated(const {{ name }}_estimator *e) { return e->x + (X_ROWS - 1) * N; }

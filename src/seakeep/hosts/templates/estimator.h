@@ -28,6 +28,9 @@ enum {
     {{ upper }}_ESTIMATES = {{ late + ([s + 1, x_rows, past + z + 1] | max) }}
 };
 
+/* What of the waves, or of the mean surge, lies outside the training. */
+enum { {{ upper }}_INSIDE = 0, {{ upper }}_PERIOD = 1, {{ upper }}_HEIGHT = 2, {{ upper }}_STEEPNESS = 4, {{ upper }}_SURGE = 8 };
+
 /* All that an estimator remembers. To save and restore it, copy it as it is. */
 typedef struct {
     double x[{{ upper }}_ESTIMATES * {{ upper }}_STATES]; /* estimates, oldest row first; the last one is of this instant */
@@ -36,6 +39,7 @@ typedef struct {
     double inputs[({{ upper }}_RECORD + {{ fore }}) * {{ [Q, 1] | max }}]; /* measured, then predicted */
     double history[{{ upper }}_EXTENDED]; /* estimates that no wave to come moves */
     double delayed[{{ [n, 1] | max * (late + z + 1) }}];
+    double surge[{{ upper }}_RECORD];
     /* Of the samples that waves to come move: */
     double y[{{ late + 1 }}][{{ upper }}_STATES], gains[{{ late + 1 }}][{{ upper }}_EXTENDED * {{ upper }}_STATES];
     int plain[{{ late + 1 }}], slot, pending, begun;
@@ -60,6 +64,10 @@ const double *{{ name }}_estimated(const {{ name }}_estimator *e);
 
 /* Standard deviation of the error of one of them. */
 double {{ name }}_deviation(const {{ name }}_estimator *e, int state);
+
+/* What lies outside the training in the record that is kept; a sum of the names above. It takes the
+ * record's length squared: ask now and then. */
+int {{ name }}_validity({{ name }}_estimator *e);
 
 /* Forecast n instants after the last sample into x, a row for each. `future` holds the inputs of
  * the n - 1 + {{ upper }}_LEAD instants after it, or is NULL. Waves that are NaN there are
