@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
@@ -96,8 +95,6 @@ def reproduce(
     from seakeep.study.reproduce import reproduce as reproduce_study
 
     size = Size.quick() if quick else Size()
-    pictured = _pictured([act.name for act in ACTS if preset in (None, act.preset)])
-
     pages = []
     with make_executor(checked_count(workers, scheduler), scheduler) as executor:
         with progress_bar("Study") as tell:
@@ -108,11 +105,7 @@ def reproduce(
                 results = play()
             else:
                 with submitting(_write_act, None, near) as submit:  # while the next act runs
-                    results = play(
-                        finished=lambda act, result: pages.append(
-                            submit([(result, act.name == pictured)])
-                        )
-                    )
+                    results = play(finished=lambda result: pages.append(submit([result])))
                     for done, each in enumerate(pages):
                         tell(done, len(pages), "drawing the pages of the acts")
                         each.result()
@@ -151,21 +144,14 @@ def _write_reproduction(
     from seakeep.report.acts import write_reproduction
     from seakeep.report.sections import write_report
 
-    for name, each in results.items() if on_this_machine(executor) is None else ():
+    for each in results.values() if on_this_machine(executor) is None else ():
         with progress_bar(f"Report of {each.attrs['study']}") as tell:
-            write_report(each, tell, pictures=name == _pictured(results))
+            write_report(each, tell)
     with progress_bar("Report") as tell:
         return write_reproduction(folder, results, tell)
 
 
-def _pictured(acts: Iterable[str]) -> str:
-    """Act whose page shows the runs, the same in all of them: the first one with their drift."""
-    from seakeep.study.reproduce import ACTS
-
-    return next(act.name for act in ACTS if act.name in acts and not act.without_drift)
-
-
-def _write_act(_: None, item: tuple[StudyResult, bool]) -> None:
+def _write_act(_: None, result: StudyResult) -> None:
     from seakeep.report.sections import write_report
 
-    write_report(item[0], pictures=item[1])
+    write_report(result)

@@ -262,13 +262,13 @@ def _spec_of(
             given = {**given, name: replace(before, **given[name])}
     if given.get("observables") is not None and "select" in _defaults(kind):
         given.setdefault("select", None)  # those that are stated are not chosen
-    if "select" not in given and (select := getattr(filled, "select", None)) is not None:
-        closed = {name: False for name in select.opened if name in given}
-        given = {**given, "select": replace(select, **closed)} if closed else given
     if given.get("delay_rows") == "ridge" or given.get("rank") is not None:
         # Free runs are tried with exact rows alone: what a preset would choose by them is left out.
         yields = {"select": None, "readouts": ()}
         given = {**{key: value for key, value in yields.items() if key in _defaults(kind)}, **given}
+    if "select" not in given and (select := getattr(filled, "select", None)) is not None:
+        closed = {name: False for name in select.opened if name in given}
+        given = {**given, "select": replace(select, **closed)} if closed else given
     if filled is not None:
         return cast("Spec", replace(cast("Any", filled), **given))
     needed = [key for key, default in _defaults(kind).items() if default is MISSING]

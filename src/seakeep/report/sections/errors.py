@@ -18,7 +18,6 @@ from seakeep.report.figures.errors import (
     eigenvalue_figure,
     error_over_time_figure,
     growth_text,
-    hyperparameter_figure,
 )
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.sections.summary import by_channel, conditional, overview_table
@@ -391,14 +390,9 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     )
 
 
-def members(result: StudyResult) -> Section | None:
-    """Return errors of the members of ensembles over what was drawn, and eigenvalues."""
-    figures = []
-    for model in filter(result.is_ensemble, result.models):
-        draw, words = partial(hyperparameter_figure, result, model), {"model": model_words(model)}
-        figures.append(drawing("hyperparameters", draw, words, f"hyperparameters_{model}"))
-    if any(name.startswith("eigenvalues/") for name in result.groups):
-        figures.append(
-            drawing("eigenvalues", partial(eigenvalue_figure, result), {"lowest": LOWEST})
-        )
-    return section("members", figures=figures) if figures else None
+def eigenvalues(result: StudyResult) -> Section | None:
+    """Return the eigenvalues of the models of the first training set."""
+    if not any(name.startswith("eigenvalues/") for name in result.groups):
+        return None
+    figure = drawing("eigenvalues", partial(eigenvalue_figure, result), {"lowest": LOWEST})
+    return section("eigenvalues", figures=[figure])
