@@ -10,7 +10,7 @@ from seakeep.study.resolve import resolve_model
 
 ENSEMBLE = "bayesian_hankel_dmdc"
 NORMAL = {"distribution": "norm", "parameters": {"loc": 15, "scale": 1}, "unit": "T"}
-READ = {"channel": "heave", "of": ["pitch"], "kind": "auto"}
+READ = {"heave": "auto"}
 
 
 def resolved(stated, period=2.0, **how):
@@ -93,9 +93,9 @@ def resolved(stated, period=2.0, **how):
             },
         ),
         (
-            {"kind": ENSEMBLE, "readouts": {"heave": {"of": ["pitch"], "kind": "auto"}}},
+            {"kind": ENSEMBLE, "readouts": READ},
             {"preset": "recommended"},
-            {"readouts": ([READ], "stated")},
+            {"readouts": (READ, "stated")},
         ),
     ],
 )  # fmt: skip
@@ -119,7 +119,7 @@ def test_each_key_has_its_value_and_its_source(stated, how, expected):
         ({"preset": "paper", "riddge": 1.0}, {}, r"has no key 'riddge'.*mean 'ridge'"),
         ({"preset": "paper", "train_on": "runs"}, {}, "'hankel_dmdc' has no key 'train_on'"),
         ({"kind": "fir", "readouts": "auto"}, {}, "kind = 'fir' has no key 'readouts'"),
-        ({"readouts": {"heave": {"of": ["pitch"], "kind": "auto"}}}, {"preset": "paper"},
+        ({"readouts": READ}, {"preset": "paper"},
          "received delay_rows = 'ridge', rank = None"),
         ({"kind": "mean", "preset": "paper"}, {}, "kind = 'mean' has no preset"),
     ],
