@@ -20,11 +20,10 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.pipeline import flag_samples
-from seakeep.quality.agreement import FEWEST_STEPS, LATE, RUN_AWAY, compare_sensors
 from seakeep.quality.faults import MISSING, flag_attributes
 from seakeep.quality.findings import Record, Redundant
 from seakeep.quality.samples import constant, flagged, levels
-from seakeep.quality.sensors import redundant
+from seakeep.quality.sensors import FEWEST_STEPS, LATE, RUN_AWAY, compare_sensors, redundant
 from seakeep.signals import bridge, integrate
 from seakeep.signals.waves import dominant_period
 from seakeep.tank.instruments import record_run

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+from seakeep.arrays import positive
 from seakeep.errors import RequestError, did_you_mean
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ __all__ = [
     "MOTIONS",
     "TURNS",
     "Channel",
-    "base_powers",
     "canonical_channel",
     "conversion",
     "displayed",
@@ -291,33 +291,45 @@ def si_unit(unit: str) -> str:
     return text or "1"
 
 
-def base_powers(unit: str) -> tuple[float, float, float, bool]:
-    """Powers of length, time and mass in a unit, and whether it has others besides angles.
+def froude_factor(units: str, scale: float, density_ratio: float = 1.0) -> float:
+    """Factor from a model's value to the full-scale one.
 
     Parameters
     ----------
-    unit : str
-        Any unit we understand.
+    units : str
+        Unit of the value, such as ``"m/s^2"`` or ``"N"``.
+    scale : float
+        Scale factor, full-scale length over model length.
+    density_ratio : float, optional
+        Density of the sea over that of the basin's water; 1.025 from fresh to sea water.
 
     Returns
     -------
-    (float, float, float, bool)
-        The powers of metre, second and kilogram; True if the unit also holds volts or kelvins.
+    float
+        The factor.
 
     Raises
     ------
     RequestError
-        If the unit is not known.
+        If a number is not positive, or the unit is not mechanical.
 
     Examples
     --------
-    >>> base_powers("N"), base_powers("rad/s")
-    ((1.0, -2.0, 1.0, False), (0.0, -1.0, 0.0, False))
+    >>> froude_factor("m", 50), round(froude_factor("s", 50), 3), froude_factor("N", 50)
+    (50.0, 7.071, 125000.0)
+    >>> froude_factor("m/s^2", 50), round(froude_factor("rad/s", 50), 4)
+    (1.0, 0.1414)
     """
-    powers = {str(k): float(v) for k, v in _parsed(unit).dimensionality.items()}
-    known = [powers.pop(f"[{name}]", 0.0) for name in ("length", "time", "mass")]
-    powers.pop("[angle]", None)
-    return known[0], known[1], known[2], bool(powers)
+    positive(scale, "the scale factor", "a ratio")
+    positive(density_ratio, "the density ratio", "a ratio")
+    powers = {str(k): float(v) for k, v in _parsed(units).dimensionality.items()}
+    length, time, mass = (powers.pop(f"[{name}]", 0.0) for name in ("length", "time", "mass"))
+    if powers.keys() - {"[angle]"}:
+        raise RequestError(
+            f"the unit '{units}' is not mechanical, so Froude's law does not scale it. Convert "
+            "the channel to a mechanical unit first, or leave it out."
+        )
+    return float(scale ** (length + 0.5 * time + 3.0 * mass) * density_ratio**mass)
 
 
 def conversion(unit: str, target: str, channel: str = "the channel") -> float:

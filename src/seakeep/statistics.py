@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import finite
-from seakeep.core import bootstrap, divergence
+from seakeep.core import bootstrap, density
 from seakeep.core import coverage as of_arrays
 from seakeep.core.bands import BandErrors, band_error_over_time, split_bands
 from seakeep.core.bootstrap import (
@@ -27,6 +27,8 @@ from seakeep.core.bootstrap import (
     block_length,
     choose_block_length,
     lag_one_correlation,
+    overlap_block,
+    two_way_interval,
 )
 from seakeep.core.calibration import ConformalMargin, band_scores, conformal_margin
 from seakeep.core.coverage import (
@@ -39,13 +41,13 @@ from seakeep.core.coverage import (
 )
 from seakeep.core.density import (
     DensityInterval,
+    JsdInterval,
     density_grid,
     density_interval,
+    jensen_shannon,
     kernel_bandwidth,
     kernel_density,
 )
-from seakeep.core.divergence import JsdInterval, jensen_shannon
-from seakeep.core.two_way import overlap_block, two_way_interval
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.pairing import channel_names, pair
 
@@ -138,7 +140,7 @@ def moving_block_bootstrap(
     return drawn["series"].rename(series.name) if alone else drawn
 
 
-@_labelled(divergence.jsd_interval, "predicted", "measured")
+@_labelled(density.jsd_interval, "predicted", "measured")
 def jsd_interval(
     predicted: xr.Dataset,
     measured: xr.Dataset,
@@ -169,7 +171,7 @@ def jsd_interval(
                     warn(f"channel '{name}': {bootstrap.too_long(choice, series.size)}")
             rows = p[..., column].reshape(-1, series.size)
             draws.append(
-                divergence.jsd_interval(rows, series, block_length=block, rng=child, **settings)
+                density.jsd_interval(rows, series, block_length=block, rng=child, **settings)
             )
         except DataError as error:
             raise DataError(f"channel '{name}': {error}") from error

@@ -87,9 +87,8 @@ def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(folder, ctrl_c):
         process.send_signal(signal.SIGINT)
         told = process.communicate()[1]
     assert process.returncode == 130, told
-    assert "the same command continues where it stopped" in told
     assert told.count("kept") == 1
-    assert f"Interrupted. What was finished is kept in {out}" in told
+    assert "Interrupted. Finished files are kept" in told
     assert "Traceback" not in told
     assert list((out / "units").glob("*.nc"))
 

@@ -10,10 +10,9 @@ from seas import sea
 
 from seakeep.errors import SeakeepWarning
 from seakeep.quality import Finding, Record, Redundant, as_json, findings_of, warn_of
-from seakeep.quality.agreement import LATE, RUN_AWAY, compare_sensors
 from seakeep.quality.faults import reading_step
 from seakeep.quality.samples import SamplesKind
-from seakeep.quality.sensors import redundant
+from seakeep.quality.sensors import LATE, RUN_AWAY, compare_sensors, redundant
 
 DT = 0.04
 T = DT * np.arange(3000)

@@ -92,8 +92,8 @@ class TestShipSection:
 
 
 def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
-    from seakeep.quality.agreement import LATE, Agreement
     from seakeep.quality.faults import FLAGS
+    from seakeep.quality.sensors import LATE, Agreement
     from seakeep.report.figures.runs import quality_figure
     from seakeep.report.quality_sheet import channel_rows
 

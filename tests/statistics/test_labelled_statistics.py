@@ -7,7 +7,7 @@ import xarray as xr
 from seakeep import statistics
 from seakeep.core import bootstrap as core_bootstrap
 from seakeep.core import coverage as core_coverage
-from seakeep.core import divergence as core_divergence
+from seakeep.core import density as core_divergence
 from seakeep.errors import DataError, SeakeepWarning
 
 TIME = np.arange(400) / 32

@@ -29,7 +29,7 @@ def test_a_file_changes_what_it_states_and_keeps_the_rest(tmp_path):
         ("[moorings.bow]\nkind = 'sprung'\nstiffness = 1\npretension = 1\neye = [0, 0]\n"
          "pole = [1, 0]", r"moorings\.bow\.kind: the kinds are spring\. Did you mean 'spring'\?"),
         ("[facility]\nwater_depth = 0", r"water_depth: received 0, .* Give a depth of 0\.01 to"),
-        ("[facility]\nwave_band = [1.4, 0.1]", r"wave_band: must be \[low, high\] in Hz"),
+        ("[facility]\nwave_band = [1.4, 0.1]", r"wave_band: a band is \[low, high\] in Hz"),
         ("[simulation]\nstepp = 0.1", r"stepp: unknown key, .* Did you mean 'step'"),
         ("[runs.'a/b']\nwavelength = 2.0\nheight = 0.1", r"runs\.a/b: the name of a run is"),
         ("[runs.a]\nwavelength = 2.0", r"either a spectrum \(irregular\) or wavelength and height"),
@@ -45,10 +45,6 @@ def test_a_file_changes_what_it_states_and_keeps_the_rest(tmp_path):
         ("[hull.pool]\nbottom_length = 0.6", "bottom opening must fit inside its free surface"),
         ("[hull.pool]\nshelf = -0.005", "shelf must lie below its lid"),
         ("seed = 18446744073709551616", r"seed: .* Give a number from 0 to 2\^64"),
-        ("[instruments.clocks.mru]\nrate = 1e7", r"clocks\.mru\.rate: received 10000000\.0"),
-        ("[simulation]\nstep = 1e-6", r"simulation\.step: received 1e-06, which should be greater"),
-        ("[simulation]\nkernel_length = 1e9", r"simulation\.kernel_length: received 1000000000\.0"),
-        ("[runs.a]\nwavelength = 2.0\nheight = 0.1\nduration = 1e9", r"a\.duration: received"),
         ("[channels.a]\ncolumn = 'a'\n[rig]\n", "is a campaign file"),
     ],
 )  # fmt: skip

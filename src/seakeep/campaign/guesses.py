@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
+from itertools import chain
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,24 +24,9 @@ from seakeep.signals import encounter_period, repeated_waves, uniform_step, wave
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import energy_period, tapered_power
 
-# What a column may be called: whole words, lower case.
-_MOTION = {"surge": {"surge", "x"}, "sway": {"sway", "y"}, "heave": {"heave", "z"},
-           "roll": {"roll", "phi", "x"}, "pitch": {"pitch", "theta", "y"},
-           "yaw": {"yaw", "psi", "z"}}  # fmt: skip
-_ACCELERATION = {"acc", "accel", "acceleration", "a", "dd"}
-_RATE = {"rate", "vel", "velocity", "gyro", "speed", "d", "dot"}
-_WAVE = {"wp", "wg", "wave", "waves", "eta", "zeta", "probe", "probes", "gauge", "gauges",
-         "elevation", "wavegauge", "waveprobe", "waveheight"}  # fmt: skip
-_PLACE = {"fwd", "cog", "aft", "mid"}
-_LOAD = {"tension", "load", "force", "mooring", "moor", "line", "fairlead"}
-_ENDS = {"bow": "bow", "fwd": "bow", "forward": "bow", "fore": "bow", "stern": "stern",
-         "aft": "stern"}  # fmt: skip
-_SIDES = {"sb": "starboard", "stb": "starboard", "starboard": "starboard", "ps": "port",
-          "port": "port", "portside": "port"}  # fmt: skip
-_BEHIND = {"aft", "behind", "down", "downstream", "lee", "leeward", "transmitted"}
-_TRIGGER = {"trigger", "trig", "sync", "synch", "ttl", "lamp", "led"}
-_REGULAR = {"regular", "reg", "monochromatic"}
-_IRREGULAR = {"irregular", "irreg", "irr", "random", "jonswap", "bretschneider", "spectrum"}
+_TEXT = resources.files("seakeep.campaign").joinpath("vocabulary.toml").read_text("utf-8")
+_CALLED: dict[str, Any] = tomllib.loads(_TEXT)
+"""Words of columns, runs and places in files of others."""
 
 LONG = 64
 """Samples that a column must have for its waves or its step to be judged."""
@@ -195,19 +183,19 @@ def _start(run: str, files: Sequence[File], guesses: Sequence[Guess]) -> float:
 
 def waves_of_name(run: str) -> str | None:
     """Say "regular" or "irregular" if the name of a run does."""
-    words = set(_words(run))
-    return "irregular" if words & _IRREGULAR else "regular" if words & _REGULAR else None
+    kinds = _kinds(_words(run))
+    return next((kind for kind in ("irregular", "regular") if kind in kinds), None)
 
 
 def is_trigger(column: str) -> bool:
     """Whether a column may hold the pulses that all loggers recorded."""
-    return bool(_TRIGGER & set(_words(column)))
+    return "trigger" in _kinds(_words(column))
 
 
 def is_wave(column: str) -> bool:
     """Whether a column is called as those of wave probes are, and not as a motion."""
-    words = set(_words(column))
-    return bool(_WAVE & words) and not any(_motions(words))
+    words = _words(column)
+    return "wave" in _kinds(words) and not any(_motions(words))
 
 
 def _plain(text: str) -> str:
@@ -348,7 +336,7 @@ def _guess(column: str, files: Sequence[File]) -> Guess:
     channel = None if why else suggest_channel(name, unit, logger or _stem(files[0].path))
     canonical = canonical_channel(channel) if channel else None
     unit = unit if unit is not None else canonical.units if canonical else "-"
-    behind = bool(_BEHIND & set(_words(column)))
+    behind = "behind" in _kinds(_words(column))
     return Guess(column, header, unit, stated_by, channel, logger, _printable(why), gaps,
                  behind=behind)  # fmt: skip
 
@@ -410,29 +398,35 @@ def _words(column: str) -> list[str]:
     return [word for word in re.split(r"[^A-Za-z0-9]+", spaced.lower()) if word]
 
 
-def _motions(words: set[str]) -> Iterator[str]:
+def _kinds(words: Sequence[str]) -> set[str]:
+    """What words may mean, by the keys of the vocabulary."""
+    return {kind for kind, called in _CALLED.items() if not set(called).isdisjoint(words)}
+
+
+def _motions(words: Sequence[str]) -> Iterator[str]:
     """Canonical motions that words may mean, the likeliest first."""
     # Of two sensors of one acceleration, neither is the motion of the body; nor is a load.
-    if words & (set(_SIDES) | _LOAD):
+    kinds = _kinds(words)
+    if kinds & {"sides", "load"}:
         return
-    said = "_acceleration" if words & _ACCELERATION else "_rate" if words & _RATE else ""
-    for motion, known in _MOTION.items():
-        if known & words:
+    said = next((f"_{kind}" for kind in ("acceleration", "rate") if kind in kinds), "")
+    for motion, known in _CALLED["motion"].items():
+        if not set(known).isdisjoint(words):
             yield from (motion + each for each in (said, "", "_rate", "_acceleration"))
 
 
 def _channels(words: Sequence[str], dimension: str | None, logger: str) -> Iterator[str]:
     """Canonical channels that words, unit and logger may mean, the likeliest first."""
-    known = set(words)
+    kinds = _kinds(words)
     numbers = [word for word in words if word.isdigit()]
-    if _WAVE & known:
-        yield "eta_" + ("_".join([w for w in words if w in _PLACE] + numbers) or "1")
-    if dimension == "m" and _WAVE & set(_words(logger)):
+    if "wave" in kinds:
+        yield "eta_" + ("_".join([w for w in words if w in _CALLED["place"]] + numbers) or "1")
+    if dimension == "m" and "wave" in _kinds(_words(logger)):
         yield "eta_" + "_".join(words)
-    yield from _motions(known)
-    if _LOAD & known and not known & set().union(*_MOTION.values()):
-        ends = [_ENDS[word] for word in words if word in _ENDS]
-        sides = [_SIDES[word] for word in words if word in _SIDES]
+    yield from _motions(words)
+    if "load" in kinds and set(words).isdisjoint(chain(*_CALLED["motion"].values())):
+        ends = [_CALLED["ends"][word] for word in words if word in _CALLED["ends"]]
+        sides = [_CALLED["sides"][word] for word in words if word in _CALLED["sides"]]
         if place := list(dict.fromkeys(ends)) or sides or numbers:
             yield "mooring_" + "_".join(place)
 

@@ -9,8 +9,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.check.parts import FreeRun, Known, free_runs, irregular, judged
-from seakeep.core.density import kernel_density
-from seakeep.core.divergence import jensen_shannon
+from seakeep.core.density import jensen_shannon, kernel_density
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
 from seakeep.errors import SeakeepError
 from seakeep.models import Model

@@ -396,11 +396,6 @@ def validation(
         If the model reads several probes and no run states where they stand.
     """
     measured = measured_response(model, runs) if measured is None else measured
-    if "kind" not in measured:
-        raise RequestError(
-            "measured must be a result of measured_response; received a Dataset of "
-            f"{', '.join(map(str, measured.data_vars)) or 'nothing'}."
-        )
     frequency, place = np.unique(measured["frequency"].values, return_inverse=True)
     result = response(model, frequency, runs)
     if WAVE not in result["input"] and elevations(model).sum() > 1:

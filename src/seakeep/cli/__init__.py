@@ -84,16 +84,6 @@ for _verb in (
 app.add_typer(campaigns.datasets, name="datasets")
 
 
-def _saved_words(leaving: BaseException) -> str:
-    """Message after Ctrl-C about what is kept."""
-    error: BaseException | None = leaving
-    while error is not None:
-        if isinstance(error, KeyboardInterrupt) and (notes := getattr(error, "__notes__", [])):
-            return " ".join(notes)
-        error = error.__context__
-    return "Finished files are kept: run the same command again to continue."
-
-
 def _unforeseen(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return (
@@ -138,7 +128,10 @@ def main(arguments: list[str] | None = None) -> int:
     except SystemExit as leaving:
         status = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
         if status == INTERRUPTED:
-            say(f"Interrupted. {_saved_words(leaving)}", style="red")
+            say(
+                "Interrupted. Finished files are kept: run the same command again to continue.",
+                style="red",
+            )
         return status
     except SeakeepError as error:
         if debug:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import progress_bar, results, say
-from seakeep.cli.options import CampaignFile
+from seakeep.cli.console import CampaignFile, progress_bar, results, say
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import check_output, is_there, replacing
 

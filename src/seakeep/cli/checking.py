@@ -11,8 +11,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import print_table, progress_bar, say, show
-from seakeep.cli.options import (
+from seakeep.cli.console import (
     DEFAULT_LEVEL,
     CampaignFile,
     Level,
@@ -20,7 +19,11 @@ from seakeep.cli.options import (
     Scheduler,
     Workers,
     member_executor,
+    print_table,
+    progress_bar,
     read_files,
+    say,
+    show,
 )
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import check_output, check_place, check_report, make_folder
@@ -152,8 +155,7 @@ def calibrate(
     from seakeep.quality import warn_of_runs
     from seakeep.report.comparison import margins_table
     from seakeep.signals.time_axis import span_text
-    from seakeep.study.calibration import calibration_parts
-    from seakeep.study.comparison import samples_of
+    from seakeep.study.comparison import calibration_parts, samples_of
 
     fitted = load_model(ensemble)
     if not is_ensemble(fitted):

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from seakeep.cli.console import say
-from seakeep.cli.options import ModelFile
+from seakeep.cli.console import ModelFile, say
 from seakeep.errors import RequestError
 from seakeep.files import check_place
 

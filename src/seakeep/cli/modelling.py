@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from seakeep.cli.console import print_table, progress_bar, say, show
-from seakeep.cli.options import (
+from seakeep.cli.console import (
     DEFAULT_LEVEL,
     BandKind,
     CampaignFile,
@@ -24,7 +23,11 @@ from seakeep.cli.options import (
     Steps,
     Workers,
     member_executor,
+    print_table,
+    progress_bar,
     read_files,
+    say,
+    show,
 )
 from seakeep.errors import RequestError
 from seakeep.files import check_output, check_place, make_folder

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from seakeep.cli.console import print_table, progress_bar, show
-from seakeep.cli.options import Scheduler, checked_count
+from seakeep.cli.console import Scheduler, checked_count, print_table, progress_bar, show
 
 if TYPE_CHECKING:
     from seakeep.study import StudyResult
@@ -45,12 +42,13 @@ def study(
 
     Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
     """
+    from seakeep.models.executor import make_executor
     from seakeep.report.sections.summary import findings, overview_table
     from seakeep.study import read_study, run_study
 
     asked = read_study(study_file)
     folder = out or study_file.parent / f"{study_file.stem}-results"
-    with _working(folder, workers, scheduler) as executor:
+    with make_executor(checked_count(workers, scheduler), scheduler) as executor:
         with progress_bar("Study") as tell:
             result = run_study(asked, folder, executor=executor, progress=tell)
         page = _write_study(result)
@@ -91,16 +89,14 @@ def reproduce(
 
     Example: seakeep reproduce --quick --out quick
     """
-    from seakeep.models.executor import on_this_machine, submitting
+    from seakeep.models.executor import make_executor, on_this_machine, submitting
     from seakeep.report.acts import finding, short_table
     from seakeep.study.reproduce import ACTS, Size
     from seakeep.study.reproduce import reproduce as reproduce_study
 
     size = Size.quick() if quick else Size()
-    pictured = _pictured([act.name for act in ACTS if preset in (None, act.preset)])
-
     pages = []
-    with _working(out, workers, scheduler) as executor:
+    with make_executor(checked_count(workers, scheduler), scheduler) as executor:
         with progress_bar("Study") as tell:
             play = partial(
                 reproduce_study, out, preset, size=size, seed=seed, executor=executor, progress=tell
@@ -109,11 +105,7 @@ def reproduce(
                 results = play()
             else:
                 with submitting(_write_act, None, near) as submit:  # while the next act runs
-                    results = play(
-                        finished=lambda act, result: pages.append(
-                            submit([(result, act.name == pictured)])
-                        )
-                    )
+                    results = play(finished=lambda result: pages.append(submit([result])))
                     for done, each in enumerate(pages):
                         tell(done, len(pages), "drawing the pages of the acts")
                         each.result()
@@ -152,36 +144,14 @@ def _write_reproduction(
     from seakeep.report.acts import write_reproduction
     from seakeep.report.sections import write_report
 
-    for name, each in results.items() if on_this_machine(executor) is None else ():
+    for each in results.values() if on_this_machine(executor) is None else ():
         with progress_bar(f"Report of {each.attrs['study']}") as tell:
-            write_report(each, tell, pictures=name == _pictured(results))
+            write_report(each, tell)
     with progress_bar("Report") as tell:
         return write_reproduction(folder, results, tell)
 
 
-def _pictured(acts: Iterable[str]) -> str:
-    """Act whose page shows the runs, the same in all of them: the first one with their drift."""
-    from seakeep.study.reproduce import ACTS
-
-    return next(act.name for act in ACTS if act.name in acts and not act.without_drift)
-
-
-def _write_act(_: None, item: tuple[StudyResult, bool]) -> None:
+def _write_act(_: None, result: StudyResult) -> None:
     from seakeep.report.sections import write_report
 
-    write_report(item[0], pictures=item[1])
-
-
-@contextmanager
-def _working(folder: Path, workers: int | None, scheduler: str | None) -> Iterator[Executor | None]:
-    """What does the work; interrupted work is kept."""
-    from seakeep.models.executor import make_executor
-
-    try:
-        with make_executor(checked_count(workers, scheduler), scheduler) as executor:
-            yield executor
-    except KeyboardInterrupt as stop:
-        stop.add_note(
-            f"What was finished is kept in {folder}; the same command continues where it stopped."
-        )
-        raise
+    write_report(result)

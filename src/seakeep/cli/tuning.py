@@ -9,14 +9,15 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli.console import progress_bar, say
-from seakeep.cli.options import (
+from seakeep.cli.console import (
     CampaignFile,
     ModelKey,
     Scheduler,
     Workers,
     member_executor,
+    progress_bar,
     read_files,
+    say,
 )
 from seakeep.errors import RequestError
 from seakeep.files import check_output, check_place, replacing

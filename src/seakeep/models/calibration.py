@@ -77,7 +77,6 @@ class Ensemble(FreeRuns, Protocol):
 
     def without_part(self, begin: int, end: int) -> Ensemble:
         """Members as they learn from the rest of the one run that trains."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

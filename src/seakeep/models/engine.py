@@ -151,7 +151,6 @@ class Runs(Protocol):
 
         Physical units, NaN from where a run is lost.
         """
-        ...
 
 
 Place = tuple[str, float]

@@ -157,53 +157,43 @@ class Model(Protocol):
     @property
     def kind(self) -> str:
         """Word of its spec in TOML files and in :data:`seakeep.models.registry.KINDS`."""
-        ...
 
     @property
     def settings(self) -> Any:
         """Settings that it was fitted with; of an ensemble, those that its members share."""
-        ...
 
     @property
     def signature(self) -> Signature:
         """Time step, labels, delays, scales and input map."""
-        ...
 
     @property
     def n_members(self) -> int:
         """Number of members; 1 for a single model."""
-        ...
 
     @property
     def dt(self) -> float:
         """Time step, s."""
-        ...
 
     @property
     def states(self) -> list[str]:
         """Names of the states."""
-        ...
 
     @property
     def inputs(self) -> list[str]:
         """Names of the measured inputs."""
-        ...
 
     @property
     def history_samples(self) -> int:
         """Samples a forecast needs up to its start."""
-        ...
 
     @property
     def training_spans(self) -> dict[str, tuple[float, float]]:
         """First and last instant of the training windows of each run, s."""
-        ...
 
     def forecast(
         self, run: xr.Dataset, start: float, steps: int | None = None, *, ahead: str = "refuse"
     ) -> xr.Dataset:
         """Free run from an instant on."""
-        ...
 
     def forecast_windows(
         self,
@@ -215,15 +205,12 @@ class Model(Protocol):
         executor: Executor | None = None,
     ) -> xr.Dataset:
         """Free runs from several instants, side by side."""
-        ...
 
     def summary(self) -> str:
         """Text that describes the model."""
-        ...
 
     def save(self, path: str | Path) -> Path:
         """Write the model as NetCDF."""
-        ...
 
 
 Role = Literal["model", "reference"]
@@ -248,28 +235,22 @@ class Spec(Protocol):
 
     def resolved(self, dt: float, encounter_period: float | None) -> Self:
         """Settings whose lengths are samples."""
-        ...
 
     def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that it asks of its runs at a time step and an encounter period, s."""
-        ...
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
     ) -> Model:
         """Identify a model from training runs."""
-        ...
 
     def to_json(self) -> Json:
         """Settings as JSON values."""
-        ...
 
     @classmethod
     def from_json(cls, content: Json) -> Self:
         """Settings from JSON values; unknown or missing ones raise an error."""
-        ...
 
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> Model:
         """Rebuild the model that a file holds."""
-        ...

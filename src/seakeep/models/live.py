@@ -84,7 +84,6 @@ class Servable(Runs, Protocol):
         roles: Mapping[str, str] | None = None,
     ) -> Live:
         """Put the model into service."""
-        ...
 
 
 class _Update(NamedTuple):
@@ -296,11 +295,16 @@ class Live:
         taken = self._count.taken
         if taken < 4 or not self.signature.inputs:
             return None
-        surge = None
-        if "surge" in self.signature.states:
-            rows = self._rows("x", max(taken - self._record, 0), taken)
-            surge = rows[:, self.signature.states.index("surge")]
-        return self.model.coverage.conditions(self._known_inputs(), self.signature, surge)
+        return self.model.coverage.conditions(self._known_inputs(), self.signature, self._surge)
+
+    @property
+    def _surge(self) -> FloatArray | None:
+        """Estimates of the surge over the record."""
+        if "surge" not in self.signature.states:
+            return None
+        rows = self._rows("x", max(self._count.taken - self._record, 0), self._count.taken)
+        surge: FloatArray = rows[:, self.signature.states.index("surge")]
+        return surge
 
     @property
     def equations(self) -> dict[str, Any]:
@@ -760,7 +764,11 @@ class Live:
         }
         attrs = {"settings": json.dumps(words), "model": self._identity}
         values = np.concatenate([each.ravel() for each in self._parts()])
-        return write_sealed_array(values, attrs, path, STATE)
+        # Most of a covariance is zero where sensors are exact: which numbers are not, and these.
+        bits = np.packbits(values != 0)
+        bits.resize(-4 * (-bits.size // 4))
+        whole = np.concatenate([bits.view(np.uint32), values[values != 0]])
+        return write_sealed_array(whole, attrs, path, STATE)
 
     def _pending(self) -> list[_Update]:
         """Updates of the samples whose estimates are not final."""
@@ -775,13 +783,10 @@ class Live:
         rows = [self._rows(each, tail, taken) for each in self._recent if each != "u"]
         updates = [update for update in self._pending() if update is not self._as_it_is]
         state = [self._history, self._free, self._innovation, self._squares]
-        state.append(self._filter.covariance)
-        return [
-            self._known_inputs(),
-            *rows,
-            *(each for update in updates for each in update),
-            *state,
-        ]
+        state += [self._filter.covariance, self._known_inputs()]
+        if self._surge is not None:
+            state.append(self._surge)
+        return [*rows, *(each for update in updates for each in update), *state]
 
     @cached_property
     def _identity(self) -> str:
@@ -798,9 +803,13 @@ class Live:
         shapes = [each.shape for each in self._as_it_is]
         for as_it_is in content["as_it_is"]:
             self._updates.append(self._as_it_is if as_it_is else _Update(*map(np.empty, shapes)))
-        at = 0
-        for part in self._parts():
-            part[:] = values[at : at + part.size].reshape(part.shape)
+        parts, at = self._parts(), 0
+        size = sum(part.size for part in parts)
+        count = -(-size // 32)
+        bits, whole = values[:count].astype(np.uint32), np.zeros(size)
+        whole[np.unpackbits(bits.view(np.uint8), count=size) > 0] = values[count:]
+        for part in parts:
+            part[:] = whole[at : at + part.size].reshape(part.shape)
             at += part.size
 
 

@@ -136,11 +136,9 @@ class Observable(Protocol):
         `period` is the encounter period in samples, None where no observable of the model has a
         ``period`` to fill in; `dt` is the time step in s.
         """
-        ...
 
     def reach(self, dt: float) -> tuple[int, int]:
         """Samples before and after an instant that its row reads, delays of the model apart."""
-        ...
 
 
 def _column(inputs: Sequence[ChannelLabel], name: str, what: str) -> int:
@@ -422,13 +420,7 @@ def observables_of(value: object) -> tuple[Observable, ...]:
             f"observables must be a list; received {value!r:.{SHOWN}}. Write "
             "observables=[seakeep.SlowSquares('eta_cog')]."
         )
-    observables = [from_json(each) if isinstance(each, Mapping) else each for each in value]
-    if strange := [each for each in observables if not hasattr(each, "bind")]:
-        raise RequestError(
-            f"observables must hold observables, such as seakeep.SlowSquares; received "
-            f"{strange[0]!r:.{SHOWN}}."
-        )
-    return tuple(observables)
+    return tuple(from_json(each) if isinstance(each, Mapping) else each for each in value)
 
 
 @dataclass(frozen=True)

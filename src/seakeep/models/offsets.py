@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, whole_number
+from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import labelled
 from seakeep.models.linear import HankelDMDcModel
@@ -52,7 +52,6 @@ def estimate_probe_offset(
     run: xr.Dataset,
     span: tuple[float, float],
     bounds: tuple[float, float] | None = None,
-    seed: int = 0,
 ) -> ProbeOffset:
     """Find the distance at which the model forecasts a part of a run best.
 
@@ -70,8 +69,6 @@ def estimate_probe_offset(
     bounds : (float, float), optional
         Least and greatest distance, m; by default half a wavelength of the mean period either
         way, since waves of one frequency fix the offset only up to whole wavelengths.
-    seed : int, optional
-        Of the resampling.
 
     Returns
     -------
@@ -112,7 +109,7 @@ def estimate_probe_offset(
             f"the offset found, {offset:.3g} m, lies at the end of the distances tried, {low:.3g} "
             f"to {high:.3g} m. Widen bounds, or check the run: another sea or another probe."
         )
-    rng = np.random.default_rng(whole_number(seed, "seed", least=0))
+    rng = np.random.default_rng(0)
     blocks = np.stack([block.mean(axis=1) for block in np.array_split(errors, BLOCKS, axis=1)])
     drawn = rng.integers(0, BLOCKS, (RESAMPLES, BLOCKS))
     offsets = np.array([_least(fine, blocks[rows].mean(axis=0))[0] for rows in drawn])

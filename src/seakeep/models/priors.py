@@ -28,7 +28,6 @@ class Prior(Protocol):
 
     def ppf(self, q: float) -> Any:
         """Quantile function: the value below which lies the probability `q`."""
-        ...
 
 
 def _values(name: str, *given: object) -> tuple[list[float], str]:

@@ -9,7 +9,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import FloatArray, fraction
-from seakeep.errors import RequestError
 
 STATISTICS = ("mean", "std", "lower", "upper")
 CHUNK = 8 * 2**20
@@ -128,7 +127,7 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
     Raises
     ------
     RequestError
-        If there is no dimension ``member``, or `level` is not between 0 and 1.
+        If `level` is not between 0 and 1.
 
     Examples
     --------
@@ -138,17 +137,6 @@ def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
     array([2., 3.])
     """
     level = fraction(level, "level")
-    is_forecast = isinstance(forecast, xr.Dataset) and "member" in forecast.dims
-    if not is_forecast or len(forecast.dims) < 2:
-        received = (
-            f"dimensions {', '.join(map(str, forecast.dims))}"
-            if isinstance(forecast, xr.Dataset)
-            else type(forecast).__name__
-        )
-        raise RequestError(
-            "summarize needs an ensemble forecast with the dimension 'member' and one of instants; "
-            f"received {received}. Pass what ensemble.forecast(...) returns."
-        )
     channels = [
         name
         for name, variable in forecast.data_vars.items()

@@ -23,8 +23,7 @@ from seakeep.report.figures.histories import acts_figure
 from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.errors import divergence_table
-from seakeep.report.sections.summary import heat_table
-from seakeep.report.style import judged_models, model_words
+from seakeep.report.style import model_words
 from seakeep.report.tables import Number, Table, number, numbers, percent, short, table
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -61,22 +60,13 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
         "digest": "",
         "finished": finished(last),
     }
-    heat = []
-    for test in first.tests:
-        places = {
-            f"{act.letter} {model_words(model)}": (results[act.name], test, model)
-            for act in _played(results)
-            for model in judged_models(results[act.name])
-        }
-        words = {"test": first.label_of(test)}
-        heat.append(heat_table(first, "channels", places, words, name=f"channels_{test}"))
     sections = [_summary(results)]
     if {"paper", "raw"} <= set(results):
         sections.append(section("claims", tables=(claims_table(results),)))
     divergence, beside = divergence_table(first, "bayesian", "paper"), ", beside the paper's"
     links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
     sections += [
-        section("channels", tables=[acts_table(results), *heat]),
+        section("channels", tables=[acts_table(results)]),
         Section("densities", f"Divergence of the densities{beside}", tables=(divergence,)),
         section("waves", tables=wave_tables(first)),
         section("studies", links=links),

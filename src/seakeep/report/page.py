@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from matplotlib.figure import Figure
 
-RASTER_DPI = 80
-"""Of pictures without vectors: as wide as the page."""
 UNFINISHED = f"""<!DOCTYPE html>
 <meta name="generator" content="{MARK}: report">
 <p>This report was not finished. Run its command again.</p>
@@ -44,14 +42,11 @@ class Drawing:
         What it shows.
     draw : callable
         Draws it.
-    raster : bool, optional
-        Too many points for vectors: a PNG file beside the page, which links to it.
     """
 
     name: str
     caption: str
     draw: Callable[[], Figure]
-    raster: bool = False
 
 
 @dataclass(frozen=True)
@@ -151,7 +146,7 @@ def write_page(
     page = folder / "report.html"
     check_output(page, "report")
     drawings = [each for section in sections for each in section.figures]
-    drawn: dict[str, Markup | None] = {}
+    drawn: dict[str, Markup] = {}
     with storing(folder), figure_style():
         if not page.exists():  # figures of an interrupted report are known as ours
             _write(page, UNFINISHED)
@@ -199,19 +194,15 @@ def inline_picture(png: bytes, words: str) -> Markup:
     return Markup(f'<img alt="{escape(words)}" src="data:image/png;base64,{encoded}">')
 
 
-def _drawn(drawing: Drawing, folder: Path) -> Markup | None:
+def _drawn(drawing: Drawing, folder: Path) -> Markup:
     """Draw a figure, write its files, and return it as an element of the page."""
     figure = drawing.draw()
-    if drawing.raster:
-        figure.set_dpi(RASTER_DPI)
     engine = figure.get_layout_engine()
     if engine is not None:  # laid out once, not again for each file
         engine.execute(figure)
         # Without any engine; "none" stands for one, for which each file would be drawn twice.
         figure.set_layout_engine(None)
     save_figure(figure, folder / f"{drawing.name}.png", figure.dpi)
-    if drawing.raster:  # a link
-        return None
     text = _svg_text(figure, drawing.name)
     _write(folder / f"{drawing.name}.svg", text)
     return _inline_svg(text, drawing)

@@ -4,6 +4,7 @@ Series are arrays with time along the first axis; instants and steps are in seco
 in hertz. Only the tracking of a video reads a file.
 """
 
+from seakeep.conventions import froude_factor
 from seakeep.signals.calculus import (
     band_pass,
     complementary_filter,
@@ -12,7 +13,6 @@ from seakeep.signals.calculus import (
     integrate,
 )
 from seakeep.signals.filters import low_pass, lowpass_taps, resample
-from seakeep.signals.froude import froude_factor
 from seakeep.signals.lags import (
     Lags,
     MotionAgreement,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import scipy
 from scipy import special
 
-from seakeep.arrays import FloatArray, as_series, fraction, number, positive, time_step
+from seakeep.arrays import FloatArray, as_series, number, positive, time_step
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import as_seconds, span_text, uniform_step
 
@@ -149,13 +149,12 @@ def resample(
     time: npt.ArrayLike,
     new_time: npt.ArrayLike,
     attenuation: float = 60.0,
-    passband: float = PASSBAND,
     anti_alias: bool = True,
 ) -> FloatArray:
     """Band-limited resampling of a uniform series onto another uniform time axis.
 
     Each new sample is a Kaiser-windowed sinc sum over the old ones. Its cut lies between
-    `passband` times the lower of the two Nyquist frequencies and that frequency itself, so that
+    0.8 times the lower of the two Nyquist frequencies and that frequency itself, so that
     going to a larger step does not alias; phase is kept, and constants are kept exactly.
 
     Parameters
@@ -168,8 +167,6 @@ def resample(
         The instants wanted, s, uniform and inside the span of `time`.
     attenuation : float, optional
         Attenuation above the new Nyquist frequency, dB; less than 50 is taken as 50.
-    passband : float, optional
-        Edge of the pass band as a fraction of the lower Nyquist frequency.
     anti_alias : bool, optional
         False cuts at the old Nyquist frequency: samples are taken as they are, and what lies
         above the new one is folded into the result, as in the paper's chain.
@@ -197,7 +194,6 @@ def resample(
     array = as_series(series, channels=True)
     t, wanted = as_seconds(time, "the series"), as_seconds(new_time, "the new time axis")
     dt, new_dt = uniform_step(t, "the series"), uniform_step(wanted, "the new time axis")
-    passband = fraction(passband, "passband, a part of the Nyquist frequency,")
     slack = 1e-6 * dt
     if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:
         raise DataError(
@@ -212,7 +208,7 @@ def resample(
 
     # The lower one, in cycles per old sample.
     nyquist = 0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)
-    return _sinc_sums(array, position, (passband * nyquist, nyquist), attenuation)
+    return _sinc_sums(array, position, (PASSBAND * nyquist, nyquist), attenuation)
 
 
 PHASES = 256

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -470,10 +469,8 @@ def paper_welch(dt: float) -> tuple[int, int, int]:
     return segment, min(overlap, segment - 1), padded
 
 
-def peak_period(
-    series: npt.ArrayLike, dt: float, preset: Literal["paper", "recommended"] = "recommended"
-) -> float:
-    """Peak period T_p of a wave record.
+def peak_period(series: npt.ArrayLike, dt: float) -> float:
+    """Peak period T_p of a wave record, by Welch's method over segments of 60 s with half overlap.
 
     Parameters
     ----------
@@ -481,9 +478,6 @@ def peak_period(
         Wave elevation, uniformly sampled, without gaps.
     dt : float
         Time step, s.
-    preset : {"recommended", "paper"}, optional
-        Welch's method over segments of at least 60 s with half overlap, or the paper's settings
-        (:func:`paper_welch`), whose bins are 0.12 Hz wide.
 
     Returns
     -------
@@ -508,8 +502,7 @@ def peak_period(
     x = as_series(series, minimum=4)
     if np.ptp(x) == 0:
         raise DataError("the record is constant: it has no peak period. Look for a dead probe.")
-    options = {"paper": paper_welch(dt), "recommended": (None, None, None)}[preset]
-    frequency, density = wave_spectrum(x, dt, *options)
+    frequency, density = wave_spectrum(x, dt)
     return float(1.0 / (peak_place(density) * frequency[1]))
 
 

@@ -7,10 +7,10 @@ from .comparison import (
     difference_table,
     forecast_at_full_scale,
     in_degrees,
+    to_full_scale,
     with_degrees,
 )
 from .fit import fit_baselines, fit_campaign, training_runs
-from .full_scale import to_full_scale
 from .nowcast import nowcast, nowcasts
 from .resolve import build_spec
 from .run import run_study

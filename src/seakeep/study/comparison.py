@@ -1,7 +1,13 @@
-"""Comparison of models with the measurement: forecasts of test runs, and their table."""
+"""Comparison of models with the measurement: forecasts of test runs, and their table.
+
+Runs and forecasts at full scale, by Froude's law.
+
+Parts of runs on which the band of an ensemble is calibrated.
+"""
 
 from __future__ import annotations
 
+import math
 import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -15,19 +21,18 @@ from seakeep import metrics, statistics
 from seakeep.arrays import Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.check.parts import samples_in
-from seakeep.conventions import displayed, is_elevation
+from seakeep.conventions import displayed, froude_factor, is_elevation
 from seakeep.core.bootstrap import FEWEST_SAMPLES
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_text
 from seakeep.quality import warn_of_runs
-from seakeep.signals import encounter_period, froude_factor
-from seakeep.signals.time_axis import span_text
+from seakeep.signals import encounter_period
+from seakeep.signals.time_axis import instant_text, span_text
 from seakeep.study.fit import warn_of_repeats, warn_of_waves
-from seakeep.study.full_scale import times, to_full_scale
 from seakeep.study.judge import MEASURES, window_errors
-from seakeep.study.plan import named
+from seakeep.study.plan import between, named
 from seakeep.toml import parse_length
 
 
@@ -154,11 +159,6 @@ def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
     RequestError
         If the unit of a channel does not scale.
     """
-    if "status" not in forecast.attrs:
-        raise RequestError(
-            "forecast must be what model.forecast or summarize returns, whose attributes hold a "
-            f"status; received a Dataset of {', '.join(map(str, forecast.data_vars)) or 'nothing'}."
-        )
     clock, own = froude_factor("s", scale), ["status", "diverged_at"]
     out = to_full_scale(forecast.drop_vars(own, errors="ignore"), scale)
     dt = float(np.diff(out["time"].values[:2]).sum())
@@ -197,8 +197,34 @@ def with_degrees(run: xr.Dataset) -> xr.Dataset:
     return out
 
 
-def compare(
-    model: Model,
+def compare(model: Model, campaign: Campaign, *where: Any, **how: Any) -> list[Comparison]:
+    """Forecast runs of a campaign with one model and pair the forecasts with the measurement.
+
+    Parameters
+    ----------
+    model : HankelDMDcModel or HankelEnsemble
+        The model. For an ensemble the members' mean is judged, and their band beside it.
+    campaign : Campaign
+        The campaign.
+    *where, **how
+        As in :func:`compare_models`: `runs`, `start`, `steps`, and by name `progress`, `members`,
+        `level`, `band`, `executor`.
+
+    Returns
+    -------
+    list of Comparison
+        One per run.
+
+    Raises
+    ------
+    RequestError, DataError
+        As :func:`compare_models`.
+    """
+    return compare_models({"model": model}, campaign, *where, **how)["model"]
+
+
+def compare_models(
+    models: Mapping[str, Model],
     campaign: Campaign,
     runs: Sequence[str] = (),
     start: float | str | None = None,
@@ -209,13 +235,13 @@ def compare(
     level: float = 0.95,
     band: Band = "members",
     executor: Executor | None = None,
-) -> list[Comparison]:
-    """Forecast runs of a campaign and pair the forecasts with the measurement.
+) -> dict[str, list[Comparison]]:
+    """Forecast the same instants with several models and pair them with the measurement.
 
     Parameters
     ----------
-    model : HankelDMDcModel or HankelEnsemble
-        The model. For an ensemble the members' mean is judged, and their band beside it.
+    models : mapping of str to model
+        Models by name; by default all start where the one with the longest history can.
     campaign : Campaign
         The campaign.
     runs : sequence of str, optional
@@ -241,72 +267,21 @@ def compare(
 
     Returns
     -------
-    list of Comparison
-        One per run.
-
-    Raises
-    ------
-    RequestError
-        If a run is unknown or none tests, or `start` and `steps` do not fit.
-    DataError
-        If a run cannot be read or used.
-
-    Warns
-    -----
-    SeakeepWarning
-        If an input of a test run repeats what the model was trained on.
-    """
-    several = compare_models(
-        {"model": model},
-        campaign,
-        runs,
-        start,
-        steps,
-        progress,
-        members=members,
-        level=level,
-        band=band,
-        executor=executor,
-    )
-    return several["model"]
-
-
-def compare_models(
-    models: Mapping[str, Model],
-    campaign: Campaign,
-    runs: Sequence[str] = (),
-    start: float | str | None = None,
-    steps: int | str | None = None,
-    progress: Progress | None = None,
-    *,
-    members: Progress | None = None,
-    level: float = 0.95,
-    band: Band = "members",
-    executor: Executor | None = None,
-) -> dict[str, list[Comparison]]:
-    """Forecast the same instants with several models and pair them with the measurement.
-
-    Parameters
-    ----------
-    models : mapping of str to model
-        Models by name; by default all start where the one with the longest history can.
-    campaign, runs, start, steps, progress, members, level, band, executor
-        As in :func:`compare`; `level` and `band` concern ensembles.
-
-    Returns
-    -------
     dict of str to list of Comparison
         One per run, by model.
 
     Raises
     ------
-    RequestError, DataError
-        As :func:`compare`; also if the time steps of the models differ.
+    RequestError
+        If a run is unknown or none tests, `start` and `steps` do not fit, or the models forecast
+        different states.
+    DataError
+        If a run cannot be read or used, or the time steps of the models differ.
 
     Warns
     -----
     SeakeepWarning
-        As :func:`compare`.
+        If an input of a test run repeats what the model was trained on.
     """
     wanted = list(runs) or campaign.test_runs
     if not wanted:
@@ -431,10 +406,6 @@ def comparison_table(comparisons: Sequence[Comparison], *, intervals: bool = Tru
         ``level`` and ``band`` ("members" or "calibrated"). At full scale ``scale`` ("full") and
         ``scale_factor`` over ``run``.
     """
-    if not comparisons:
-        raise RequestError(
-            "there is no comparison to tabulate. Give those of seakeep.study.compare."
-        )
     table = xr.concat([_row(comparison, intervals) for comparison in comparisons], dim="run")
     for name in set(table) & set(UNITS):
         table[name].attrs["units"] = UNITS[str(name)]
@@ -591,3 +562,122 @@ def _seconds(
         )
     known = (float(r.attrs["encounter_period"]) for r in runs if "encounter_period" in r.attrs)
     return length.value * (next(known, None) or campaign.encounter_period())
+
+
+ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s",
+               "test_span": "s", "water_depth": "m",
+               "reads_input_until": "s", "input_predicted_from": "s", "diverged_at": "s",
+               "probe_offset": "m", "probe_offset_spread": "m"}  # fmt: skip
+"""Times and lengths among the attributes of a run, with their units."""
+
+
+def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> xr.Dataset:
+    """Convert a run, or a forecast, from model to full scale.
+
+    Parameters
+    ----------
+    run : Dataset
+        With a coordinate ``time`` in seconds and ``units`` on each variable.
+    scale : float
+        Scale factor, full-scale length over model length.
+    density_ratio : float, optional
+        As in :func:`seakeep.signals.froude_factor`.
+
+    Returns
+    -------
+    Dataset
+        Times and values at full scale; units keep their names. ``attrs["scale"]`` says
+        ``"full"``; times and lengths among the attributes are converted with them.
+
+    Raises
+    ------
+    RequestError
+        If the run is at full scale already, or a unit does not scale.
+
+    Examples
+    --------
+    >>> run = xr.Dataset(
+    ...     {"heave": ("time", [0.1, 0.2], {"units": "m"})},
+    ...     {"time": ("time", [0.0, 1.0], {"units": "s"})},
+    ... )
+    >>> full = to_full_scale(run, 100.0)
+    >>> full["heave"].values, full["time"].values
+    (array([10., 20.]), array([ 0., 10.]))
+    """
+    if run.attrs.get("scale") == "full":
+        raise RequestError("the run is at full scale already; convert it once.")
+    clock = froude_factor("s", scale)
+    out = run.assign_coords(time=run["time"] * clock)
+    out["time"].attrs = dict(run["time"].attrs)
+    for name, variable in run.data_vars.items():
+        factor = froude_factor(str(variable.attrs.get("units", "1")), scale, density_ratio)
+        out[name] = times(variable.assign_coords(time=out["time"]), factor)
+        if "x_position" in variable.attrs:
+            out[name].attrs["x_position"] = scale * float(variable.attrs["x_position"])
+    out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}
+    for key in ATTRIBUTES.keys() & run.attrs:
+        by = clock if ATTRIBUTES[key] == "s" else scale
+        value = run.attrs[key]
+        pair = isinstance(value, tuple | list)
+        out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
+    return out
+
+
+def times(channel: xr.DataArray, factor: float) -> xr.DataArray:
+    """Multiply a channel, and the standard deviations among its attributes, by a factor."""
+    known = {"training_std", "noise_std"} & set(channel.attrs)
+    spreads = {key: factor * float(channel.attrs[key]) for key in known}
+    return (channel * factor).assign_attrs(channel.attrs | spreads)
+
+
+def calibration_parts(
+    campaign: Campaign,
+    runs: Mapping[str, xr.Dataset],
+    dt: float,
+    start: str | None = None,
+    stop: str | None = None,
+) -> dict[str, xr.Dataset]:
+    """Part of each run between two instants, by default its training span, or the whole run.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign.
+    runs : mapping of str to Dataset
+        Prepared runs.
+    dt : float
+        Their time step, s.
+    start, stop : str, optional
+        Seconds, or encounter periods such as ``"20 T"``; a stop of ``"inf"`` is the end of all.
+
+    Returns
+    -------
+    dict of str to Dataset
+        The parts.
+
+    Raises
+    ------
+    RequestError
+        If an instant lies in none of the runs, or the start at or after the stop.
+    """
+    spans = {name: (float(each["time"][0]), float(each["time"][-1])) for name, each in runs.items()}
+    edges: dict[str, float] = {}
+    for option, stated in (("--start", start), ("--stop", stop)):
+        if stated is None:
+            continue
+        instant = edges[option] = instant_of(stated, campaign, runs.values(), option)
+        inside = any(begin <= instant <= end for begin, end in spans.values())
+        if not (inside or (option == "--stop" and instant == math.inf)):
+            known = ", ".join(f"{name}: {span_text(*span, dt)}" for name, span in spans.items())
+            raise RequestError(
+                f"{option} {stated} ({instant_text(instant, dt)} s) lies in none of the runs "
+                f"({known}). Name an instant inside, or leave {option} out."
+            )
+    if len(edges) == 2 and edges["--start"] >= edges["--stop"]:
+        begin, end = (instant_text(edge, dt) for edge in edges.values())
+        raise RequestError(f"--start {start} ({begin} s) lies at or after --stop {stop} ({end} s).")
+    parts = {}
+    for name, run in runs.items():
+        first, last = run.attrs.get("train_span", spans[name])
+        parts[name] = between(run, (edges.get("--start", first), edges.get("--stop", last)))
+    return parts

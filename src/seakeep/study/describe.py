@@ -161,7 +161,7 @@ def _training(plan: Plan, runs: Runs) -> xr.Dataset:
 
 
 def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
-    """Waves and spans of each run, and samples of its channels that stand still or are slack."""
+    """Waves and spans of each run, and the part of the time at which its lines are slack."""
     waves = next(filter(is_elevation, plan.inputs), None)
     rows = []
     for run in runs.values():
@@ -181,16 +181,13 @@ def _runs(plan: Plan, runs: Runs) -> xr.Dataset:
             }
         )
     names = [*plan.states, *plan.inputs]
-    idle = np.full((2, len(runs), len(names)), np.nan)
+    slack = np.full((len(runs), len(names)), np.nan)
     for r, run in enumerate(runs.values()):
         for c, name in enumerate(names):
-            x, noise = run[name].values, run[name].attrs.get("noise_std", 0.0)
-            # A sample equal to both neighbours: a frozen sensor, or a limit that clips.
-            idle[0, r, c] = np.mean((np.diff(x)[1:] == 0) & (np.diff(x)[:-1] == 0))
             if name.startswith("mooring"):
-                idle[1, r, c] = slack_share(x, noise)
+                slack[r, c] = slack_share(run[name].values, run[name].attrs.get("noise_std", 0.0))
     out = _table(rows, "run", runs).assign_coords(name=names)
-    return out.assign(constant=(("run", "name"), idle[0]), slack=(("run", "name"), idle[1]))
+    return out.assign(slack=(("run", "name"), slack))
 
 
 def _spectra(plan: Plan, runs: Runs) -> xr.Dataset | None:

@@ -324,20 +324,6 @@ class Plan:
         """Names of the models that have members."""
         return [name for name, each in self.models.items() if each.is_ensemble]
 
-    def shown(self, test: str) -> dict[int, int]:
-        """Windows of a test set whose members are kept for figures, and the training set of each.
-
-        Of the first test set as many as the settings ask for, of each further set one.
-        """
-        wanted = self.settings.output.shown_windows
-        wanted = wanted if test == next(iter(self.tests)) else min(wanted, 1)
-        windows = self.tests[test]
-        out = {}
-        for k in np.linspace(0, len(windows) - 1, min(wanted, len(windows))).round().astype(int):
-            first = (t for t, each in enumerate(self.training) if each.may_test(windows[k].run))
-            out[int(k)] = next(first)
-        return out
-
 
 def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dict[str, xr.Dataset]]:
     """Prepare the runs of a study and choose its windows."""

@@ -12,7 +12,6 @@ import re
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -140,7 +139,7 @@ def reproduce(
     seed: int = 0,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    finished: Callable[[Act, StudyResult], None] | None = None,
+    finished: Callable[[StudyResult], None] | None = None,
 ) -> dict[str, StudyResult]:
     """Play the virtual campaign and run the paper's study on it, in three acts.
 
@@ -160,7 +159,7 @@ def reproduce(
     progress : callable, optional
         Called as ``progress(done, total, what)``.
     finished : callable, optional
-        Called with each act and its result once it is known, before it is written.
+        Called with the result of each act once it is known, before it is written.
 
     Returns
     -------
@@ -201,7 +200,7 @@ def reproduce(
             progress=named(progress, f"{act.title}: "),
             extra={"nominal": nominal},
             notes={"preparation_note": f"{act.sentence} {NOTE}", "waves_note": WAVES},
-            finished=None if finished is None else partial(finished, act),
+            finished=finished,
         )
     return results
 

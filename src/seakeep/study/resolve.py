@@ -156,14 +156,14 @@ def resolve_model(
     """Fill in, key by key, what the table of a model does not state."""
     kind = _kind_of(settings)
     ensemble = kind.is_ensemble
-    if settings.preset is not None and not hasattr(kind, settings.preset):
+    if settings.preset not in (None, *presets_of(kind)):
         raise RequestError(
             f"kind = '{settings.kind}' has no preset. Remove preset = '{settings.preset}', and "
             f"state its keys: {', '.join(_defaults(kind))}."
         )
     alignment = ALIGNMENTS.get(settings.preset or preset or "") if aligned else None
     if settings.preset is None and preset is not None:  # a baseline may lack the paper's
-        preset = next((p for p in (preset, "recommended") if hasattr(kind, p)), None)
+        preset = next((p for p in (preset, "recommended") if p in presets_of(kind)), None)
     else:
         preset = preset_of(settings)
     stated = settings.arguments()
@@ -230,11 +230,16 @@ def mistakes_of(
     return []
 
 
+def presets_of(kind: type[Spec]) -> list[str]:
+    """Presets that a kind of model has, each a constructor of its spec."""
+    return [name for name in ("recommended", "paper") if hasattr(kind, name)]
+
+
 def preset_of(settings: ModelSettings) -> str | None:
     """What a table names, or takes where it states none of the keys that have no default."""
     kind = _kind_of(settings)
     needed = {key for key, default in _defaults(kind).items() if default is MISSING}
-    none = not needed & set(settings.arguments()) and hasattr(kind, "recommended")
+    none = not needed & set(settings.arguments()) and "recommended" in presets_of(kind)
     return settings.preset or ("recommended" if none else None)
 
 
@@ -257,13 +262,13 @@ def _spec_of(
             given = {**given, name: replace(before, **given[name])}
     if given.get("observables") is not None and "select" in _defaults(kind):
         given.setdefault("select", None)  # those that are stated are not chosen
-    if "select" not in given and (select := getattr(filled, "select", None)) is not None:
-        closed = {name: False for name in select.opened if name in given}
-        given = {**given, "select": replace(select, **closed)} if closed else given
     if given.get("delay_rows") == "ridge" or given.get("rank") is not None:
         # Free runs are tried with exact rows alone: what a preset would choose by them is left out.
         yields = {"select": None, "readouts": ()}
         given = {**{key: value for key, value in yields.items() if key in _defaults(kind)}, **given}
+    if "select" not in given and (select := getattr(filled, "select", None)) is not None:
+        closed = {name: False for name in select.opened if name in given}
+        given = {**given, "select": replace(select, **closed)} if closed else given
     if filled is not None:
         return cast("Spec", replace(cast("Any", filled), **given))
     needed = [key for key, default in _defaults(kind).items() if default is MISSING]
@@ -271,7 +276,7 @@ def _spec_of(
         as_priors = (
             " as priors, such as { uniform = ['0.5 T', '1.5 T'] }" if kind.is_ensemble else ""
         )
-        presets = [f"'{name}'" for name in ("recommended", "paper") if hasattr(kind, name)]
+        presets = [f"'{name}'" for name in presets_of(kind)]
         raise RequestError(
             f"the [model] table states no {missing[0]}. Add {', '.join(missing)}{as_priors}"
             + (f", or a preset: preset = {' or '.join(presets)}." if presets else ".")

@@ -161,7 +161,7 @@ class OutputSettings(Table):
     """``[output]``: what is kept beside the arrays that are judged, and what a report shows."""
 
     shown_windows: Annotated[int, Field(ge=0)] = Field(
-        default=2, description="windows of the first test set whose members are kept for figures"
+        default=2, description="windows of the first test set that figures show; of the others one"
     )
     eigenvalues: bool = Field(default=True, description="true or false")
     regularisation: bool = Field(

@@ -126,9 +126,9 @@ def compute(
     -------
     dict of str to Dataset
         ``tests/NAME``: ``mean``, and its ``error`` and ``error_over_time``; of an ensemble
-        ``bands/NAME``, the other statistics of its members and what became of each, and
-        ``shown/NAME``, the members of windows that figures show; ``chosen``; ``calibration``;
-        ``regularisation``. Of the first training set ``eigenvalues`` and ``draws``.
+        ``bands/NAME``, the other statistics of its members and what became of each; ``chosen``;
+        ``calibration``; ``regularisation``. Of the first training set ``eigenvalues`` and
+        ``draws``.
     """
     training, settings = plan.training[unit.training], plan.settings
     with _named_after(plan, unit):
@@ -148,25 +148,15 @@ def compute(
         if is_ensemble:
             reduced = reduce_members(series, lost, settings.statistics.level)
             mean = reduced[:, 0]
-            each = [metrics.nrmse(predicted=np.array(values), **pair) for values in series]
             bands: dict[str, Any] = {
                 key: (("window", "time", "channel"), reduced[:, row])
                 for row, key in enumerate(STATISTICS)
                 if key != "mean"
             }
             bands["lost"] = (("window", "member"), lost.T)
-            errors = np.stack(each, axis=1).astype(np.float32)
-            bands["member_nrmse"] = (("window", "member", "channel"), errors)
             if settings.statistics.scale == "learnt":
                 bands["envelope"] = (("window", "time"), envelope)
-            members = {"member": np.arange(len(series))}
-            out[f"bands/{test}"] = xr.Dataset(bands, {**at, **members})
-            numbers = [k for k, number in plan.shown(test).items() if number == unit.training]
-            if numbers:
-                rows = [tested[test].index(k) for k in numbers]
-                values = np.stack([series[:, row] for row in rows]).astype(np.float32)
-                drawn = {"members": (("shown", "member", "time", "channel"), values)}
-                out[f"shown/{test}"] = xr.Dataset(drawn, {"shown": numbers, **members})
+            out[f"bands/{test}"] = xr.Dataset(bands, {**at, "member": np.arange(len(series))})
         judged = judge_windows(predicted=mean, **pair, dt=plan.dt, frequency=frequency)
         out[f"tests/{test}"] = judged.assign_coords(at)
     if is_ensemble and plan.calibrated_on:
@@ -368,10 +358,6 @@ def collect(plan: Plan, facts: Groups, read: Callable[[Unit], Groups]) -> Groups
         if plan.ensembles:
             bands = stacked(plan.ensembles, f"bands/{test}", "ensemble")
             parts.append(bands.reindex(every, fill_value=FILL))
-            shown = {m: [*of(m, f"shown/{test}").values()] for m in plan.ensembles}
-            if any(shown.values()):
-                drawn = {m: xr.concat(each, "shown") for m, each in shown.items()}
-                parts.append(_along("ensemble", drawn).sortby("shown"))
         data = xr.merge([*parts, facts[test]], join="outer")
         out[f"tests/{test}"] = data.drop_vars("member", errors="ignore")
     out["chosen"] = stacked(list(plan.models), "chosen", "model")
@@ -446,7 +432,6 @@ def facts_of(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
                 "window": range(len(windows)),
                 "time": ("time", time, {"units": "s"}),
                 "channel": list(plan.states),
-                "shown": list(plan.shown(test)),
             },
         )
     return out

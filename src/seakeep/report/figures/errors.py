@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import textwrap
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 import xarray as xr
 
 from seakeep.arrays import FloatArray
@@ -50,12 +48,6 @@ DECADE = 10.0
 """Ratio of the channels' medians from which on an axis is logarithmic."""
 BAND_WORDS = {"all": "all frequencies", "low": "low frequencies", "wave": "wave frequencies"}
 """Bands of ε(t)."""
-HYPERPARAMETERS = {
-    "window": "training length",
-    "state_delays": "state delay",
-    "input_delays": "input delay",
-    "ridge": "ridge λ",
-}
 LOWEST = 0.8
 """Modulus at which the axis ends; what lies below dies out within a few samples."""
 
@@ -217,42 +209,6 @@ def growth_text(at: xr.Dataset) -> str:
     """Change of ε(t) over the window with its interval, where there is one, in percent."""
     value, *bounds = (signed(100 * at[key]) for key in ("change", "lower", "upper"))
     return f"{value} %" + f" [{', '.join(bounds)}]" * bool(np.isfinite(at["lower"]))
-
-
-def member_errors(result: StudyResult, test: str, model: str) -> FloatArray:
-    """Median ANRMSE of each member over all cells of a test set."""
-    data = result.tests[test]
-    errors = data["member_nrmse"].sel(ensemble=model).values[..., : result.members_of(model), :]
-    cells = errors[data["judged"].values].astype(float)
-    averages = np.stack([average_of(each) for each in cells])
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a member that is lost everywhere
-        out: FloatArray = np.nanmedian(averages, axis=0)
-    return out
-
-
-@figure_style()
-def hyperparameter_figure(result: StudyResult, model: str) -> Figure:
-    """Error of each member against what was drawn for it, a row per test set."""
-    draws, tests = result.groups[f"draws/{model}"], list(result.tests)
-    drawn = [name for name in HYPERPARAMETERS if np.ptp(draws[name].values) > 0]
-    colour = line_of(result, model)["color"]
-    figure = new_figure(8.5, 0.5 + 1.9 * len(tests))
-    grid = figure.subplots(len(tests), max(len(drawn), 1), squeeze=False, sharey="row")
-    for row, test in zip(grid, tests, strict=True):
-        errors = member_errors(result, test, model)
-        known = np.isfinite(errors)
-        for axes, name in zip(row, drawn, strict=False):
-            x = draws[name].values
-            axes.scatter(x, errors, s=9, color=colour, alpha=0.6, linewidths=0)
-            if known.sum() > 2 and np.ptp(errors[known]) > 0:
-                rank = float(scipy.stats.spearmanr(x[known], errors[known]).statistic)
-                axes.set_title(f"rank correlation {rank:+.2f}", loc="right", fontsize=7, pad=2)
-        row[0].set_ylabel(f"{result.label_of(test)}\nANRMSE")
-    for axes, name in zip(grid[-1], drawn, strict=False):
-        unit = "" if name == "ridge" else f" [{draws[name].attrs['units']}]"
-        axes.set_xlabel(HYPERPARAMETERS[name] + unit)
-    return figure
 
 
 @figure_style()

@@ -10,8 +10,8 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.quality import findings_of
-from seakeep.quality.agreement import LATE, Agreement
 from seakeep.quality.faults import FLAGS
+from seakeep.quality.sensors import LATE, Agreement
 from seakeep.report.style import (
     COLOURS,
     DASHED,

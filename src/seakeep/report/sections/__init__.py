@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 from seakeep.arrays import Progress
@@ -23,7 +22,7 @@ SECTIONS: list[Callable[[StudyResult], Section | None]] = [
     errors.coverage,
     errors.bands,
     errors.densities,
-    errors.members,
+    errors.eigenvalues,
     data.waves,
     data.data,
     data.chosen,
@@ -34,9 +33,7 @@ SECTIONS: list[Callable[[StudyResult], Section | None]] = [
 """A section is one function here; where it has nothing to show it returns None."""
 
 
-def write_report(
-    result: StudyResult, progress: Progress | None = None, pictures: bool = True
-) -> Path:
+def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
     """Write ``report.html`` with its ``figures/``, ``tables/`` and ``histories/``.
 
     Figures are PNG and SVG, tables CSV and LaTeX; histories are what the interactive plot loads.
@@ -47,8 +44,6 @@ def write_report(
         The study; all is written into its folder.
     progress : callable, optional
         Called as ``progress(done, total, what)``.
-    pictures : bool, optional
-        Whether all channels of each run are drawn too: what takes longest.
 
     Returns
     -------
@@ -56,9 +51,6 @@ def write_report(
         The page; errors as of :func:`seakeep.report.page.write_page`.
     """
     sections = [section for make in SECTIONS if (section := make(result)) is not None]
-    if not pictures:
-        drawn = [[each for each in one.figures if not each.raster] for one in sections]
-        sections = [replace(one, figures=f) for one, f in zip(sections, drawn, strict=True)]
     stamp = {key: str(result.attrs[key]) for key in ("preset", "seed", "digest", "description")}
     stamp["finished"] = data.finished(result)
     with storing(result.folder):

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from seakeep.report.figures.runs import quality_figure, spectrum_figure
+from seakeep.report.figures.runs import spectrum_figure
 from seakeep.report.page import Section, drawing, section
-from seakeep.report.quality_sheet import channel_rows, clock_rows, other_findings, run_row
+from seakeep.report.quality_sheet import clock_rows, other_findings, run_row
 from seakeep.report.style import model_words, shown_unit
-from seakeep.report.tables import Number, Table, number, percent, short, table
+from seakeep.report.tables import Table, number, percent, table
 from seakeep.study import StudyResult
 from seakeep.study.plan import windows_overlap
 from seakeep.waves import phase_speed
@@ -83,19 +82,11 @@ def _wave_table(result: StudyResult) -> Table:
 
 def data(result: StudyResult) -> Section:
     """Return channels, and what preparation found in each run."""
-    figures = [
-        replace(
-            drawing("quality", partial(quality_figure, run, {}), {"run": name}, f"quality_{name}"),
-            raster=True,
-        )
-        for name, run in result.prepared.items()
-    ]
     tables = [_sign_table(result), _run_table(result)]
     clocks = [(n, *row) for n, run in result.prepared.items() for row in clock_rows(run)]
     if clocks:
         tables.append(table("clocks", clocks))
-    tables += [_quality_table(result, name) for name in result.prepared]
-    return section("data", figures=figures, tables=tables)
+    return section("data", tables=tables)
 
 
 def _sign_table(result: StudyResult) -> Table:
@@ -116,22 +107,6 @@ def _run_table(result: StudyResult) -> Table:
         others = "; ".join(other_findings(run))
         rows.append((name, sea, str(span), count, kinds.replace("_", " ") or "none", others))
     return table("quality_of_runs", rows, name="runs")
-
-
-def _quality_table(result: StudyResult, name: str) -> Table:
-    """Data quality of all channels of a run, those that the study does not use too."""
-    runs, rows, channels = result.groups["runs"], [], channel_rows(result.prepared[name])
-    for each in channels:
-        use, frozen, slack = "", Number(), Number()
-        if each.channel in runs["name"].values:
-            at = runs.sel(run=name, name=each.channel)
-            use, frozen = "yes", percent(at["constant"], 2)
-            slack = percent(at["slack"], 1) if np.isfinite(at["slack"]) else slack
-        low, high, *others = map(short, each.numbers)
-        row = (each.words, use, each.unit, *others, low, high, frozen, slack, each.flagged)
-        rows.append((*row, "; ".join(each.findings)))
-    marked = [k for k, each in enumerate(channels) if each.findings]
-    return table("quality", rows, {"run": name}, name=f"quality_{name}", marked=marked)
 
 
 APART = 0.005

@@ -18,7 +18,6 @@ from seakeep.report.figures.errors import (
     eigenvalue_figure,
     error_over_time_figure,
     growth_text,
-    hyperparameter_figure,
 )
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.sections.summary import by_channel, conditional, overview_table
@@ -34,6 +33,9 @@ from seakeep.report.tables import (
     signed,
     small_number,
     table,
+)
+from seakeep.report.tables import (
+    words as known_words,
 )
 from seakeep.study import StudyResult
 from seakeep.study.judge import VARIANTS, average_of
@@ -232,28 +234,6 @@ def _of_all(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title:
     return table("bands_by_channel", rows, words, conditional(result), name=f"{name}_channels")
 
 
-PUBLISHED = {
-    "surge": ("0.0026", "0.0010", "0.0061", "0.0052"),
-    "heave": ("0.0031", "0.0013", "0.0061", "0.0049"),
-    "pitch": ("0.0035", "0.0017", "0.0076", "0.0059"),
-    "surge_rate": ("0.0021", "0.0007", "0.0063", "0.0057"),
-    "heave_rate": ("0.0036", "0.0015", "0.0075", "0.0060"),
-    "pitch_rate": ("0.0041", "0.0011", "0.0106", "0.0095"),
-    "surge_acceleration": ("0.0045", "0.0028", "0.0073", "0.0045"),
-    "heave_acceleration": ("0.0071", "0.0030", "0.0140", "0.0110"),
-    "pitch_acceleration": ("0.0086", "0.0028", "0.0181", "0.0153"),
-    "mooring_bow": ("0.0186", "0.0099", "0.0302", "0.0203"),
-    "mooring_stern": ("0.0274", "0.0185", "0.0387", "0.0202"),
-    "average": ("0.0077", "0.0040", "0.0139", "0.0099"),
-}
-"""Divergence that the paper publishes, BHDMDc of the CK-14e in irregular waves: EV and quantiles
-0.025 and 0.975 of the bootstrap, and their difference U.
-
-They come from another vessel in another tank; they are for orientation, and nothing is tuned to
-them.
-"""
-
-
 def age(result: StudyResult) -> Section:
     """Return the error over the age of a forecast."""
     split = float(result.settings["statistics"]["split_period"])
@@ -387,7 +367,7 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
         yield from (small_number(one[key]) for key in keys)
         yield "" if of_all else number(one["block_length"], 0)
         if comparable:
-            yield from PUBLISHED.get(name, (MISSING,) * 4)
+            yield from known_words()["published"].get(name, (MISSING,) * 4)
 
     quantiles = ("EV", "q0.025", "q0.975", "U")
     heads = [*quantiles, "noise floor", "block (samples)"]
@@ -410,14 +390,9 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     )
 
 
-def members(result: StudyResult) -> Section | None:
-    """Return errors of the members of ensembles over what was drawn, and eigenvalues."""
-    figures = []
-    for model in filter(result.is_ensemble, result.models):
-        draw, words = partial(hyperparameter_figure, result, model), {"model": model_words(model)}
-        figures.append(drawing("hyperparameters", draw, words, f"hyperparameters_{model}"))
-    if any(name.startswith("eigenvalues/") for name in result.groups):
-        figures.append(
-            drawing("eigenvalues", partial(eigenvalue_figure, result), {"lowest": LOWEST})
-        )
-    return section("members", figures=figures) if figures else None
+def eigenvalues(result: StudyResult) -> Section | None:
+    """Return the eigenvalues of the models of the first training set."""
+    if not any(name.startswith("eigenvalues/") for name in result.groups):
+        return None
+    figure = drawing("eigenvalues", partial(eigenvalue_figure, result), {"lowest": LOWEST})
+    return section("eigenvalues", figures=[figure])

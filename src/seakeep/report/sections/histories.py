@@ -18,8 +18,6 @@ from seakeep.report.page import Section, drawing, section
 from seakeep.report.style import judged_models, line_of, model_words, shown_unit
 from seakeep.study import StudyResult
 
-MOST_MEMBERS = 20
-"""Members of a cell that are kept; a screen cannot show more."""
 MISSING = 65535
 
 
@@ -150,19 +148,12 @@ def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[st
         """Values (…, channel) in the units that are shown, packed channel by channel."""
         return [pack(factor * values[..., k]) for k, factor in enumerate(factors)]
 
-    shown = data["shown"].values.tolist()
-    first = int(np.argmax(data["judged"].values[:, window]))
     for model in judged_models(result):
         one = data.sel(model=model, measure="nrmse")
         keys = ["mean"]
         if result.is_ensemble(model):
             one, keys = one.sel(ensemble=model), ["mean", "lower", "upper"]
         entry: dict[str, Any] = {key: packed(one[key].values[training, window]) for key in keys}
-        if result.is_ensemble(model) and window in shown and training == first:
-            some = slice(min(MOST_MEMBERS, result.members_of(model)))
-            entry["members"] = packed(
-                one["members"].values[shown.index(window), some].astype(float)
-            )
         errors = one["error"].values[training, window]
         models[model] = entry | {"nrmse": [round(float(e), 3) if e == e else None for e in errors]}
     return {

@@ -105,28 +105,16 @@ def by_channel(
 def _heat(result: StudyResult) -> Table:
     """Median error of each channel in each test set, of the models that are not baselines."""
     places = {
-        f"{result.label_of(test)}: {model_words(model)}": (result, test, model)
+        f"{result.label_of(test)}: {model_words(model)}": {"test": test, "model": model}
         for test in result.tests
         for model in judged_models(result)
     }
-    return heat_table(result, "heat", places, more=conditional(result))
-
-
-def heat_table(
-    result: StudyResult,
-    key: str,
-    places: Mapping[str, tuple[StudyResult, str, str]],
-    values: Mapping[str, Any] | None = None,
-    **options: Any,
-) -> Table:
-    """Median error of each channel, by heading in a test set of a study, of one model."""
+    median = result.groups["statistics/boxes"]["median"].sel(measure="nrmse")
 
     def cells(channel: str) -> Iterator[str]:
-        for study, test, model in places.values():
-            at = {"test": test, "model": model, "measure": "nrmse", "channel": channel}
-            yield number(study.groups["statistics/boxes"]["median"].sel(at), 2)
+        return (number(median.sel({**at, "channel": channel}), 2) for at in places.values())
 
-    return by_channel(result, key, cells, values, columns=places, **options)
+    return by_channel(result, "heat", cells, columns=places, more=conditional(result))
 
 
 def overview_table(result: StudyResult) -> Table:

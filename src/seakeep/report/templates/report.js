@@ -58,7 +58,6 @@
     const line = (kind, m, values, label, more) => out.push({ kind, colour: m.colour, dash: m.dash, values: values.map(numbers), label, ...more });
     for (const m of data.models) {
       const found = c.models[m.name], plain = { ...m, dash: [] };
-      if (found.members && shown("members")) { line("members", plain, [found.members[k]], m.label + " members", { width: .7 }); }
       if (found.lower && shown("band")) { line("band", plain, [found.lower[k], found.upper[k]], m.label + " band"); }
     }
     if (shown("measured")) { line("line", { colour: "#000000" }, [c.measured[k]], "measured", { width: 1.8 }); }
@@ -122,7 +121,7 @@
     const value = (s, unit) => s.label + " " + s.values.map(v => v[i]?.toPrecision(4)).join(" to ") + " " + unit;
     const errors = list.filter(s => s.nrmse != null).map(s => s.label + " " + s.nrmse.toFixed(3));
     const told = i < 0 ? ["NRMSE of " + channel().label + " in this window: " + (errors.join(", ") || "not judged")]
-      : ["t = " + (data.step * (i + 1)).toFixed(2) + " s", ...list.filter(s => s.kind !== "members").map(s => value(s, channel().unit)),
+      : ["t = " + (data.step * (i + 1)).toFixed(2) + " s", ...list.map(s => value(s, channel().unit)),
         ...sea.map(s => value(s, data.waves[0].unit))];
     readout.textContent = told.join("   ");
   }
@@ -153,7 +152,7 @@
     pen.rect(margin.left, top, width - margin.left - margin.right, bottom - top);
     pen.clip();
     for (const s of list) {
-      style(s, { members: 0.25, band: 0.22, line: 1 }[s.kind]);
+      style(s, { band: 0.22, line: 1 }[s.kind]);
       if (s.kind === "band") {
         pen.beginPath();
         points(s.values[0], 0).concat(points(s.values[1], 0).reverse()).forEach(at => pen.lineTo(...at));
