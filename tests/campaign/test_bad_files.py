@@ -142,33 +142,6 @@ def test_a_text_cut_off_within_its_last_line(tmp_path, left):
     assert read_table(path).sizes["time"] == 200
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (png(), r"is a PNG picture, not a table\. Name the file that holds the run's samples"),
-        (b"\xff\xd8\xff\xe0" + bytes(99), r"is a JPEG picture, not a table"),
-        (b"%PDF-1.7\n%\xe2\xe3\n" + bytes(99), r"is a PDF document, not a table"),
-        (
-            b"PK\x03\x04" + bytes(99),
-            r"is an Excel workbook .*\. Save its sheet as CSV and name",
-        ),
-        (b"\xd0\xcf\x11\xe0" + bytes(99), r"is an Excel workbook of the old kind .* as CSV"),
-        (bytes(4) + b"ftypisom" + bytes(99), r"is an MP4 video, .* first, with `seakeep track`"),
-        (b"RIFF" + bytes(99), r"is a recording in AVI or WAV, .* with `seakeep track`"),
-        (
-            bytes(range(256)) * 4,
-            r"holds binary data of a kind|cannot be read as (a MATLAB file|NetCDF|a TDMS"
-            " file|a recording of ROS 2).*(cut off|damaged)",
-        ),
-    ],
-    ids=["PNG", "JPEG", "PDF", "Excel", "old Excel", "MP4", "AVI", "noise"],
-)
-def test_another_kind_of_file_under_the_name(path, content, message):
-    path.write_bytes(content)
-    with pytest.raises(DataError, match=message):
-        read_table(path)
-
-
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "cp1252"])
 def test_text_under_the_name_of_a_binary_format(path, encoding):
     """A table that is not UTF-8 either; a text file's own reader takes it."""
@@ -304,28 +277,3 @@ class TestUnits:
     def test_a_unit_in_one_run_alone(self, tank):
         with pytest.raises(RequestError, match=r"column 'Heave' of .*second\.csv states no unit"):
             self.prepared(tank, "")
-
-
-class TestLengths:
-    """Two loggers a run, one of them stopped early, or another day."""
-
-    TEXT = (
-        "[channels.load]\n[channels.heave]\n[instruments]\nreference = 'loads'\n"
-        "[instruments.loads]\n[instruments.mru]\n[runs.r.files]\nloads = 'loads.csv'\n"
-        "mru = 'mru.csv'\n"
-    )
-
-    def prepared(self, folder, begin, end):
-        write_csv(folder / "loads.csv", {"time [s]": T, "load [N]": HEAVE})
-        at = np.arange(begin, end, 0.02)
-        write_csv(folder / "mru.csv", {"time [s]": at, "heave [m]": np.sin(at)})
-        (folder / "campaign.toml").write_text(self.TEXT)
-        return read_campaign(folder / "campaign.toml").prepare()["r"]
-
-    def test_loggers_that_never_recorded_together(self, tmp_path):
-        with pytest.raises(
-            DataError,
-            match=r"run 'r': its instruments never recorded together \(loads 0 to 19\.95 s, mru 30 "
-            r"to 39\.98 s, on the reference's clock\)\. Check the files of the run and the clocks",
-        ):
-            self.prepared(tmp_path, 30.0, 40.0)

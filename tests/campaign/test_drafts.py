@@ -2,16 +2,12 @@
 
 import numpy as np
 import pytest
-from scipy import io
 from small_tank import tank_columns, write_csv
 
 from seakeep import cli
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
-from seakeep.errors import SeakeepWarning
-
-ASSUMED = "{} is taken as .*, which is assumed: no file states its unit"
 
 
 def drafted(folder, files):
@@ -95,38 +91,6 @@ def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path):
     rate = campaign.settings.preparation.sampling_rate
     assert rate == pytest.approx(200 / 3, rel=1e-5)  # 40 samples in 0.6 s; each fourth made 30
     assert "# Hz; guessed: about 32 samples per wave of 0.6 s, the shortest" in text
-
-
-def named(t):
-    """A run as loggers save it that have no place for units: in the names."""
-    waves = np.cos(2 * np.pi * t / 1.2)
-    return {"WaveHeight_1_mm": 10 * waves, "Pitch_deg": 2 * waves, "Heave_MM": 5 * waves,
-            "Strain_kN": 0.3 + waves, "gyro_x_deg_s": waves, "Trim_s": waves}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("time", "unit"), [("Tid_s", 1.0), ("time_ms", 1e3), ("Klokke_ms", 1e3), ("Klokke", 1.0)]
-)
-def test_units_that_names_end_on(tmp_path, time, unit):
-    """Times are found by their name, or because they rise evenly; 50 Hz they are in any unit."""
-    t = 0.02 * np.arange(1000)
-    for i in (1, 2):
-        io.savemat(tmp_path / f"Run_00{i}.mat", {**named(t), time: unit * t})
-    text, campaign = drafted(tmp_path, sorted(tmp_path.glob("*.mat")))
-    why = "it rises evenly, as times do, in " if "Klokke" in time else "from its name"
-    assert f'time = "{time}" # guessed' in text
-    assert why in text
-    assert "# the files have 50 samples per second" in text
-    with pytest.warns(SeakeepWarning, match=ASSUMED.format("trim_s")):
-        run = campaign.prepare()["Run_001"]
-    assert run.attrs["dt"] == pytest.approx(0.02, rel=1e-12)
-    for name, units, size in (
-        ("eta_1", "m", 0.01), ("pitch", "rad", np.radians(2)), ("heave", "m", 0.005),
-        ("strain", "N", 1000.0), ("roll_rate", "rad/s", np.radians(1)), ("trim_s", "1", 1.0),
-    ):  # fmt: skip
-        assert run[name].attrs["units"] == units
-        assert float(np.ptp(run[name].to_numpy())) == pytest.approx(2 * size, rel=1e-12)
-    assert run["strain"].attrs["long_name"] == "Strain"  # kN it is no more
 
 
 def test_motions_are_the_states_and_loads_are_named_beside_them(tmp_path):

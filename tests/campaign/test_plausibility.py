@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from small_tank import tank_columns, write_csv
 
-from seakeep import cli
 from seakeep.campaign import draft_campaign, read_campaign
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.quality import findings_of
@@ -312,15 +311,3 @@ class TestValues:
 
 def kinds(run):
     return {each.kind.word for each in findings_of(run)}
-
-
-@pytest.mark.usefixtures("empty_sheet")
-def test_the_command_tells_what_was_found(loggers, tmp_path, capsys):
-    loggers()
-    path = tmp_path / "mru.csv"
-    columns = {**tank_columns(), "Pitch (deg)": np.full(1001, 3.2)}
-    write_csv(path, {name: x for name, x in columns.items() if name != "WP fwd [mm]"})
-    assert cli.main(["prepare", str(tmp_path / "campaign.toml")]) == 0
-    said = " ".join(capsys.readouterr().err.split())
-    assert "Found in first: pitch: constant at 3.2 deg Found" in said
-    assert "Found in first: mru: clock assumed the same as the reference's: state" in said

@@ -220,29 +220,6 @@ def test_the_paper_preset_of_the_preparation(tmp_path):
     np.testing.assert_allclose(run["tone_9p9"].values[150:-150], folded, atol=2.5e-3)
 
 
-MODEL = "[model]\npreset = '{}'\nstates = ['tone_5']\n"
-
-
-def test_the_filters_of_the_preparation_follow_the_preset_of_study_or_model(tmp_path):
-    tone_campaign(tmp_path, TONES[1:2], "paper")
-    file = tmp_path / "campaign.toml"
-    bare = file.read_text().replace("[preparation]\npreset = 'paper'\n", "[preparation]\n{}\n")
-
-    def preparation(model, stated="", **asked):
-        file.write_text(bare.format(stated) + MODEL.format(model))
-        found = read_campaign(file, **asked).settings.preparation
-        return found.preset, found.low_pass, found.anti_alias, found.steps_per_period
-
-    paper = ("paper", (10.0, 10.75), False, None)
-    assert preparation("paper") == paper
-    assert preparation("recommended") == ("recommended", None, True, None)
-    assert preparation("recommended", preset="paper") == paper
-    stated = "anti_alias = true\nlow_pass = [8, 9]\nsteps_per_period = 20"
-    assert preparation("paper", stated) == ("paper", (8.0, 9.0), True, 20)
-    stated = "preset = 'recommended'"
-    assert preparation("paper", stated, preset="paper") == ("recommended", None, True, 32)
-
-
 def two_probes(folder, positions, spans=""):
     """A long wave that passes two probes, one after the other, at 2 m/s, and at first at 2.5."""
     t = np.arange(0, 120, 0.05)

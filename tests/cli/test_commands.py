@@ -118,34 +118,6 @@ def test_forecast_writes_netcdf_and_csv_alike(run, place):
     np.testing.assert_array_equal(table["heave_[m]"], heave)  # CSV keeps all digits
 
 
-@pytest.mark.parametrize("model", ["model.nc", "ensemble.nc"])
-def test_lengths_in_encounter_periods(run, place, model):
-    """`T` is the period of the campaign, prepared or not; instants and steps are rounded."""
-    campaign = seakeep.read_campaign(place / CAMPAIGN)
-    period = campaign.encounter_period()
-    status, _, err = run(
-        f"forecast {model} {CAMPAIGN} --run unseen --start '20 T' --steps '15 T' -o periods.nc"
-    )
-    assert status == 0
-    start, steps = round(20 * period / 0.08) * 0.08, round(15 * period / 0.08)
-    assert f"{steps} instants after t = {start:.10g} s, status ok" in err
-    status, _, _ = run(
-        f"forecast {model} {CAMPAIGN} --run unseen --start {20 * period} --steps {steps} -o s.nc"
-    )
-    with (
-        xr.open_dataset(place / "periods.nc", engine="h5netcdf") as one,
-        xr.open_dataset(place / "s.nc", engine="h5netcdf") as other,
-    ):
-        xr.testing.assert_equal(one, other)
-    if model == "ensemble.nc":
-        return
-    pytest.importorskip("matplotlib")
-    assert run(f"compare {model} {CAMPAIGN} --start '20 T' --steps '15 T' -o in_periods")[0] == 0
-    assert run(f"compare {model} {CAMPAIGN} --start {start} --steps {steps} -o in_s")[0] == 0
-    tables = [(place / folder / "comparison.csv").read_text() for folder in ("in_periods", "in_s")]
-    assert tables[0] == tables[1]
-
-
 FROM_20 = f"{CAMPAIGN} --run unseen --start 20 --steps 50"
 
 
@@ -206,34 +178,6 @@ def rows_of(path):
 def judged_rows(folder):
     """Rows of a comparison's CSV by their channel."""
     return {row["channel"]: row for row in rows_of(folder / "comparison.csv")}
-
-
-def test_bands_come_in_degrees_and_at_full_scale(run, place):
-    text = (place / CAMPAIGN).read_text(encoding="utf-8")
-    scaled = place / "docs/tutorial/scaled_ensemble.toml"
-    scaled.write_text(text.replace("[campaign]", "[campaign]\nscale_factor = 25.0", 1))
-    found = {}
-    for name, options in (("model", ""), ("full", "--full-scale"), ("radians", "--radians")):
-        command = f"compare ensemble.nc {scaled} --start 20 --steps 100 -o {name} {options}"
-        assert run(command)[0] == 0
-        found[name] = judged_rows(place / name)
-
-    def width(name, channel):
-        return float(found[name][channel]["band_width"])
-
-    assert width("full", "heave") == pytest.approx(25 * width("model", "heave"), rel=1e-12)
-    assert width("full", "pitch") == pytest.approx(width("model", "pitch"), rel=1e-12)
-    assert width("model", "pitch") == pytest.approx(np.degrees(width("radians", "pitch")))
-    for channel in ("heave", "pitch", "mooring_bow"):
-        inside = {found[name][channel]["coverage"] for name in found}
-        assert len(inside) == 1
-    command = f"forecast ensemble.nc {scaled} --run unseen --start 20 --steps 30 -o {{}}.nc"
-    assert run(command.format("small"))[0] == 0
-    assert run(command.format("large") + " --full-scale")[0] == 0
-    small, large = (xr.load_dataset(place / f"{n}.nc") for n in ("small", "large"))
-    np.testing.assert_allclose(large["heave"], 25 * small["heave"], rtol=1e-12)
-    np.testing.assert_allclose(large["time"], 5 * small["time"], rtol=1e-12)
-    assert list(large["status"].values) == ["ok"] * 8
 
 
 @pytest.mark.usefixtures("drawn")

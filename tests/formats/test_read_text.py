@@ -215,7 +215,7 @@ def test_round_trip(tmp_path, values, delimiter, comma, units, compressed, newli
         (
             b"\x93\x00\x01PNG" * 9,
             DataError,
-            "holds binary data of a kind that is not known. Export the run as CSV",
+            "holds binary data of a kind that is not known, or UTF-16 without its mark. Export the",
         ),
         (gzip.compress(PLAIN.encode(), mtime=0)[:-12], DataError, r"cut off or damaged \(gzip: "),
         (

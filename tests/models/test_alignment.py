@@ -13,7 +13,6 @@ from seakeep import (
     Fixed,
     HankelDMDc,
     ProbeAlignment,
-    RequestError,
     Uniform,
     estimate_probe_offset,
     load_model,
@@ -57,29 +56,6 @@ def test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is(models):
     assert errors["none"] > 0.4
     # With no surge and no offset the elevation stays where it is, to a transform's rounding.
     assert errors["rest"] == pytest.approx(errors["none"], rel=1e-6)
-
-
-@pytest.mark.parametrize("key", ["dispersion", "predicted"])
-def test_windows_side_by_side_are_aligned_as_single_forecasts(models, key):
-    model, run = models[key], drifting_run(7)
-    together = model.forecast_windows(run, [60.0, 71.0], steps=100)
-    for window, start in enumerate((60.0, 71.0)):
-        alone = model.forecast(run, start=start, steps=100)
-        for name in model.states:
-            # The record is read up to the end of the last window and continued by prediction from
-            # there: the end of a window before is carried with what was measured later.
-            np.testing.assert_allclose(together[name][window], alone[name], rtol=0, atol=3e-6)
-    assert together.attrs == {k: v for k, v in alone.attrs.items() if k not in ("start", "status")}
-
-
-def test_measured_surge_says_that_it_was_read(models):
-    run = drifting_run(7)
-    forecast = models["dispersion"].forecast(run, start=60.0, steps=300)
-    assert forecast.attrs["conditional_on"] == "surge"
-    assert forecast.attrs["alignment_mode"] == "dispersion"
-    run["surge"].values[700:] += 0.3
-    other = models["dispersion"].forecast(run, start=60.0, steps=300)
-    assert not np.allclose(other["heave"], forecast["heave"], atol=1e-3)
 
 
 def test_a_shorter_forecast_is_the_start_of_a_longer_one(models):
@@ -185,17 +161,6 @@ def test_training_reads_nothing_after_its_stop(runs):
     assert one.training == replace(other.training)
 
 
-def test_a_window_needs_no_more_than_window_and_history(runs):
-    alignment = ProbeAlignment(mode="dispersion", surge="measured")
-    gapped = runs[0].copy(deep=True)
-    gapped["surge"].values[:200] = np.nan
-    gapped["eta_fwd"].values[:150] = np.nan
-    windowed = replace(spec(alignment), window=1000)
-    assert windowed.fit(gapped, STATES, INPUTS).training.columns == (999,)
-    with pytest.raises(DataError, match=r"channel 'surge' of run 1 has 200 missing .* at t = 0 s"):
-        spec(alignment).fit(gapped.assign(eta_fwd=runs[0]["eta_fwd"]), ["heave"], INPUTS)
-
-
 def test_a_gap_in_the_surge_is_named_in_a_forecast(models):
     run = drifting_run(7)
     run["surge"].values[700] = np.nan
@@ -241,68 +206,6 @@ def test_aligned_members_equal_the_deterministic_model(runs, alignment):
         alone = model.forecast(run, start=60.0, steps=200)
         for name in STATES:
             np.testing.assert_allclose(forecast[name][number], alone[name], rtol=0, atol=1e-10)
-
-
-def without(run, *names, positions=True):
-    run = run.copy(deep=True)
-    for name in names:
-        run.attrs.pop(name, None)
-    if not positions:
-        for each in run.data_vars.values():
-            each.attrs.pop("x_position", None)
-    return run
-
-
-@pytest.mark.parametrize(
-    ("alignment", "change", "states", "inputs", "message"),
-    [
-        (
-            {"mode": "dispersion"},
-            lambda run: without(run, "water_depth"),
-            STATES,
-            INPUTS,
-            "needs the water depth and run 1 has no attribute 'water_depth'. State water_depth",
-        ),
-        (
-            {"mode": "effective"},
-            lambda run: without(run, positions=False),
-            STATES,
-            INPUTS,
-            r"celerity cannot be estimated from run 1: .* \(positions stated: 0\). State celerity",
-        ),
-        (
-            {"mode": "dispersion", "surge": "predicted"},
-            lambda run: run,
-            ["heave"],
-            INPUTS,
-            "surge = 'predicted' needs 'surge' among the states; received heave. Add it, or choose",
-        ),
-        (
-            {"channels": ["eta_bow"]},
-            lambda run: run,
-            STATES,
-            INPUTS,
-            r"channels names 'eta_bow', which is not among the inputs \(eta_fwd, eta_cog\)",
-        ),
-        (
-            {},
-            lambda run: run,
-            STATES,
-            [],
-            r"none of the inputs \(none\) is known as a wave elevation. Give the channels an attr",
-        ),
-        (
-            {},
-            lambda run: run.drop_vars("surge"),
-            ["heave"],
-            INPUTS,
-            "run 1 has no channel 'surge'. .*It has: heave, eta_fwd, eta_cog",
-        ),
-    ],
-)
-def test_runs_that_lack_what_the_alignment_needs(runs, alignment, change, states, inputs, message):
-    with pytest.raises(RequestError, match=message):
-        spec(alignment).fit(change(runs[0]), states, inputs)
 
 
 def test_the_spread_of_celerities_is_that_between_the_runs():

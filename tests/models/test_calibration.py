@@ -148,28 +148,6 @@ def test_no_window_touches_what_a_member_has_read(ensemble, moved, run):
     np.testing.assert_allclose(calibrated.calibration.conformal.margin, expected.margin, rtol=1e-12)
 
 
-def test_windows_leave_room_for_the_look_ahead():
-    spec = seakeep.BayesianHankelDMDc(
-        encounter_period=1.6,
-        window=seakeep.Fixed("15 T"),
-        state_delays=seakeep.Fixed("0.4 T"),
-        input_delays=seakeep.Fixed("1.0 T"),
-        ridge=seakeep.Uniform(200, 400),
-        n_members=3,
-        lead=10,
-    )
-    ensemble = spec.fit(sea(0), STATES, INPUTS, stop=60.0)
-    history, other = ensemble.history_samples, sea(3, 400, "other")
-    # The last of 40 steps starts from instant 39 and is driven by the input at 39 + 10.
-    for samples, windows in ((history + 40 + 9, 1), (history + 40 + 8, 0)):
-        part = other.isel(time=slice(None, samples))
-        if windows:
-            assert ensemble.calibrate(part, 40).calibration.windows == {"other": 1}
-        else:
-            with pytest.raises(RequestError, match="no window of 40 steps"):
-                ensemble.calibrate(part, 40)
-
-
 def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(learnt, run):
     one = learnt.forecast_summary(run, 120.0, 30, band="calibrated")
     several = learnt.summarize_windows(run, [115.0, 120.0], 30, band="calibrated")
@@ -183,16 +161,6 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(lear
         np.testing.assert_allclose(arrays.upper[:, k], one[name].sel(statistic="upper"), atol=1e-9)
     assert "learnt from the members' spread" in one["statistic"].attrs["comment"]
     assert "times a learnt scale and a floor of" in learnt.summary()
-
-
-def test_a_learnt_band_reads_no_state_after_the_start_and_no_wave_beyond_the_last_step(learnt, run):
-    expected = learnt.forecast_summary(run, 120.0, 30, band="calibrated")
-    poisoned = run.copy(deep=True)
-    for name in STATES:
-        poisoned[name].values[1201:] = np.nan
-    poisoned["eta"].values[1230:] = 1e9
-    found = learnt.forecast_summary(poisoned, 120.0, 30, band="calibrated")
-    xr.testing.assert_identical(found, expected)
 
 
 @pytest.mark.parametrize("scale", ["spread", "constant", "learnt"])

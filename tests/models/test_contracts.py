@@ -103,38 +103,6 @@ class TestLead:
         np.testing.assert_array_equal(found.coefficients, expected.coefficients)
         assert found.training.columns == (200 - 1 - 4,)
 
-    def test_arrays_take_as_many_future_rows_as_the_lead_needs(self):
-        run = sea(ahead=4)
-        model = HankelDMDc(1, 8, 1.0, lead=5).fit(run, ["heave"], ["eta"])
-        x, u = run.heave.values[:, None], run.eta.values[:, None]
-        found = model.forecast_arrays(x[:201], u[:201], u[201:255], steps=50)
-        expected = model.forecast(run, start=20.0, steps=50)
-        np.testing.assert_allclose(found[:, 0], expected.heave, rtol=0, atol=1e-13)
-        with pytest.raises(RequestError, match=r"at least 54 rows \(steps − 1 \+ lead_samples\)"):
-            model.forecast_arrays(x[:201], u[:201], u[201:254], steps=50)
-
-    def test_the_end_of_a_run_leaves_room_for_the_lead(self):
-        run = sea(ahead=4)
-        model = HankelDMDc(1, 8, 1.0, lead=5).fit(run, ["heave"], ["eta"])
-        whole = model.forecast(run, start=20.0)
-        assert whole.sizes["time"] == 599 - 200 - 4
-        with pytest.raises(RequestError, match=r"model's lead takes 5\. At most 395 steps"):
-            model.forecast(run, start=20.0, steps=396)
-
-    @pytest.mark.parametrize(("lead", "samples"), [(5, 5), ("0.25 T", 4)])
-    def test_an_ensemble_counts_it_in_samples_or_periods(self, lead, samples, tmp_path):
-        run = sea(ahead=3)
-        fitted = ensemble(lead=lead).fit(run, ["heave"], ["eta"])
-        assert fitted.lead_samples == samples
-        one = fitted.member(2)
-        assert one.lead_samples == samples
-        members = fitted.forecast(run, start=20.0, steps=30)
-        np.testing.assert_allclose(
-            members.heave[2], one.forecast(run, start=20.0, steps=30).heave, atol=1e-12
-        )
-        back = load_model(fitted.save(tmp_path / "e.nc"))
-        xr.testing.assert_identical(back.forecast(run, start=20.0, steps=30), members)
-
 
 @dataclass(frozen=True)
 class Half:

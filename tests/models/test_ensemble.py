@@ -204,26 +204,6 @@ def test_priors_that_never_fit_are_refused(run):
         fitted(run, window=Fixed("50 T"))
 
 
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of scipy, about its parameters
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"ridge": Uniform(-2, -1)}, r"gave ridge = -1\.\d+, which is negative\. Move the prior"),
-        ({"state_delays": Fixed("-1 T")}, r"gave state_delays = -16, which is negative"),
-        ({"ridge": stats.uniform(np.nan, 1)}, r"gave ridge = nan\. Check the parameters of that"),
-        ({"input_delays": stats.uniform(0, np.inf)}, r"gave input_delays = inf\. Check the"),
-        ({"window": Fixed("0.05 T")}, r"a window of 1 samples, and 2 are needed\. Raise window"),
-        (
-            {"window": Fixed("1 T"), "input_delays": Fixed("2 T"), "history": "inside"},
-            r"window of 16 samples with delays of \d and 32 inside it, and 34 are needed",
-        ),
-    ],
-)
-def test_priors_that_give_nothing_to_train_with_are_refused(run, changes, text):
-    with pytest.raises(DataError, match=rf"no feasible draw in 1000: the last one .*{text}"):
-        fitted(run, **changes)
-
-
 def test_the_seed_may_be_a_sequence_or_a_generator(run):
     sequence = np.random.SeedSequence(3)
     xr.testing.assert_equal(fitted(run).draws, fitted(run, seed=sequence).draws)
@@ -301,16 +281,6 @@ def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
     assert set(found.draws.last_sample.values) == {175}
 
 
-def test_members_over_runs_learn_from_one_run_each(run):
-    runs = {"one": run, "two": wave_run(1), "three": wave_run(2)}
-    ensemble = small(train_on="runs", n_members=12).fit(runs, STATES, INPUTS)
-    assert set(ensemble.draws.training_run.values) == {0, 1, 2}
-    for number in range(3):
-        chosen = list(runs.values())[int(ensemble.draws.training_run[number])]
-        model = alone(ensemble, number).fit(chosen, STATES, INPUTS)
-        np.testing.assert_allclose(ensemble.member(number).A, model.A, atol=1e-10)
-
-
 def test_a_file_gives_back_the_ensemble_to_the_last_bit(run, tmp_path):
     ensemble = small(train_on="windows").fit([run, wave_run(1, name="b")], STATES, INPUTS)
     path = ensemble.save(tmp_path / "ensemble.nc")
@@ -320,20 +290,6 @@ def test_a_file_gives_back_the_ensemble_to_the_last_bit(run, tmp_path):
     xr.testing.assert_identical(
         back.forecast(run, start=65.0, steps=20), ensemble.forecast(run, start=65.0, steps=20)
     )
-
-
-def test_diverged_members_are_counted_and_left_out(run):
-    ensemble = fitted(run)
-    forecast = ensemble.forecast(run, start=65.0, steps=30)
-    broken = forecast.copy(deep=True)
-    broken["heave"][1, 20:] = np.nan
-    broken["pitch"][1, 20:] = np.nan
-    summary = seakeep.summarize(broken)
-    rest = seakeep.summarize(forecast.drop_isel(member=1))
-    for name in STATES:
-        np.testing.assert_array_equal(summary[name], rest[name])
-    assert summary.attrs["diverged"] == 1
-    assert summary.attrs["members"] == 6
 
 
 def test_members_that_diverge_say_when():
@@ -363,38 +319,6 @@ def test_members_that_diverge_say_when():
         radii = ensemble.spectral_radii()
     assert np.all(radii[lost] > 1)
     assert f"({np.sum(radii >= 1)} of 6 UNSTABLE: their long forecasts" in ensemble.summary()
-
-
-def test_the_summary_says_what_the_members_are(run):
-    ensemble = fitted(run, window=Uniform("30 T", "40 T"), n_members=20, ridge=STABLE)
-    assert repr(ensemble) == (
-        "HankelEnsemble(n_members=20, states=['heave', 'pitch'], inputs=['eta'], dt=0.1; "
-        "print(ensemble.summary()) says more)"
-    )
-    text = ensemble.summary()
-    draws = ensemble.draws
-    for words in (
-        "Ensemble of 20 Hankel DMD models with control: 2 states, 1 input, dt 0.1 s",
-        "heave [m], pitch [m]",
-        f"Monte Carlo, seed 3; {draws.attrs['redrawn']} infeasible and drawn again",
-        f"({int(draws.window_samples.min())} to {int(draws.window_samples.max())} sam",
-        f"state delay   {float(draws.state_delays.min()):.4g} to",
-        f"({int(draws.input_delays_samples.min())} to {int(draws.input_delays_samples.max())} sam",
-        f"ridge         {float(draws.ridge.min()):.4g} to {float(draws.ridge.max()):.4g}; delay",
-        f"history       {ensemble.history_samples} samples up to",
-        "to 60 s",
-        "(stable)",
-    ):
-        assert words in text
-    windows = small(train_on="windows", sampling="sobol", ridge=STABLE).fit(
-        [run, wave_run(1)], STATES, INPUTS
-    )
-    assert "Sobol, seed 3" in windows.summary()
-    assert "2 runs, a window of one of them per member, drawn" in windows.summary()
-    whole = small(window=None, ridge=STABLE).fit(run, STATES, INPUTS)
-    assert "window        all of a run" in whole.summary()
-    single = small(state_delays=Fixed("1.0 T"), ridge=STABLE).fit(run, STATES, INPUTS)
-    assert "state delay   1 encounter period (" in single.summary()
 
 
 def test_spectral_radii_are_those_of_the_members_for_any_workers(run, tmp_path):

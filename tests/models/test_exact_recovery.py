@@ -35,15 +35,6 @@ def test_a_position_only_oscillator_gives_its_arx_coefficients(oscillator, part,
     np.testing.assert_allclose(model.B[1], [0, 0], rtol=0, atol=EXACT)
 
 
-def test_a_model_without_input_may_forecast_past_the_end_of_the_run(oscillator):
-    run = oscillator.run(samples=80, forced=False)
-    model = HankelDMDc(1, 0, 0.0, standardize=False).fit(run, states=["heave"], inputs=[])
-    whole = model.forecast(run, start=float(run.time[9]), steps=60)
-    cut = model.forecast(run.isel(time=slice(0, 10)), start=float(run.time[9]), steps=60)
-    np.testing.assert_array_equal(cut.heave, whole.heave)
-    np.testing.assert_allclose(cut.time, run.time[10:70], rtol=0, atol=1e-12)  # rounding of k·dt
-
-
 @pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
 @pytest.mark.parametrize(("s", "z"), [(3, 2), (2, 5), (6, 6)])
 def test_with_redundant_delays_forecasts_are_right_and_coefficients_are_not(

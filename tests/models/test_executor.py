@@ -15,7 +15,6 @@ import side_work
 import xarray as xr
 
 import seakeep
-from seakeep.errors import RequestError
 from seakeep.models import executor as executors
 from seakeep.models import processes
 from seakeep.models.executor import WorkerLostError, as_finished, in_order, make_executor
@@ -241,11 +240,3 @@ class TestCluster:
             with pytest.raises(WorkerLostError, match=r"no workers that answer|was lost"):
                 list(in_order(side_work.square, 1, range(4), executor))
             assert time.monotonic() - begin < 120
-
-    def test_an_address_where_nobody_answers(self, monkeypatch):
-        monkeypatch.setattr(executors, "PATIENCE", 0.5)
-        with (
-            pytest.raises(RequestError, match=r"no Dask scheduler answers at .*`dask scheduler`"),
-            make_executor(scheduler="tcp://127.0.0.1:9"),
-        ):
-            pass

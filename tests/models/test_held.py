@@ -1,7 +1,5 @@
 """Members that are held give the ensemble's own numbers, from plain arrays that are checked."""
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -74,17 +72,3 @@ def test_the_numbers_are_those_of_the_ensemble(delay_rows, band, arrays):
         # The same operations on the same numbers, in another order of windows at most.
         np.testing.assert_allclose(getattr(found, key), values, rtol=1e-12, atol=1e-12)
     assert found.diverged == 0
-
-
-def test_who_identifies_them_makes_no_difference(ensemble, held, arrays):
-    told = []
-    threads = ensemble.hold(
-        executor=ThreadPoolExecutor(2), progress=lambda *each: told.append(each)
-    )
-    expected = held.forecast_arrays(**arrays, steps=STEPS)
-    for members in (threads, ensemble):  # the latter identifies them anew
-        found = members.forecast_arrays(**arrays, steps=STEPS)
-        for one, other in zip(found, expected, strict=True):
-            np.testing.assert_array_equal(one, other)
-    np.testing.assert_array_equal(ensemble.live().errors.rms, held.live().errors.rms)
-    assert told[-1] == (7, 7, "member 7")

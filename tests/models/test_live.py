@@ -304,7 +304,30 @@ def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, run):
     live = model.live()  # of another rig: each probe from its own record
     play(live, cut, 0, START)
     # Futures lie in pairs about the predicted one, and the model is linear in them.
-    np.testing.assert_allclose(mean(live.forecast(STEPS)), matrix(expected, STATES), atol=1e-9)
+    made = live.forecast(STEPS)
+    error = np.stack([made[name].sel(statistic="std") for name in STATES], axis=1)
+    scale = model.state_scale
+    weight = np.minimum.accumulate(np.clip((1.2 - (error / scale.spread) ** 2) / 0.5, 0, 1))
+    shrunk = scale.centre + weight * (matrix(expected, STATES) - scale.centre)
+    np.testing.assert_allclose(mean(made), shrunk, atol=1e-9)
+    assert weight.min() < 0.5 < weight.max() == 1
+
+
+@pytest.mark.parametrize("key", ["plain", "lead"])
+def test_without_waves_to_come_no_lead_errs_more_than_the_mean(models, run, key):
+    model, steps = models[key], 150
+    live = model.live()
+    play(live, run, 0, 300)
+    errors, spread = [], matrix(run, STATES).std(axis=0)
+    for first in range(300, 1300, 25):
+        truth = matrix(run, STATES)[first : first + steps]
+        errors.append(((mean(live.forecast(steps)) - truth) / spread) ** 2)
+        play(live, run, first, first + 25)
+    ratio = np.sqrt(np.mean(errors, axis=0))[:, 1]  # of heave; waves do not drive surge
+    # Forty tones beat, and 40 starts tell a ratio to a tenth; unweighted, it is 1.4 and stays so.
+    assert ratio.max() < 1.2
+    assert ratio[-50:].mean() < 1.05
+    assert ratio[:3].max() < 0.2
 
 
 def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(models, run):
@@ -404,18 +427,6 @@ def test_what_is_kept_does_not_grow_and_does_not_count(models, run, tmp_path):
     assert kept < size < kept + 18_000
 
 
-def test_samples_have_names_and_instants(models, run):
-    live, plain = models["plain"].live(), models["plain"].live()
-    for at in range(40):
-        sample = {name: float(run[name][at]) for name in [*INPUTS, *STATES]}
-        y = {name: sample[name] for name in STATES if name != "heave"}
-        live.step({name: sample[name] for name in INPUTS}, y, time=float(run.time[at]))
-        play(plain, run, at, at + 1, dead=["heave"])
-    np.testing.assert_array_equal(live.state, plain.state)
-    assert live.time == float(run.time[39])
-    assert plain.time == pytest.approx(39 * models["plain"].dt)
-
-
 BAD = {
     "y has shape": {"y": [1.0]},
     "u has shape": {"u": [0.0, 0.0, 0.0, 0.0, 0.0]},
@@ -437,26 +448,6 @@ def test_a_bad_sample_leaves_the_state_as_it_was(models, run, message):
         each.step(**good)
     np.testing.assert_array_equal(live.state, untouched.state)
     assert live.consistency == untouched.consistency
-
-
-def test_what_cannot_be_is_refused(models, ensemble, runs, run):
-    model = models["plain"]
-    aligned = spec(alignment=ProbeAlignment(mode="dispersion", surge="measured"))
-    without = aligned.fit(runs, [name for name in STATES if name != "surge"], INPUTS)
-    with pytest.raises(RequestError, match="carried over whole records, which are not"):
-        without.live()
-    with pytest.raises(RequestError, match=r"it is a member .* Use ensemble.hold\(\).live\(\)"):
-        ensemble.member(1).live()
-    live = model.live()
-    with pytest.raises(RequestError, match="there are 0 samples of history and the model needs 13"):
-        live.forecast(5)
-    with pytest.raises(RequestError, match="Start with at least 4 samples of all of u"):
-        live.step()
-    with pytest.raises(RequestError, match="noise names 'roll', which the model does not know"):
-        model.live(noise={"roll": 1.0})
-    live = started(model, run, 20)
-    with pytest.raises(RequestError, match="future holds an infinite value"):
-        live.forecast(5, np.full((5, len(INPUTS)), np.inf))
 
 
 def test_a_model_without_inputs_serves_too(make_dataset):

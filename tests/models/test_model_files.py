@@ -1,11 +1,8 @@
 """Models on disk: the same bits in another process, and what a wrong file is told."""
 
-import errno
 import json
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -120,26 +117,6 @@ def test_a_single_bit_that_changed_is_noticed(saved, part):
         saved.write_bytes(damaged)
         with pytest.raises(DataError, match="its checksum is another one"):
             load_model(saved)
-
-
-def test_an_interrupted_write_leaves_the_old_file(saved, model, monkeypatch):
-    before = saved.read_bytes()
-
-    usual = Path.open
-
-    def fill_the_disk(self, mode="r", **kwargs):
-        file = usual(self, mode, **kwargs)
-        if self.parent != saved.parent or "w" not in mode:
-            return file
-        with file:
-            file.write(b"0123456789")
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(Path, "open", fill_the_disk)
-    with pytest.raises(RequestError, match=r"cannot write .*: No space left .* is untouched"):
-        model.save(saved)
-    assert saved.read_bytes() == before
-    assert [path.name for path in saved.parent.iterdir()] == ["rom.nc"]
 
 
 def test_a_mat_file_reproduces_the_forecast(model, make_run, tmp_path):

@@ -54,18 +54,6 @@ def test_a_stop_between_two_samples_takes_the_one_before(run, channels):
         np.testing.assert_array_equal(model.coefficients, same.coefficients)
 
 
-def test_every_run_may_have_its_own_stop(make_run, channels):
-    runs = {"a": make_run(seed=1), "b": make_run(seed=2)}
-    spec = HankelDMDc(3, 8, 1.0, window=100)
-    by_name = spec.fit(runs, stop={"a": 8.0, "b": 12.0}, **channels)
-    by_order = spec.fit(list(runs.values()), stop=[8.0, 12.0], **channels)
-    assert by_name.training.stop == pytest.approx((8.0, 12.0))
-    np.testing.assert_array_equal(by_name.A, by_order.A)
-    assert spec.fit(runs, stop={"a": 8.0}, **channels).training.stop == pytest.approx(
-        (8.0, float(runs["b"].time[-1]))
-    )
-
-
 @pytest.mark.parametrize("history", ["before", "inside"])
 def test_moments_are_those_of_the_windows_pooled_with_ddof_one(make_run, channels, history):
     runs = [make_run(seed=1), make_run(samples=300, seed=2)]
@@ -80,18 +68,6 @@ def test_moments_are_those_of_the_windows_pooled_with_ddof_one(make_run, channel
         # The same sums in the same order, or nearly.
         np.testing.assert_allclose(mean, pooled.mean(axis=0), rtol=1e-13)
         np.testing.assert_allclose(std, pooled.std(axis=0, ddof=1), rtol=1e-13)
-
-
-def test_samples_before_the_window_never_enter_the_moments(run, channels):
-    spec = HankelDMDc(3, 8, 1.0, window=100)
-    model = spec.fit(run, **channels)
-    shifted = run.copy(deep=True)
-    shifted.heave[:300] += 5.0
-    other = spec.fit(shifted, **channels)
-    np.testing.assert_array_equal(other.state_mean, model.state_mean)
-    np.testing.assert_array_equal(other.state_std, model.state_std)
-    # They are the delay history of the first columns, so that the matrices do change.
-    assert np.max(np.abs(other.A - model.A)) > 1e-3
 
 
 def test_history_inside_reads_nothing_before_the_window(run, channels):

@@ -74,24 +74,8 @@ def test_a_dead_probe_in_a_test_run_is_told(halves):
     table = np.loadtxt(halves / "run.csv", delimiter=",", skiprows=1)
     table[1001:, 1] = 0.0
     np.savetxt(halves / "run.csv", table, delimiter=",", header="t [s],eta [m],z [m]", comments="")
-    with (
-        pytest.warns(SeakeepWarning, match="eta_fwd stuck"),
-        pytest.warns(SeakeepWarning, match="eta_fwd level drifts"),
-    ):
+    with pytest.warns(SeakeepWarning, match="eta_fwd stuck"):
         compare(model, whole)
-
-
-def test_start_and_steps_of_the_user_are_taken(halves):
-    whole = campaign(halves, EXACT)
-    model = fit_campaign(whole)
-    (judged,) = compare(model, whole, ["all"], start=150.0, steps=20)
-    assert judged.forecast.sizes["time"] == 20
-    assert float(judged.forecast.time[0]) == pytest.approx(150.1)
-    # One past the record: judged where there is a measurement.
-    (judged,) = compare(model, whole, ["all"], start=199.0, steps=11)
-    assert (judged.forecast.sizes["time"], judged.status) == (10, "ok")
-    with pytest.raises(RequestError, match=r"steps must be a whole number of .* received 4\.7"):
-        compare(model, whole, ["all"], start=150.0, steps=4.7)
 
 
 def test_runs_that_train_and_test_apart(halves):
@@ -113,44 +97,6 @@ kind = "bayesian_hankel_dmdc"
 n_members = 4
 seed = 7
 """
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("{ uniform = [30, 10] }", "state_delays: Uniform needs its lower bound below the upper"),
-        ("{ uniform = [1, inf] }", "Uniform needs finite numbers; received 1 and inf"),
-        ('{ uniform = ["1 T", 3] }', "Uniform needs one unit"),
-        ("{ log_uniform = [0, 1] }", "LogUniform needs a positive lower bound"),
-        ("{ uniform = [1, 2], fixed = 1 }", "state_delays: a prior is one of { uniform"),
-        ('{ distribution = "nrom" }', "scipy.stats has no distribution 'nrom'.*mean 'norm'"),
-        (
-            '{ distribution = "gamma", parameters = { scale = 2.0 } }',
-            "'parameters' of 'gamma' are a, loc, scale, of which loc and scale may be left out; ",
-        ),
-        (
-            '{ distribution = "norm", parameters = { scale = -1.0 } }',
-            "'norm' with these 'parameters' has no median; correct them",
-        ),
-        ("-1", "state_delays must be an integer of at least 0; received -1"),
-        ('"1 /T"', "state_delays must be a length that is not negative, .* received '1 /T'"),
-        ('"-1 T"', "state_delays must be a length that is not negative, .* received '-1 T'"),
-        ("1\nridge = '1 T'", "ridge must be a number, zero or positive, or the word rollout"),
-        ('"1 Q"', "state_delays: a text in place of a number counts in encounter periods"),
-        ("1\nriddge = 2", "has no key 'riddge'. Did you mean 'ridge'"),
-        (
-            "1\nalignment = { mode = 'dispersive' }",
-            "alignment: mode must be 'effective'",
-        ),
-        ("1\nalignment = { mode = 'dispersion', celerity = 2.0 }", "celerity.*effective"),
-        ("1\nalignment = { sruge = 'none' }", "alignment: unknown key 'sruge'.*mean 'surge'"),
-        ("1\nselect = { fold = 'run' }", "select: unknown key 'fold'.*mean 'folds'"),
-    ],
-)
-def test_wrong_keys_of_a_model_are_named_before_its_runs_are_prepared(halves, text, message):
-    wrong = campaign(halves, f'{ENSEMBLE}\npreset = "paper"\nstate_delays = {text}')
-    with pytest.raises(RequestError, match=rf"line \d+, model: .*{message}"):
-        fit_campaign(wrong)
 
 
 WINDOWED = (

@@ -5,7 +5,6 @@ import json
 import pytest
 
 from seakeep.campaign import ModelSettings
-from seakeep.errors import RequestError
 from seakeep.study.resolve import resolve_model
 
 ENSEMBLE = "bayesian_hankel_dmdc"
@@ -104,26 +103,3 @@ def test_each_key_has_its_value_and_its_source(stated, how, expected):
     settings = told["settings"]
     assert {key: (settings[key]["value"], settings[key]["source"]) for key in expected} == expected
     assert told["n_members"] == stated.get("n_members", 100 if told["ensemble"] else 1)
-
-
-@pytest.mark.parametrize(
-    ("stated", "how", "words"),
-    [
-        ({"preset": "recommended"}, {"period": None}, r"State encounter_period \(s\) in \[campaig"),
-        ({"kind": ENSEMBLE, "state_delays": 1, "input_delays": 1, "ridge": 1}, {"period": None},
-         r"an ensemble counts in .* State encounter_period"),
-        ({"state_delays": 3}, {}, r"no input_delays\. Add input_delays, ridge, or a preset"),
-        ({"kind": ENSEMBLE, "state_delays": 1}, {},
-         r"no input_delays\. Add input_delays, ridge as priors, such as { uniform"),
-        ({"kind": "hankel"}, {}, r"no kind of model 'hankel'.*Kinds: hankel_dmdc"),
-        ({"preset": "paper", "riddge": 1.0}, {}, r"has no key 'riddge'.*mean 'ridge'"),
-        ({"preset": "paper", "train_on": "runs"}, {}, "'hankel_dmdc' has no key 'train_on'"),
-        ({"kind": "fir", "readouts": "auto"}, {}, "kind = 'fir' has no key 'readouts'"),
-        ({"readouts": {"heave": {"of": ["pitch"], "kind": "auto"}}}, {"preset": "paper"},
-         "received delay_rows = 'ridge', rank = None"),
-        ({"kind": "mean", "preset": "paper"}, {}, "kind = 'mean' has no preset"),
-    ],
-)  # fmt: skip
-def test_a_table_that_is_no_model_is_refused(stated, how, words):
-    with pytest.raises(RequestError, match=words):
-        resolved(stated, **how)

@@ -1,7 +1,6 @@
 """A study runs, resumes after a kill, and says what is wrong with what it is given."""
 
 import json
-import pickle
 import shutil
 import signal
 import subprocess
@@ -17,7 +16,7 @@ from tutorial_study import assert_cells_are_what_the_models_say, put_tutorial
 from seakeep.errors import RequestError
 from seakeep.models.executor import processes
 from seakeep.statistics import band_error_over_time
-from seakeep.study import read_result, read_study, run, run_study, store
+from seakeep.study import read_study, run, run_study, store
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.store import LOCK, UNITS, UnitFolder
@@ -88,15 +87,6 @@ def test_the_error_over_time_is_kept_in_bands_and_its_growth_is_that_of_each_cha
 def test_arrays_do_not_depend_on_workers(study_folder, finished):
     study = read_study(study_folder / "study.toml")
     same(finished, run_study(study, study_folder / "alone"))
-
-
-def test_what_is_read_back_is_what_was_found(study_folder, finished):
-    found = read_result(study_folder / "out")
-    same(finished, found)
-    same(finished, pickle.loads(pickle.dumps(found)))  # workers draw its pages
-    assert found.attrs["digest"] == read_study(study_folder / "study.toml").digest
-    assert set(json.loads(found.attrs["versions"])) >= {"seakeep", "numpy", "scipy"}
-    assert not (study_folder / "out" / "units").exists()
 
 
 WHOLE = 3  # both models of one training set, and one of the next

@@ -43,23 +43,6 @@ def test_what_no_study_file_may_say(tables, words):
         validated(StudySettings, content, "study.toml", "study")
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('["unseen"]', '["unseeen"]', r"no such run. Did you mean 'unseen'"),
-        ("seed = 3", 'states = ["sway"]\ninputs = ["eta_fwd"]',
-         r"study.states: received 'sway'.*no such channel"),
-        ("seed = 3", 'states = ["heave"]\ninputs = ["heave"]', "is among the states too"),
-        ("ridge = 0.15", 'states = ["heave"]', r"all models of a study share their channels"),
-    ],
-)  # fmt: skip
-def test_what_does_not_fit_the_campaign(study_folder, old, new, words):
-    path = study_folder / "study.toml"
-    path.write_text(path.read_text("utf-8").replace(old, new), "utf-8")
-    with pytest.raises(RequestError, match=words):
-        read_study(path)
-
-
 def test_the_digest_follows_settings_and_not_words(study_folder):
     path = study_folder / "study.toml"
     text = path.read_text("utf-8")

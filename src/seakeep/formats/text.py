@@ -118,7 +118,10 @@ def _decoded(path: Path, raw: bytes, encoding: str | None) -> str:
     if encoding is None and raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encoding = "utf-16"
     if encoding is None and b"\x00" in raw[:4096]:
-        raise _binary(path, raw)
+        raise DataError(
+            f"{path} holds binary data of a kind that is not known, or UTF-16 without its mark. "
+            "Export the run as CSV, or state encoding = 'utf-16-le' in [files]."
+        )
     try:
         text = raw.decode(encoding or "utf-8")
     except UnicodeError as error:
@@ -134,21 +137,6 @@ def _decoded(path: Path, raw: bytes, encoding: str | None) -> str:
             f"{path}: the encoding {encoding!r} is not known. Write 'utf-8', 'latin-1' or 'cp1252'."
         ) from None
     return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _binary(path: Path, raw: bytes) -> DataError:
-    """Error for zero bytes, which no text has but one of two or four bytes per letter."""
-    for form, zeros, letters in (("utf-16-le", raw[1:200:2], raw[0:200:2]),
-                                 ("utf-16-be", raw[0:200:2], raw[1:200:2])):  # fmt: skip
-        if not any(zeros) and all(letters):
-            return DataError(
-                f"{path} seems to be UTF-16 without the mark that says so. State encoding = "
-                f"'{form}' in [files]."
-            )
-    return DataError(
-        f"{path} holds binary data of a kind that is not known. Export the run as CSV, or see the "
-        "documentation of [files] for the kinds that are read."
-    )
 
 
 _UNUSED = {0x81, 0x8D, 0x8F, 0x90, 0x9D}
