@@ -14,10 +14,20 @@ from seakeep.arrays import Progress
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, warn
-from seakeep.models import KINDS, BayesianHankelDMDc, HankelDMDc, Model, Spec, outside_training
+from seakeep.models import (
+    KINDS,
+    BayesianHankelDMDc,
+    HankelDMDc,
+    HankelEnsemble,
+    Model,
+    Spec,
+    outside_training,
+)
+from seakeep.models.conditions import disagreements
 from seakeep.models.labelled import mean_period
 from seakeep.models.settings import Select
 from seakeep.models.specs import left_open
+from seakeep.models.training import until
 from seakeep.models.validity import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
 from seakeep.signals import find_leakage
@@ -110,7 +120,7 @@ def fit_campaign(
         windows (for an ensemble the longest) hold fewer than five periods of a slow motion; of what
         the quality checks found in the model's channels; of tests outside the training (periods,
         heights and steepness of the waves, mean surge); and where the model reads waves after the
-        instant that it forecasts.
+        instant that it forecasts; and of runs that disagree with the others.
     """
     settings = campaign.model(model)
     spec, prepared, runs, stop = read_training(campaign, model, progress)
@@ -128,14 +138,20 @@ def fit_campaign(
         begin, end = run.attrs.get("test_span", (run["time"].values[0], run["time"].values[-1]))
         warn_of_waves(identified, run, name, float(begin), round((end - begin) / dt))
     look_ahead = identified.signature.input_map.look_ahead
-    until = max(look_ahead(run, dt) for run in runs.values()) - dt
-    if until > 0.5 * dt:
+    latest = max(look_ahead(run, dt) for run in runs.values()) - dt
+    if latest > 0.5 * dt:
         warn(
-            f"forecasts of this model read the waves up to {until:.3g} s after the instant that "
+            f"forecasts of this model read the waves up to {latest:.3g} s after the instant that "
             "they forecast: it needs these waves ahead of time."
         )
     if getattr(spec, "standardize", False):
         _warn_of_slow_model(identified, runs)
+    single = identified.settings
+    if isinstance(identified, HankelEnsemble):
+        single = None if identified.centre is None else identified.centre.settings
+    if isinstance(single, HankelDMDc):
+        for each in disagreements(single, until(runs, stop), *channels):
+            warn(each.describe())
     return identified
 
 

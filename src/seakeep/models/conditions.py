@@ -1,0 +1,211 @@
+"""Runs that one model of all of them does not serve: which, and what sets each apart."""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import FloatArray
+from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.models import labelled
+from seakeep.models.alignment import ProbeAlignment
+from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.offsets import estimate_probe_offset
+from seakeep.models.selection import regular_periods
+from seakeep.models.specs import HankelDMDc
+
+PERIODS = 5.0
+"""Length of the free runs that are judged, encounter periods."""
+BETTER = 0.8
+"""Part of the pooled model's error below which a model of the run alone says that it differs.
+
+Half of one run is little to learn from: within one condition the pooled model is better."""
+LEAST = 0.02
+"""Gain, training SD, below which nothing is said."""
+SURE = 2.0
+"""Standard errors over the windows by which it must be better."""
+EXPLAINS = 0.7
+"""Part of what the run's own model gains, in squared errors, that a reason must explain."""
+LOST = 10.0
+"""Error of a window, training SD, beyond which it counts no worse."""
+
+Reason = Literal["offset", "probe position", "scale", "dynamics"]
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """A run that a model of all runs serves worse than one of half of it.
+
+    Parameters
+    ----------
+    run : str
+        The run.
+    pooled, own : float
+        Mean NRMSE of free runs on its second half, in training SD: of the model of the first halves
+        of all runs, and of that of its own.
+    reason : {"offset", "probe position", "scale", "dynamics"}
+        What makes up most of the difference; the last where nothing else does.
+    channel : str
+        State with the offset or the scale; empty for the others.
+    value : float
+        Offset in units of the channel, distance in m, or factor; NaN for dynamics.
+    spread : float
+        Standard deviation of a distance, m.
+    """
+
+    run: str
+    pooled: float
+    own: float
+    reason: Reason
+    channel: str = ""
+    value: float = np.nan
+    spread: float = np.nan
+
+    def describe(self) -> str:
+        """A sentence, and what to do."""
+        what = {
+            "offset": f"{self.channel} lies {self.value:+.3g} off what the other runs teach. "
+            "Correct its zero, or take the mean of each run off",
+            "probe position": "its waves fit where they are carried by "
+            f"{self.value:.3g} ± {self.spread:.1g} m, as if the probe stood elsewhere. Set "
+            f"probe_offset = {self.value:.3g} in [runs.{self.run}], or correct its position",
+            "scale": f"{self.channel} moves {self.value:.3g} times as much as the other runs "
+            "teach. Check its calibration",
+            "dynamics": "no offset, scale or place of a probe explains it. Fit one model per "
+            "condition, and forecast each with its own",
+        }[self.reason]
+        return (
+            f"{self.run} disagrees with the other runs: free runs on its second half err "
+            f"{self.pooled:.2f} SD by a model of all runs and {self.own:.2f} by one of its first "
+            f"half alone; {what}. One model of unlike conditions forecasts none of them well."
+        )
+
+
+def disagreements(
+    spec: HankelDMDc, runs: Mapping[str, xr.Dataset], states: Sequence[str], inputs: Sequence[str]
+) -> list[Disagreement]:
+    """Compare a model of all runs with one per run, on data that neither learnt from.
+
+    Parameters
+    ----------
+    spec : HankelDMDc
+        Settings that leave nothing to be chosen.
+    runs : mapping of str to Dataset
+        Training runs, cut at the end of their training windows.
+    states, inputs : sequence of str
+        Channels.
+
+    Returns
+    -------
+    list of Disagreement
+        Runs in irregular waves that need a model of their own, the one that differs most first,
+        each from those after it; empty for a single run, and where halves are too short.
+    """
+    if len(runs) < 2 or not inputs:
+        return []
+    spec = replace(spec, readouts=(), window=None)
+    at_rest = replace(spec, alignment=ProbeAlignment(mode="dispersion", surge="none"))
+    halves = {n: run.isel(time=slice(run.sizes["time"] // 2)) for n, run in runs.items()}
+    steps = round(PERIODS * labelled.mean_period(runs, inputs))
+
+    def fitted(names: Iterable[str], settings: HankelDMDc = spec) -> HankelDMDcModel:
+        return settings.fit({name: halves[name] for name in names}, states, inputs)
+
+    found: list[Disagreement] = []
+    with warnings.catch_warnings(), contextlib.suppress(DataError, RequestError):  # too short
+        warnings.simplefilter("ignore", SeakeepWarning)  # given when all of the runs were fitted
+        judged = [name for name in runs if not regular_periods({name: runs[name]}, inputs)]
+        own = {name: _errors(fitted([name]), runs[name], steps) for name in judged}
+        left = dict.fromkeys(runs)
+        while len(left) > 1 and judged:  # the odd one out, then the next among the rest
+            pooled = fitted(left)
+            errors = {name: _errors(pooled, runs[name], steps) for name in judged}
+            sure = {name: _worse(errors[name], own[name]) for name in judged}
+            odd = max(judged, key=lambda name: sure[name])
+            if not sure[odd]:
+                break
+            judged.remove(odd)
+            del left[odd]
+            reason: tuple[Any, ...] | None = _reason(fitted(left), runs[odd], steps, own[odd])
+            if reason is None or reason[0] != "offset":
+                with contextlib.suppress(DataError, RequestError):  # no depth, or no positions
+                    reason = _place(fitted(left, at_rest), runs[odd]) or reason
+            pair = [float(_scores(each[odd]).mean()) for each in (errors, own)]
+            found.append(Disagreement(odd, pair[0], pair[1], *(reason or ("dynamics",))))
+    return found
+
+
+def _scores(errors: FloatArray) -> FloatArray:
+    """NRMSE of each window, in training SD."""
+    result: FloatArray = np.sqrt((errors**2).mean(axis=1)).mean(axis=1)
+    return result
+
+
+def _worse(pooled: FloatArray, own: FloatArray) -> float:
+    """By how much a model of all runs errs more than one of the run, if that is sure; else zero."""
+    pooled, own = _scores(pooled), _scores(own)
+    gain, doubt = pooled - own, SURE * (pooled - own).std(ddof=1) / len(own) ** 0.5
+    is_sure = gain.mean() > max(doubt, LEAST) and own.mean() < BETTER * pooled.mean()
+    return float(gain.mean()) if is_sure else 0.0
+
+
+def _series(model: HankelDMDcModel, run: xr.Dataset, steps: int) -> tuple[FloatArray, FloatArray]:
+    """Free runs end to end in the second half, and the measurement, (window, steps, N), in SD."""
+    last = run.sizes["time"] - steps - max(model.lead_samples - 1, 0)
+    starts = range(max(run.sizes["time"] // 2, model.history_samples - 1), last, steps)
+    if len(starts) < 2:
+        raise DataError("no two windows fit into half of the run.")
+    name, time = "the run", run["time"].values
+    windows = model.read_windows({name: run}, [(name, float(time[at])) for at in starts], steps)
+    states = labelled.channel_matrix(run, model.states, name)
+    measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
+    scale = model.signature.state_scale
+    predicted, measured = (
+        (each - scale.centre) / scale.spread
+        for each in (model.free_runs([windows])[0][0], measured)
+    )
+    return np.where(np.isfinite(predicted), predicted, measured + LOST), measured
+
+
+def _errors(model: HankelDMDcModel, run: xr.Dataset, steps: int) -> FloatArray:
+    """Errors of these, at most LOST."""
+    predicted, measured = _series(model, run, steps)
+    errors: FloatArray = np.clip(measured - predicted, -LOST, LOST)
+    return errors
+
+
+def _reason(
+    model: HankelDMDcModel, run: xr.Dataset, steps: int, own: FloatArray
+) -> tuple[Reason, str, float] | None:
+    """The offset or the scale of a state that explains what a model of other runs errs more."""
+    # What a run starts with has an offset and a scale of its own; later the waves decide.
+    predicted, measured, own = (
+        each[:, steps // 2 :] for each in (*_series(model, run, steps), own)
+    )
+    errors = (measured - predicted).reshape(-1, measured.shape[2])
+    least = EXPLAINS * (np.mean(errors**2) - np.mean(own**2)) * errors.shape[1]
+    offsets, spread = errors.mean(axis=0), model.signature.state_scale.spread
+    at = int(np.argmax(np.abs(offsets)))
+    if np.sum(offsets**2) >= least:
+        return "offset", model.states[at], float(offsets[at] * spread[at])
+    p, m = ((each - each.mean(axis=(0, 1))).reshape(errors.shape) for each in (predicted, measured))
+    factors = np.sum(p * m, axis=0) / np.sum(p * p, axis=0)
+    gains = np.mean((m - p) ** 2, axis=0) - np.mean((m - factors * p) ** 2, axis=0)
+    at = int(np.argmax(gains))
+    return ("scale", model.states[at], float(factors[at])) if gains.sum() >= least else None
+
+
+def _place(model: HankelDMDcModel, run: xr.Dataset) -> tuple[Reason, str, float, float] | None:
+    """A distance of the probe that explains the error of a model of other runs."""
+    time = run["time"].values
+    found = estimate_probe_offset(model, run, (float(time[len(time) // 2]), float(time[-1])))
+    is_sure = found.interval[0] * found.interval[1] > 0
+    if not is_sure or found.nrmse**2 > (1.0 - EXPLAINS) * found.nrmse_uncorrected**2:
+        return None
+    return "probe position", "", found.offset, found.spread
