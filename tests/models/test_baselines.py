@@ -115,6 +115,23 @@ def test_a_linear_vessel_is_forecast_to_rounding(kind, runs):
     np.testing.assert_allclose(values(forecast), values(test)[201:501], atol=1e-7)
 
 
+def test_the_ridge_of_an_arx_model_is_that_of_the_chosen_free_runs(runs):
+    """The recommended λ is one of the settings', and as good as any on what was held out."""
+    spec = dataclasses.replace(SPECS["arx"], ridge="rollout", ridge_scale="per_snapshot")
+    noisy = [linear_run(seed, noise=0.3) for seed in (1, 2, 3)]
+    model = spec.fit(noisy, STATES, INPUTS)
+    test = linear_run(4, noise=0.3)
+
+    def error(ridge):
+        fitted = dataclasses.replace(spec, ridge=ridge).fit(noisy, STATES, INPUTS)
+        forecast = fitted.forecast(test, start=20.0, steps=300)
+        return np.std(values(forecast) - values(test)[201:501])
+
+    # λ that is far too large forgets the states, and what was chosen does not.
+    assert error(model.settings.ridge) < 0.9 * error(10.0)
+    assert "free runs on 3 parts held out in turn" in model.selection
+
+
 def test_fir_finds_a_known_impulse_response():
     rng = np.random.default_rng(5)
     response, u = rng.normal(size=(2, 12)), rng.normal(size=(2000, 1))

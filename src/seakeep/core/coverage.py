@@ -59,9 +59,9 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
     Raises
     ------
     RequestError
-        If the shapes differ, or the bounds are swapped.
+        If the bounds are swapped.
     DataError
-        If the measurement has gaps or fewer than two instants, or units or instants differ.
+        If the measurement has gaps, or units or instants differ.
 
     Examples
     --------
@@ -71,17 +71,9 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
     """
     low, high, m = _triple(lower, upper, measured)
     plain = m.ndim == 1
-    if m.ndim < 1 or len({np.shape(each)[-2:] for each in (lower, upper, measured)}) > 1:
-        raise RequestError(
-            f"lower has shape {np.shape(lower)}, upper {np.shape(upper)} and measured "
-            f"{np.shape(measured)}; all must end in (time, channel) of the same size, or be series "
-            "of the same length."
-        )
     finite(m, "measured")
     if plain:
         low, high, m = low[:, None], high[:, None], m[:, None]
-    if m.shape[-2] < 2:
-        raise DataError(f"a window of {m.shape[-2]} instant(s) has no width to judge; give two.")
     lost = (np.isnan(low) | np.isnan(high)).any(axis=-2)
     below, above = (m < low).mean(axis=-2), (m > high).mean(axis=-2)
     width = (high - low).mean(axis=-2)
@@ -143,7 +135,7 @@ def winkler_score(
     Raises
     ------
     RequestError
-        If the shapes do not fit, the bounds are swapped, or `level` is not between 0 and 1.
+        If the bounds are swapped, or `level` is not between 0 and 1.
 
     Examples
     --------
@@ -201,13 +193,7 @@ def _triple(
     """Bounds and measurement of one shape."""
     low, high = as_real(lower, "lower"), as_real(upper, "upper")
     y = as_real(measured, "measured")
-    try:
-        low, high, y = np.broadcast_arrays(low, high, y)
-    except ValueError:
-        raise RequestError(
-            f"lower has shape {low.shape}, upper {high.shape} and measured {y.shape}; they do not "
-            "fit together."
-        ) from None
+    low, high, y = np.broadcast_arrays(low, high, y)
     if np.any(low > high):
         raise RequestError(
             f"lower exceeds upper at {int(np.count_nonzero(low > high))} instant(s); they are "
@@ -244,10 +230,9 @@ def coverage_table(
     Raises
     ------
     RequestError
-        If shapes do not fit, the bounds are swapped, or `level` is not between 0 and 1.
+        If the bounds are swapped, or `level` is not between 0 and 1.
     DataError
-        If the measurement or the waves have gaps, a window has fewer than three instants, or no
-        window is whole.
+        If the measurement or the waves have gaps, or no window is whole.
 
     Examples
     --------
@@ -257,19 +242,9 @@ def coverage_table(
     0.5
     """
     low, high, y = _triple(lower, upper, measured)
-    if y.ndim < 2 or y.shape[-2] < 3:
-        raise DataError(
-            f"the band has shape {y.shape}; (…, time, channel) with at least three instants is "
-            "needed."
-        )
     heights = None if waves is None else as_real(waves, "waves")
     finite(y, "measured")
     if heights is not None:
-        if heights.shape != y.shape[y.ndim - 1 - heights.ndim : -1]:
-            raise RequestError(
-                f"waves has shape {heights.shape}; {y.shape[:-1]} is expected, the height at each "
-                "instant."
-            )
         finite(np.atleast_1d(heights), "waves")
         heights = np.broadcast_to(heights, y.shape[:-1]).reshape(-1, y.shape[-2])
     low, high, y = (each.reshape(-1, *y.shape[-2:]) for each in (low, high, y))

@@ -5,7 +5,8 @@ The model is :math:`z_{j+1} = A z_j + B u_j`, :math:`y_{j+1} = C z_j + D u_j`. W
 u_{j+f-1}]` and outputs :math:`Y_j = [y_{j+1}; …; y_{j+f}]`, the regression :math:`Y = L_z Z + L_u
 U` gives the part :math:`L_z Z` of the future that the past decides (the oblique projection). Its
 leading singular vectors span the states: :math:`z_j = S^{-1/2} P^T L_z Z_j`, a filter of the past.
-A second regression gives A, B, C and D. (Van Overschee and De Moor, 1994.)
+A second regression gives A, B, C and D. (Van Overschee and De Moor, 1994.) Modes of A that grow,
+as those of noise do where the states are more than the data decide, are moved onto the unit circle.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.core.embedding import TrainingWindow, embed
+from seakeep.core.response import clip_modes
 from seakeep.core.rollout import rollout
 from seakeep.core.solve import solve
 from seakeep.errors import DataError
@@ -159,4 +161,4 @@ def identify_subspace(
     then = [np.concatenate([x[:, 1:], y[:, :-1]]) for x, y in zip(states, following, strict=True)]
     both = solve(np.concatenate(now, axis=1), np.concatenate(then, axis=1), 0.0).coefficients
     (A, B), (C, D) = (np.split(rows, [order], axis=1) for rows in np.split(both, [order]))
-    return StateSpace(A, B, C, D, estimator)
+    return StateSpace(clip_modes(A, 1.0)[0], B, C, D, estimator)

@@ -149,6 +149,8 @@ class LinearSpec(HankelSettings):
     """A linear model of delayed states and inputs: it finds coefficients, the rest is common."""
 
     n_members: ClassVar[int] = 1
+    may_choose: ClassVar[bool] = True
+    opened: ClassVar[tuple[str, ...]] = ()
     delay_rows: DelayRows = field(default="exact", init=False, repr=False)
     rank: int | None = field(default=None, init=False, repr=False)
     readouts: ReadOuts = field(default=(), init=False, repr=False)
@@ -161,8 +163,26 @@ class LinearSpec(HankelSettings):
         """Fit the model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
         named = as_runs(runs)
         spec = self.resolved_in(named, inputs)
-        data = gather(named, states, inputs, stop, spec)
-        return HankelDMDcModel.fitted(spec, data, data.signature(spec), spec.solve(data), named)
+        if self.ridge != "rollout":
+            data = gather(named, states, inputs, stop, spec)
+            return HankelDMDcModel.fitted(spec, data, data.signature(spec), spec.solve(data), named)
+        read = named = until(named, stop)
+        if spec.window is not None:  # what the model reads, and no more
+            dt = common_step(named)
+            reach = spec.needs(dt, mean_period(named, inputs) * dt).history + spec.window
+            read = {name: run.isel(time=slice(-reach, None)) for name, run in named.items()}
+        start = replace(spec, window=None, ridge=RIDGES[-1], ridge_scale="per_snapshot")
+        chosen = select(
+            start,
+            read,
+            states,
+            inputs,
+            opened=self.opened,
+            ridges=(*RIDGES, *LARGER),
+            horizon=WINDOWS,
+        )
+        model = replace(chosen.settings, window=spec.window).fit(named, states, inputs)
+        return replace(model, selection=chosen.describe())
 
     def solve(self, data: TrainingData) -> Solution:
         """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""
@@ -186,8 +206,10 @@ class ARX(LinearSpec):
     ----------
     state_delays, input_delays : int
         s and z. A forecast needs max(s, z) + 1 samples of history.
-    ridge : float, optional
+    ridge : float or "rollout", optional
         λ added to the diagonal; zero is least squares, of least norm where it is not unique.
+        "rollout" chooses it by forecasts of training runs, or of thirds of one, that are held out
+        in turn.
     ridge_scale : {"absolute", "per_snapshot"}, optional
         Whether λ is multiplied by the number of columns.
     window, history, standardize, alignment, lead, observables
@@ -196,16 +218,16 @@ class ARX(LinearSpec):
 
     kind: ClassVar[str] = "arx"
     title: ClassVar[str] = "ARX: least squares on past states and inputs"
-    ridge: float = 0.0
+    ridge: float | Literal["rollout"] = 0.0
 
     @classmethod
     def recommended(cls, encounter_period: float, dt: float) -> Self:
-        """One encounter period of the states, three of the inputs, λ = 1e-3 per snapshot pair.
+        """One encounter period of the states, three of the inputs, and λ chosen on held-out data.
 
         Plain least squares diverges where a period is finely sampled.
         """
         s, z = (periods_to_samples(periods, encounter_period, dt) for periods in (1, 3))
-        return cls(state_delays=s, input_delays=z, ridge=1e-3, ridge_scale="per_snapshot")
+        return cls(state_delays=s, input_delays=z, ridge="rollout", ridge_scale="per_snapshot")
 
     def solve(self, data: TrainingData) -> Solution:
         """Rows of the next states."""
@@ -235,8 +257,8 @@ class FIR(LinearSpec):
 
     kind: ClassVar[str] = "fir"
     title: ClassVar[str] = "FIR: a filter of the inputs, without states"
-    may_choose: ClassVar[bool] = True
     is_filter: ClassVar[bool] = True
+    opened: ClassVar[tuple[str, ...]] = ("input_delays",)
     state_delays: int = field(default=0, init=False, repr=False)
     ridge: float | Literal["rollout"] = 1e-3
     ridge_scale: RidgeScale = "per_snapshot"
@@ -254,27 +276,7 @@ class FIR(LinearSpec):
             raise RequestError(
                 "a FIR model is a filter of its inputs and has none; name at least one input."
             )
-        if self.ridge != "rollout":
-            return super().fit(runs, states, inputs, stop)
-        named = until(as_runs(runs), stop)
-        spec = self.resolved_in(named, inputs)
-        read = named
-        if spec.window is not None:  # what the model reads, and no more
-            dt = common_step(named)
-            reach = spec.needs(dt, mean_period(named, inputs) * dt).history + spec.window
-            read = {name: run.isel(time=slice(-reach, None)) for name, run in named.items()}
-        start = replace(spec, window=None, ridge=RIDGES[-1], ridge_scale="per_snapshot")
-        chosen = select(
-            start,
-            read,
-            states,
-            inputs,
-            opened=["input_delays"],
-            ridges=(*RIDGES, *LARGER),
-            horizon=WINDOWS,
-        )
-        model = replace(chosen.settings, window=spec.window).fit(named, states, inputs)
-        return replace(model, selection=chosen.describe())
+        return super().fit(runs, states, inputs, stop)
 
     def solve(self, data: TrainingData) -> Solution:
         """Filters of the inputs, beside zeros for the states."""
@@ -431,12 +433,11 @@ class SubspaceModel(SingleModel, store.Saved):
     def summary(self) -> str:
         """Text that describes the model and its identification."""
         radius = float(np.abs(np.linalg.eigvals(self.space.A)).max())
-        verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
         return "\n".join(
             [
                 f"Subspace model (N4SID): {self.settings.order} latent states, dt {self.dt:g} s",
                 *self.lines(),
-                f"  stability     spectral radius {radius:.6f} ({verdict})",
+                f"  stability     spectral radius {radius:.6f}",
             ]
         )
 

@@ -622,10 +622,12 @@ class Live:
             ``std`` stays below half of its SD in training, s; where it is as long as
             the forecast, it is at least that. ``std`` holds the errors of free runs in training,
             those of the estimate, the spread of the members and that of the waves that are not
-            known. Where waves or mean surge of late lie outside the training, the errors are
-            raised to those of late and by the square of the height: ``attrs["validity"]`` names
-            what does (:class:`seakeep.models.validity.Validity`), beside the numbers and
-            ``trained_`` ones. ``attrs["predictable"]`` is the time for which
+            known. Where waves are predicted, the mean tends to that of training as ``std`` comes
+            near the SD there, so that no lead errs more than the mean. Where waves or mean surge of
+            late lie outside the training, the errors are raised to those of late and by the square
+            of the height: ``attrs["validity"]`` names what does
+            (:class:`seakeep.models.validity.Validity`), beside the numbers and ``trained_`` ones.
+            ``attrs["predictable"]`` is the time for which
             the waves at the probe farthest down-wave are known from the one farthest up-wave, s
             (:func:`seakeep.signals.prediction.predictable_time`); 0 without positions and depth.
 
@@ -635,6 +637,7 @@ class Live:
             If there is too little history yet, or an argument does not fit.
         """
         signature, count = self.signature, whole_number(steps, "steps")
+        scale = signature.state_scale
         level = fraction(level, "level")
         if not self.ready:
             needed = signature.history_samples
@@ -656,10 +659,14 @@ class Live:
             )
             table[0] = complete.mean(axis=0) if len(complete) > 1 else complete[0]
             table[1] = np.sqrt(spread + wider * self._error_variances(count))
+            if len(futures) > 1:
+                foreseen = np.arange(count) <= known - self._ahead  # their waves are known
+                weight = np.where(foreseen[:, None], 1.0, _trust(table[1] / scale.spread))
+                table[0] = scale.centre + weight * (table[0] - scale.centre)
             half = _quantile(level, spread, table[1] ** 2, len(futures) > 1) * table[1]
             table[2:] = table[0] - half, table[0] + half
         variables = label_channels(signature, table, ("statistic", "time"))
-        inside = table[1] <= SMALL * signature.state_scale.spread
+        inside = table[1] <= SMALL * scale.spread
         for label, samples in zip(signature.state_labels, held_samples(inside), strict=True):
             variables[label.name][2]["lead_time"] = int(samples) * signature.dt
         words = "the mean minus and plus a quantile times std"
@@ -854,6 +861,17 @@ def held_samples(inside: BoolArray) -> npt.NDArray[np.intp]:
     ended = np.concatenate([inside, np.zeros((1, inside.shape[1]), bool)])
     samples: npt.NDArray[np.intp] = np.argmin(ended, axis=0)
     return samples
+
+
+def _trust(error: FloatArray) -> FloatArray:
+    """Weight of a forecast against the mean of training, by its error in training SDs.
+
+    What an autoregressive model continues errs more than the mean where its error, claimed, comes
+    near the SD: all weight up to seven tenths of its square, and none from 1.2 of it on, or after.
+    """
+    weight = np.clip((1.2 - error**2) / 0.5, 0.0, 1.0)
+    lasting: FloatArray = np.minimum.accumulate(weight)
+    return lasting
 
 
 def _quantile(level: float, spread: FloatArray, variance: FloatArray, drawn: bool) -> FloatArray:

@@ -1,0 +1,67 @@
+"""The examples in service: the C estimator on a run, and a thruster that is planned."""
+
+import importlib.util
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import signal
+
+import seakeep
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def loaded(path):
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_c_estimator_is_python_where_a_tenth_is_lost(make_run, tmp_path):
+    if shutil.which("cc") is None:
+        pytest.skip("there is no C compiler")
+    example = loaded(EXAMPLES / "in_service/play_c.py")
+    model = seakeep.HankelDMDc(4, 8, 1.0).fit(make_run(), ["heave", "pitch"], ["eta_fwd"])
+    estimates, ahead, outside, lost = example.play(model, make_run(500, 3), tmp_path)
+    assert 20 < lost.sum() < 80
+    # The same sums in another order.
+    np.testing.assert_allclose(estimates[:, 0], estimates[:, 1], rtol=0, atol=1e-12)
+    assert np.isfinite(ahead).all()
+    assert outside == 0
+
+
+def drifting(seed):
+    """A surge of 40 s, driven by slow noise, and waves that do little to it."""
+    rng, dt, samples = np.random.default_rng(seed), 0.1, 4000
+    example = loaded(EXAMPLES / "known_actuator/plan.py")
+    a, b = example.thruster(dt)
+    slow = signal.lfilter([0.005], [1, -0.995], rng.standard_normal(samples))
+    moved = np.zeros((samples, 2))
+    for k in range(samples - 1):
+        moved[k + 1] = a @ moved[k] + b * 0.1 * slow[k]
+    wave = signal.lfilter(*signal.butter(2, [0.08, 0.12], "bandpass"), rng.standard_normal(samples))
+    units = {"surge": "m", "surge_rate": "m/s", "eta_fwd": "m", "eta_cog": "m"}
+    series = (moved[:, 0] + 0.01 * wave, moved[:, 1], wave, np.roll(wave, 5))
+    return xr.Dataset(
+        {
+            name: ("time", values + 1e-4 * rng.standard_normal(samples), {"units": unit})
+            for (name, unit), values in zip(units.items(), series, strict=True)
+        },
+        coords={"time": dt * np.arange(samples)},
+        attrs={"encounter_period": 2.0},
+    )
+
+
+def test_a_planned_thrust_holds_a_vessel_nearer_to_its_place():
+    example = loaded(EXAMPLES / "known_actuator/plan.py")
+    model = example.fit({str(seed): drifting(seed) for seed in (1, 2)})
+    away = {}
+    for plans in (False, True):
+        surge = example.play(model, drifting(3), plans) - model.state_scale.centre[0]
+        away[plans] = np.sqrt(np.mean(surge**2))
+    # A plan of another sign or another instant pushes it away.
+    assert away[True] < 0.7 * away[False]
