@@ -130,15 +130,15 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tutorial, cap
 
 
 def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():
-    chosen = [seakeep.ReadOut("bow", ("heave", "pitch"), "wave"), seakeep.ReadOut("a", ("b",))]
+    chosen = {"bow": "wave", "a": "auto"}
     spec = replace(SPEC, ridge=1e-3, lead=3, readouts=chosen)
     before = """[model]
 ridge = 1  # as it was
 # of the model
 state_delays = 6
 
-[model.readouts.old]
-of = ["heave"]
+[model.readouts]
+old = "auto"
 
 # of the next table
 [models.other]
@@ -146,13 +146,9 @@ states = ["a"]  # kept
 """
     text = tuned_campaign(before, None, spec, ["readouts"], None, None)
     middle = """
-[model.readouts.bow]
-kind = "wave"
-of = ["heave", "pitch"]
-
-[model.readouts.a]
-kind = "auto"
-of = ["b"]
+[model.readouts]
+bow = "wave"
+a = "auto"
 
 # of the next table
 [models.other]
@@ -167,7 +163,7 @@ states = ["a"]  # kept
     assert tomllib.loads(none)["model"]["readouts"] == {}
     assert none.endswith('\n# of the next table\n[models.other]\nstates = ["a"]  # kept\n')
     kept = tuned_campaign(before, None, spec, [], None, None)
-    assert kept.endswith(before[before.index("[model.readouts.old]") :])
+    assert kept.endswith(before[before.index("[model.readouts]") :])
     assert "# as it was" not in kept  # it spoke of the λ before
     assert "ridge = 0.001 # chosen by seakeep tune" in kept
 
@@ -235,9 +231,8 @@ kind = "powers"
 of = ["eta_fwd"]
 powers = [2]
 
-[model.readouts.mooring_bow]
-kind = "wave"
-of = ["heave"]
+[model.readouts]
+mooring_bow = "wave"
 """
     )
     settings = seakeep.read_campaign(tmp_path / "campaign.toml").model()
@@ -247,7 +242,7 @@ of = ["heave"]
     squares, powers = spec.observables
     assert squares == seakeep.SlowSquares("eta_mid", (0, 1, 2), 0.33, 2.0, (0.0, 1.0), 1.5)
     assert powers == seakeep.Powers("eta_fwd", (2,))
-    assert spec.readouts == (seakeep.ReadOut("mooring_bow", ("heave",), "wave"),)
+    assert spec.readouts == (("mooring_bow", "wave"),)
     assert isinstance(spec, HankelDMDc)
 
 

@@ -18,6 +18,7 @@ from seakeep.errors import RequestError
 from seakeep.files import read_bytes, replacing
 from seakeep.models import HankelDMDc
 from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
+from seakeep.models.readouts import readouts_json
 from seakeep.models.selection import Selected, select
 from seakeep.models.settings import FOLDS, Folds
 from seakeep.models.training import check_names, until
@@ -317,12 +318,7 @@ def _choice(
     if "alignment" in stated and spec.alignment is not None:
         values["alignment"] = _stated(spec.alignment, "mode", "surge")
     if "readouts" in stated:
-        asked = spec.readouts
-        values["readouts"] = (
-            asked
-            if isinstance(asked, str)
-            else {each.channel: {"kind": each.kind, "of": list(each.of)} for each in asked}
-        )
+        values["readouts"] = readouts_json(spec.readouts)
     return values
 
 

@@ -13,7 +13,6 @@ from seakeep import (
     HankelDMDcModel,
     Powers,
     ProbeAlignment,
-    ReadOut,
     SlowSquares,
 )
 from seakeep.baselines import ARX
@@ -75,7 +74,7 @@ def case_of(model, steps=60, start=200, run=None):
 @pytest.fixture(scope="session")
 def cases():
     runs = {f"run{seed}": sea_run(seed) for seed in range(3)}
-    kept = {"delay_rows": "exact", "readouts": [ReadOut("load", of=("surge",))]}
+    kept = {"delay_rows": "exact", "readouts": {"load": "auto"}}
     full = HankelDMDc(3, 6, 1.0, lead=5, observables=OBSERVABLES).fit(runs, STATES, INPUTS)
     short = HankelDMDc(2, 4, 1e-3, memory=21, **kept).fit(runs, STATES, INPUTS)
     models = {
@@ -93,7 +92,7 @@ def cases():
             4, 12, 1e-3, delay_rows="exact", lead=lead, memory=2 * lead,
             alignment=ProbeAlignment(mode="dispersion", surge="predicted"),
             observables=(SlowSquares("eta_cog", lags=(0, 1), lead=0), Powers("eta_cog")),
-            readouts=[ReadOut("mooring_bow", of=("surge", "heave"), kind="wave")],
+            readouts={"mooring_bow": "wave"},
         )  # fmt: skip
         states = ["surge", "heave", "mooring_bow"]
         model = spec.fit(drifting, states, ["eta_fwd", "eta_cog"])

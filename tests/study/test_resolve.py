@@ -9,7 +9,7 @@ from seakeep.study.resolve import resolve_model
 
 ENSEMBLE = "bayesian_hankel_dmdc"
 NORMAL = {"distribution": "norm", "parameters": {"loc": 15, "scale": 1}, "unit": "T"}
-READ = {"channel": "heave", "of": ["pitch"], "kind": "auto"}
+READ = {"heave": "auto"}
 
 
 def resolved(stated, period=2.0, **how):
@@ -92,9 +92,9 @@ def resolved(stated, period=2.0, **how):
             },
         ),
         (
-            {"kind": ENSEMBLE, "readouts": {"heave": {"of": ["pitch"], "kind": "auto"}}},
+            {"kind": ENSEMBLE, "readouts": READ},
             {"preset": "recommended"},
-            {"readouts": ([READ], "stated")},
+            {"readouts": (READ, "stated")},
         ),
     ],
 )  # fmt: skip

@@ -24,11 +24,11 @@ SOFT = 0.5
 """Standard deviations beyond the trained range at which half of the weight is left."""
 FLOOR = 0.002
 """Quantile of a slack channel that is its floor: what it rests on, less its noise."""
-LOW, FLAT = 0.1, 0.3
-"""Part of the samples in which a slack channel is looked for, and the slope up to which it is."""
-LOWEST, SURELY, LEAST = (0.03, 0.01), 4.0, 20
-"""Smaller parts, for lines that are seldom slack, the standard errors that are added to their
-slopes, and the least number of samples that show one.
+FLAT = 0.3
+"""Slope up to which a channel is slack."""
+LOWEST, SURELY, LEAST = (0.1, 0.03, 0.01), 4.0, 20
+"""Parts of the samples in which a slack channel is looked for, the standard errors that are added
+to their slopes, and the least number of samples that show one.
 
 In irregular waves of the virtual tank, seed 0, the lowest hundredth of the line that falls slack
 has a slope of 0.02 ± 0.04; in regular waves at λ/L 3 that of a taut line 0.22 ± 0.38."""
@@ -178,20 +178,17 @@ def floor_of(states: FloatArray, target: FloatArray, columns: list[int]) -> floa
     """
     bending = np.concatenate([states[:, columns], np.ones((len(states), 1))], axis=1)
     linear = bending @ np.linalg.lstsq(bending, target, rcond=None)[0]
-    rests = _slope(linear, target, LOW)[0] < FLAT
-    for part in LOWEST:
-        slope, error = _slope(linear, target, part)
-        rests = rests or slope + SURELY * error < FLAT
+    rests = any(_slope(linear, target, part) < FLAT for part in LOWEST)
     return float(np.quantile(target, FLOOR)) if rests else -np.inf
 
 
-def _slope(linear: FloatArray, target: FloatArray, part: float) -> tuple[float, float]:
-    """Slope of a channel over its linear map where that is lowest, and its standard error."""
+def _slope(linear: FloatArray, target: FloatArray, part: float) -> float:
+    """Slope of a channel over its linear map where that is lowest, plus standard errors."""
     low = linear <= np.quantile(linear, part)
     across = linear[low] - linear[low].mean()
     spread = float(across @ across)
     if not spread > 0 or len(across) < LEAST:
-        return 1.0, np.inf
+        return np.inf
     slope = float(across @ target[low]) / spread
     left = target[low] - target[low].mean() - slope * across
-    return slope, float(np.sqrt(left @ left / (len(across) - 2) / spread))
+    return slope + SURELY * float(np.sqrt(left @ left / (len(across) - 2) / spread))

@@ -11,7 +11,7 @@ from seakeep.models.live import Live, load_live
 from seakeep.models.observables import OBSERVABLES, Bound, Expression, Powers, SlowSquares
 from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
-from seakeep.models.readouts import FittedReadOut, ReadOut
+from seakeep.models.readouts import FittedReadOut
 from seakeep.models.registry import KINDS, is_ensemble, load_model
 from seakeep.models.settings import Select
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
@@ -40,7 +40,6 @@ __all__ = [
     "Powers",
     "ProbeAlignment",
     "ProbeOffset",
-    "ReadOut",
     "Select",
     "Signature",
     "SlowSquares",

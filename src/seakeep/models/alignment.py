@@ -172,7 +172,7 @@ class ProbeAlignment:
         windows = {name: run.isel(time=last) for name, run in runs.items()}
         depth = _common_depth(runs)
         celerity = None if self.celerity == "common" else self.celerity
-        spread = limit = None
+        limit = None
         elevations = [channel for channel, yes in zip(inputs, carried, strict=True) if yes]
         if self.mode == "dispersion":
             depth = depth_of(first, first_name, depth)
@@ -180,14 +180,13 @@ class ProbeAlignment:
                 np.median([_band(run, name, elevations) for name, run in windows.items()])
             )
         elif celerity is None:
-            celerity, spread = _celerity(runs, elevations, depth)
+            celerity = _celerity(runs, elevations, depth)
         return FittedAlignment(
             settings=self,
             inputs=tuple(inputs),
             carried=carried,
             positions=tuple(_position(first, channel) for channel in inputs),
             celerity=celerity,
-            celerity_spread=spread,
             water_depth=depth,
             highest_frequency=limit,
         )
@@ -238,8 +237,6 @@ class FittedAlignment:
         Position of each input's probe in training, m; None where the run did not state it.
     celerity : float or None
         The one given, or the mean of the training runs, m/s (mode "effective").
-    celerity_spread : float or None
-        Standard deviation of its estimates over the training runs, m/s.
     water_depth : float or None
         m, of the training runs.
     highest_frequency : float or None
@@ -251,7 +248,6 @@ class FittedAlignment:
     carried: tuple[bool, ...]
     positions: tuple[float | None, ...]
     celerity: float | None = None
-    celerity_spread: float | None = None
     water_depth: float | None = None
     highest_frequency: float | None = None
 
@@ -468,8 +464,8 @@ def _band(run: xr.Dataset, name: str, elevations: Sequence[str]) -> float:
 
 def _celerity(
     runs: Mapping[str, xr.Dataset], elevations: Sequence[str], depth: float | None
-) -> tuple[float, float | None]:
-    """Celerity from the mean slowness over the runs, and its standard deviation over them."""
+) -> float:
+    """Celerity from the mean slowness over the runs."""
     slowness = []
     for name, run in runs.items():
         if "celerity" in run.attrs:
@@ -493,6 +489,4 @@ def _celerity(
         except DataError as error:
             raise DataError(f"{name}, '{first}' and '{last}': {error}") from None
         slowness.append(celerity.lag / apart)
-    speeds = 1.0 / np.array(slowness)
-    spread = float(speeds.std(ddof=1)) if len(slowness) > 1 else None
-    return float(1.0 / np.mean(slowness)), spread
+    return float(1.0 / np.mean(slowness))

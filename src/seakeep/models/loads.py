@@ -14,7 +14,7 @@ from seakeep.core.readouts import KNOTS, MARGIN, LoadMap, best_place, floor_of, 
 from seakeep.errors import RequestError
 from seakeep.models import labelled
 from seakeep.models.following import PER_WAVE
-from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOutKind
+from seakeep.models.readouts import Asked, FittedReadOut, ReadOutKind, motions_of
 from seakeep.models.training import TrainingData
 
 PERIODS = 15.0
@@ -51,7 +51,7 @@ class Held:
 
 
 def fit_readouts(
-    readouts: Sequence[ReadOut],
+    readouts: Mapping[str, Asked],
     data: TrainingData,
     runs: Mapping[str, xr.Dataset],
     judged: Sequence[Held],
@@ -60,8 +60,8 @@ def fit_readouts(
 
     Parameters
     ----------
-    readouts : sequence of ReadOut
-        What is wanted.
+    readouts : mapping of str to str
+        Kind that is wanted of each channel.
     data : TrainingData
         Of the training windows.
     runs : mapping of str to Dataset
@@ -86,26 +86,26 @@ def fit_readouts(
     spacing = 0.0 if follows is None else follows.place.spacing
     places: FloatArray = STEP * spacing * np.arange(-REACH, REACH + 1.0)
     waves = [_waves(data, runs, number, places) for number in range(len(states) * bool(follows))]
-    for each in readouts:
-        column, columns = names.index(each.channel), [names.index(name) for name in each.of]
+    for channel, asked in readouts.items():
+        column, columns = names.index(channel), motions_of(data.state_labels, channel)
         floor, units = floor_of(seen, seen[:, column], columns), data.state_labels[column].units
-        kind: ReadOutKind = "none" if each.kind == "auto" else each.kind
+        kind: ReadOutKind = "none" if asked == "auto" else asked
         scores: dict[str, float] = {}
         load = None
         if follows is not None:
             columns = [follows.column, *(c for c in columns if c != follows.column)]
             line = _Line(data, states, waves, places, column, columns)
-            if each.kind == "auto":
+            if asked == "auto":
                 kind, scores = _chosen(line, judged, floor)
             if kind == "wave":
                 load = line.map(range(len(states)))
         elif kind == "wave":
             raise RequestError(
-                f"readouts: {each.channel}: kind = 'wave' reads waves that are carried to the "
+                f"readouts: {channel} = 'wave' reads waves that are carried to the "
                 "surge which the model predicts. Set alignment mode = 'dispersion', surge = "
-                "'predicted', or take kind = 'auto'."
+                "'predicted', or write 'auto'."
             )
-        out.append(FittedReadOut(each.channel, each.of, kind, column, units, scores, floor, load))
+        out.append(FittedReadOut(channel, kind, column, units, scores, floor, load))
     return tuple(out)
 
 

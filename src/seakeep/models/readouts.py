@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, as_table
 from seakeep.conventions import MOTIONS
 from seakeep.core.readouts import LoadMap
-from seakeep.errors import SHOWN, RequestError, did_you_mean
-from seakeep.models.checks import Json, check_choice, check_keys, names_of, plain
+from seakeep.errors import RequestError, did_you_mean
+from seakeep.models.checks import Json, check_choice, plain
 from seakeep.models.labelled import ChannelLabel
 
 ReadOutKind = Literal["none", "wave"]
@@ -21,59 +21,8 @@ ARRAYS = ("mean", "std", "low", "high", "knots", "weights", "span")
 """Parts of a load map that are arrays."""
 
 
-@dataclass(frozen=True)
-class ReadOut:
-    r"""A load that is read off the forecast: a function of motions and of the wave at its line.
-
-    A linear model cannot follow a load that depends on how deep its line is in the water, or that
-    stops at a floor. A read-out replaces the forecast of the channel by a ridge regression (1e-2
-    per sample, standardised) on motions, hinges of the surge, and elevation and rate of the wave
-    at one place, which is the one whose regression errs least on training runs that are left out
-    in turn. The waves are carried there by the filters of an alignment with ``surge="predicted"``.
-    Where motions or wave leave the range of training, the forecast of the channel itself takes
-    over. A channel that rests on a floor in training never falls below it by more than its noise,
-    whichever kind is chosen: below the 0.002 quantile of its training. It must rest there in a
-    hundredth of the samples or more.
-
-    Parameters
-    ----------
-    channel : str
-        The state that is read off.
-    of : sequence of str
-        The motions that it depends on, and their rates.
-    kind : {"auto", "wave"}, optional
-        ``"auto"``: ``"wave"`` where that forecasts training runs that are held out better than no
-        read-out, by more than two standard errors of the gain and 2 % of the error; else none.
-
-    Raises
-    ------
-    RequestError
-        If the channel reads itself, or a setting is out of range.
-
-    Examples
-    --------
-    >>> ReadOut("mooring_stern", of=("surge", "heave", "pitch")).kind
-    'auto'
-    """
-
-    channel: str
-    of: tuple[str, ...]
-    kind: Asked = "auto"
-
-    def __post_init__(self) -> None:
-        what = f"readouts: {self.channel}"
-        check_choice(f"{what}: kind", self.kind, get_args(Asked))
-        example = "of = ['surge', 'heave', 'pitch']"
-        names = names_of(self.of, f"{what}: of", example)
-        if self.channel in names:
-            raise RequestError(
-                f"{what} cannot be read off itself. Leave it out of of = {list(names)}."
-            )
-        object.__setattr__(self, "of", names)
-
-
-ReadOuts = tuple[ReadOut, ...] | Literal["auto"]
-"""Read-outs of a model; "auto" for every load among its states."""
+ReadOuts = tuple[tuple[str, Asked], ...] | Literal["auto"]
+"""Kinds of read-outs by channel; "auto" for every load among the states."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +31,8 @@ class FittedReadOut:
 
     Parameters
     ----------
-    channel, of
-        As in :class:`ReadOut`.
+    channel : str
+        The state that is read off.
     kind : {"none", "wave"}
         What it is; what was chosen.
     column : int
@@ -99,7 +48,6 @@ class FittedReadOut:
     """
 
     channel: str
-    of: tuple[str, ...]
     kind: ReadOutKind
     column: int
     units: str
@@ -121,14 +69,14 @@ class FittedReadOut:
         """Line of a summary."""
         text = f"{self.channel}: {self.kind}"
         if self.load is not None:
-            text += f" at {self.load.place:.3g} m, of {', '.join(self.of)}"
+            text += f" at {self.load.place:.3g} m"
         if self.floor > -np.inf:
             text += f", floor {self.floor:.4g} {self.units}".rstrip()
         if self.scores:
             scores = ", ".join(f"{kind} {score:.3f}" for kind, score in self.scores.items())
             text += f" (NRMSE on held-out runs: {scores})"
         elif self.kind == "none":
-            text += " (no two runs could be held out to judge it)"
+            text += " (not judged: no waves are carried, or no two runs can be held out)"
         return f"  read-out      {text}"
 
     def to_json(self) -> Json:
@@ -143,7 +91,7 @@ class FittedReadOut:
         if load is not None:
             arrays = {key: np.array(value) for key, value in load.items() if key in ARRAYS}
             load = LoadMap(**load | arrays)
-        return cls(**content | {"of": tuple(content["of"]), "load": load})
+        return cls(**content | {"load": load})
 
 
 def read_out(
@@ -173,53 +121,37 @@ def read_out(
     return values
 
 
-def readouts_of(value: object) -> ReadOuts:
-    """Read-outs as they are, or made of tables (in a list, or by channel), or "auto"."""
+def readouts_of(value: Any) -> ReadOuts:
+    """Kinds by channel, in a mapping or as pairs, or "auto"; refuses what is no kind."""
     if isinstance(value, str) and value == "auto":
         return "auto"
-    if isinstance(value, Mapping):
-        value = [{"channel": name, **table} for name, table in value.items()]
-    if isinstance(value, str) or not isinstance(value, Iterable):
-        raise RequestError(
-            f"readouts must be a list or 'auto'; received {value!r:.{SHOWN}}. Write "
-            "readouts=[seakeep.ReadOut('mooring_stern', of=('surge', 'heave', 'pitch'))]."
-        )
-    readouts = tuple(_of_table(each) if isinstance(each, Mapping) else each for each in value)
-    names = []
-    for each in readouts:
-        if not isinstance(each, ReadOut):
-            raise RequestError(f"readouts must hold seakeep.ReadOut; received {each!r:.{SHOWN}}.")
-        names.append(each.channel)
-    if double := {name for name in names if names.count(name) > 1}:
-        raise RequestError(
-            f"readouts names {sorted(double)[0]} more than once. Name each channel once."
-        )
-    return readouts
-
-
-def _of_table(table: Mapping[str, Any]) -> ReadOut:
-    check_keys(ReadOut, table, "readouts: ")
-    return ReadOut(**table)
+    kinds = as_table(dict(value) if isinstance(value, tuple) else value, "readouts")
+    for channel, kind in kinds.items():
+        check_choice(f"readouts: {channel}", kind, get_args(Asked))
+    return tuple(kinds.items())
 
 
 def readouts_json(readouts: ReadOuts) -> Any:
     """Argument of :func:`readouts_of` as JSON values."""
-    return readouts if readouts == "auto" else [asdict(each) for each in readouts]
+    return readouts if isinstance(readouts, str) else dict(readouts)
 
 
-def readouts_asked(readouts: ReadOuts, states: Sequence[ChannelLabel]) -> tuple[ReadOut, ...]:
-    """Read-outs of a model with these states; refuses those of, or off, what is no state."""
-    if readouts == "auto":
-        motions = {*MOTIONS, *(f"{name}_rate" for name in MOTIONS)}
-        of = tuple(label.name for label in states if label.name in motions)
+def motions_of(states: Sequence[ChannelLabel], channel: str) -> list[int]:
+    """Places of motions and their rates among the states, without a channel that is read off."""
+    motions = {*MOTIONS, *(f"{name}_rate" for name in MOTIONS)} - {channel}
+    return [column for column, label in enumerate(states) if label.name in motions]
+
+
+def readouts_asked(readouts: ReadOuts, states: Sequence[ChannelLabel]) -> dict[str, Asked]:
+    """Kinds by channel of a model with these states; refuses those of what is no state."""
+    if isinstance(readouts, str):
         loads = [label.name for label in states if label.units == "N"]
-        return tuple(ReadOut(name, of) for name in loads) if of else ()
+        return dict.fromkeys(loads if motions_of(states, "") else [], "auto")
     names = [label.name for label in states]
-    for each in readouts:
-        for name, what in ((each.channel, "channel"), *((name, "of") for name in each.of)):
-            if name not in names:
-                raise RequestError(
-                    f"readouts: {each.channel}: {what} names '{name}', which is not among the "
-                    f"states ({', '.join(names)}).{did_you_mean(name, names)}"
-                )
-    return readouts
+    for channel, _ in readouts:
+        if channel not in names:
+            raise RequestError(
+                f"readouts names '{channel}', which is not among the states ({', '.join(names)})."
+                f"{did_you_mean(channel, names)}"
+            )
+    return dict(readouts)

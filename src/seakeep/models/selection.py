@@ -44,7 +44,7 @@ from seakeep.models.following import LEAD
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.loads import PERIODS, Held, fit_readouts
 from seakeep.models.observables import Observable, Powers, SlowSquares, named
-from seakeep.models.readouts import FittedReadOut, ReadOut, ReadOuts, readouts_asked
+from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
 from seakeep.models.training import TrainingData, gather, scales_of
 from seakeep.signals import encounter_period, repeated_waves
@@ -611,7 +611,7 @@ def select(
     _check_asked(settings, vary)
     if "readouts" in vary:
         asked = readouts or readouts_asked("auto", labels)
-        readouts = tuple(replace(each, kind="auto") for each in asked)
+        readouts = dict.fromkeys(asked, "auto")
     if isinstance(folds, str):
         folds = 3 if len(runs) == 1 else folds
     step = labelled.common_step(runs)
@@ -744,10 +744,10 @@ class _Search:
         aligned, lead = candidate.alignment, None
         if aligned is not None and aligned.surge == "predicted":
             lead = int(candidate.lead)
-        found = default_observables(self.given[2], self.period * self.step, self.unseen, lead)
+        every = default_observables(self.given[2], self.period * self.step, self.unseen, lead)
         if lead is None and candidate.lead < self.base.lead and not candidate.lead:
-            found = tuple(replace(o, lead=0.0) if isinstance(o, SlowSquares) else o for o in found)
-        return found[self.cut :]
+            every = tuple(replace(o, lead=0.0) if isinstance(o, SlowSquares) else o for o in every)
+        return every[self.cut :]
 
     def left_open(self) -> list[Step]:
         """Steps through what the settings leave open."""
@@ -957,11 +957,11 @@ def _asked(
     """Read-outs of complete settings: as stated, or of the kinds that were chosen."""
     if "readouts" not in vary:
         return settings.readouts
-    return tuple(ReadOut(o.channel, o.of, o.kind) for o in fitted if o.kind != "none")
+    return tuple((o.channel, o.kind) for o in fitted if o.kind != "none")
 
 
 def _learnt(
-    readouts: Sequence[ReadOut],
+    readouts: Mapping[str, Asked],
     problem: Problem | None,
     candidate: HankelSettings,
     level: float,
@@ -972,7 +972,8 @@ def _learnt(
     if not readouts:
         return ()
     if problem is not None:
-        judged = list(problem.held_out(candidate, level, steps))
+        is_judged = problem.data.input_map.follows is not None
+        judged = list(problem.held_out(candidate, level, steps)) if is_judged else []
         return fit_readouts(readouts, problem.data, problem.runs, judged)
     settings = replace(candidate, ridge=1.0, standardize=True)
     return fit_readouts(readouts, gather(*given, None, settings), given[0], ())
@@ -1006,14 +1007,13 @@ def readouts_for(
         "wave" meets no waves that are carried to the predicted surge.
     """
     readouts = readouts_asked(settings.readouts, labelled.common_labels(runs, states))
-    judged = [each for each in readouts if each.kind == "auto"]
-    if not judged:
+    if "auto" not in readouts.values():
         return _learnt(readouts, None, settings, 0.0, 0, (runs, states, inputs))
     ridge = float(settings.ridge)
     if ridge == 0.0:
         raise RequestError(
-            f"readouts: {judged[0].channel}: kind = 'auto' is chosen by free runs of ridge "
-            "regressions, which take ridge above zero. Raise ridge, or take kind = 'wave'."
+            "readouts = 'auto' is chosen by free runs of ridge regressions, which take ridge above "
+            "zero. Raise ridge, or write 'wave'."
         )
     steps = round(PERIODS * labelled.mean_period(runs, inputs))
     if len(runs) == 1 and settings.window is not None:  # whose parts are shorter

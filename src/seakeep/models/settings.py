@@ -341,8 +341,8 @@ class HankelSettings:
         followed = None
         if self.alignment is not None and self.alignment.surge == "predicted":
             followed = self.alignment.surge_channel
-        named = () if self.readouts == "auto" else self.readouts
-        if followed in [each.channel for each in named]:
+        kinds = {"every load": "auto"} if isinstance(self.readouts, str) else dict(self.readouts)
+        if followed in kinds:
             raise RequestError(
                 f"readouts: {followed} is the surge that the model follows from step to step, "
                 "before any read-out. Read off another channel, or set alignment surge = 'none'."
@@ -353,12 +353,11 @@ class HankelSettings:
                 f"takes delay_rows = 'exact'; received '{self.delay_rows}'. Change it, or take "
                 "surge = 'measured' or 'none'."
             )
-        judged = self.readouts == "auto" or any(each.kind == "auto" for each in named)
-        if judged and (self.delay_rows != "exact" or self.rank is not None):
+        if "auto" in kinds.values() and (self.delay_rows != "exact" or self.rank is not None):
             raise RequestError(
-                "readouts of kind 'auto' are judged by free runs on training runs that are held "
+                "readouts = 'auto' are judged by free runs on training runs that are held "
                 "out, which takes delay_rows = 'exact' and no rank; received delay_rows = "
-                f"'{self.delay_rows}', rank = {self.rank}. Change them, or take kind = 'wave'."
+                f"'{self.delay_rows}', rank = {self.rank}. Change them, or write 'wave'."
             )
 
     @property

@@ -100,9 +100,16 @@ class HankelDMDc(HankelSettings):
         Clip the eigenvalues of Â outside a radius to it, after the regression: True is 0.999. The
         modes inside stay as they are, exact delay rows stay exact, and ``training.clipped`` and
         ``summary()`` say which were moved.
-    readouts : sequence of ReadOut or tables, or "auto", optional
-        Loads that are read off the forecast motions and the wave at their lines; "auto" does so
-        with every load among the states (in N) where that helps.
+    readouts : mapping of str to {"auto", "wave"}, or "auto", optional
+        Loads that are read off the forecast: a ridge regression (1e-2 per sample, standardised) on
+        motions, hinges of the surge, and elevation and rate of the wave at one place, the line's.
+        The waves are carried there by an alignment with ``surge="predicted"``; the place is the one
+        whose regression errs least on training runs that are left out in turn. Where motions or
+        wave leave the range of training, the forecast of the channel as a state takes over.
+        ``"wave"`` does so; ``"auto"`` where that forecasts training runs that are held out better,
+        by more than two standard errors of the gain and 2 % of the error. Alone, "auto" holds for
+        every load among the states (in N). A channel that rests on a floor in a hundredth of the
+        training samples or more is not forecast below their 0.002 quantile, with either.
     memory : int or str, optional
         Longest delay of averages of the states, such as ``"8 T"``: beyond `state_delays` their
         means over blocks of delays that double in length are further regressors. It takes exact
