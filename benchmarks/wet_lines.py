@@ -4,7 +4,7 @@ The lines of the virtual tank do not feel the wave. Here each of them bears a fu
 form, 1.9 m up-wave (bow) and 2.6 m down-wave (stern) of the vessel at rest, where the elevation e
 in standard deviations wets it:
 
-    w = clip((e + 0.5) / 1, 0, 1),    load = 0.6 SD (w e + 0.5 |e'| e' w)
+    w = clip((e + 0.5) / 1, 0, 1),    load = 0.3 SD (w e + 0.5 |e'| e' w)
 
 with e' its rate, in standard deviations too, and SD that of the measured load. The elevation is
 that of `eta_cog`, carried by dispersion as a whole record, not by the carriers of the model. Models
@@ -33,7 +33,7 @@ from seakeep.tank.play import play
 from seakeep.tank.settings import default_settings, with_waves
 
 PLACES = {"mooring_bow": -1.9, "mooring_stern": 2.6}
-PART = 0.6
+PART = 0.3
 KINDS = {"as states": (), "chosen": "auto"}
 REGULAR = "regular_1_5"
 

@@ -205,6 +205,20 @@ def test_waves_of_periods_that_were_not_trained_are_warned_of(tmp_path, period, 
         fit_campaign(asked)
 
 
+def test_a_run_that_disagrees_with_the_others_is_warned_of(tmp_path):
+    sines(tmp_path, dict.fromkeys("abc", (0.7, 0.83, 0.97, 1.13, 1.37, 1.61)))
+    text, rng = "", np.random.default_rng(0)
+    for name, factor in {"a": 1.0, "b": 1.0, "c": 1.8}.items():
+        table = np.loadtxt(tmp_path / f"{name}.csv", delimiter=",", skiprows=1)
+        # Without noise the last state alone tells the next one, and its scale.
+        table[:, 2] = factor * table[:, 2] + 0.1 * rng.standard_normal(len(table))
+        np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header="t [s],eta [m],z [m]",
+                   comments="")  # fmt: skip
+        text += f'[runs.{name}]\nfile = "{name}.csv"\nrole = "train"\n'
+    with pytest.warns(SeakeepWarning, match=r"c disagrees .*; heave moves 1\.(79|8) times as much"):
+        fit_campaign(campaign(tmp_path, EXACT, text))
+
+
 def test_a_setting_has_one_score_whether_fit_or_tune_chose_it(halves, capsys):
     lengths = 'state_delays = "1 T"\ninput_delays = "1 T"\nridge = "rollout"\ndelay_rows = "exact"'
     asked = campaign(halves, f"{lengths}\n[campaign]\nencounter_period = 2.5")  # 2 s is measured

@@ -15,6 +15,7 @@ from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled
 from seakeep.models.alignment import ProbeAlignment
+from seakeep.models.interface import Scale
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.offsets import estimate_probe_offset
 from seakeep.models.selection import regular_periods
@@ -27,13 +28,13 @@ BETTER = 0.8
 
 Half of one run is little to learn from: within one condition the pooled model is better."""
 LEAST = 0.02
-"""Gain, training SD, below which nothing is said."""
+"""Gain, SD, below which nothing is said."""
 SURE = 2.0
 """Standard errors over the windows by which it must be better."""
 EXPLAINS = 0.7
 """Part of what the run's own model gains, in squared errors, that a reason must explain."""
 LOST = 10.0
-"""Error of a window, training SD, beyond which it counts no worse."""
+"""Error, SD, beyond which it counts no worse."""
 
 Reason = Literal["offset", "probe position", "scale", "dynamics"]
 
@@ -47,8 +48,8 @@ class Disagreement:
     run : str
         The run.
     pooled, own : float
-        Mean NRMSE of free runs on its second half, in training SD: of the model of the first halves
-        of all runs, and of that of its own.
+        Mean NRMSE of free runs on its second half, in SD of its first: of the model of the first
+        halves of all runs, and of that of its own.
     reason : {"offset", "probe position", "scale", "dynamics"}
         What makes up most of the difference; the last where nothing else does.
     channel : str
@@ -112,42 +113,46 @@ def disagreements(
     spec = replace(spec, readouts=(), window=None)
     at_rest = replace(spec, alignment=ProbeAlignment(mode="dispersion", surge="none"))
     halves = {n: run.isel(time=slice(run.sizes["time"] // 2)) for n, run in runs.items()}
-    steps = round(PERIODS * labelled.mean_period(runs, inputs))
 
     def fitted(names: Iterable[str], settings: HankelDMDc = spec) -> HankelDMDcModel:
         return settings.fit({name: halves[name] for name in names}, states, inputs)
 
-    found: list[Disagreement] = []
-    with warnings.catch_warnings(), contextlib.suppress(DataError, RequestError):  # too short
+    disagreeing: list[Disagreement] = []
+    # Halves may be too short, and runs without waves.
+    with warnings.catch_warnings(), contextlib.suppress(DataError, RequestError):
         warnings.simplefilter("ignore", SeakeepWarning)  # given when all of the runs were fitted
+        steps = round(PERIODS * labelled.mean_period(runs, inputs))
         judged = [name for name in runs if not regular_periods({name: runs[name]}, inputs)]
-        own = {name: _errors(fitted([name]), runs[name], steps) for name in judged}
+        alone = {name: fitted([name]) for name in judged}
+        scales = {name: model.signature.state_scale for name, model in alone.items()}
+        own = {name: _errors(alone[name], runs[name], steps, scales[name]) for name in judged}
         left = dict.fromkeys(runs)
         while len(left) > 1 and judged:  # the odd one out, then the next among the rest
             pooled = fitted(left)
-            errors = {name: _errors(pooled, runs[name], steps) for name in judged}
-            sure = {name: _worse(errors[name], own[name]) for name in judged}
-            odd = max(judged, key=lambda name: sure[name])
-            if not sure[odd]:
+            errors = {name: _errors(pooled, runs[name], steps, scales[name]) for name in judged}
+            gains = {name: _gain(errors[name], own[name]) for name in judged}
+            odd = max(judged, key=lambda name: gains[name])
+            if not gains[odd]:
                 break
             judged.remove(odd)
             del left[odd]
-            reason: tuple[Any, ...] | None = _reason(fitted(left), runs[odd], steps, own[odd])
+            reason: tuple[Any, ...] | None = None
+            reason = _reason(fitted(left), runs[odd], steps, scales[odd], own[odd])
             if reason is None or reason[0] != "offset":
                 with contextlib.suppress(DataError, RequestError):  # no depth, or no positions
                     reason = _place(fitted(left, at_rest), runs[odd]) or reason
             pair = [float(_scores(each[odd]).mean()) for each in (errors, own)]
-            found.append(Disagreement(odd, pair[0], pair[1], *(reason or ("dynamics",))))
-    return found
+            disagreeing.append(Disagreement(odd, pair[0], pair[1], *(reason or ("dynamics",))))
+    return disagreeing
 
 
 def _scores(errors: FloatArray) -> FloatArray:
-    """NRMSE of each window, in training SD."""
+    """NRMSE of each window."""
     result: FloatArray = np.sqrt((errors**2).mean(axis=1)).mean(axis=1)
     return result
 
 
-def _worse(pooled: FloatArray, own: FloatArray) -> float:
+def _gain(pooled: FloatArray, own: FloatArray) -> float:
     """By how much a model of all runs errs more than one of the run, if that is sure; else zero."""
     pooled, own = _scores(pooled), _scores(own)
     gain, doubt = pooled - own, SURE * (pooled - own).std(ddof=1) / len(own) ** 0.5
@@ -155,7 +160,9 @@ def _worse(pooled: FloatArray, own: FloatArray) -> float:
     return float(gain.mean()) if is_sure else 0.0
 
 
-def _series(model: HankelDMDcModel, run: xr.Dataset, steps: int) -> tuple[FloatArray, FloatArray]:
+def _series(
+    model: HankelDMDcModel, run: xr.Dataset, steps: int, scale: Scale
+) -> tuple[FloatArray, FloatArray]:
     """Free runs end to end in the second half, and the measurement, (window, steps, N), in SD."""
     last = run.sizes["time"] - steps - max(model.lead_samples - 1, 0)
     starts = range(max(run.sizes["time"] // 2, model.history_samples - 1), last, steps)
@@ -165,7 +172,6 @@ def _series(model: HankelDMDcModel, run: xr.Dataset, steps: int) -> tuple[FloatA
     windows = model.read_windows({name: run}, [(name, float(time[at])) for at in starts], steps)
     states = labelled.channel_matrix(run, model.states, name)
     measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
-    scale = model.signature.state_scale
     predicted, measured = (
         (each - scale.centre) / scale.spread
         for each in (model.free_runs([windows])[0][0], measured)
@@ -173,27 +179,27 @@ def _series(model: HankelDMDcModel, run: xr.Dataset, steps: int) -> tuple[FloatA
     return np.where(np.isfinite(predicted), predicted, measured + LOST), measured
 
 
-def _errors(model: HankelDMDcModel, run: xr.Dataset, steps: int) -> FloatArray:
+def _errors(model: HankelDMDcModel, run: xr.Dataset, steps: int, scale: Scale) -> FloatArray:
     """Errors of these, at most LOST."""
-    predicted, measured = _series(model, run, steps)
+    predicted, measured = _series(model, run, steps, scale)
     errors: FloatArray = np.clip(measured - predicted, -LOST, LOST)
     return errors
 
 
 def _reason(
-    model: HankelDMDcModel, run: xr.Dataset, steps: int, own: FloatArray
+    model: HankelDMDcModel, run: xr.Dataset, steps: int, scale: Scale, own: FloatArray
 ) -> tuple[Reason, str, float] | None:
     """The offset or the scale of a state that explains what a model of other runs errs more."""
     # What a run starts with has an offset and a scale of its own; later the waves decide.
     predicted, measured, own = (
-        each[:, steps // 2 :] for each in (*_series(model, run, steps), own)
+        each[:, steps // 2 :] for each in (*_series(model, run, steps, scale), own)
     )
     errors = (measured - predicted).reshape(-1, measured.shape[2])
     least = EXPLAINS * (np.mean(errors**2) - np.mean(own**2)) * errors.shape[1]
-    offsets, spread = errors.mean(axis=0), model.signature.state_scale.spread
+    offsets = errors.mean(axis=0)
     at = int(np.argmax(np.abs(offsets)))
     if np.sum(offsets**2) >= least:
-        return "offset", model.states[at], float(offsets[at] * spread[at])
+        return "offset", model.states[at], float(offsets[at] * scale.spread[at])
     p, m = ((each - each.mean(axis=(0, 1))).reshape(errors.shape) for each in (predicted, measured))
     factors = np.sum(p * m, axis=0) / np.sum(p * p, axis=0)
     gains = np.mean((m - p) ** 2, axis=0) - np.mean((m - factors * p) ** 2, axis=0)
@@ -204,8 +210,8 @@ def _reason(
 def _place(model: HankelDMDcModel, run: xr.Dataset) -> tuple[Reason, str, float, float] | None:
     """A distance of the probe that explains the error of a model of other runs."""
     time = run["time"].values
-    found = estimate_probe_offset(model, run, (float(time[len(time) // 2]), float(time[-1])))
-    is_sure = found.interval[0] * found.interval[1] > 0
-    if not is_sure or found.nrmse**2 > (1.0 - EXPLAINS) * found.nrmse_uncorrected**2:
+    best = estimate_probe_offset(model, run, (float(time[len(time) // 2]), float(time[-1])))
+    is_sure = best.interval[0] * best.interval[1] > 0
+    if not is_sure or best.nrmse**2 > (1.0 - EXPLAINS) * best.nrmse_uncorrected**2:
         return None
-    return "probe position", "", found.offset, found.spread
+    return "probe position", "", best.offset, best.spread

@@ -744,10 +744,10 @@ class _Search:
         aligned, lead = candidate.alignment, None
         if aligned is not None and aligned.surge == "predicted":
             lead = int(candidate.lead)
-        found = default_observables(self.given[2], self.period * self.step, self.unseen, lead)
+        every = default_observables(self.given[2], self.period * self.step, self.unseen, lead)
         if lead is None and candidate.lead < self.base.lead and not candidate.lead:
-            found = tuple(replace(o, lead=0.0) if isinstance(o, SlowSquares) else o for o in found)
-        return found[self.cut :]
+            every = tuple(replace(o, lead=0.0) if isinstance(o, SlowSquares) else o for o in every)
+        return every[self.cut :]
 
     def left_open(self) -> list[Step]:
         """Steps through what the settings leave open."""
