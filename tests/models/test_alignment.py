@@ -205,10 +205,3 @@ def test_aligned_members_equal_the_deterministic_model(runs, alignment):
         alone = model.forecast(run, start=60.0, steps=200)
         for name in STATES:
             np.testing.assert_allclose(forecast[name][number], alone[name], rtol=0, atol=1e-10)
-
-
-def test_the_spread_of_celerities_is_that_between_the_runs():
-    given = {f"run{c}": drifting_run(seed).assign_attrs(celerity=c)
-             for seed, c in enumerate((2.0, 2.2, 2.7))}  # fmt: skip
-    alignment = ProbeAlignment(mode="effective", surge="none")
-    HankelDMDc(2, 4, 1.0, alignment=alignment).fit(given, ["heave"], INPUTS)
