@@ -1,10 +1,13 @@
 """MATLAB files of models with observables, played by scipy as their entry Regressors says."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import io, signal
+
+from seakeep import HankelDMDc, RequestError
 
 FUNCTIONS = {"sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "abs": np.abs}
 
@@ -52,3 +55,33 @@ def test_a_mat_file_with_observables_computes_the_forecast(cases, tmp_path, name
         found.append(content["C"] @ state + content["OutputOffset"][:, 0])
     # Rounding, of values up to some hundreds.
     np.testing.assert_allclose(found, case.expected, rtol=1e-12, atol=1e-11)
+
+
+def test_the_error_of_a_truncated_system_stays_below_its_bound(make_run, tmp_path):
+    runs = [make_run(1200, seed) for seed in (1, 2)]
+    model = HankelDMDc(4, 8, 1.0, stable=True).fit(runs, ["heave", "pitch"], ["eta_fwd"])
+    whole, small = (
+        io.loadmat(model.to_mat(tmp_path / f"{order}.mat", order)) for order in (None, 6)
+    )
+    assert small["A"].shape == (6, 6)
+    spreads = model.state_scale.spread[:, None] / model.signature.input_scale.spread
+    frequencies = np.linspace(0, np.pi, 400)
+    errors = []
+    for omega in frequencies:
+        gains = [
+            m["C"] @ np.linalg.solve(np.exp(1j * omega) * np.eye(len(m["A"])) - m["A"], m["B"])
+            for m in (whole, small)
+        ]
+        errors.append(np.linalg.norm((gains[1] - gains[0]) / spreads, 2))
+    bound = small["ErrorBound"].item()
+    # At least the first singular value that is left out, at most twice the sum of all.
+    assert 0.05 * bound < max(errors) <= bound
+    with pytest.raises(RequestError, match="order is 99; it must lie between 1 and"):
+        model.to_mat(tmp_path / "more.mat", 99)
+
+
+def test_a_system_that_grows_is_not_truncated(make_run, tmp_path):
+    model = HankelDMDc(1, 0, 1.0, delay_rows="exact").fit(make_run(), ["heave"], ["eta_fwd"])
+    model = replace(model, coefficients=np.array([[1.001, 0.0, 0.1]]))
+    with pytest.raises(RequestError, match=r"modulus 1\.001, and balanced truncation takes"):
+        model.to_mat(tmp_path / "rom.mat", 1)

@@ -205,3 +205,12 @@ def test_aligned_members_equal_the_deterministic_model(runs, alignment):
         alone = model.forecast(run, start=60.0, steps=200)
         for name in STATES:
             np.testing.assert_allclose(forecast[name][number], alone[name], rtol=0, atol=1e-10)
+
+
+def test_the_celerity_is_that_of_the_mean_slowness():
+    speeds = (2.0, 2.2, 2.7)
+    given = {f"run{c}": drifting_run(seed).assign_attrs(celerity=c)
+             for seed, c in enumerate(speeds)}  # fmt: skip
+    alignment = ProbeAlignment(mode="effective", surge="none")
+    model = HankelDMDc(2, 4, 1.0, alignment=alignment).fit(given, ["heave"], INPUTS)
+    assert model.alignment.celerity == pytest.approx(3 / sum(1 / c for c in speeds), rel=1e-12)

@@ -271,7 +271,8 @@ class TestFitting:
             spec.fit(each, STATES, INPUTS).signature.readouts[0].load.weights
             for each in (runs, late)
         ]
-        np.testing.assert_array_equal(*weights)
+        # BLAS sums in an order that follows the memory: 5e-14 under the kernels of Nehalem.
+        np.testing.assert_allclose(*weights, rtol=1e-11)
 
     def test_settings_that_are_tuned_hold_the_kinds_that_were_chosen(self, runs):
         found = select(SPEC, runs, STATES, INPUTS, vary=("ridge", "readouts"), horizon=(15.0,))

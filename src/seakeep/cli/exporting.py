@@ -43,6 +43,10 @@ def export(
         Path | None,
         typer.Option(help="State-space system for MATLAB.", metavar="FILE.mat"),
     ] = None,
+    order: Annotated[
+        int | None,
+        typer.Option(help="Order of the MATLAB system, by balanced truncation.", min=1),
+    ] = None,
     steps: Annotated[
         int | None,
         typer.Option(help="Instants that the ONNX graph forecasts; by default 1.", min=1),
@@ -63,6 +67,7 @@ def export(
     if not any((c, fmu, onnx, mat)):
         raise RequestError("nothing to write. Give --c DIR, --fmu, --onnx or --mat FILE.")
     _check_beside(steps is not None, onnx, "--steps belongs to --onnx FILE")
+    _check_beside(order is not None, mat, "--order belongs to --mat FILE")
     _check_beside(estimator, c, "--estimator belongs to --c DIR")
     for path, suffix in ((fmu, ".fmu"), (onnx, ".onnx"), (mat, ".mat")):
         if path is not None:
@@ -79,7 +84,7 @@ def export(
     if onnx is not None:
         written.append(write_onnx(linear, onnx, steps or 1))
     if mat is not None:
-        written.append(linear.to_mat(mat))
+        written.append(linear.to_mat(mat, order))
     say(f"Wrote {', '.join(map(str, written))}.")
     if fmu is not None:
         say(_binary(fmu))

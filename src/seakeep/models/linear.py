@@ -392,7 +392,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         """
         return export.to_control(self._system(), self.signature)
 
-    def to_mat(self, path: str | Path) -> Path:
+    def to_mat(self, path: str | Path, order: int | None = None) -> Path:
         """Write A, B, C, D, Ts, offsets, names (of the state's entries too) and units for MATLAB.
 
         With observables the inputs of the system are the regressors; the file holds filters, as
@@ -403,6 +403,10 @@ class HankelDMDcModel(SingleModel, store.Saved):
         ----------
         path : str or Path
             File to write; its suffix should be ``.mat``. It replaces no file but another system.
+        order : int, optional
+            Order to which balanced truncation brings the system. Its entry ``ErrorBound`` is the
+            largest gain that the error can have at any frequency, SDs of outputs per SD of inputs;
+            its state is no longer that of :meth:`initial_state`, and starts from zero.
 
         Returns
         -------
@@ -410,7 +414,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
             The file. In MATLAB: ``m = load('rom.mat'); sys = idss(m.A, m.B, m.C, m.D, 'Ts',
             m.Ts, 'InputName', m.InputName, 'OutputName', m.OutputName);``
         """
-        return export.to_mat(self._system(is_file=True), self.signature, path)
+        return export.to_mat(self._system(is_file=True), self.signature, path, order)
 
     def initial_state(self, run: xr.Dataset, start: float) -> FloatArray:
         """State of the exported system that continues a measured run.
