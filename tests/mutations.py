@@ -330,7 +330,7 @@ def main() -> int:
     chosen.results.parent.mkdir(exist_ok=True)
     chosen.results.touch()
     lines = chosen.results.read_text(encoding="utf-8").splitlines()
-    known = dict(line.split(maxsplit=2)[:2] for line in lines)
+    known = dict(line.split(maxsplit=2)[:2] for line in lines if " stale " not in line)
     keys = {each: key(each) for each in changes}
     left = [each for each in changes if keys[each] not in known]
     places: queue.Queue[Path] = queue.Queue()
