@@ -130,6 +130,8 @@ CHANGES = (
     ("models/alignment.py", "celerity.lag / apart", "apart / celerity.lag", "models/test_alignment.py::test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is"),
     ("models/alignment.py", "float(1.0 / np.mean(slowness))", "float(np.mean(1.0 / np.array(slowness)))", "models/test_alignment.py::test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for"),
     ("models/alignment.py", "out[column] += reference - float(here)", "out[column] += float(here) - reference", "models/test_alignment.py::test_a_probe_that_was_moved_and_says_so_changes_nothing"),
+    ("models/following.py", "np.tile([0, 1, 2], len(places))", "np.tile([2, 1, 0], len(places))", "models/test_readouts.py::TestTruth"),
+    ("core/readouts.py", "(SOFT * std)", "(SOFT / std)", "core/test_readouts.py::test_a_load_gives_way_to_its_state_outside_training"),
     ("models/alignment.py", "1.0 / np.mean(slowness)", "np.mean(1.0 / np.array(slowness))", "models/test_alignment.py::test_the_celerity_is_that_of_the_mean_slowness"),
     ("models/baselines.py", "factor = 1.0", "factor = 0.5", "models/test_baselines.py::test_mean_and_hold_last_are_what_they_say_and_read_no_input"),
     ("models/baselines.py", "np.hstack([np.zeros((size, size))", "np.hstack([np.eye(size)", "models/test_baselines.py::test_fir_finds_a_known_impulse_response"),
@@ -328,7 +330,7 @@ def main() -> int:
     chosen.results.parent.mkdir(exist_ok=True)
     chosen.results.touch()
     lines = chosen.results.read_text(encoding="utf-8").splitlines()
-    known = dict(line.split(maxsplit=2)[:2] for line in lines)
+    known = dict(line.split(maxsplit=2)[:2] for line in lines if " stale " not in line)
     keys = {each: key(each) for each in changes}
     left = [each for each in changes if keys[each] not in known]
     places: queue.Queue[Path] = queue.Queue()
