@@ -14,6 +14,7 @@ from seakeep import HankelDMDc, ProbeAlignment, RequestError, load_live
 from seakeep.models.live import LEAST_RECORD
 from seakeep.models.validity import Validity
 from seakeep.signals import predict_waves
+from seakeep.study.nowcast import nowcast
 from seakeep.waves import group_speed
 
 START, STEPS = 500, 60  # the record that is kept holds all samples up to there
@@ -353,6 +354,28 @@ def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(models
     assert apart[1] < 0.1 * apart[0]
     assert filled[1][0] == filled[0][0]  # the first probe
     assert filled[1][1] < 0.5 * filled[0][1]
+
+
+def test_skill_against_lead_time_is_that_of_forecasts_by_hand(models, run):
+    model, steps = models["plain"], 10
+    spread, truth = model.state_scale.spread, matrix(run, STATES)
+    span = tuple(float(run.time[at]) for at in (START, START + 1 + steps))
+    found = nowcast(model, run.assign_attrs(test_span=span), steps)
+    assert found.attrs["starts"] == 2
+    squares, claimed, inside = np.zeros((3, steps, len(STATES)))
+    live = started(model, run)
+    for at in (START, START + 1):
+        play(live, run, at, at + 1)
+        mean_, std, lower, upper = (
+            matrix(live.forecast(steps).isel(statistic=row), STATES) for row in range(4)
+        )
+        measured = truth[at + 1 : at + 1 + steps]
+        squares += ((mean_ - measured) / spread) ** 2 / 2
+        claimed += (std / spread) ** 2 / 2
+        inside += 50 * ((lower <= measured) & (measured <= upper))
+    np.testing.assert_allclose(found.error, np.sqrt(squares), rtol=1e-12)
+    np.testing.assert_allclose(found.claimed, np.sqrt(claimed), rtol=1e-12)
+    np.testing.assert_array_equal(found.coverage, inside)
 
 
 def test_of_a_sample_what_is_missing_is_predicted_and_what_is_there_taken(models, run):

@@ -29,7 +29,7 @@ def export(
     ] = None,
     estimator: Annotated[
         bool,
-        typer.Option("--estimator", help="Beside the C99 sources, those of an estimator."),
+        typer.Option("--estimator", help="Of C99 sources and FMU: an estimator beside a vessel."),
     ] = False,
     fmu: Annotated[
         Path | None,
@@ -49,7 +49,10 @@ def export(
     ] = None,
     steps: Annotated[
         int | None,
-        typer.Option(help="Instants that the ONNX graph forecasts; by default 1.", min=1),
+        typer.Option(
+            help="Instants that an ONNX graph, or an estimator's FMU, forecasts; by default 1.",
+            min=1,
+        ),
     ] = None,
     member: Annotated[
         int | None,
@@ -66,9 +69,12 @@ def export(
     """
     if not any((c, fmu, onnx, mat)):
         raise RequestError("nothing to write. Give --c DIR, --fmu, --onnx or --mat FILE.")
-    _check_beside(steps is not None, onnx, "--steps belongs to --onnx FILE")
+    follows = fmu if estimator else None
+    _check_beside(
+        steps is not None, onnx or follows, "--steps belongs to --onnx FILE, or --fmu --estimator"
+    )
     _check_beside(order is not None, mat, "--order belongs to --mat FILE")
-    _check_beside(estimator, c, "--estimator belongs to --c DIR")
+    _check_beside(estimator, c or fmu, "--estimator belongs to --c DIR or --fmu FILE")
     for path, suffix in ((fmu, ".fmu"), (onnx, ".onnx"), (mat, ".mat")):
         if path is not None:
             check_place(path, suffix)
@@ -80,7 +86,7 @@ def export(
     if c is not None:
         written += (write_estimator if estimator else write_c)(linear, c, model.stem)
     if fmu is not None:
-        written.append(write_fmu(linear, fmu))
+        written.append(write_fmu(linear, fmu, (steps or 1) if estimator else None))
     if onnx is not None:
         written.append(write_onnx(linear, onnx, steps or 1))
     if mat is not None:

@@ -10,7 +10,7 @@ from seakeep.conventions import is_elevation
 from seakeep.core.bands import PER_OCTAVE
 from seakeep.hosts.c import content_of, identifier, rendered, sources, write_sources
 from seakeep.hosts.program import exportable
-from seakeep.models import Model
+from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.validity import CYCLES, TRAINED
 from seakeep.signals.prediction import MEMORY
 from seakeep.waves import GRAVITY
@@ -45,10 +45,19 @@ def write_estimator(
         If the model cannot be exported, or a file is there that seakeep did not write.
     """
     linear, name = exportable(model), identifier(name)
-    content = content_of(linear, name) | linear.live(noise=noise, roles=roles).equations
-    content |= {"begins": linear.history_samples, "memory": MEMORY, "pi": math.pi}
-    content |= {"coverage": linear.coverage, "trained": TRAINED, "cycles": CYCLES}
+    return write_sources(followed(linear, name, noise, roles), folder)
+
+
+def followed(
+    model: HankelDMDcModel,
+    name: str,
+    noise: Mapping[str, float] | None = None,
+    roles: Mapping[str, str] | None = None,
+) -> dict[str, str]:
+    """Text of the C files of a model and its estimator, by their names."""
+    content = content_of(model, name) | model.live(noise=noise, roles=roles).equations
+    content |= {"begins": model.history_samples, "memory": MEMORY, "pi": math.pi}
+    content |= {"coverage": model.coverage, "trained": TRAINED, "cycles": CYCLES}
     content |= {"gravity": GRAVITY, "per_octave": PER_OCTAVE, "is_elevation": is_elevation}
     files = ("estimator.h", "estimator.c")
-    more = {f"{name}_{file}": rendered(file, **content) for file in files}
-    return write_sources(sources(linear, name) | more, folder)
+    return sources(model, name) | {f"{name}_{file}": rendered(file, **content) for file in files}

@@ -18,6 +18,7 @@ from typing import Any
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
 from seakeep.hosts.c import identifier, rendered, sources
+from seakeep.hosts.estimator import followed
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
 
@@ -31,7 +32,7 @@ PLATFORMS = {
 """Folder of a binary in an FMU and its suffix, by system and processor."""
 
 
-def write_fmu(model: Model, path: str | Path) -> Path:
+def write_fmu(model: Model, path: str | Path, ahead: int | None = None) -> Path:
     """Write a model as an FMU 2.0 for co-simulation.
 
     It holds the sources of :func:`seakeep.hosts.write_c` and, where a C compiler is found, a binary
@@ -44,6 +45,10 @@ def write_fmu(model: Model, path: str | Path) -> Path:
         As for :func:`seakeep.hosts.write_c`.
     path : str or Path
         File to write; its suffix should be ``.fmu``.
+    ahead : int, optional
+        Instants that an estimator forecasts. With it the unit follows a vessel, as
+        :func:`seakeep.hosts.write_estimator` says: inputs ``measured.NAME`` are the states, NaN
+        where they were not measured, and outputs their estimates and ``ahead.NAME[1]`` …
 
     Returns
     -------
@@ -59,7 +64,7 @@ def write_fmu(model: Model, path: str | Path) -> Path:
     target = Path(path)
     check_output(target, KIND)
     linear, name = exportable(model), identifier(target.stem)
-    files = sources(linear, name)
+    files = sources(linear, name) if ahead is None else followed(linear, name)
     digest = hashlib.sha256("".join(files.values()).encode()).digest()
     content: dict[str, Any] = {
         "name": name,
@@ -67,7 +72,8 @@ def write_fmu(model: Model, path: str | Path) -> Path:
         "mark": f"{MARK}: {KIND},",
         "guid": f"{{{uuid.UUID(bytes=digest[:16])}}}",
         "dt": model.dt,
-        **_described(linear),
+        "ahead": ahead,
+        **_described(linear, ahead),
     }
     files["fmi2.c"] = rendered("fmi2.c", **content)
     description = rendered("modelDescription.xml", **content)
@@ -117,7 +123,7 @@ def _compiled(compiler: list[str], folder: Path, name: str, suffix: str) -> Path
     return library
 
 
-def _described(model: HankelDMDcModel) -> dict[str, Any]:
+def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
     """What the model description says beside names and numbers."""
     signature = model.signature
     inputs, states = signature.input_labels, signature.state_labels
@@ -140,7 +146,18 @@ def _described(model: HankelDMDcModel) -> dict[str, Any]:
             (inputs, states), means, (history, signature.state_samples), strict=True
         )
     ]
-    channels = [*groups[0], *groups[1]]
+    given, answered = groups
+    channels = [*given, *answered]
+    if ahead is not None:
+        measured = [
+            each | {"name": f"measured.{each['name']}", "is_output": False} for each in answered
+        ]
+        coming = [
+            each | {"name": f"ahead.{each['name']}[{step}]"}
+            for step in range(1, ahead + 1)
+            for each in answered
+        ]
+        channels, groups = [*given, *measured, *answered, *coming], []
     return {
         "version": metadata.version("seakeep"),
         "timing": timing(model),

@@ -2,7 +2,7 @@
  *
  * Types and functions are those of the FMI standard 2.0, sections 2.1 and 4.2.
  */
-#include "{{ name }}.h"
+#include "{{ name }}{{ "_estimator" if ahead else "" }}.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -38,17 +38,24 @@ typedef struct {
 enum {
     N = {{ upper }}_STATES,
     Q = {{ upper }}_INPUTS,
+{% if ahead %}
+    OUTPUTS = Q + N, /* values are inputs and what was measured, estimates, and forecasts */
+    X_HISTORY = OUTPUTS + N * {{ 1 + ahead }},
+    U_HISTORY = X_HISTORY,
+    COUNT = U_HISTORY
+{% else %}
     OUTPUTS = Q, /* values are inputs, outputs, and the histories to start from */
     X_HISTORY = OUTPUTS + N,
     U_HISTORY = X_HISTORY + {{ upper }}_X_ROWS * N,
     COUNT = U_HISTORY + {{ upper }}_U_ROWS * Q
+{% endif %}
 };
 
 typedef struct {
     char guid[sizeof GUID];
     int started;
     double values[COUNT];
-    {{ name }}_model model;
+    {{ name }}_{{ "estimator" if ahead else "model" }} model;
 } State;
 
 typedef struct {
@@ -57,7 +64,7 @@ typedef struct {
     char *name;
 } Instance;
 
-static const double start_values[Q + N] = {
+static const double start_values[X_HISTORY] = {
 {{ start | numbers }}
 };
 
@@ -132,9 +139,11 @@ EXPORT Status FMI(fmi2EnterInitializationMode)(void *c) { return OK; }
 EXPORT Status FMI(fmi2ExitInitializationMode)(void *c)
 {
     Instance *instance = c;
+{% if not ahead %}
     double *values = instance->state.values;
     if ({{ name }}_start(&instance->state.model, values + X_HISTORY, values + U_HISTORY))
         return report(instance, ERROR, "a start value of a history is not finite");
+{% endif %}
     instance->state.started = 1;
     return OK;
 }
@@ -170,8 +179,10 @@ EXPORT Status FMI(fmi2SetReal)(void *c, const Reference at[], size_t count, cons
             return report(instance, ERROR, "histories are set before the end of initialization");
         state->values[place] = values[i];
     }
+{% if not ahead %}
     if (!state->started)
         memcpy(state->values + OUTPUTS, state->values + U_HISTORY - N, N * sizeof(double));
+{% endif %}
     return OK;
 }
 
@@ -244,20 +255,24 @@ EXPORT Status FMI(fmi2GetDirectionalDerivative)(void *c, const Reference unknown
                                                 const Reference known[], size_t knowns,
                                                 const double change[], double response[])
 {
+{% if ahead %}
+    return ERROR;
+{% else %}
     Instance *instance = c;
-    double along[Q + 1] = { 0.0 }, found[N];
+    double along[Q + 1] = { 0.0 }, slope[N];
     for (size_t i = 0; i < knowns; i++) {
         if (known[i] >= Q)
             return report(instance, ERROR, "derivatives are those with respect to inputs");
         along[known[i]] = change[i];
     }
-    {{ name }}_derivative(&instance->state.model, instance->state.values, along, found);
+    {{ name }}_derivative(&instance->state.model, instance->state.values, along, slope);
     for (size_t i = 0; i < unknowns; i++) {
         if (unknown[i] < OUTPUTS || unknown[i] >= X_HISTORY)
             return report(instance, ERROR, "derivatives are those of outputs");
-        response[i] = found[unknown[i] - OUTPUTS];
+        response[i] = slope[unknown[i] - OUTPUTS];
     }
     return OK;
+{% endif %}
 }
 
 EXPORT Status FMI(fmi2SetRealInputDerivatives)(void *c, const Reference at[], size_t count,
@@ -279,10 +294,20 @@ EXPORT Status FMI(fmi2DoStep)(void *c, double time, double step, int no_return)
     int status;
     if (!(fabs(step - {{ upper }}_STEP) <= 1e-6 * {{ upper }}_STEP))
         return report(instance, ERROR, "the communication step must be {{ dt }} s");
+{% if ahead %}
+    double *values = state->values, *coming = values + OUTPUTS + N;
+    if ({{ name }}_estimate(&state->model, values, values + Q))
+        return report(instance, DISCARD, "a value is infinite, or an input missing too early");
+    memcpy(values + OUTPUTS, {{ name }}_estimated(&state->model), N * sizeof(double));
+    status = {{ name }}_forecast(&state->model, {{ ahead }}, NULL, coming);
+    for (int i = 0; status == 1 && i < {{ ahead }} * N; i++)
+        coming[i] = NAN; /* there is too little history yet */
+{% else %}
     status = {{ name }}_step(&state->model, state->values);
     if (status == 1)
         return report(instance, DISCARD, "an input is not finite; the step was not made");
     memcpy(state->values + OUTPUTS, state->model.x, sizeof state->model.x);
+{% endif %}
     if (status == 2)
         return report(instance, ERROR, "the run is lost: a state is far beyond its training");
     return OK;

@@ -170,7 +170,7 @@ def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure
     change, *bounds = (100 * float(at[key]) for key in ("change", "lower", "upper"))
     if not np.isfinite(change):
         return ""
-    outcome = verdict(*bounds)
+    outcome = "as good" if np.abs(bounds).max() < 0.5 else verdict(*bounds)
     words = f"the ensemble's mean is {outcome}"
     if outcome == "cannot tell":
         words = "cannot tell whether the ensemble's mean is better"
