@@ -215,7 +215,8 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     def sea(seed, push, samples=3000):
         rng = np.random.default_rng(seed)
         wave, noise = rng.standard_normal(samples), rng.standard_normal((samples, 2))
-        forced = 0.5 * wave[:, None] + noise + [push, 0.0]
+        forced = 0.5 * wave[:, None] + noise
+        forced[:, 0] += push
         x = signal.lfilter([0.0, 1.0], [1.0, -0.98], forced, axis=0)
         time = 0.1 * np.arange(samples)
         return make_dataset(time, surge=x[:, 0], heave=x[:, 1], eta_fwd=wave)
@@ -223,12 +224,14 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     model = HankelDMDc(0, 0, 1e-6, delay_rows="exact").fit(
         sea(1, 0.0, 20_000), ["surge", "heave"], ["eta_fwd"]
     )
-    found = {}
-    for push in (0.0, 0.7):
-        live, run = model.live(), sea(2, push)
+
+    def after(run):
+        live = model.live()
         for u, y in zip(run["eta_fwd"].values, matrix(run, ["surge", "heave"]), strict=True):
             live.step([u], y)
-        found[push] = live.consistency, live.consistency_by_state
+        return live.consistency, live.consistency_by_state
+
+    found = {push: after(sea(2, push)) for push in (0.0, 0.7)}
     # 256 squares of a normal number have a mean of 1 ± 0.09 (SD); those of free runs, which are
     # alike within some dozens of samples, of 1 ± 0.4.
     assert found[0.0][0] == pytest.approx(1.0, abs=0.3)
@@ -239,6 +242,9 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     surge, heave = found[0.7][1][1]
     assert surge > 5 > 2.2 > heave > 0.2
     assert found[0.7][0] == pytest.approx(found[0.7][1].mean())
+    # A push of 2 SD that ended six time constants ago is forgotten; over all samples, 3 would stay.
+    ended = after(sea(2, np.where(np.arange(3000) < 1500, 2.0, 0.0)))
+    assert ended[1][0][0] == pytest.approx(1.0, abs=0.3)
 
 
 def test_outside_the_training_the_band_widens_and_says_why(models, run):

@@ -250,9 +250,7 @@ def find_held(series: npt.ArrayLike, dt: float, witness: npt.ArrayLike | None = 
     for begin, length in zip(starts[long], lengths[long], strict=True):
         end = begin + length
         if other is None:
-            out[begin:end] = length > expected + TIMES * _stay(
-                x, starts, begin, end, period
-            )
+            out[begin:end] = length > expected + TIMES * _stay(x, starts, begin, end, period)
         else:
             out[begin:end] = length >= period and other[begin:end].std() > CALM * other.std()
     return out
