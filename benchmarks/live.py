@@ -3,6 +3,7 @@
 python benchmarks/live.py steps [COUNT]                  # time and memory of COUNT steps
 python benchmarks/live.py service CAMPAIGN.toml                   # what `recommended` costs
 python benchmarks/live.py bands CAMPAIGN.toml [KIND [STARTS]]     # errors and bands; KIND of SPECS
+python benchmarks/live.py higher CAMPAIGN.toml HIGHER.toml        # bands in seas that did not train
 python benchmarks/live.py lost CAMPAIGN.toml                      # filling of lost samples of waves
 python benchmarks/live.py chain MODEL.nc CAMPAIGN.toml RUN    # live chain against the offline one
 """
@@ -159,6 +160,31 @@ def _served(model, run, steps, starts):
     }
 
 
+def higher(campaign, other, name="irregular_3"):
+    """What 95 % bands hold over 5 T in a run of another campaign, widened and as in training."""
+    read = seakeep.read_campaign(campaign)
+    trained = [each for each in read.training_runs if each != name]
+    runs, channels = load_prepared(read, names=trained), read.model()
+    run = load_prepared(seakeep.read_campaign(other), names=[name])[name]
+    dt, period = float(run.attrs["dt"]), read.seconds("1 T")
+    spec = SPECS["plain"](period, dt)
+    model = spec.fit(runs, list(channels.states), list(channels.inputs))
+    u, y = (np.stack([run[each].values for each in of], 1) for of in (model.inputs, model.states))
+    live, steps, inside, trusted = model.live(like=run), round(5 * period / dt), [], []
+    for at in range(len(y) - steps - model.lead_samples):
+        live.step(u[at], y[at])
+        if at < 900 or at % 90:
+            continue
+        made = live.forecast(steps, u[at + 1 :])
+        mean, std, lower, upper = np.stack([made[each].values for each in model.states], axis=-1)
+        truth = y[at + 1 : at + steps + 1]
+        inside.append((lower <= truth) & (truth <= upper))
+        factor = model.errors.of_forecast(steps) ** 0.5 / std
+        trusted.append(np.abs(truth - mean) <= factor * (upper - mean))
+    print(f"{made.attrs['validity']}: {100 * np.mean(inside):.0f} % in the band, and")
+    print(f"{100 * np.mean(trusted):.0f} % if it were as in training; {len(inside)} forecasts")
+
+
 def lost(campaign, gaps=100):
     """Errors in gaps of waves that are filled from each record, or from the probe up-wave too."""
     read = seakeep.read_campaign(campaign)
@@ -228,5 +254,5 @@ def chain(model, campaign, name, until=120.0):
 
 
 if __name__ == "__main__":
-    calls = (steps, service, bands, lost, chain)
+    calls = (steps, service, bands, higher, lost, chain)
     {each.__name__: each for each in calls}[sys.argv[1]](*sys.argv[2:])

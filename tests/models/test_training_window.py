@@ -169,7 +169,11 @@ def test_the_recommended_preset_uses_all_of_the_runs_and_exact_rows():
         alignment={"mode": "dispersion", "surge": "predicted", "optional": True},
         lead=24,
         readouts="auto",
-        select={"observables": True, "horizon": (15, 45), "period": 1.64},
+        select={
+            **dict.fromkeys(("observables", "alignment", "lead", "memory"), True),
+            "horizon": (15, 45),
+            "period": 1.64,
+        },
     )
 
 

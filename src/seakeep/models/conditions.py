@@ -29,7 +29,7 @@ BETTER = 0.8
 Half of one run is little to learn from: within one condition the pooled model is better."""
 LEAST = 0.02
 """Gain, SD, below which nothing is said."""
-SURE = 2.0
+STANDARD_ERRORS = 2.0
 """Standard errors over the windows by which it must be better."""
 EXPLAINS = 0.7
 """Part of what the run's own model gains, in squared errors, that a reason must explain."""
@@ -155,9 +155,9 @@ def _scores(errors: FloatArray) -> FloatArray:
 def _gain(pooled: FloatArray, own: FloatArray) -> float:
     """By how much a model of all runs errs more than one of the run, if that is sure; else zero."""
     pooled, own = _scores(pooled), _scores(own)
-    gain, doubt = pooled - own, SURE * (pooled - own).std(ddof=1) / len(own) ** 0.5
-    is_sure = gain.mean() > max(doubt, LEAST) and own.mean() < BETTER * pooled.mean()
-    return float(gain.mean()) if is_sure else 0.0
+    gain, doubt = pooled - own, STANDARD_ERRORS * (pooled - own).std(ddof=1) / len(own) ** 0.5
+    is_certain = gain.mean() > max(doubt, LEAST) and own.mean() < BETTER * pooled.mean()
+    return float(gain.mean()) if is_certain else 0.0
 
 
 def _series(
@@ -211,7 +211,7 @@ def _place(model: HankelDMDcModel, run: xr.Dataset) -> tuple[Reason, str, float,
     """A distance of the probe that explains the error of a model of other runs."""
     time = run["time"].values
     best = estimate_probe_offset(model, run, (float(time[len(time) // 2]), float(time[-1])))
-    is_sure = best.interval[0] * best.interval[1] > 0
-    if not is_sure or best.nrmse**2 > (1.0 - EXPLAINS) * best.nrmse_uncorrected**2:
+    is_certain = best.interval[0] * best.interval[1] > 0
+    if not is_certain or best.nrmse**2 > (1.0 - EXPLAINS) * best.nrmse_uncorrected**2:
         return None
     return "probe position", "", best.offset, best.spread

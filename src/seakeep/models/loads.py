@@ -24,7 +24,7 @@ STEP, REACH = 2, PER_WAVE // 2
 of the peak's wave. Half of the gain is lost 0.3 m off the line, on tanks with waves of 4 m."""
 WORST = 10.0
 """NRMSE at which a window counts no worse."""
-SURE = 2.0
+STANDARD_ERRORS = 2.0
 """Standard errors by which a read-out must be better than none."""
 LEAST = 0.02
 """Part of the error that it must gain: a load that is linear in the motions stays a state."""
@@ -227,5 +227,5 @@ def _chosen(
     scores = {"none": float(none[sound].mean()), "wave": float(wave[sound].mean())}
     gain = (none - wave)[sound]
     doubt = float(gain.std(ddof=1)) / len(gain) ** 0.5 if len(gain) > 1 else np.inf
-    least = max(SURE * doubt, LEAST * scores["none"])
+    least = max(STANDARD_ERRORS * doubt, LEAST * scores["none"])
     return ("wave" if gain.mean() > least else "none"), scores

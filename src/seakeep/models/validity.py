@@ -102,7 +102,7 @@ class Conditions:
 
     def sentences(self, units: Sequence[str]) -> list[str]:
         """A sentence for each reason: periods, heights, steepnesses, mean surge."""
-        told: list[list[str]] = [[], [], []]
+        texts: list[list[str]] = [[], [], []]
         for at, (channel, unit) in enumerate(zip(self.trained.channels, units, strict=True)):
             peak, taught = self.peak[at], self.trained.shares[at] >= TRAINED
             known, trained = self.trained.known[at], np.flatnonzero(taught)
@@ -111,7 +111,7 @@ class Conditions:
                 if low < peak < high and not known[peak]:
                     low, high = trained[trained < peak][-1], trained[trained > peak][0]
                     where, word, nothing = "between", "and", ", with none between"
-                told[0].append(
+                texts[0].append(
                     f"{channel}: the dominant period of {self.periods[peak]:.3g} s lies {where} "
                     f"the periods that trained the model ({self.periods[high]:.3g} {word} "
                     f"{self.periods[low]:.3g} s{nothing}); {100 * self.unseen[at]:.0f} % of the "
@@ -122,11 +122,11 @@ class Conditions:
                 (2, "steepness in deep water", self.steepnesses, self.trained.steepnesses, ""),
             ):
                 if self.reasons[group, at]:
-                    told[group].append(
+                    texts[group].append(
                         f"{channel}: a {what} of {values[at]:.3g}{of}, trained up to "
                         f"{most[at]:.3g}{of}"
                     )
-        lines = ["; ".join(each) for each in told if each]
+        lines = ["; ".join(each) for each in texts if each]
         if Validity.SURGE in self.validity:
             assert self.surge is not None
             side = "downstream" if self.surge > self.reach[1] else "upstream"

@@ -42,7 +42,7 @@ moored models reach 9 standard deviations."""
 ABRUPT = 0.7
 """Part of its distance by which an outlier is entered and left in one step: a crest grows."""
 
-SURE = 2.0
+STANDARD_ERRORS = 2.0
 """Times longer than the longest run of equal readings expected by chance that a held one is."""
 
 CALM = 0.3
@@ -240,7 +240,7 @@ def find_held(series: npt.ArrayLike, dt: float, witness: npt.ArrayLike | None = 
     # and Rényi). Where all readings repeat, as the frames of a slow camera do, they count as one.
     frame = max(int(np.sort(lengths)[(lengths.size - 1) // 4]), _frame(x))
     goes_on = max(float(np.mean(lengths >= 2 * frame)), 1 / lengths.size)
-    expected = frame * float(1 + SURE * np.log(lengths.size) / np.log(1 / goes_on))
+    expected = frame * float(1 + STANDARD_ERRORS * np.log(lengths.size) / np.log(1 / goes_on))
     long = lengths > expected
     free = np.repeat(~long, lengths)
     if free.sum() < 2:
@@ -250,7 +250,9 @@ def find_held(series: npt.ArrayLike, dt: float, witness: npt.ArrayLike | None = 
     for begin, length in zip(starts[long], lengths[long], strict=True):
         end = begin + length
         if other is None:
-            out[begin:end] = length > expected + SURE * _stay(x, starts, begin, end, period)
+            out[begin:end] = length > expected + STANDARD_ERRORS * _stay(
+                x, starts, begin, end, period
+            )
         else:
             out[begin:end] = length >= period and other[begin:end].std() > CALM * other.std()
     return out

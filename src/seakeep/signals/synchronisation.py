@@ -223,12 +223,12 @@ def clock_from_correlation(
     Raises
     ------
     DataError
-        If a signal has gaps, or fewer than two windows correlate.
+        If fewer than two windows correlate.
     RequestError
-        If a record is shorter than the window, or a signal and its times differ in length.
+        If a record is shorter than the window.
     """
-    a, c = _whole(series, time, "the logger")
-    b, t = _whole(reference, reference_time, "the reference")
+    a, c = record(series, time, "the logger")
+    b, t = record(reference, reference_time, "the reference")
     step = min(uniform_step(c, "the logger"), uniform_step(t, "the reference"))
     begin, end = max(c[0], t[0]), min(c[-1], t[-1])
     if end - begin < window + 2 * largest_lag:
@@ -255,19 +255,6 @@ def clock_from_correlation(
     instants = begin + lags.centre[good]
     clock = _line(instants + lags.lag[good], instants, None)
     return replace(clock, method="correlation of windows")
-
-
-def _whole(signal: npt.ArrayLike, time: npt.ArrayLike, owner: str) -> tuple[FloatArray, FloatArray]:
-    """Signal without gaps of a logger, and the readings of its clock."""
-    x, t = record(signal, time, owner)
-    lost = np.flatnonzero(~np.isfinite(x))
-    if lost.size:
-        raise DataError(
-            f"the signal of {owner} has {lost.size} missing or infinite value(s), the first at "
-            f"sample {lost[0]}. Bridge the gap (seakeep.signals.bridge), or use the record before "
-            "or after it."
-        )
-    return x, t
 
 
 def clock_from_shared(
@@ -299,8 +286,8 @@ def clock_from_shared(
         As :func:`clock_from_correlation`.
     """
     first = clock_from_correlation(series, time, reference, reference_time, window, largest_lag)
-    a, c = _whole(series, time, "the logger")
-    b, t = _whole(reference, reference_time, "the reference")
+    a, c = record(series, time, "the logger")
+    b, t = record(reference, reference_time, "the reference")
     offset, drift = first.offset, first.drift
     turned = np.median(np.diff(c)) < np.median(np.diff(t))  # the spline is of the faster one
     if turned:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import scipy
 
 from seakeep.arrays import BoolArray, FloatArray, as_real, time_step
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import DataError
 
 STEP_TOLERANCE = 0.01
 """A time axis is uniform if no instant is further than this part of a step from its grid."""
@@ -84,11 +84,6 @@ def _shown(t: FloatArray, sample: int | np.intp) -> str:
 def record(series: npt.ArrayLike, time: npt.ArrayLike, owner: str) -> tuple[FloatArray, FloatArray]:
     """Signal of an owner, not finite where it has gaps, and its instants in their order."""
     x, t = as_real(series, f"the signal of {owner}"), check_order(time, owner)
-    if x.shape != t.shape:
-        raise RequestError(
-            f"the signal of {owner} has shape {x.shape} and its times {t.shape}; one value per "
-            "instant is needed."
-        )
     if np.isfinite(x).sum() < 2:
         raise DataError(f"the signal of {owner} has fewer than two values. Give a longer record.")
     return x, t

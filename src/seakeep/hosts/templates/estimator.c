@@ -438,7 +438,7 @@ static void spectrum(const {{ name }}_estimator *e, int q, double mean, int beyo
 
 int {{ name }}_validity({{ name }}_estimator *e)
 {
-    int size = e->filled, found = 0;
+    int size = e->filled, outside = 0;
     for (int q = 0; size >= 4 && q < Q; q++) {
         double mean = 0.0, square = 0.0, fourth = 0.0, sum = 0.0, grown = 0.0;
         double energy[BANDS] = { 0.0 }, total = 0.0, unseen = 0.0, height, steepness, repeats, margin;
@@ -478,11 +478,11 @@ int {{ name }}_validity({{ name }}_estimator *e)
             continue;
         margin = 1.1 + 1.7 / sqrt(repeats);
         if (unseen > 0.5 * total)
-            found |= {{ upper }}_PERIOD;
+            outside |= {{ upper }}_PERIOD;
         if (height > margin * heights[q])
-            found |= {{ upper }}_HEIGHT;
+            outside |= {{ upper }}_HEIGHT;
         if (elevations[q] && steepness > margin * steepnesses[q])
-            found |= {{ upper }}_STEEPNESS;
+            outside |= {{ upper }}_STEEPNESS;
     }
 {% if "surge" in signature.states %}
     double surge = 0.0, away;
@@ -490,9 +490,9 @@ int {{ name }}_validity({{ name }}_estimator *e)
         surge += e->surge[RECORD - 1 - t] / size;
     away = surge - centre[{{ signature.states.index("surge") }}];
     if (size >= 4 && Q > 0 && fabs(away) > {{ signature.state_scale.reach[signature.states.index("surge")] | hex }})
-        found |= {{ upper }}_SURGE;
+        outside |= {{ upper }}_SURGE;
 {% endif %}
-    return found;
+    return outside;
 }
 
 const double *{{ name }}_estimated(const {{ name }}_estimator *e) { return e->x + (X_ROWS - 1) * N; }

@@ -259,17 +259,17 @@ EXPORT Status FMI(fmi2GetDirectionalDerivative)(void *c, const Reference unknown
     return ERROR;
 {% else %}
     Instance *instance = c;
-    double along[Q + 1] = { 0.0 }, found[N];
+    double along[Q + 1] = { 0.0 }, slope[N];
     for (size_t i = 0; i < knowns; i++) {
         if (known[i] >= Q)
             return report(instance, ERROR, "derivatives are those with respect to inputs");
         along[known[i]] = change[i];
     }
-    {{ name }}_derivative(&instance->state.model, instance->state.values, along, found);
+    {{ name }}_derivative(&instance->state.model, instance->state.values, along, slope);
     for (size_t i = 0; i < unknowns; i++) {
         if (unknown[i] < OUTPUTS || unknown[i] >= X_HISTORY)
             return report(instance, ERROR, "derivatives are those of outputs");
-        response[i] = found[unknown[i] - OUTPUTS];
+        response[i] = slope[unknown[i] - OUTPUTS];
     }
     return OK;
 {% endif %}
