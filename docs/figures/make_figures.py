@@ -327,15 +327,12 @@ def sjtu():
 
 def tank():
     """Coefficients, spectrum, a run and a video frame of the virtual tank."""
-    from seakeep.report.figures.runs import (
-        hydrodynamics_figure,
-        run_figure,
-        tank_spectrum_figure,
-    )
+    sys.path.insert(0, str(ROOT / "benchmarks"))
+    from tank_figures import hydrodynamics_figure, realise, run_figure, tank_spectrum_figure
+
     from seakeep.signals.panel import opencv
     from seakeep.tank.delivery import side_view
     from seakeep.tank.play import check_settings, play_run, truth
-    from seakeep.tank.realised import realise
     from seakeep.tank.settings import default_settings
 
     settings = default_settings()

@@ -1,10 +1,15 @@
+"""What `benchmarks/tank_figures.py` prints and draws."""
+
 import numpy as np
+import pandas as pd
 import pytest
+from tank_figures import comparison, main, matrix_rows, realise, realised_tables
 
 from seakeep.tank.play import play_run
-from seakeep.tank.realised import comparison, matrix_rows, realise
 
 pytest.importorskip("numba", reason="needs the extra tank")
+
+pytest.importorskip("matplotlib", reason="needs the extra figures")
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +58,37 @@ def test_test_matrix_is_the_papers_first_table(settings, realised):
     assert phase == pytest.approx([1.811, 2.090, 2.560], abs=1.5e-3)
     assert group == pytest.approx([0.905, 1.045, 1.280], abs=1.5e-3)
     assert rows[1]["realised h [m]"].startswith("0.105 ± 0.00")
+
+
+def test_tables_state_units_and_verdicts(settings, realised):
+    _, waves, true = realised_tables(settings, realised)
+    cells = {row[0]: row[1:] for row in waves.rows}
+    assert cells["zero-up-crossing period"][0] == "s"
+    assert cells["significant height"][0] == "m"
+    assert {row[-1] for row in waves.rows} == {"within"}
+    units = {channel: unit for _, channel, unit, *_ in true.rows}
+    assert units["surge_fast"] == units["piston"] == "m"
+    assert units["pitch"] == "rad"
+    assert units["mooring_bow"] == "N"
+    slack = {(run, channel): share for run, channel, *_, share in true.rows}
+    assert 60 < float(slack["regular_1_5", "mooring_stern"]) < 100  # percent, mostly
+    assert slack["regular_1_5", "heave"] == ""
+
+
+def test_the_script_prints_tables_and_draws_figures(tmp_path, capsys):
+    short = tmp_path / "short.toml"
+    short.write_text(
+        "[runs.sea]\nstartup = 5.0\nduration = 30.0\n"
+        "spectrum = { height = 0.15, peak_period = 2.0 }\n"
+        "[runs.regular]\nstartup = 5.0\nduration = 20.0\nwavelength = 2.8\nheight = 0.1\n",
+        encoding="utf-8",
+    )
+    out = tmp_path / "out"
+    main([str(short), "--out", str(out), "--seed", "3", "--run", "sea"])
+    printed = capsys.readouterr().out
+    for text in ("Test matrix", "Realised waves", "significant height", "Pierson", "True motions"):
+        assert text in printed
+    figures = list(out.glob("*.png"))
+    assert {p.name for p in figures} == {"hydrodynamics.png", "spectrum.png", "run_sea.png"}
+    assert all(p.stat().st_size > 10_000 for p in figures)
+    assert set(pd.read_csv(out / "truth.csv")["run"]) == {"sea"}

@@ -1,4 +1,4 @@
-"""Figures of runs: all their channels, wave spectra, and what the virtual tank's vessel answers."""
+"""Figures of runs: all their channels, and wave spectra."""
 
 from __future__ import annotations
 
@@ -16,21 +16,13 @@ from seakeep.report.style import (
     COLOURS,
     DASHED,
     PALETTE,
-    SERIES,
     figure_style,
     new_figure,
     plain_text,
     shown,
 )
-from seakeep.signals import wave_spectrum
 from seakeep.signals.time_axis import over_gaps
 from seakeep.study import StudyResult
-from seakeep.tank.dynamics import Rig, linear_response
-from seakeep.tank.hydrodynamics import excitation_at, kernel_coefficients
-from seakeep.tank.realised import Realised, paper_peak
-from seakeep.tank.seas import spectral_density
-from seakeep.tank.settings import TankSettings
-from seakeep.waves import wavelength_to_frequency, wavenumber
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,19 +40,12 @@ MARKS = {
 """Colour and shape of each flag: shapes distinguish them in grey print."""
 LABELS = -0.06
 """Where labels of the vertical axes stand, in widths of the axes: beyond six figures."""
-SEAS = {"pierson_moskowitz": "Pierson–Moskowitz", "jonswap": "JONSWAP", "table": "as given"}
 WELCH: dict[str, tuple[str, Any]] = {
     "paper": (COLOURS["forecast"], DASHED),
     "recommended": (COLOURS["ensemble"], "-"),
 }
 """Colour and dash of a measured spectrum, by how it is estimated."""
 Curve = tuple[FloatArray, FloatArray]
-
-
-def run_figure(run: xr.Dataset, channels: Sequence[str] | None = None) -> Figure:
-    """All channels of a run of the tank over time but crests, its start-up shaded."""
-    names = [str(name) for name in run.data_vars if not str(name).endswith("_crest")]
-    return quality_figure(run[names if channels is None else list(channels)], {})
 
 
 @figure_style()
@@ -151,7 +136,7 @@ def spectrum_figure(result: StudyResult) -> Figure:
     ]
     figure = new_figure(8.5, 4.2)
     axes = figure.subplots()
-    _draw_spectra(axes, nominal, measured, runs["wave_frequency"].values)
+    draw_spectra(axes, nominal, measured, runs["wave_frequency"].values)
     peaks = [float(f[np.argmax(density)]) for f, density in curves("recommended", every)]
     axes.set_xlim(0, 2.2 * max(peaks, default=1.0))
     channel = plain_text(result.words_of(str(spectra.attrs["channel"])))
@@ -159,31 +144,7 @@ def spectrum_figure(result: StudyResult) -> Figure:
     return figure
 
 
-@figure_style()
-def tank_spectrum_figure(settings: TankSettings, realised: Sequence[Realised]) -> Figure:
-    """Nominal wave spectra of the tank against the measured ones, regular waves marked."""
-    seas = [each for each in realised if each.irregular]
-    f = np.linspace(0.15, 1.6, 600)
-    figure = new_figure(6.4, 3.8)
-    axes = figure.subplots()
-    stated = {repr(each): each for sea in seas if (each := settings.runs[sea.run].spectrum)}
-    nominal = [
-        (f"nominal ({SEAS[each.kind]})", (f, spectral_density(each, f))) for each in stated.values()
-    ]
-    for edge in (edge for each in stated.values() for edge in each.band):
-        axes.axvline(edge, color=PALETTE["grey"], linewidth=0.8, linestyle=":")
-    fine = [wave_spectrum(each.elevation, each.dt) for each in seas]
-    rough = [paper_peak(each.elevation, each.dt)[1:] for each in seas]
-    measured = {
-        "recommended": ("measured, segments of 60 s", fine),
-        "paper": ("measured, paper's Welch settings", rough),
-    }
-    _draw_spectra(axes, nominal, measured, _regular_waves(settings) / (2 * np.pi))
-    axes.set(xlim=(0.15, 1.6), xlabel="frequency $f$ [Hz]", ylabel="$E$ [m²/Hz]")
-    return figure
-
-
-def _draw_spectra(
+def draw_spectra(
     axes: Any,
     nominal: Sequence[tuple[str, Curve]],
     measured: Mapping[str, tuple[str, Sequence[Curve]]],
@@ -204,51 +165,3 @@ def _draw_spectra(
     axes.set_ylim(bottom=0)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8)
-
-
-def _regular_waves(settings: TankSettings) -> FloatArray:
-    """Frequencies of the tank's regular runs, rad/s."""
-    lengths = sorted({each.wavelength for each in settings.runs.values() if each.wavelength})
-    return np.array([wavelength_to_frequency(n, settings.facility.water_depth) for n in lengths])
-
-
-@figure_style()
-def hydrodynamics_figure(rig: Rig, settings: TankSettings) -> Figure:
-    """Added mass, damping, excitation and response amplitude operators over frequency."""
-    hydro, omega = rig.hydro, rig.hydro.omega
-    fine, waves = np.linspace(max(0.5, omega[0]), omega[-1], 500), np.linspace(1.6, 9.0, 600)
-    motion = np.abs(linear_response(rig, waves))
-    slope = wavenumber(waves, hydro.water_depth)
-    diagonal = [np.diagonal(each, axis1=1, axis2=2) for each in (hydro.added_mass, hydro.damping)]
-    points = [*diagonal, np.abs(hydro.excitation)]
-    kernel = [np.diagonal(x, axis1=1, axis2=2) for x in kernel_coefficients(rig.kernel, fine)]
-    lines = [*kernel, np.abs(excitation_at(hydro, fine))]
-    labels = (
-        "added mass\n[kg, kg m²]",
-        "radiation damping\n[kg/s, kg m²/s]",
-        "excitation\n[N/m, N m/m]",
-        "linear response\n[m/m, pitch rad/(ka)]",
-    )
-    figure = new_figure(9.0, 8.4)
-    grid = figure.subplots(4, len(hydro.names), sharex="row", squeeze=False)
-    for i, name in enumerate(hydro.names):
-        tint = SERIES[i % len(SERIES)]["color"]
-        for axes, point, line in zip(grid[:3, i], points, lines, strict=True):
-            axes.plot(omega, point[:, i], ".", color=tint, markersize=3)
-            axes.plot(fine, line[:, i], color=tint, linewidth=1.0)
-        grid[3, i].plot(waves, motion[:, i] / (slope if name == "pitch" else 1.0), color=tint)
-        grid[0, i].set_title(name)
-    for axes in grid.flat:
-        for frequency in _regular_waves(settings):
-            axes.axvline(frequency, color=COLOURS["start"], linewidth=1.0, linestyle=(0, (6, 3)))
-        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-        axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4))
-    for row, label in zip(grid, labels, strict=True):
-        row[0].set_ylabel(label)
-    for axes in grid[2:].flat:
-        axes.set_xlabel(r"$\omega$ [rad/s]")
-    words = (
-        "Points: boundary element solver; lines: as the time domain sees it; dashed: regular waves"
-    )
-    figure.suptitle(words, fontsize=9)
-    return figure
