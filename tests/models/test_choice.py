@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from seakeep import HankelDMDc, Select, SlowSquares, tune
-from seakeep.models.selection import Trial, groups_of, select
+from seakeep.models.selection import Trial, groups_of, select, simplest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -42,6 +42,20 @@ def test_the_noise_is_a_standard_error_over_what_is_held_out(other, is_as_good):
     best = trial(0.3, 0.2, 0.1)
     assert trial(*other).is_as_good_as(best) == is_as_good
     assert best.is_as_good_as(best)
+
+
+@pytest.mark.parametrize(
+    ("other", "is_taken"),
+    [
+        ((0.36, 0.19), False),  # within the noise of two groups, .035, and 10 % worse
+        ((0.312, 0.195), True),  # within it, and 1.4 % worse
+        ((0.303, 0.203), False),  # 1.2 % worse everywhere
+    ],
+)
+def test_what_is_simpler_errs_little_more(other, is_taken):
+    remembers, plain = replace(SPEC, memory=9), replace(SPEC, memory=0)
+    trials = {remembers: trial(0.3, 0.2), plain: trial(*other)}
+    assert (simplest(trials, remembers) == plain) == is_taken
 
 
 def test_a_group_that_repeats_counts_once():

@@ -197,8 +197,8 @@ def signed(value: SupportsFloat) -> Number:
 
     Examples
     --------
-    >>> signed(1.4), signed(-0.04, 1), signed(-0.06, 1)
-    ('+1', '0.0', '-0.1')
+    >>> signed(1.4), signed(-0.4), signed(-0.6)
+    ('+1', '0', '-1')
     """
     text = number(value, 0)
     return Number(f"+{text}") if text != MISSING and float(text) > 0 else text
