@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seakeep import HankelDMDc, Select, SlowSquares, tune
+from seakeep import HankelDMDc, ProbeAlignment, Select, SlowSquares, tune
 from seakeep.models.selection import Trial, groups_of, select, simplest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -56,6 +56,13 @@ def test_what_is_simpler_errs_little_more(other, is_taken):
     remembers, plain = replace(SPEC, memory=9), replace(SPEC, memory=0)
     trials = {remembers: trial(0.3, 0.2), plain: trial(*other)}
     assert (simplest(trials, remembers) == plain) == is_taken
+
+
+@pytest.mark.parametrize(("surge", "lead"), [("predicted", 9), ("measured", 0)])
+def test_the_look_ahead_of_carried_waves_is_no_part_of_its_own(surge, lead):
+    alignment = ProbeAlignment(mode="dispersion", surge=surge)
+    ahead, without = (replace(SPEC, alignment=alignment, lead=each) for each in (9, 0))
+    assert simplest({ahead: trial(0.3, 0.2), without: trial(0.312, 0.195)}, ahead).lead == lead
 
 
 def test_a_group_that_repeats_counts_once():
