@@ -4,7 +4,7 @@ A candidate is a complete set of settings but for λ. It is fitted to all traini
 judged by its free runs on that one, in windows of one or two lengths; the mean over folds, windows
 and channels of the NRMSE decides. The noise is the standard error, over what is held out, of the
 difference between two candidates. Of what settings leave open, the simplest candidate is taken that
-is as good as the best but for the noise, and errs at most 5 % more; what a search starts from is
+errs at most 5 % more than the best, or is as good but for the noise; what a search starts from is
 left for nothing less. The regressors of all candidates are made once; one Gram matrix of a
 candidate and a fold gives the whole path of λ (:mod:`seakeep.core.gram`).
 """
@@ -76,9 +76,7 @@ On the virtual tank the error falls by that much over the last decade of λ: les
 seed to the next. Free runs of a larger λ decay sooner. Where sea states are held out the lowest
 error decides: slow loads of other seas suffer most from a large λ."""
 SIMPLER = 0.05
-"""Part of the lowest error by which what is simpler may be worse: less is not worth a part.
-
-Two or three groups do not tell the noise well."""
+"""Part of the lowest error by which what is simpler may be worse: less is not worth a part."""
 SAME = 1.03
 """Ratio of two periods of regular waves up to which they count as the same."""
 HYSTERESIS = 0.1
@@ -866,14 +864,18 @@ class _Search:
 
 
 def simplest(trials: Mapping[Settings, Trial], best: Settings) -> Settings:
-    """Take the candidate with the fewest parts that is as good as the best but for the noise.
+    """Take the candidate with the fewest parts that errs at most 5 % more than the best.
 
-    It errs at most 5 % more.
+    Where three groups or more tell the noise, also one that errs more, but for the noise.
     """
     least = (1.0 + SIMPLER) * trials[best].best
-    near = {key: each.best for key, each in trials.items() if each.best <= least}
-    alike = [key for key in near if trials[key].is_as_good_as(trials[best])]
-    return min(alike, key=lambda key: (_parts_of(key), near[key]))
+    is_known = len(set(trials[best].groups)) > 2
+    alike = {
+        key: each.best
+        for key, each in trials.items()
+        if each.best <= least or (is_known and each.is_as_good_as(trials[best]))
+    }
+    return min(alike, key=lambda key: (_parts_of(key), alike[key]))
 
 
 def _parts_of(candidate: HankelSettings) -> int:

@@ -228,8 +228,9 @@ class HankelDMDc(HankelSettings):
             Observables (none, slow squares and powers of the elevations, or both), whether waves
             are carried and read ahead at all, a memory of eight periods or none, λ, and read-outs
             of the loads are chosen by free runs of 15 and 45 periods on training runs that are held
-            out in turn: the simplest that is as good as the best but for the noise and 5 %. Where
-            nothing can be held out there are no observables, and λ is 1e-3 per snapshot pair.
+            out in turn: the simplest that errs at most 5 % more than the best, or is as good
+            but for the noise. Where nothing can be held out there are no observables, and λ is
+            1e-3 per snapshot pair.
         """
         step = _step_of(dt, runs)
 
