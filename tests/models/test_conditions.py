@@ -1,5 +1,7 @@
 """Runs that a model of all runs does not serve, and what sets them apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -58,7 +60,29 @@ def test_a_run_of_another_condition_is_named_with_what_sets_it_apart(last, reaso
     assert each.own < 0.8 * each.pooled
     # Estimated from a minute of free runs, by a model of noisy data.
     np.testing.assert_allclose(each.value, value, rtol=0.1)
-    assert "odd disagrees with the other runs" in each.describe()
+    assert "odd disagrees with the other runs: " in each.describe()
+    # These runs state no water depth.
+    assert "of a probe explains it" not in each.describe()
+    assert ("water_depth in [rig]" in each.describe()) == (reason == "dynamics")
+
+
+def test_of_two_runs_either_may_be_wrong():
+    runs = {"p1": vessel(1), "p2": vessel(4, offset=0.5)}
+    (each,) = disagreements(SPEC, runs, ["heave", "pitch"], ["eta"])
+    text = "p1 and p2 disagree; which one is wrong, these data do not say"
+    assert sorted((each.run, each.rival)) == ["p1", "p2"]
+    assert text in each.describe() or text.replace("p1 and p2", "p2 and p1") in each.describe()
+    assert "other runs" not in each.describe()
+
+
+def test_an_offset_is_named_also_for_a_model_with_a_memory():
+    offset = 1.3 * float(vessel(4)["heave"].std())
+    runs = {"a": vessel(1), "b": vessel(2), "odd": vessel(4, offset=offset)}
+    spec = replace(SPEC, memory=100)  # eight periods, whose means learn the offset of each run
+    (each,) = disagreements(spec, runs, ["heave", "pitch"], ["eta"])
+    assert (each.run, each.reason, each.channel) == ("odd", "offset", "heave")
+    # Estimated from a minute of free runs, by a model of noisy data.
+    np.testing.assert_allclose(each.value, offset, rtol=0.1)
 
 
 def test_a_probe_that_was_moved_is_found_with_its_distance():
@@ -70,3 +94,11 @@ def test_a_probe_that_was_moved_is_found_with_its_distance():
     # What is recorded downstream of where the probe is said to stand is carried back.
     assert moved.value == pytest.approx(-1.5, abs=max(3 * moved.spread, 0.2))
     assert f"Set probe_offset = {moved.value:.3g} in [runs.moved]" in moved.describe()
+    assert 'alignment = { mode = "dispersion", surge = "none" } in [model]' in moved.describe()
+
+
+def test_the_place_of_a_probe_explains_no_other_dynamics_where_the_depth_is_stated():
+    runs = {"a": vessel(1), "b": vessel(2), "c": vessel(3), "odd": vessel(4, stiffness=0.6)}
+    deep = {name: run.assign_attrs(water_depth=np.inf) for name, run in runs.items()}
+    (each,) = disagreements(SPEC, deep, ["heave", "pitch"], ["eta"])
+    assert "no offset, scale or place of a probe explains it" in each.describe()

@@ -58,6 +58,10 @@ class Disagreement:
         Offset in units of the channel, distance in m, or factor; NaN for dynamics.
     spread : float
         Standard deviation of a distance, m.
+    rival : str
+        The other run, where only one is left: either may be wrong.
+    placed : bool
+        Whether the probe was tried at other places.
     """
 
     run: str
@@ -67,24 +71,37 @@ class Disagreement:
     channel: str = ""
     value: float = np.nan
     spread: float = np.nan
+    rival: str = ""
+    placed: bool = True
 
     def describe(self) -> str:
         """A sentence, and what to do."""
+        rest = self.rival or "the other runs"
+        place = "no offset, scale or place of a probe explains it"
+        if not self.placed:
+            place = (
+                "no offset or scale explains it, and the place of a probe was not tried: that "
+                "takes water_depth in [rig] and the probe's x_position in [rig.positions]"
+            )
         what = {
-            "offset": f"{self.channel} lies {self.value:+.3g} off what the other runs teach. "
+            "offset": f"{self.channel} lies {self.value:+.3g} off where a model of {rest} has it. "
             "Correct its zero, or take the mean of each run off",
             "probe position": "its waves fit where they are carried by "
             f"{self.value:.3g} ± {self.spread:.1g} m, as if the probe stood elsewhere. Set "
-            f"probe_offset = {self.value:.3g} in [runs.{self.run}], or correct its position",
-            "scale": f"{self.channel} moves {self.value:.3g} times as much as the other runs "
-            "teach. Check its calibration",
-            "dynamics": "no offset, scale or place of a probe explains it. Fit one model per "
-            "condition, and forecast each with its own",
+            f"probe_offset = {self.value:.3g} in [runs.{self.run}], with alignment = "
+            '{ mode = "dispersion", surge = "none" } in [model] if it has none, or correct the '
+            "position",
+            "scale": f"{self.channel} moves {self.value:.3g} times as much as in a model of "
+            f"{rest}. Check its calibration",
+            "dynamics": f"{place}. Fit one model per condition, and forecast each with its own",
         }[self.reason]
+        pair = f"{self.run} disagrees with {rest}"
+        if self.rival:
+            pair = f"{self.run} and {rest} disagree; which one is wrong, these data do not say"
         return (
-            f"{self.run} disagrees with the other runs: free runs on its second half err "
-            f"{self.pooled:.2f} SD by a model of all runs and {self.own:.2f} by one of its first "
-            f"half alone; {what}. One model of unlike conditions forecasts none of them well."
+            f"{pair}: free runs on the second half of {self.run} err {self.pooled:.2f} SD by a "
+            f"model of all runs and {self.own:.2f} by one of its first half alone; {what}. One "
+            "model of unlike conditions forecasts none of them well."
         )
 
 
@@ -110,7 +127,7 @@ def disagreements(
     """
     if len(runs) < 2 or not inputs:
         return []
-    spec = replace(spec, readouts=(), window=None)
+    spec = replace(spec, readouts=(), window=None, memory=0)  # a memory learns offsets of runs
     at_rest = replace(spec, alignment=ProbeAlignment(mode="dispersion", surge="none"))
     halves = {n: run.isel(time=slice(run.sizes["time"] // 2)) for n, run in runs.items()}
 
@@ -138,11 +155,15 @@ def disagreements(
             del left[odd]
             reason: tuple[Any, ...] | None = None
             reason = _reason(fitted(left), runs[odd], steps, scales[odd], own[odd])
+            placed = False
             if reason is None or reason[0] != "offset":
                 with contextlib.suppress(DataError, RequestError):  # no depth, or no positions
                     reason = _place(fitted(left, at_rest), runs[odd]) or reason
+                    placed = True
             pair = [float(_scores(each[odd]).mean()) for each in (errors, own)]
-            disagreeing.append(Disagreement(odd, pair[0], pair[1], *(reason or ("dynamics",))))
+            said = Disagreement(odd, pair[0], pair[1], *(reason or ("dynamics",)))
+            rival = next(iter(left)) if len(left) == 1 else ""
+            disagreeing.append(replace(said, rival=rival, placed=placed))
     return disagreeing
 
 
