@@ -171,6 +171,7 @@ CHANGES = (
     ("models/live.py", "self._filter.limit(limit, exactly=not (count.partly or seen.any()))", "self._filter.limit(limit)", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
     ("models/observables.py", "calm = u / np.sqrt(1.0 + u * u / limits", "calm = u / np.sqrt(1.0 + 0.0 * u / limits", "models/test_observables.py::test_powers_grow_like_the_input_far_out"),
     ("models/observables.py", "reach = len(kernel) // 2 + (max(self.orders) > 0)", "reach = len(kernel) // 2", "models/test_observables.py::test_columns_are_named_with_units_and_stand_in_two_groups"),
+    ("models/selection.py", "key.lead != lead, alike[key]", "alike[key]", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),
     ("models/selection.py", "candidate.lead and not follows", "candidate.lead", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),
     ("models/selection.py", "if each.best <= least or (is_known", "if (True", "models/test_choice.py::test_what_is_simpler_errs_little_more"),
     ("models/selection.py", "(1.0 + alike) * trial.best", "trial.best", "models/test_selection.py::test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone"),

@@ -63,7 +63,8 @@ def test_what_is_simpler_errs_little_more(best, other, is_taken):
 def test_the_look_ahead_of_carried_waves_is_no_part_of_its_own(surge, lead):
     alignment = ProbeAlignment(mode="dispersion", surge=surge)
     ahead, without = (replace(SPEC, alignment=alignment, lead=each) for each in (9, 0))
-    assert simplest({ahead: trial(0.3, 0.2), without: trial(0.312, 0.195)}, ahead).lead == lead
+    trials = {ahead: trial(0.3, 0.2), without: trial(0.298, 0.198)}
+    assert simplest(trials, without).lead == lead
 
 
 def test_a_group_that_repeats_counts_once():

@@ -866,8 +866,10 @@ class _Search:
 def simplest(trials: Mapping[Settings, Trial], best: Settings) -> Settings:
     """Take the candidate with the fewest parts that errs at most 5 % more than the best.
 
-    Where three groups or more tell the noise, also one that errs more, but for the noise.
+    Where three groups or more tell the noise, also one that errs more, but for the noise. The
+    look-ahead of the first candidate goes before another one of as many parts.
     """
+    lead = next(iter(trials)).lead
     least = (1.0 + SIMPLER) * trials[best].best
     is_known = len(set(trials[best].groups)) > 2
     alike = {
@@ -875,7 +877,7 @@ def simplest(trials: Mapping[Settings, Trial], best: Settings) -> Settings:
         for key, each in trials.items()
         if each.best <= least or (is_known and each.is_as_good_as(trials[best]))
     }
-    return min(alike, key=lambda key: (_parts_of(key), alike[key]))
+    return min(alike, key=lambda key: (_parts_of(key), key.lead != lead, alike[key]))
 
 
 def _parts_of(candidate: HankelSettings) -> int:
