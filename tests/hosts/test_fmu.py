@@ -174,3 +174,25 @@ def test_a_compiler_that_fails_is_quoted(cases, tmp_path, monkeypatch):
     with pytest.raises(RequestError, match=r"the C compiler failed: (.|\n)*no licence(.|\n)*CC"):
         write_fmu(cases["arx"].model, tmp_path / "arx.fmu")
     assert not (tmp_path / "arx.fmu").exists()
+
+
+def test_a_unit_that_follows_estimates_as_the_live_model_with_samples_lost(cases, tmp_path):
+    model = cases["full"].model
+    unit = write_fmu(model, tmp_path / "follow.fmu", ahead=3)
+    assert validate_fmu(str(unit)) == []
+    rng, dt, count = np.random.default_rng(0), model.dt, 120
+    u, y = (0.1 * rng.standard_normal((count, size)) for size in (2, 2))
+    for each in (u, y):  # a tenth is lost
+        each[rng.random(each.shape) < 0.1] = np.nan
+    names = ["eta", "'wave probe'", *(f"measured.{state}" for state in model.states)]
+    rows = [(at * dt, *u[at], *y[at]) for at in range(count)]
+    result = fmpy.simulate_fmu(
+        str(unit),
+        stop_time=count * dt,
+        input=np.array(rows, dtype=[("time", float), *((name, float) for name in names)]),
+        output=list(model.states),
+    )
+    live = model.live()
+    expected = [live.step(*row) for row in zip(u, y, strict=True)]
+    found = np.stack([result[name] for name in model.states], axis=1)
+    np.testing.assert_allclose(found[1:], expected, rtol=1e-10, atol=1e-10)

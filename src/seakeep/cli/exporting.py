@@ -61,9 +61,8 @@ def export(
 ) -> None:
     """Write a model for another host: C, FMU, ONNX, MATLAB.
 
-    The exported model computes the same as forecast_arrays. If the model has an alignment, pass
-    aligned waves. The FMU holds its C sources, and a binary for this platform if a C compiler is
-    found.
+    The exported model computes the same as forecast_arrays; the command says which inputs a step
+    takes. The FMU holds its C sources, and a binary for this platform if a C compiler is found.
 
     Example: seakeep export model.nc --c library --fmu model.fmu
     """
@@ -94,7 +93,7 @@ def export(
     say(f"Wrote {', '.join(map(str, written))}.")
     if fmu is not None:
         say(_binary(fmu))
-    say(timing(linear))
+    say(timing(linear, estimator and not onnx and not mat))
 
 
 def _check_beside(is_given: bool, target: Path | None, option: str) -> None:

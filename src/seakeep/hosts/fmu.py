@@ -109,7 +109,8 @@ def compiler() -> list[str] | None:
 def _compiled(compiler: list[str], folder: Path, name: str, suffix: str) -> Path:
     library = folder / f"{name}{suffix}"
     flags = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden"]
-    command = [*compiler, *flags, "-o", library.name, f"{name}.c", "fmi2.c", "-lm"]
+    written = sorted(each.name for each in folder.glob("*.c"))
+    command = [*compiler, *flags, "-o", library.name, *written, "-lm"]
     try:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         said, failed = done.stderr, done.returncode
@@ -160,7 +161,7 @@ def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
         channels, groups = [*given, *measured, *answered, *coming], []
     return {
         "version": metadata.version("seakeep"),
-        "timing": timing(model),
+        "timing": timing(model, ahead is not None),
         # Structured names are ASCII.
         "convention": "structured" if all(c["name"].isascii() for c in channels) else "flat",
         "channels": channels,

@@ -63,8 +63,13 @@ def exportable(model: Model) -> HankelDMDcModel:
     return model
 
 
-def timing(model: HankelDMDcModel) -> str:
-    """Which inputs a step takes, as a sentence."""
+def timing(model: HankelDMDcModel, follows: bool = False) -> str:
+    """Which inputs a step takes, as a sentence; or a step that `follows` a vessel."""
+    if follows:
+        return (
+            f"It follows a vessel: a step of {model.dt:g} s takes the inputs and states of one "
+            "instant as measured, NaN where they were not."
+        )
     said = f"A step of {model.dt:g} s takes the inputs of the instant that it starts from."
     if ahead := model.lead_samples:
         said = (
