@@ -281,16 +281,16 @@ def _roles(
     irregular = [name for name in moved if _kind(name, seas) != "regular"]
     mixed = 0 < len(irregular) < len(moved)
     order = irregular if mixed else moved
-    tests = _tests_of(order, seas) if len(order) > 1 else []
-    why = "guessed: one run whose waves lie within those of the others tests, these train"
+    tests, which = _tests_of(order, seas) if len(order) > 1 else ([], "")
+    why = f"guessed: {which} tests, these train" if tests else "the only run to train on"
     if mixed:
         why = "guessed: irregular runs train" + (" but one, the rest tests" if tests else "")
     trains = [name for name in order if name not in tests]
     return roles | {n: ("train" if n in trains else "test", why) for n in moved}
 
 
-def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> list[str]:
-    """A run whose waves lie within the range of the others', or nearest to it, and its repeats.
+def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> tuple[list[str], str]:
+    """A run whose waves lie within the range of the others', or nearest, and its repeats; in words.
 
     Of several regular waves, that with the least distance to the next one in period.
     """
@@ -298,7 +298,7 @@ def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> list[str]:
     for name in names if seas else ():
         groups.setdefault(seas[name].group, []).append(name)
     if len(groups) < 2:
-        return [names[-1]]
+        return [names[-1]], "the last run"
 
     def distance(group: list[str]) -> tuple[float, int, float]:
         own, others = seas[group[0]], [seas[name] for name in names if name not in group]
@@ -309,7 +309,10 @@ def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> list[str]:
         nearest = min(abs(math.log(sea.period / own.period)) for sea in others)
         return outside, len(group), nearest if own.regular else -names.index(group[0])
 
-    return min(groups.values(), key=distance)
+    best = min(groups.values(), key=distance)
+    if distance(best)[0] > 0:
+        return best, "no waves lie within those of the others; the nearest run"
+    return best, "one run whose waves lie within those of the others"
 
 
 def _relative(path: Path, folder: Path | str | None) -> str:

@@ -126,8 +126,8 @@ def _by_run(result: xr.Dataset, one: str) -> Table:
         averages.append(len(rows))
         rows.append((f"mean, {kind} waves", *_cells(result.sel(waves=kind, state="all"), "nrmse")))
     note = (
-        "Baselines are fitted to the training runs with their recommended settings, and read no "
-        "wave after the instant that they forecast and no measured state after the start."
+        "Baselines are fitted to the training runs with their recommended settings and the model's "
+        "look-ahead, alignment and observables."
     ) * (len(models) > 1)
     heads = (one, "model", "95 %", *models[1:])
     return table("worth", rows, columns=heads, more=note, averages=averages)

@@ -204,6 +204,8 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
     if name != first:
         low, high = (1 + float(best[f"all_{bound}"]) for bound in ("lower", "upper"))
         said += f", {change(1 + best['all_change'])} [{change(low, high)}] from {first}"
+        if verdict(low - 1, high - 1) != "better":
+            return f"{said}: no model is surely better. Keep {first}."
     if kind := baselines.get(name):
         said += (
             f". To use it, give the campaign file a table [models.{kind}] with kind = '{kind}' and "
