@@ -78,7 +78,7 @@ train_on = "all"
 [models.windows]
 kind = "bayesian_hankel_dmdc"
 n_members = 12
-window = {{ uniform = ["60 T", "120 T"] }}
+window = {{ uniform = ["60 T", "115 T"] }}
 train_on = "windows"
 
 {baselines}
@@ -348,7 +348,7 @@ def bands(
     }
 
 
-ENSEMBLES = {"ensemble": "all runs", "windows": "windows of 60 to 120 T̂"}
+ENSEMBLES = {"ensemble": "all runs", "windows": "windows of 60 to 115 T̂"}
 """Ensembles by what each of their members learns from."""
 
 

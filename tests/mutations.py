@@ -237,6 +237,8 @@ CHANGES = (
     ("signals/synchronisation.py", "_line(instants + lags.lag[good], instants, None)", "_line(instants - lags.lag[good], instants, None)", "signals/test_synchronisation.py::test_a_shared_signal"),
     ("signals/synchronisation.py", "level - drift * centre, drift,", "level + drift * centre, drift,", "signals/test_synchronisation.py::test_pulses_give_offset_and_drift_with_honest_errors"),
     ("signals/tracking.py", 'pitch = side * seen["angle"] - how.camera_pitch', 'pitch = seen["angle"] - how.camera_pitch', "signals/test_tracking.py::test_a_camera_on_the_other_side"),
+    ("check/parts.py", "max(history - 1, _waves_come(run, names))", "history - 1", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),
+    ("signals/waves.py", "np.gradient(series) if is_motion else series, 1.0).start", "series, 1.0).stop", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),
     ("signals/waves.py", "4.0 * float(np.std(as_series(series)))", "2.0 * float(np.std(as_series(series)))", "signals/test_waves.py::test_statistics_of_a_regular_wave"),
     ("signals/waves.py", "before - x[before] / (x[before + 1] - x[before])", "before + x[before] / (x[before + 1] - x[before])", "signals/test_waves.py::test_crossings_lie_between_samples"),
     ("signals/waves.py", "height > best.correlation", "height < best.correlation", "signals/test_leakage.py::test_equally_spaced_components_come_back_after_116_5_seconds"),

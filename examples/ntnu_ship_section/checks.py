@@ -1,4 +1,4 @@
-"""The numbers of README.md that no seakeep command prints: sway, camera, record ends, periods.
+"""Numbers of README.md that no seakeep command prints: sway, camera, record ends, periods, reach.
 
 Run in the repository, with SEAKEEP_DATA_DIR set:
 
@@ -7,12 +7,14 @@ Run in the repository, with SEAKEEP_DATA_DIR set:
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 import seakeep
 from seakeep import metrics, signals
+from seakeep.baselines import ARX
 from seakeep.campaign import read_table
 from seakeep.study import fit_campaign
 
@@ -132,7 +134,28 @@ def periods(campaign, runs):
         print(f"{name:10s} " + "  ".join(f"{float(judged[s]):10.3f}" for s in states))
 
 
-CHECKS = {each.__name__: each for each in (sway, springs, camera, means, ends, periods)}
+def reach(campaign, runs):
+    """Error over the test runs by how far back and ahead the waves are read, beside ARX."""
+    chosen = fit_campaign(campaign)
+    train = {name: runs[name] for name in campaign.training_runs}
+    powers = chosen.settings.observables
+    print("mean ANRMSE of three test runs from 30 s on; look-ahead and delays of the waves in T")
+    print("ahead  delays  reaches back     HDMDc  HDMDc, powers       ARX  ARX, powers")
+    for ahead, delays in ((0.76, 3), (0, 3), (0.76, 5), (0, 5)):
+        errors = []
+        for spec in (chosen.settings, ARX(25, 0, ridge="rollout", ridge_scale="per_snapshot")):
+            for observables in ((), powers):
+                lead, back = round(25 * ahead), 25 * delays
+                each = replace(spec, lead=lead, input_delays=back, observables=observables)
+                model = each.fit(train, chosen.states, chosen.inputs)
+                forecasts = [(model.forecast(runs[n], start=30.0), n) for n in campaign.test_runs]
+                tables = [metrics.nrmse(predicted=f, measured=runs[n]) for f, n in forecasts]
+                errors.append(np.mean([float(t[s]) for t in tables for s in model.states]))
+        words = "".join(f"{error:13.3f}" for error in errors)
+        print(f"{ahead:5.2f}  {delays:6d}  {delays - ahead:12.2f}{words}")
+
+
+CHECKS = {each.__name__: each for each in (sway, springs, camera, means, ends, periods, reach)}
 
 
 def main(names):

@@ -6,7 +6,7 @@ import scipy
 import xarray as xr
 
 from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, LogUniform, check
-from seakeep.check.parts import free_windows
+from seakeep.check.parts import free_windows, samples_in
 from seakeep.core.extremes import free_decay
 
 DT, FREQUENCY, RATIO = 0.05, 2.0, 0.06  # s, rad/s, 1
@@ -103,3 +103,22 @@ def test_strong_damping_is_no_small_angle():
     heave = np.exp(-0.3 * FREQUENCY * time) * np.cos(damped * time)
     # Extremes by a parabola, (ωΔt)²/12 of their height.
     assert free_decay(heave, DT).damping_ratio == pytest.approx(0.3, rel=0.01)
+
+
+def test_a_forecast_starts_where_the_waves_have_come():
+    time = np.arange(0, 200, 0.1)
+    wave = np.where(time < 40, 0.0, np.sin(np.pi * time))
+    heave = np.where(time < 50, 0.0, np.sin(np.pi * time + 1))
+    run = xr.Dataset({"eta": ("time", wave), "heave": ("time", heave)}, {"time": time})
+
+    def start(names, span=(0.0, 199.9), history=11, stated=None):
+        first, last = samples_in(run, names, span, 0.1, history, 3, stated)
+        assert last == 1997  # the last step reads three samples ahead
+        return time[first]
+
+    # The waves stand in a window of two periods of 2 s, whose spread is a fifth of theirs.
+    assert start(["heave", "eta"]) == pytest.approx(50, abs=1)
+    assert start(["eta"]) == pytest.approx(40, abs=1)
+    assert start(["eta"], span=(60.0, 199.9)) == 60
+    assert start(["eta"], history=701) == 70
+    assert start(["eta"], stated=20.0) == 20

@@ -22,7 +22,7 @@ from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
 from seakeep.signals.time_axis import over_gaps, stretches
-from seakeep.signals.waves import energy_period, tapered_power
+from seakeep.signals.waves import energy_period, first_wave, tapered_power
 
 _TEXT = resources.files("seakeep.campaign").joinpath("vocabulary.toml").read_text("utf-8")
 _CALLED: dict[str, Any] = tomllib.loads(_TEXT)
@@ -173,9 +173,7 @@ def _start(run: str, files: Sequence[File], guesses: Sequence[Guess]) -> float:
             name, series = str(guess.channel), file.series(guess.column)
             if series is None or not (is_elevation(name, rates=True) or name in MOTIONS):
                 continue
-            if name in MOTIONS:  # slow drifts hide the start of the waves, and less so in rates
-                series = np.gradient(series)
-            if begin := waves_part(series, 1.0).start:
+            if begin := first_wave(series, name in MOTIONS):
                 step = 1.0 / float(file.rate or 1.0)
                 starts.append(step * begin + file.start)
     return max(starts)

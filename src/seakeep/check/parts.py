@@ -11,13 +11,14 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
-from seakeep.conventions import is_elevation
+from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, SlowSquares, is_ensemble
 from seakeep.models.labelled import Span, channel_matrix, check_step
 from seakeep.models.observables import HALF_WIDTH
 from seakeep.models.registry import is_linear
 from seakeep.signals.time_axis import stretches
+from seakeep.signals.waves import first_wave
 from seakeep.waves import wavenumber
 
 T = TypeVar("T")
@@ -240,7 +241,8 @@ def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
             f"the run has {run.sizes['time']} samples and a forecast reads {history} before "
             "its first. Give a longer run."
         )
-    at, last = samples_in(run, whole_span(run), model.dt, history, lead)
+    names = [*model.states, *model.inputs]
+    at, last = samples_in(run, names, whole_span(run), model.dt, history, lead)
     if last - at < 2:
         raise DataError("its test part ends before the first forecast. Give a longer run.")
     return at, last
@@ -248,19 +250,36 @@ def window_of(model: Model, run: xr.Dataset) -> tuple[int, int]:
 
 def samples_in(
     run: xr.Dataset,
+    names: Iterable[str],
     span: tuple[float, float],
     dt: float,
     history: int,
     lead: int,
     start: float | None = None,
 ) -> tuple[int, int]:
-    """First sample that a forecast of a span may start from, or that of `start`, and the last."""
+    """First sample that a forecast of a span may start from, or that of `start`, and the last.
+
+    Before the waves have come to the probes and the vessel among the channels `names`, a constant
+    is as good a forecast as any.
+    """
     time = np.asarray(run["time"].values, dtype=float)
-    if start is None:
-        start = max(float(span[0]), float(time[min(history, time.size) - 1]))
     last = int(np.searchsorted(time, float(span[1]) + 0.5 * dt)) - 1
     # The last step reads the input `lead` samples after the instant that it starts from.
-    return int(np.argmin(np.abs(time - start))), min(last, time.size - max(lead, 1))
+    last = min(last, time.size - max(lead, 1))
+    if start is None:
+        first = float(time[min(max(history - 1, _waves_come(run, names)), time.size - 1)])
+        start = max(float(span[0]), first)
+    return int(np.argmin(np.abs(time - start))), last
+
+
+def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
+    """Sample at which waves have come to each probe, and each motion has begun."""
+    begins = [0]
+    for name in (each for each in names if is_elevation(each) or each in MOTIONS):
+        series = np.asarray(run[name].values, dtype=float)
+        if np.isfinite(series).all() and np.ptp(series):
+            begins.append(first_wave(series, name in MOTIONS))
+    return max(begins)
 
 
 def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:

@@ -213,7 +213,7 @@ def compare(
         str | None,
         typer.Option(
             help="Instant of the last measured state, s or encounter periods such as '20 T'; by "
-            "default the first possible one.",
+            "default the first possible one in waves.",
         ),
     ] = None,
     steps: Steps = None,

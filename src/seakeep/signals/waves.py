@@ -104,6 +104,12 @@ def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
     return slice(begin, end)
 
 
+def first_wave(series: npt.ArrayLike, is_motion: bool) -> int:
+    """Sample at which the waves have come: of a motion by its rate, which slow drifts hide less."""
+    begin: int = waves_part(np.gradient(series) if is_motion else series, 1.0).start
+    return begin
+
+
 ALIKE = 0.9
 """Correlation of two records from which their waves are the same, and part of the larger standard
 deviation that the smaller one must reach.

@@ -248,8 +248,8 @@ def compare_models(
         Runs; by default those that test.
     start : float or str, optional
         Instant of the last measured state, s or encounter periods (``"20 T"``); by default the
-        first possible one of the run's test span, its delay history read from before the span
-        where the run has it.
+        first possible one of the run's test span once the waves have come, its delay history
+        read from before the span where the run has it.
     steps : int or str, optional
         Number of instants, or a length (``"15 T"``); by default to the end of the test span, or
         as far as the waves are measured that the models look ahead to.
@@ -310,7 +310,7 @@ def compare_models(
                 how = {"level": level, "band": band, "executor": executor, "progress": tell}
             time = run["time"].values
             span = run.attrs.get("test_span", (time[0], time[-1]))
-            at, last = samples_in(run, span, dt, history, lead, first)
+            at, last = samples_in(run, used, span, dt, history, lead, first)
             begin = float(time[at]) if first is None else first
             each = _compare_run(model, run, name, begin, count or max(last - at, 1), how)
             compared[label].append(each)
