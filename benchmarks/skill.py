@@ -450,7 +450,8 @@ def measured(folder: Path, progress: Progress) -> list[str]:
     return [
         "## Measured sets",
         "",
-        "NRMSE of `seakeep compare` on the campaign files of `examples`, and of a study of the "
+        "NRMSE of `seakeep compare` on the campaign files of `examples`, from where the waves have "
+        "come, and of a study of the "
         "ship section that leaves all runs of a sea state out: medians over windows of 15 T̂ from "
         "20 to 50 s, when the waves arrive and pass, and over the last 30 s of each run, when some "
         "have stopped. Goals and means of the rows that they name, then all rows:",

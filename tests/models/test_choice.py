@@ -56,7 +56,16 @@ def test_the_noise_is_a_standard_error_over_what_is_held_out(other, is_as_good):
 def test_what_is_simpler_errs_little_more(best, other, is_taken):
     remembers, plain = replace(SPEC, memory=9), replace(SPEC, memory=0)
     trials = {remembers: trial(*best), plain: trial(*other)}
-    assert (simplest(trials, remembers) == plain) == is_taken
+    assert (simplest(trials, remembers, 0.0) == plain) == is_taken
+
+
+@pytest.mark.parametrize(("alike", "is_taken"), [(0.0, True), (0.03, False)])
+def test_what_is_simpler_counts_with_the_ridge_that_it_would_be_given(alike, is_taken):
+    remembers, plain = replace(SPEC, memory=9), replace(SPEC, memory=0)
+    scores = np.array([[0.104, 0.104], [0.107, 0.107]])  # 4 % and 7 % worse than the best
+    other = Trial((1e-3, 1e-2), scores, np.array([0.5, 0.5]), np.array([0, 1]))
+    trials = {remembers: trial(0.1, 0.1), plain: other}
+    assert (simplest(trials, remembers, alike) == plain) == is_taken
 
 
 @pytest.mark.parametrize(("surge", "lead"), [("predicted", 9), ("measured", 0)])
@@ -64,7 +73,7 @@ def test_the_look_ahead_of_carried_waves_is_no_part_of_its_own(surge, lead):
     alignment = ProbeAlignment(mode="dispersion", surge=surge)
     ahead, without = (replace(SPEC, alignment=alignment, lead=each) for each in (9, 0))
     trials = {ahead: trial(0.3, 0.2), without: trial(0.298, 0.198)}
-    assert simplest(trials, without).lead == lead
+    assert simplest(trials, without, 0.0).lead == lead
 
 
 def test_a_group_that_repeats_counts_once():

@@ -132,7 +132,8 @@ def coherence(
         "still": ("state", still),
         "period": ("state", slow, {"units": "s"}),
     }
-    bounds = {"linear_bound": ("multiple", spectra, len(references) + linear)}
+    # Baselines take the observables of the model: then they bound no linear map.
+    bounds = {"linear_bound": ("multiple", spectra, 1 if names else len(references) + linear)}
     if names:
         bounds["observables_bound"] = ("multiple_observables", further, len(references) + 1)
     least: FloatArray = spectra.ordinary()[..., :size].max(axis=1).T

@@ -136,6 +136,16 @@ class Trial:
         """Score at the best level."""
         return float(self.means.min())
 
+    def level(self, alike: float, stated: float | None = None) -> float:
+        """The largest λ that is as good as the best, or the stated one if that is."""
+        near = self.means <= (1.0 + alike) * self.best
+        levels = [level for level, is_near in zip(self.levels, near, strict=True) if is_near]
+        return stated if stated in levels else levels[-1]
+
+    def at(self, level: float) -> float:
+        """Score at a level."""
+        return float(self.means[self.levels.index(level)])
+
     def is_as_good_as(self, other: Trial) -> bool:
         """Whether it errs no more than another, but for a standard error over the groups."""
         scores, weights = zip(*(each._by_group() for each in (self, other)), strict=True)
@@ -662,10 +672,11 @@ def select(
 
     _judge(problems, trials, [base], *work, later)
     best = searched(base, left)
-    start = simplest(trials, best) if left else base
+    alike = 0.0 if by_sea else ALIKE
+    start = simplest(trials, best, alike) if left else base
     best = searched(start, varied)
     taken = start if trials[start].is_as_good_as(trials[best]) else best
-    level = _level(trials[taken], 0.0 if by_sea else ALIKE, stated if taken == start else None)
+    level = trials[taken].level(alike, stated if taken == start else None)
     taken, level = _stable(problems, trials, taken, level)
     without = {
         left_out: replace(taken, observables=tuple(o for o in taken.observables if o != left_out))
@@ -757,23 +768,28 @@ class _Search:
             steps.append(self._subsets)
         if {"alignment", "lead"} & {*self.opened}:
             steps.append(self._with_and_without)
-        if "memory" in self.opened and self.remembers:
+        if "memory" in self.opened and self.remembers and not self._follows:
             steps.append(self._remembering)
         return steps
 
+    @property
+    def _follows(self) -> bool:
+        """Whether waves are carried to the predicted surge: a memory of it fits one sea only."""
+        return _columns_of(self.base)[1] is not None
+
     def varied(self) -> list[Step]:
         """Steps through what is varied."""
-        vary = {*self.vary} - ({"observables", "memory"} & {*self.opened})
-        follows = _columns_of(self.base)[1] is not None
+        tried = {"observables"} if self._follows else {"observables", "memory"}
+        vary = {*self.vary} - (tried & {*self.opened})
         steps: list[Step] = []
         if "observables" in vary:
             steps.append(self._subsets)
-        if "lead" in vary and not follows:
+        if "lead" in vary and not self._follows:
             steps.append(self._lengths("lead", LEADS))
         steps += self._delays(vary)
         if "memory" in vary and self.remembers:
             steps.append(self._remembering)
-        if "alignment" in vary or ("lead" in vary and follows):
+        if "alignment" in vary or ("lead" in vary and self._follows):
             steps.append(self._variants)
         return steps
 
@@ -863,8 +879,10 @@ class _Search:
         return problems
 
 
-def simplest(trials: Mapping[Settings, Trial], best: Settings) -> Settings:
+def simplest(trials: Mapping[Settings, Trial], best: Settings, alike: float) -> Settings:
     """Take the candidate with the fewest parts that errs at most 5 % more than the best.
+
+    It counts with the λ that it would be given, the best one with its best λ.
 
     Where three groups or more tell the noise, also one that errs more, but for the noise. The
     look-ahead of the first candidate goes before another one of as many parts.
@@ -872,12 +890,12 @@ def simplest(trials: Mapping[Settings, Trial], best: Settings) -> Settings:
     lead = next(iter(trials)).lead
     least = (1.0 + SIMPLER) * trials[best].best
     is_known = len(set(trials[best].groups)) > 2
-    alike = {
+    near = {
         key: each.best
         for key, each in trials.items()
-        if each.best <= least or (is_known and each.is_as_good_as(trials[best]))
+        if each.at(each.level(alike)) <= least or (is_known and each.is_as_good_as(trials[best]))
     }
-    return min(alike, key=lambda key: (_parts_of(key), key.lead != lead, alike[key]))
+    return min(near, key=lambda key: (_parts_of(key), key.lead != lead, near[key]))
 
 
 def _parts_of(candidate: HankelSettings) -> int:
@@ -889,13 +907,6 @@ def _parts_of(candidate: HankelSettings) -> int:
     follows = aligned is not None and aligned.surge == "predicted"
     parts = aligned, candidate.lead and not follows, candidate.memory
     return sum(map(bool, parts)) + len(candidate.observables)
-
-
-def _level(trial: Trial, alike: float, stated: float | None) -> float:
-    """The largest λ that is as good as the best, or the stated one if that is."""
-    near = trial.means <= (1.0 + alike) * trial.best
-    levels = [level for level, is_near in zip(trial.levels, near, strict=True) if is_near]
-    return stated if stated in levels else levels[-1]
 
 
 def _stable(
@@ -930,11 +941,10 @@ def _note(
 ) -> str:
     """How the choice was made, in words."""
     count = sum(len(trial.levels) for trial in trials.values())
-    score = trials[taken].means[trials[taken].levels.index(level)]
     note = (
         f"{taken.ridge_text(level)}: out of {count} settings (below, the best λ of each kind) "
         f"in free runs on {len(problem.folds())} parts held out in turn, mean NRMSE "
-        f"{score:.3f}{worth}"
+        f"{trials[taken].at(level):.3f}{worth}"
     )
     if {"lead", "input_delays", "state_delays", "alignment", "memory"} & {*tried}:
         note += "; over instants that all of these can forecast"

@@ -175,7 +175,8 @@ class Select:
     alignment, lead : bool, optional
         Whether they choose between the alignment, or the look-ahead, that is stated and none.
     memory : bool, optional
-        Whether they choose between the memory that is stated and one of eight encounter periods.
+        Whether they choose between the memory that is stated and one of eight encounter periods,
+        unless the waves are carried to the predicted surge.
     horizon : float or sequence of float, optional
         Lengths of the free runs, encounter periods.
     period : float, optional
