@@ -34,7 +34,7 @@ from seakeep.arrays import (
 from seakeep.core.kalman import DelayFilter, process_noise
 from seakeep.core.recursion import read_table
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.files import load_sealed, write_sealed_array
+from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.checks import check_choice
@@ -775,7 +775,7 @@ class Live:
         bits = np.packbits(values != 0)
         bits.resize(-4 * (-bits.size // 4))
         whole = np.concatenate([bits.view(np.uint32), values[values != 0]])
-        return write_sealed_array(whole, attrs, path, STATE)
+        return write_sealed(xr.Dataset({"values": ("number", whole)}, attrs=attrs), path, STATE)
 
     def _pending(self) -> list[_Update]:
         """Updates of the samples whose estimates are not final."""
