@@ -273,7 +273,7 @@ def write_netcdf(
     import h5py
 
     buffer = io.BytesIO()
-    with h5py.File(buffer, "w", libver="latest", track_order=True) as file:
+    with h5py.File(buffer, "w", libver=("v108", "v108"), track_order=True) as file:
         _write_group(file, dataset, packed)
         for name, group in (groups or {}).items():
             _write_group(file.create_group(name, track_order=True), group, packed)

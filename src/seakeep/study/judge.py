@@ -316,13 +316,14 @@ def band_tables(
     known = "wave_height" in test and np.isfinite(test["wave_height"]).all()
     waves = cells("wave_height") if known else None
     bands = {"members": None} | ({} if calibration is None else {"calibrated": calibration})
-    shares, parts = {}, {}
+    shares: dict[str, list[Any]] = defaultdict(list)
+    parts = {}
     for model, band in product(ensembles, bands):
         lower, upper = (bound[judged] for bound in band_of(test, model, bands[band]))
         rows = [_coverage_row(lower, upper, each) for each in against.values()]
         prefix = "" if band == "members" else f"{band}_"
         for key, values in zip(COVERAGE, zip(*rows, strict=True), strict=True):
-            shares.setdefault(prefix + key, []).append(values)
+            shares[prefix + key].append(values)
         if not np.isnan(lower).any(axis=(1, 2)).all():  # lost, or nothing to calibrate on
             parts[model, band] = statistics.coverage_table(
                 lower, upper, against["measured"], level, waves
@@ -583,4 +584,5 @@ def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> Floa
     NaN where a cell or a channel is not judged.
     """
     place = list(groups[f"tests/{test}"]["model"].values).index(model)
-    return np.degrees(np.angle(_responses(groups, test)[1][place]))
+    leads: FloatArray = np.degrees(np.angle(_responses(groups, test)[1][place]))
+    return leads
