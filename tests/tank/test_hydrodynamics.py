@@ -3,9 +3,9 @@ import shutil
 import numpy as np
 import pytest
 import xarray as xr
+from hull import hull_mesh, hydrostatics
 
 from seakeep.errors import RequestError
-from seakeep.tank.hull import hull_mesh, hydrostatics
 from seakeep.tank.hydrodynamics import (
     excitation_at,
     kernel_coefficients,
@@ -149,7 +149,7 @@ def test_incomplete_and_damaged_files_are_refused(tmp_path):
 @pytest.mark.oracle
 def test_coefficients_are_reproduced_by_the_builder(hydro):
     pytest.importorskip("capytaine", reason="needs the extra tank-build")
-    from seakeep.tank.build import build_hydrodynamics
+    from build_hydrodynamics import build_hydrodynamics
 
     made = build_hydrodynamics(HULL, frequencies=[6.0])
     at = int(np.argmin(np.abs(hydro.omega - 6.0)))
@@ -174,7 +174,8 @@ def test_another_hull_is_built_and_played_from_a_settings_file(tmp_path, capsys)
     """No code: its dimensions, one command, its file in the settings."""
     pytest.importorskip("capytaine", reason="needs the extra tank-build")
     pytest.importorskip("numba", reason="needs the extra tank")
-    from seakeep.tank.build import main
+    from build_hydrodynamics import main
+
     from seakeep.tank.play import play_run
     from seakeep.tank.settings import read_tank
 

@@ -176,7 +176,7 @@ def assemble_rig(settings: TankSettings, hydro: Hydrodynamics | None = None) -> 
             raise RequestError(
                 f"facility.{name} is {wanted:g} and the hydrodynamics file was made for {built:g}. "
                 "Set facility to the file's value, or build a file for this one: "
-                "python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
+                "tools/build_hydrodynamics.py SETTINGS.toml -o FILE.nc, in the source"
             )
     linear, quadratic, pool = _viscous(settings, coefficients)
     step = settings.simulation.step

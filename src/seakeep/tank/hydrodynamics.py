@@ -116,14 +116,14 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
     except (SeakeepError, OSError, ValueError) as error:
         raise RequestError(
             f"{source} is not a readable NetCDF file ({error}). Correct vessel.hydrodynamics, or "
-            "build a file: python -m seakeep.tank.build SETTINGS.toml -o FILE.nc"
+            "build a file: tools/build_hydrodynamics.py SETTINGS.toml -o FILE.nc, in the source"
         ) from None
     for key, expected in CONVENTIONS.items():
         if data.attrs.get(key) != expected:
             raise RequestError(
                 f"{source} was made under another convention: {key} is {data.attrs.get(key)!r}, "
                 f"the tank needs {expected!r}. Convert the coefficients, or build the file with "
-                "python -m seakeep.tank.build."
+                "tools/build_hydrodynamics.py of the source."
             )
     bad = [n for n in VARIABLES if n not in data or not np.isfinite(data[n].values).all()]
     if bad:

@@ -1,7 +1,7 @@
 """Hydrodynamic coefficients of the virtual hull by a boundary element solver.
 
-Needs the extra ``tank-build`` (capytaine). The result is a small NetCDF file that the tank reads,
-so that running the tank needs no solver. Run it as ``python -m seakeep.tank.build``.
+Needs capytaine 3.0.0. The result is a small NetCDF file that the tank reads,
+so that running the tank needs no solver. Run it as ``python tools/build_hydrodynamics.py``.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 import xarray as xr
+from hull import HullMesh, hull_mesh, hydrostatics
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.tank.delivery import write_dataset
-from seakeep.tank.hull import HullMesh, hull_mesh, hydrostatics
 from seakeep.tank.hydrodynamics import CONVENTIONS, POOL_MODES, RIGID
 from seakeep.tank.settings import HullSettings, default_settings, read_tank
 from seakeep.waves import GRAVITY, group_speed, wavenumber
@@ -187,7 +187,7 @@ def _dataset(solved: xr.Dataset, hull: HullSettings, mesh: HullMesh, density: fl
 
 def main(arguments: list[str] | None = None) -> int:
     """Build the file of the default hull (or of the ``[hull]`` table of a settings file)."""
-    parser = argparse.ArgumentParser(prog="python -m seakeep.tank.build", description=__doc__)
+    parser = argparse.ArgumentParser(prog="build_hydrodynamics.py", description=__doc__)
     parser.add_argument("settings", nargs="?", type=Path, help="tank settings (TOML)")
     parser.add_argument("-o", "--out", type=Path, default=Path("hydrodynamics.nc"))
     parser.add_argument(
