@@ -34,7 +34,7 @@ MOST_BINS = 2**21
 """Bins of a density, which fit into 16 MB; finer ones are summed directly."""
 
 Bandwidth = Literal["paper", "silverman"] | float
-FACTORS: dict[object, tuple[float, float]] = {"paper": (1.06, 1.0), "silverman": (0.9, 1.34)}
+FACTORS = {"paper": (1.06, 1.0), "silverman": (0.9, 1.34)}
 """Factor of a rule, and divisor of its inter-quartile range."""
 
 BINS_PER_BANDWIDTH = 64
@@ -92,7 +92,7 @@ def _bandwidths(
     x: FloatArray, bandwidth: Bandwidth, of_constant: float | FloatArray = 0.0
 ) -> FloatArray:
     """Bandwidth of each series (series, time); a constant one is refused, or has another's."""
-    if bandwidth in FACTORS:
+    if isinstance(bandwidth, str) and bandwidth in FACTORS:
         factor, scale = FACTORS[bandwidth]
         spread = np.where(np.ptp(x, axis=-1) > 0, x.std(axis=-1, ddof=1), 0.0)
         upper, lower = np.quantile(x, [0.75, 0.25], axis=-1)

@@ -136,9 +136,10 @@ def _adjusted(
     """
     design = np.column_stack([shape, np.ones(shape.size), *slopes])
     solution = np.linalg.lstsq(design, values, rcond=None)[0]
-    gain = float(solution[0] or 1.0)
+    gain = float(solution[0]) or 1.0
     variances = np.diagonal(np.linalg.pinv(design.T @ design))[2:]
-    return solution[2:] / gain, np.sqrt(variances) / abs(gain), values - design @ solution, gain
+    errors: FloatArray = np.sqrt(variances) / abs(gain)
+    return solution[2:] / gain, errors, np.asarray(values - design @ solution), gain
 
 
 def clock_from_pulses(
@@ -325,10 +326,11 @@ def clock_from_shared(
         if abs(shift) < 1e-9 and abs(stretch) < 1e-12:
             break
     # Samples of a residual that is itself a wave count less than once each.
-    whiteness = float(left[1:] @ left[:-1] / max(left @ left, 1e-300))
+    power = float(left @ left)
+    whiteness = float(left[1:] @ left[:-1]) / max(power, 1e-300)
     inflation = np.sqrt((1 + max(whiteness, 0.0)) / max(1 - whiteness, 1e-3))
     level_error, drift_error = (
-        errors * np.sqrt(left @ left / max(left.size - 4, 1)) * inflation
+        errors * np.sqrt(power / max(left.size - 4, 1)) * inflation
     ).tolist()
     rms = float(np.sqrt(np.mean(left**2)) / (abs(gain) * float(np.std(slope)) + 1e-300))
     if turned:
