@@ -139,7 +139,8 @@ def _adjusted(
     gain = float(solution[0]) or 1.0
     variances = np.diagonal(np.linalg.pinv(design.T @ design))[2:]
     errors: FloatArray = np.sqrt(variances) / abs(gain)
-    return solution[2:] / gain, errors, np.asarray(values - design @ solution), gain
+    shifts = np.asarray(solution[2:] / gain, dtype=np.float64)
+    return shifts, errors, np.asarray(values - design @ solution), gain
 
 
 def clock_from_pulses(
