@@ -124,6 +124,19 @@ class Dynamics:
     direct_scale: Scale
     follows: Following | None = None
 
+    @classmethod
+    def of(cls, coefficients: FloatArray, signature: Signature) -> Dynamics:
+        """Of coefficients, and what else a model knows."""
+        return cls(
+            coefficients,
+            signature.state_delays,
+            signature.input_delays,
+            signature.state_scale,
+            signature.input_scale,
+            signature.direct_scale,
+            signature.input_map.follows,
+        )
+
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Regressed rows of Â and B̂."""

@@ -202,16 +202,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
     @cached_property
     def dynamics(self) -> Dynamics:
         """What a free run needs."""
-        signature = self.signature
-        return Dynamics(
-            self.coefficients,
-            signature.state_delays,
-            signature.input_delays,
-            signature.state_scale,
-            signature.input_scale,
-            signature.direct_scale,
-            signature.input_map.follows,
-        )
+        return Dynamics.of(self.coefficients, self.signature)
 
     def aligned_inputs(self, run: xr.Dataset) -> xr.Dataset:
         """Inputs of a run as the model wants them: carried to the measured position.
