@@ -371,7 +371,7 @@ class _Opened:
         values = self.read(signature.inputs, first, stop)
         for each in read:
             wanted = values[each.first - first : max(each.stop - first, 0)]
-            labelled.check_finite(wanted, signature.inputs, self.name, each.first, self.time)
+            labelled.check_finite(wanted, signature.inputs, self.run, self.name, each.first)
         surge = None
         if (follows := signature.input_map.follows) is not None:
             last = max(span.known for span in spans) + 1  # no later state is read
@@ -382,7 +382,7 @@ class _Opened:
         """States up to the start."""
         first = span.known + 1 - signature.state_samples
         states = self.read(signature.states, first, span.known + 1)
-        labelled.check_finite(states, signature.states, self.name, first, self.time)
+        labelled.check_finite(states, signature.states, self.run, self.name, first)
         return states
 
     def read(self, names: Sequence[str], first: int, stop: int) -> FloatArray:

@@ -230,8 +230,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         values = labelled.channel_matrix(run, self.inputs, name)
         alignment = self.alignment
         if alignment is not None and self.signature.input_map.follows is None:
-            time = np.asarray(run["time"].values, dtype=float)
-            labelled.check_finite(values, self.inputs, name, 0, time)
+            labelled.check_finite(values, self.inputs, run, name)
             span = Span(0, len(values) - 1, len(values))
             values = alignment.carry(run, [span])
         variables = {
