@@ -140,6 +140,6 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
                 f"{max(stop - at - 1, 0)} after it. Choose an instant further inside the run."
             )
         values = labelled.channel_matrix(run, names, name, slice(first, stop))
-        labelled.check_finite(values, names, name, first, time)
+        labelled.check_finite(values, names, run, name, first)
         rows.append(values)
     return rows[0], rows[1]

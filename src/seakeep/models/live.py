@@ -968,7 +968,7 @@ def _places(
     if depth is None:
         return np.full(len(signature.inputs), math.nan), math.nan
     if alignment is not None:
-        return np.array(alignment.positions_in(rig), dtype=float), depth
+        return np.array(alignment.rig(rig).positions, dtype=float), depth
     places = [rig[name].attrs.get("x_position") for name in signature.inputs]
     return np.array(places, dtype=float), depth  # None becomes NaN
 

@@ -203,9 +203,8 @@ class Coverage:
         ndarray of bool, shape (channel, frequency)
         """
         edges = band_edges(self.first, self.shares.shape[1])
-        band = np.searchsorted(edges, frequency, side="right") - 1
-        inside = (band >= 0) & (band < self.shares.shape[1])
-        result: BoolArray = inside & self.known[:, np.clip(band, 0, self.shares.shape[1] - 1)]
+        known = np.pad(self.known, ((0, 0), (1, 1)))  # nothing below and above the bands
+        result: BoolArray = known[:, np.searchsorted(edges, frequency, side="right")]
         return result
 
     def conditions(

@@ -314,10 +314,12 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
             if rest and tests:
                 others = TrainingSet(f"{training.name}, calibration", rest)
                 ensemble = fit_training(plan, runs, unit.model, others, spec)
-                judged += held_out(ensemble, tests, steps, statistics.level).values()
+                judged += held_out(
+                    dict.fromkeys(tests, ensemble), tests, steps, statistics.level
+                ).values()
     else:
         parts = {n: between(runs[n], runs[n].attrs["train_span"]) for n in plan.calibrated_on}
-        judged += held_out(fitted, parts, steps, statistics.level).values()
+        judged += held_out(dict.fromkeys(parts, fitted), parts, steps, statistics.level).values()
     keys = ("margin", "blocks", "warranted")
     nothing = np.full(len(plan.states), np.nan)
     out: dict[str, Any] = dict.fromkeys(keys, ("channel", nothing))
