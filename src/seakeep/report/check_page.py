@@ -234,7 +234,7 @@ def _validation_table(result: xr.Dataset) -> Table:
             if not at.sizes["point"]:
                 continue
             error = at["error"]
-            worst = at.isel(point=(np.abs(error) - at["uncertainty"]).argmax("point"))
+            worst = at.isel(point=(abs(error) - at["uncertainty"]).argmax("point"))
             rows.append(
                 (
                     *row(own, "shown"),

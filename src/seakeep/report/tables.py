@@ -233,7 +233,7 @@ def entries(data: xr.Dataset, *dims: str) -> Iterator[xr.Dataset]:
         yield data.sel(dict(zip(dims, place, strict=True)))
 
 
-def row(at: xr.Dataset, *words: str, **forms: int | Form) -> tuple[str, ...]:
+def row(at: xr.Dataset, /, *words: str, **forms: int | Form) -> tuple[str, ...]:
     """Cells of an entry: its words, then its numbers, each with its decimals or form.
 
     Examples

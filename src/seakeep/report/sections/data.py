@@ -91,8 +91,8 @@ def data(result: StudyResult) -> Section:
     for name, run in result.prepared.items():
         _, span, count, kinds = run_row(name, run)
         sea = row(result.groups["runs"].sel(run=name), "sea_state")
-        others = "; ".join(other_findings(run))
-        runs.append((name, *sea, str(span), count, kinds.replace("_", " ") or "none", others))
+        findings = "; ".join(other_findings(run))
+        runs.append((name, *sea, str(span), count, kinds.replace("_", " ") or "none", findings))
     tables = [
         table("signs", signs, {"frame": frame and f"Frame: {frame}."}),
         table("quality_of_runs", runs, name="runs"),
