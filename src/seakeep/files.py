@@ -408,8 +408,12 @@ def write_sealed(
 
 def head_of(kind: str) -> dict[str, Any]:
     """Attributes of a file of ours: its kind, its format and what wrote it."""
-    version = metadata.version("seakeep")
-    return {MARK: kind, "seakeep_format": FORMAT, "seakeep_version": version}
+    return {MARK: kind, "seakeep_format": FORMAT, "seakeep_version": _version()}
+
+
+@functools.cache
+def _version() -> str:
+    return metadata.version("seakeep")
 
 
 def load_sealed(path: Path | str, kind: str) -> xr.Dataset:

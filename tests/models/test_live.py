@@ -454,6 +454,28 @@ def test_a_restarted_process_goes_on_bit_for_bit(models, run, tmp_path, key):
         load_live(models["lead"], path)
 
 
+@pytest.mark.parametrize("begin", [20, START])
+def test_a_state_without_measurements_is_small_and_goes_on_bit_for_bit(
+    models, run, tmp_path, begin
+):
+    """Its covariance follows from their number, and is not written: before a whole history too."""
+    model = models["plain"]
+    live = started(model, run, begin)
+    whole = live.save(tmp_path / "whole.nc").stat().st_size
+    settled = len(live.errors.rms) + model.signature.state_delays
+    for count in (5, settled - 5, 3):  # growing, at its end, and after it
+        play(live, run, begin, begin + count, lost=range(begin, begin + count))
+        path = live.save(tmp_path / "state.nc")
+        if begin == START:
+            assert path.stat().st_size < 1.05 * whole  # the head's numbers grow
+        again = load_live(model, path)
+        np.testing.assert_array_equal(again._filter.covariance, live._filter.covariance)
+    for each in (live, again):
+        play(each, run, 100, 110, dead=["heave"])
+    np.testing.assert_array_equal(again.state, live.state)
+    np.testing.assert_array_equal(again.covariance, live.covariance)
+
+
 def test_what_is_kept_does_not_grow_and_does_not_count(models, run, tmp_path):
     model = models["plain"]
     live = started(model, run)

@@ -474,17 +474,12 @@ class Live:
 
     def _filtered(self, at: int, seen: BoolArray) -> None:
         """Covariance and gain of a sample."""
-        count, begins = self._count, self.signature.history_samples
+        count = self._count
         is_exact = bool(seen.all()) and not self._noise.any()
-        if is_exact and count.since == 0 and at >= begins:
+        if is_exact and count.since == 0 and at >= self.signature.history_samples:
             update = self._as_it_is
         else:
-            if at < begins:
-                self._filter.shift(np.diag(self.signature.state_scale.spread**2))
-            else:
-                self._filter.shift()
-                limit = self.errors.at(count.since + 1) ** 2
-                self._filter.limit(limit, exactly=not (count.partly or seen.any()))
+            self._predict_covariance(at, count.since, blind=not (count.partly or seen.any()))
             deviations = np.sqrt(np.diagonal(self.covariance) + self._noise**2)
             update = _Update(self._filter.measure(seen), deviations)
         self._updates.append(update)
@@ -495,6 +490,20 @@ class Live:
         elif update is not self._as_it_is:
             count.since += 1
             count.partly = count.partly or bool(seen.any())
+
+    def _predict_covariance(self, at: int, since: int, *, blind: bool) -> None:
+        """Covariance of a sample before its measurement, so many after a whole history.
+
+        While `blind` since then it depends on their number alone, and stays as it is from free
+        runs as long as those of training on, and a history.
+        """
+        if blind and since >= len(self.errors.rms) + self.signature.state_delays:
+            return
+        if at < self.signature.history_samples:
+            self._filter.shift(np.diag(self.signature.state_scale.spread**2))
+            return
+        self._filter.shift()
+        self._filter.limit(self.errors.at(since + 1) ** 2, exactly=blind)
 
     def _settle(self, at: int) -> None:
         """Bring estimates up to the sample `at`: final ones, then those that waves to come move."""
@@ -796,8 +805,10 @@ class Live:
             "roles": self._roles,
         }
         attrs = {"settings": json.dumps(words), "model": self._identity}
-        values = np.concatenate([each.ravel() for each in self._parts()])
-        # Most of a covariance is zero where sensors are exact: which numbers are not, and these.
+        # Of a covariance, a triangle, or nothing where it follows from the count of samples. Most
+        # is zero where sensors are exact: which numbers are not, and these.
+        lower = np.tril(self._filter.covariance) * self._count.partly
+        values = np.concatenate([each.ravel() for each in [*self._parts(), lower]])
         bits = np.packbits(values != 0)
         bits.resize(-4 * (-bits.size // 4))
         whole = np.concatenate([bits.view(np.uint32), values[values != 0]])
@@ -816,7 +827,7 @@ class Live:
         rows = [self._rows(each, tail, taken) for each in self._recent if each != "u"]
         updates = [update for update in self._pending() if update is not self._as_it_is]
         state = [self._history, self._free, self._innovation, self._squares]
-        state += [self._filter.covariance, self._known_inputs()]
+        state.append(self._known_inputs())
         if self._surge is not None:
             state.append(self._surge)
         return [*rows, *(each for update in updates for each in update), *state]
@@ -836,7 +847,8 @@ class Live:
         shapes = [each.shape for each in self._as_it_is]
         for as_it_is in content["as_it_is"]:
             self._updates.append(self._as_it_is if as_it_is else _Update(*map(np.empty, shapes)))
-        parts, at = self._parts(), 0
+        covariance = self._filter.covariance
+        parts, at = [*self._parts(), covariance], 0
         size = sum(part.size for part in parts)
         count = -(-size // 32)
         bits, whole = values[:count].astype(np.uint32), np.zeros(size)
@@ -844,6 +856,11 @@ class Live:
         for part in parts:
             part[:] = whole[at : at + part.size].reshape(part.shape)
             at += part.size
+        covariance += np.tril(covariance, -1).T
+        count = self._count
+        if not count.partly:
+            for since in range(count.since):
+                self._predict_covariance(count.taken - count.since + since, since, blind=True)
 
 
 def load_live(model: Servable, path: str | Path) -> Live:

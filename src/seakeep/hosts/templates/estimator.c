@@ -20,6 +20,7 @@ enum {
     RECORD = {{ upper }}_RECORD,
     BEGINS = {{ begins }},      /* samples before the first prediction */
     LEADS = {{ errors | length }},
+    SETTLED = LEADS + OLD / N,  /* samples without a measurement after which errors stay as they are */
     FORE = {{ fore }}                   /* inputs that are predicted before each is from its own record */
 };
 
@@ -397,9 +398,12 @@ int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *
     plain = exact && e->since == 0 && e->taken >= BEGINS;
     e->plain[e->slot] = plain;
     if (!plain) {
-        shift(e, e->taken >= BEGINS);
-        if (e->taken >= BEGINS)
-            limit(e, !(e->partly || count));
+        int blind = !(e->partly || count);
+        if (!blind || e->since < SETTLED) {
+            shift(e, e->taken >= BEGINS);
+            if (e->taken >= BEGINS)
+                limit(e, blind);
+        }
         measure(e, rows, count);
     }
     e->complete = exact ? (e->complete < M ? e->complete + 1 : M) : 0;
@@ -407,7 +411,7 @@ int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *
         e->since = e->partly = 0;
         memset(e->covariance, 0, sizeof e->covariance);
     } else if (!plain) {
-        e->since += e->since < LEADS;
+        e->since += e->since < SETTLED;
         e->partly = e->partly || count;
     }
     settle(e);
