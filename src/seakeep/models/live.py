@@ -850,9 +850,9 @@ class Live:
         covariance = self._filter.covariance
         parts, at = [*self._parts(), covariance], 0
         size = sum(part.size for part in parts)
-        count = -(-size // 32)
-        bits, whole = values[:count].astype(np.uint32), np.zeros(size)
-        whole[np.unpackbits(bits.view(np.uint8), count=size) > 0] = values[count:]
+        head = -(-size // 32)
+        bits, whole = values[:head].astype(np.uint32), np.zeros(size)
+        whole[np.unpackbits(bits.view(np.uint8), count=size) > 0] = values[head:]
         for part in parts:
             part[:] = whole[at : at + part.size].reshape(part.shape)
             at += part.size

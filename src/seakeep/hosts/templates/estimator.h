@@ -72,6 +72,8 @@ int {{ name }}_validity({{ name }}_estimator *e);
 /* Forecast n instants after the last sample into x, a row for each. `future` holds the inputs of
  * the n - 1 + {{ upper }}_LEAD instants after it, or is NULL. Waves that are NaN there are
  * predicted from the samples up to now; other inputs stay at their last value.
+ * Unlike the forecast of Python it draws no waves about these, so far from the last sample it does
+ * not tend to the mean of training.
  * Returns 0; 1 if there are fewer than {{ begins }} samples; 2 if the run is lost, as a step is. */
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x);
 
