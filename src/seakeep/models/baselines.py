@@ -17,10 +17,9 @@ from seakeep.arrays import FloatArray
 from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
-from seakeep.models import store
 from seakeep.models.checks import Json, check_integer, check_keys
 from seakeep.models.engine import Windows, cut_lost
-from seakeep.models.forecasts import SingleModel, counted
+from seakeep.models.forecasts import Model, counted
 from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs, common_step, mean_period
 from seakeep.models.linear import HankelDMDcModel, packed, unpacked
@@ -382,7 +381,7 @@ class Subspace(Plain):
 
 
 @dataclass(frozen=True, eq=False)
-class SubspaceModel(SingleModel, store.Saved):
+class SubspaceModel(Model):
     """Model fitted by :class:`Subspace`.
 
     Parameters

@@ -18,7 +18,7 @@ from seakeep.errors import RequestError, warn
 from seakeep.models import engine, export, labelled, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
-from seakeep.models.forecasts import SingleModel, check_arrays, counted, one_run, rows_by_name
+from seakeep.models.forecasts import Model, check_arrays, counted, one_run, rows_by_name
 from seakeep.models.growth import LeadErrors, training_errors
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class HankelDMDcModel(SingleModel, store.Saved):
+class HankelDMDcModel(Model):
     """An identified model; made by :meth:`HankelDMDc.fit` or :func:`seakeep.load_model`.
 
     Parameters

@@ -17,7 +17,8 @@ from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.checks import Json, check_choice, check_flag, check_integer
 from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members
 from seakeep.models.ensemble import HankelEnsemble, spectral_radius
-from seakeep.models.interface import Needs, Role, Signature, Spec
+from seakeep.models.forecasts import Spec
+from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.observables import Observable
