@@ -524,11 +524,16 @@ class HankelDMDcModel(Model):
         errors = {} if self.errors is None else self.errors.to_variables()
         return dataset.assign(errors).assign_attrs(selection=self.selection)
 
+
+class LinearKind:
+    """A spec that fits a :class:`HankelDMDcModel`."""
+
     @classmethod
-    def from_dataset(cls, dataset: xr.Dataset, settings: Any) -> Self:
-        """Rebuild a model from :meth:`to_dataset`; it is equal to the last bit."""
-        return cls(
-            settings=settings,
+    def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
+        """Rebuild the model that a file holds; it is equal to the last bit."""
+        spec: Any = cls
+        return HankelDMDcModel(
+            settings=spec.from_json(store.content(dataset, "settings")),
             coefficients=store.numbers(dataset, "coefficients"),
             learnt=LeadErrors.from_dataset(dataset),
             selection=str(dataset.attrs["selection"]),
