@@ -127,7 +127,8 @@ def disagreements(
     """
     if len(runs) < 2 or not inputs:
         return []
-    spec = replace(spec, readouts=(), window=None, memory=0)  # a memory learns offsets of runs
+    # A memory learns offsets of runs.
+    spec = replace(spec, readouts=(), window=None, memory=0, parameter="")
     at_rest = replace(spec, alignment=ProbeAlignment(mode="dispersion", surge="none"))
     halves = {n: run.isel(time=slice(run.sizes["time"] // 2)) for n, run in runs.items()}
 
