@@ -569,13 +569,14 @@ class HankelDMDcModel(SingleModel, store.Saved):
         ]
         if self.selection:
             lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
+        shown = self
         if (varies := self.variation) is not None:
             lines.append(
                 f"  parameter     {self.signature.parameter}, trained from {varies.low:g} to "
                 f"{varies.high:g}; below, in the middle, {varies.centre:g}"
             )
-            return "\n".join(lines + self.at(parameter=varies.centre).summary().splitlines()[-6:])
-        radius = self.spectral_radius
+            shown = self.at(parameter=varies.centre)
+        radius = shown.spectral_radius
         verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
         lines.append(f"  stability     spectral radius {radius:.6f} ({verdict})")
         if clipped := self.training.clipped:
@@ -583,7 +584,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
                 f"    {counted(len(clipped), 'eigenvalue')} clipped to {self.settings.radius:g}; "
                 f"the largest was {clipped[0]:.6f}"
             )
-        table = self.modes()
+        table = shown.modes()
         for mode in range(min(5, table.sizes["mode"])):
             at = table.isel(mode=mode)
             lines.append(

@@ -183,14 +183,14 @@ def regress_varying(
     return Solution(fixed, "primal", ridge, len(gram)), replace(data, **scales), variation
 
 
-def varying_or_pooled(
+def varying_then_pooled(
     fit: Callable[[Any, dict[str, xr.Dataset]], Any],
     pooled: Any,
     varying: Sequence[Any],
     runs: Mapping[str, xr.Dataset],
     inputs: Sequence[str],
-) -> tuple[Any, str]:
-    """Settings that forecast held-out data best: pooled, unless a parameter errs 5 % less.
+) -> list[tuple[Any, str]]:
+    """Settings in the order of preference: those that err 5 % less than pooled ones, and these.
 
     With three values or more, all runs of an inner value are held out in turn; with two, the second
     half of each run.
@@ -210,10 +210,8 @@ def varying_or_pooled(
 
     Returns
     -------
-    settings : HankelDMDc
-        The best.
-    words : str
-        Errors of both kinds.
+    list of (HankelDMDc, str)
+        Settings, and words on the errors of both kinds.
     """
     parameter = varying[0].parameter
     values = {name: parameter_of(run, parameter, name) for name, run in runs.items()}
@@ -232,14 +230,18 @@ def varying_or_pooled(
             for name in judged:
                 errors[each].extend(_scores(model, runs[name], name, steps, not inner))
     means = {each: float(np.mean(scores)) for each, scores in errors.items()}
-    best = min(varying, key=means.__getitem__)
-    taken = best if means[best] < BETTER * means[pooled] else pooled
+    order = sorted(varying, key=means.__getitem__)
+    better = [each for each in order if means[each] < BETTER * means[pooled]]
     what = "runs of inner values" if inner else "second halves of the runs"
-    return taken, (
-        f"on {what} that are held out, a model that varies with {parameter} errs "
-        f"{means[best]:.3f} ({best.ridge_text(float(best.ridge))}) and a pooled one "
-        f"{means[pooled]:.3f}, which is taken unless the other errs 5 % less"
-    )
+    return [
+        (
+            taken,
+            f"on {what} that are held out, a model that varies with {parameter} errs "
+            f"{means[each]:.3f} ({each.ridge_text(float(each.ridge))}) and a pooled one "
+            f"{means[pooled]:.3f}, which is taken unless the other errs 5 % less and does not grow",
+        )
+        for taken, each in zip((*better, pooled), (*better, order[0]), strict=True)
+    ]
 
 
 def _scores(model: Any, run: xr.Dataset, name: str, steps: int, is_half: bool) -> Sequence[float]:

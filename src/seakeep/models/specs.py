@@ -22,7 +22,7 @@ from seakeep.models.interface import Needs, Role, Signature, Spec
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.observables import Observable
-from seakeep.models.parametric import SMALLER, regress_varying, varying_or_pooled
+from seakeep.models.parametric import SMALLER, regress_varying, varying_then_pooled
 from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import (
@@ -357,21 +357,27 @@ class HankelDMDc(HankelSettings):
             choice = selected or self.settled(
                 named, states, inputs, stop, executor=executor, progress=progress
             )
-            settings, said = choice.settings, choice.describe()
+            tried = [(choice.settings, "")]
             if self.parameter:
                 parts = SMALLER if isinstance(self.ridge, str) else (1.0,)
-                varying = [replace(settings, ridge=part * float(settings.ridge)) for part in parts]
-                settings, words = varying_or_pooled(
+                ridge = float(choice.settings.ridge)
+                tried = varying_then_pooled(
                     lambda spec, runs: spec._fitted(runs, states, inputs, None, ()),
-                    replace(settings, parameter=""),
-                    varying,
+                    replace(choice.settings, parameter=""),
+                    [replace(choice.settings, ridge=part * ridge) for part in parts],
                     until(named, stop),
                     inputs,
                 )
-                said = f"{words}\n{said}"
-            model = settings._fitted(named, states, inputs, stop, choice.readouts)
-            _check_growth(model)
-            return replace(model, selection=said)
+            for settings, words in tried:
+                model = settings._fitted(named, states, inputs, stop, choice.readouts)
+                if (radius := _largest_radius(model)) < 1.0:
+                    return replace(model, selection=f"{words}\n{choice.describe()}".lstrip())
+            raise DataError(
+                f"the model that was chosen grows: its spectral radius is {radius:.6f} at "
+                f"{settings.ridge_text(float(settings.ridge))}. Look for transients at the ends of "
+                "the training runs, use fewer state delays, clip eigenvalues (stable=True), or "
+                "state the ridge to have it as it is."
+            )
         spec = self.resolved_in(named, inputs)
         readouts: tuple[FittedReadOut, ...] = ()
         if self.readouts:
@@ -401,23 +407,12 @@ class HankelDMDc(HankelSettings):
         return HankelDMDcModel.fitted(self, data, signature, solution, named)
 
 
-def _check_growth(model: HankelDMDcModel) -> None:
-    """Refuse a model that was chosen and grows."""
-    settings = model.settings
-    values: list[float | None] = [None]
-    if (varies := model.variation) is not None:
-        values = [varies.low, varies.high]
-    radius = max(
-        spectral_radius((model if value is None else model.at(parameter=value)).dynamics)
-        for value in values
-    )
-    if radius >= 1.0:
-        raise DataError(
-            f"the model that was chosen grows: its spectral radius is {radius:.6f} at "
-            f"{settings.ridge_text(float(settings.ridge))}. Look for transients at the ends of the "
-            "training runs, use fewer state delays, clip eigenvalues (stable=True), or state the "
-            "ridge to have it as it is."
-        )
+def _largest_radius(model: HankelDMDcModel) -> float:
+    """Spectral radius, the largest over the trained range of a parameter."""
+    varies = model.variation
+    values = () if varies is None else (varies.low, varies.centre, varies.high)
+    models = [model.at(parameter=value) for value in values] or [model]
+    return max(spectral_radius(each.dynamics) for each in models)
 
 
 WINDOW = Uniform("60 T", "120 T")
