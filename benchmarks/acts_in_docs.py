@@ -14,7 +14,14 @@ from io import StringIO
 from pathlib import Path
 
 from seakeep.cli.console import print_table
-from seakeep.report.acts import acts_table, against_filter, band_sentence, finding, short_table
+from seakeep.report.acts import (
+    acts_table,
+    against_filter,
+    band_sentence,
+    finding,
+    short_table,
+    still_water,
+)
 from seakeep.report.claims import claims_table
 from seakeep.study.reproduce import read_reproduction
 
@@ -39,7 +46,8 @@ def write(results, root):
     table = "\n".join(line.rstrip() for line in shown.getvalue().strip().splitlines())
     said = finding(results)
     ending = f"{_wrapped(said)}\n\nReport: reproduction/report.html"
-    every = " ".join([said, against_filter(results), band_sentence(results)])
+    said_of_all = (finding, against_filter, still_water, band_sentence)
+    every = " ".join(each(results) for each in said_of_all)
     blocks = {
         "README.md": {"finding": _wrapped(said), "short": f"```text\n{table}\n\n{ending}\n```"},
         "docs/study.md": {

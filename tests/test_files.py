@@ -72,7 +72,7 @@ def test_a_netcdf_file_is_packed_as_asked(tmp_path):
         coords={"time": 0.1 * np.arange(5000)},
         attrs={"name": "Mörkö", "span": (1.0, 2.0)},
     )
-    write_netcdf(tmp_path / "a.nc", heave, {"heave": {"zlib": True}})
+    write_netcdf(tmp_path / "a.nc", heave, packed=True)
     found = xr.load_dataset(tmp_path / "a.nc", engine="h5netcdf")
     xr.testing.assert_equal(found, heave)
     assert found["heave"].encoding["zlib"]

@@ -201,7 +201,7 @@ celerity = 2.0
 
 
 def test_a_campaign_file_states_observables_read_outs_and_a_ridge_by_roll_out(tmp_path):
-    from seakeep.study.resolve import build_spec
+    from seakeep.study.resolve import resolve_model
 
     for path in TUTORIAL.iterdir():
         if path.suffix == ".csv":
@@ -236,7 +236,7 @@ mooring_bow = "wave"
 """
     )
     settings = seakeep.read_campaign(tmp_path / "campaign.toml").model()
-    spec = build_spec(settings, 1.5, 0.08)
+    spec = resolve_model(settings, 1.5, 0.08).spec
     assert spec.ridge == "rollout"
     assert spec.lead == 14
     squares, powers = spec.observables

@@ -19,17 +19,19 @@ from typing import TYPE_CHECKING, Any
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
 
 if TYPE_CHECKING:
+    import h5py
     import xarray as xr
 
-    from seakeep.arrays import FloatArray
-
-FORMAT = 6
+FORMAT = 7
 """Format of sealed files; one of another format is refused, and made again."""
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""
 SEAL = b"seakeep SHA-256 "
 """Marker between the content of a NetCDF file and its checksum; HDF5 reads no further."""
 
+NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
+OF_HDF5 = frozenset({"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"})
+"""Attributes that tie variables to their dimensions."""
 SHOWN = 5
 """Names of a folder that a message lists at most."""
 
@@ -241,21 +243,26 @@ def replacing(path: Path) -> Iterator[Path]:
 def write_netcdf(
     path: Path,
     dataset: xr.Dataset,
-    encoding: Mapping[Any, Mapping[str, Any]] | None = None,
+    groups: Mapping[str, xr.Dataset] | None = None,
+    *,
+    packed: bool = False,
 ) -> None:
     """Write a NetCDF file with a checksum at its end, which :func:`read_sealed` compares.
 
     HDF5 does not survive a write that fails: it raises errors of many kinds, keeps the file open,
-    and takes the process with it at its end. The file is therefore made in memory first.
+    and takes the process with it at its end. The file is therefore made in memory first. h5netcdf
+    would take a hundred times as long for many groups.
 
     Parameters
     ----------
     path : Path
         The file, such as :func:`replacing` gives it; overwritten.
     dataset : Dataset
-        What goes into it.
-    encoding : mapping, optional
-        Encoding of variables by their names, such as their compression.
+        What goes into its root.
+    groups : mapping of str to Dataset, optional
+        What goes into groups.
+    packed : bool, optional
+        Whether arrays of more than 4096 numbers are compressed.
 
     Raises
     ------
@@ -263,19 +270,68 @@ def write_netcdf(
         If it cannot be written; :func:`replacing` puts it into words.
     """
     # Here, so that commands that write no such file start without HDF5.
-    import h5netcdf
-    from xarray.backends import H5NetCDFStore
+    import h5py
 
     buffer = io.BytesIO()
-    with h5netcdf.File(buffer, "w") as file:
-        dataset.dump_to_store(H5NetCDFStore(file, mode="a"), encoding=encoding or {})
-    write_whole(path, buffer)
-
-
-def write_whole(path: Path, buffer: io.BytesIO) -> None:
-    """Write a NetCDF file that was made in memory, and its checksum."""
+    with h5py.File(buffer, "w", libver=("v108", "v108"), track_order=True) as file:
+        _write_group(file, dataset, packed)
+        for name, group in (groups or {}).items():
+            _write_group(file.create_group(name, track_order=True), group, packed)
     content = buffer.getvalue()
     path.write_bytes(content + _seal_of(content))
+
+
+def _write_group(place: h5py.Group, data: xr.Dataset, packed: bool) -> None:
+    """Write a Dataset as NetCDF-4: its dimensions are scales of HDF5."""
+    import h5py
+
+    place.attrs.update(data.attrs)
+    if others := [str(name) for name in data.coords if name not in data.dims]:
+        place.attrs["coordinates"] = " ".join(others)
+    for dim in data.sizes.keys() - data.variables.keys():
+        place.create_dataset(dim, (data.sizes[dim],), ">f4").make_scale(NO_VARIABLE)
+    for key, each in data.variables.items():
+        kind, how = each.dtype.kind, dict[str, Any]()
+        if kind in "OU":
+            how = {"dtype": h5py.string_dtype()}
+        elif packed and kind == "f" and each.size > 4096:
+            how = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+        values = each.values.astype({"b": "i1", "U": "O"}.get(kind, each.dtype))
+        stored = place.create_dataset(key, data=values, **how)
+        stored.attrs.update(each.attrs | ({"dtype": "bool"} if kind == "b" else {}))
+        if each.dims == (key,):
+            stored.make_scale(key)
+    for key, each in data.variables.items():
+        for number, dim in enumerate(each.dims if each.dims != (key,) else ()):
+            place[key].dims[number].attach_scale(place[dim])
+
+
+def _read_group(place: h5py.Group) -> xr.Dataset:
+    """Read what :func:`_write_group` wrote, into memory."""
+    import h5py
+    import numpy as np
+    import xarray as xr
+
+    variables = {}
+    for key, stored in place.items():
+        if isinstance(stored, h5py.Dataset) and stored.attrs.get("NAME") != NO_VARIABLE.encode():
+            attrs = _attributes(stored)
+            dims = [dim[0].name.rpartition("/")[2] if len(dim) else key for dim in stored.dims]
+            values = (stored.asstr() if stored.dtype.kind == "O" else stored)[()]
+            variables[key] = dims, np.asarray(values, attrs.pop("dtype", None)), attrs
+    attrs = _attributes(place)
+    others = attrs.pop("coordinates", "").split()
+    return xr.Dataset(variables, attrs=attrs).set_coords(others)
+
+
+def _attributes(of: h5py.HLObject) -> dict[str, Any]:
+    """Attributes as they were written; an array is a tuple."""
+
+    def plain(value: Any) -> Any:
+        value = value.tolist() if hasattr(value, "tolist") else value
+        return tuple(value) if isinstance(value, list) else value
+
+    return {key: plain(value) for key, value in of.attrs.items() if key not in OF_HDF5}
 
 
 def _seal_of(content: bytes) -> bytes:
@@ -346,34 +402,23 @@ def write_sealed(
     target = Path(path)
     check_output(target, kind)
     with replacing(target) as temporary:
-        write_netcdf(temporary, dataset.assign_attrs(_head(kind)))
+        write_netcdf(temporary, dataset.assign_attrs(head_of(kind)))
     return target
 
 
-def write_sealed_array(
-    values: FloatArray, attrs: Mapping[str, str], path: Path | str, kind: str
-) -> Path:
-    """Write one series ``values`` as :func:`write_sealed` does, in a few milliseconds."""
-    import h5py
-
-    target, buffer = Path(path), io.BytesIO()
-    check_output(target, kind)
-    with h5py.File(buffer, "w") as file:
-        file.attrs.update({**attrs, **_head(kind)})
-        file["values"] = values
-        file["values"].make_scale("values")  # a dimension of NetCDF
-    with replacing(target) as temporary:
-        write_whole(temporary, buffer)
-    return target
-
-
-def _head(kind: str) -> dict[str, Any]:
+def head_of(kind: str) -> dict[str, Any]:
+    """Attributes of a file of ours: its kind, its format and what wrote it."""
     version = metadata.version("seakeep")
     return {MARK: kind, "seakeep_format": FORMAT, "seakeep_version": version}
 
 
 def load_sealed(path: Path | str, kind: str) -> xr.Dataset:
-    """Read a file of :func:`write_sealed` into memory.
+    """Read the root of a file as :func:`load_groups` does."""
+    return load_groups(path, kind)[""]
+
+
+def load_groups(path: Path | str, kind: str) -> dict[str, xr.Dataset]:
+    """Read a file of ours into memory.
 
     What it holds is trusted: its checksum fits, and this version knows its format.
 
@@ -386,8 +431,8 @@ def load_sealed(path: Path | str, kind: str) -> xr.Dataset:
 
     Returns
     -------
-    Dataset
-        What was written.
+    dict of str to Dataset
+        What was written: its groups by name, and its root under the empty name.
 
     Raises
     ------
@@ -396,21 +441,32 @@ def load_sealed(path: Path | str, kind: str) -> xr.Dataset:
     DataError
         If it is damaged, of another kind, or of another format.
     """
-    import xarray as xr
+    import h5py
 
-    dataset = xr.load_dataset(read_sealed(path), engine="h5netcdf", decode_times=False)
-    mark, number = dataset.attrs.pop(MARK, None), dataset.attrs.pop("seakeep_format", None)
-    if mark != kind:
-        raise DataError(
-            f"{path} holds a {mark or 'table'}, and a {kind} is expected here. Name another file."
-        )
-    if number != FORMAT:
-        raise DataError(
-            f"{path} has format {number}, written by seakeep "
-            f"{dataset.attrs.get('seakeep_version', '?')}, and this seakeep reads format {FORMAT}. "
-            "Make the file again with this version, or update seakeep."
-        )
-    return dataset
+    with h5py.File(read_sealed(path), "r") as file:
+        head = dict(file.attrs)
+        if (mark := head.get(MARK)) != kind:
+            raise DataError(
+                f"{path} holds a {mark or 'table'}, and a {kind} is expected here. Name another "
+                "file."
+            )
+        if (number := head.get("seakeep_format")) != FORMAT:
+            raise DataError(
+                f"{path} has format {number}, written by seakeep "
+                f"{head.get('seakeep_version', '?')}, and this seakeep reads format {FORMAT}. "
+                "Make the file again with this version, or update seakeep."
+            )
+        out = {"": _read_group(file)}
+
+        def read(name: str, item: h5py.HLObject) -> None:
+            parts = item.values() if isinstance(item, h5py.Group) else ()
+            if any(isinstance(part, h5py.Dataset) for part in parts):
+                out[name] = _read_group(item)
+
+        file.visititems(read)
+    for key in (MARK, "seakeep_format"):
+        del out[""].attrs[key]
+    return out
 
 
 def check_place(path: Path, suffix: str | None = None) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Any
@@ -22,10 +23,8 @@ from seakeep.core import bootstrap, density
 from seakeep.core import coverage as of_arrays
 from seakeep.core.bands import BandErrors, band_error_over_time, split_bands
 from seakeep.core.bootstrap import (
-    BlockChoice,
     BlockRule,
     block_length,
-    choose_block_length,
     lag_one_correlation,
     overlap_block,
     two_way_interval,
@@ -54,7 +53,6 @@ from seakeep.pairing import channel_names, pair
 __all__ = [
     "BandCoverage",
     "BandErrors",
-    "BlockChoice",
     "BoxStatistics",
     "ConformalMargin",
     "CoverageTable",
@@ -65,7 +63,6 @@ __all__ = [
     "band_scores",
     "block_length",
     "box_statistics",
-    "choose_block_length",
     "conformal_margin",
     "coverage",
     "coverage_table",
@@ -162,19 +159,15 @@ def jsd_interval(
         )
     draws = []
     for column, (name, child) in enumerate(zip(pairs.names, rng.spawn(p.shape[-1]), strict=True)):
-        series, block = m[:, column], block_length
+        rows = p[..., column].reshape(-1, len(m))
+        how = {"block_length": block_length, "rng": child, **settings}
         try:
-            if isinstance(block, str):
-                choice = choose_block_length(series, block, segments=settings.get("segments"))
-                block = choice.samples
-                if choice.capped:
-                    warn(f"channel '{name}': {bootstrap.too_long(choice, series.size)}")
-            rows = p[..., column].reshape(-1, series.size)
-            draws.append(
-                density.jsd_interval(rows, series, block_length=block, rng=child, **settings)
-            )
+            with warnings.catch_warnings(record=True) as caught:
+                draws.append(density.jsd_interval(rows, m[:, column], **how))
         except DataError as error:
             raise DataError(f"channel '{name}': {error}") from error
+        for each in caught:
+            warn(f"channel '{name}': {each.message}")
     arrays = ("draws", "noise", "grid", "predicted", "measured")
     keys = [field.name for field in fields(JsdInterval) if field.name not in arrays]
     return xr.Dataset(

@@ -64,6 +64,13 @@ def test_accuracy_is_kept_in_si_units(edited):
     assert "accuracy" not in run["eta_fwd"].attrs
 
 
+def test_parameters_of_a_run_are_its_attributes(edited):
+    stated = "span = [2, 18]\nparameters = { draught = 0.083, water_depth = 3.0 }"
+    runs = read_campaign(edited(("span = [2, 18]", stated))).prepare()
+    assert (runs["second"].attrs["draught"], runs["second"].attrs["water_depth"]) == (0.083, 3.0)
+    assert "draught" not in runs["first"].attrs
+
+
 def test_prepared_runs(campaign):
     calls = []
     runs = campaign.prepare(progress=lambda *call: calls.append(call))
@@ -175,10 +182,6 @@ class TestStep:
         assert runs["first"].attrs["encounter_period"] == period
         assert {run.attrs["dt"] for run in runs.values()} == {period / 16}
 
-    def test_step_longer_than_the_record(self, edited):
-        with pytest.raises(RequestError, match=r"of 20 s is shorter than two steps of 50 s"):
-            read_campaign(edited(("sampling_rate = 10", "dt = 50"))).prepare()
-
 
 class TestEncounterPeriod:
     def test_mean_of_the_irregular_runs(self, edited):
@@ -250,20 +253,86 @@ class TestEncounterPeriod:
         assert float(campaign.prepare()["first"]["eta_fwd"].std()) == 0.0
 
 
-class TestBadRuns:
-    def test_gap_of_values(self, tank):
-        def change(columns):
-            columns["Heave [mm]"][[100, 101, 102, 300]] = np.nan
-            columns["Pitch (deg)"][5] = np.nan
+def without(columns, part):
+    return {name: np.delete(values, part) for name, values in columns.items()}
 
-        with pytest.raises(
-            DataError,
-            match=r"run 'second' .*: channel 'heave' has 4 missing values of 1001 in 2 gap\(s\), "
-            r"the first at t = 2 s \(3 samples, 0\.06 s\), the longest at t = 2 s \(3 samples, "
-            r"0\.06 s\) \(also in pitch\)\. Repair the file, leave the channel out, or cut the gap "
-            r"off with record = \[start, end\] in \[runs\.second\]",
-        ):
-            rewrite(tank, change).prepare()
+
+def gapped(columns):
+    heave, pitch = columns["Heave [mm]"].copy(), columns["Pitch (deg)"].copy()
+    heave[[100, 101, 102, 300]] = pitch[5] = np.nan
+    return columns | {"Heave [mm]": heave, "Pitch (deg)": pitch}
+
+
+class TestBadRuns:
+    @pytest.mark.parametrize(
+        ("change", "error", "message"),
+        [
+            (
+                gapped,
+                DataError,
+                r"run 'second' .*: channel 'heave' has 4 missing values of 1001 in 2 gap\(s\), the "
+                r"first at t = 2 s \(3 samples, 0\.06 s\), the longest at t = 2 s \(3 samples, "
+                r"0\.06 s\) \(also in pitch\)\. Repair the file, leave the channel out, or cut the "
+                r"gap off with record = \[start, end\] in \[runs\.second\]",
+            ),
+            (
+                lambda columns: without(columns, slice(100, 125)),
+                DataError,
+                r"the times of run 'second' \(.*second\.csv\) have 1 gap\(s\): after t = 1\.98 s, "
+                r"25 sample\(s\) of 0\.02 s are missing; the longest gap, after t = 1\.98 s, "
+                r"lasts 0",
+            ),
+            (
+                lambda columns: columns | {"Time [s]": columns["Time [s]"] ** 1.1},
+                DataError,
+                r"the times of run 'second' .* are not uniform: steps r",
+            ),
+            (
+                lambda columns: columns | {"Heave [deg]": columns.pop("Heave [mm]")},
+                RequestError,
+                r"the unit 'deg' does not fit channel 'heave' \(column 'Heave' of .*second\.csv\), "
+                "which is measured in 'm'",
+            ),
+        ],
+        ids=["values", "times", "jitter", "unit"],
+    )
+    def test_a_file_at_fault(self, campaign, tank, change, error, message):
+        write_csv(tank / "second.csv", change(tank_columns(1)))
+        with pytest.raises(error, match=message):
+            campaign.prepare()
+
+    @pytest.mark.parametrize(
+        ("old", "new", "message"),
+        [
+            (
+                'column = "Heave"',
+                'column = "Heaves"',
+                r"first\.csv has no column 'Heaves'\. Did you mean 'Heave'\? Its columns: Time",
+            ),
+            *(
+                (
+                    "span = [2, 18]",
+                    f"{key} = {span}",
+                    rf"runs\.second\.{key}: received \[.*\] s, and the record runs from 0 to "
+                    r"20 s\.",
+                )
+                for key in ("span", "record")
+                for span in ("[2, 30]", "[-3, 10]", "[30, 40]")
+            ),
+            *(
+                (
+                    "span = [2, 18]",
+                    span,
+                    rf"holds 0 sample\(s\) at a step of {step} s\. Lengthen",
+                )
+                for span, step in (("span = [2.01, 2.05]", 0.1), ("record = [2.001, 2.01]", 0.02))
+            ),
+            ("sampling_rate = 10", "dt = 50", r"of 20 s is shorter than two steps of 50 s"),
+        ],
+    )
+    def test_a_campaign_at_fault(self, edited, old, new, message):
+        with pytest.raises(RequestError, match=message):
+            read_campaign(edited((old, new))).prepare()
 
     def test_gap_cut_off(self, tank):
         rewrite(tank, lambda c: c["Heave [mm]"].__setitem__(slice(20, 30), np.nan))
@@ -271,62 +340,6 @@ class TestBadRuns:
         path.write_text(path.read_text().replace("span = [2, 18]", "record = [1, inf]"))
         run = read_campaign(path).prepare()["second"]
         assert float(run["time"][0]) == 1.0
-
-    def test_gap_of_time(self, tank):
-        def change(columns):
-            for name, values in columns.items():
-                columns[name] = np.delete(values, slice(100, 125))
-
-        with pytest.raises(
-            DataError,
-            match=r"the times of run 'second' \(.*second\.csv\) have 1 gap\(s\): after t = 1\.98 s"
-            r", 25 sample\(s\) of 0\.02 s are missing; the longest gap, after t = 1\.98 s, lasts 0",
-        ):
-            rewrite(tank, change).prepare()
-
-    def test_times_not_uniform(self, tank):
-        def change(columns):
-            columns["Time [s]"] = columns["Time [s]"] ** 1.1
-
-        with pytest.raises(
-            DataError, match=r"the times of run 'second' .* are not uniform: steps r"
-        ):
-            rewrite(tank, change).prepare()
-
-    def test_missing_column(self, edited):
-        path = edited(('column = "Heave"', 'column = "Heaves"'))
-        with pytest.raises(
-            RequestError,
-            match=r"first\.csv has no column 'Heaves'\. Did you mean 'Heave'\? Its columns: Time",
-        ):
-            read_campaign(path).prepare()
-
-    def test_unit_of_the_header_does_not_fit(self, tank):
-        campaign = rewrite(tank, lambda c: c.update({"Heave [deg]": c.pop("Heave [mm]")}))
-        with pytest.raises(
-            RequestError,
-            match=r"the unit 'deg' does not fit channel 'heave' \(column 'Heave' of .*second\.csv\)"
-            ", which is measured in 'm'",
-        ):
-            campaign.prepare()
-
-    @pytest.mark.parametrize("key", ["span", "record"])
-    @pytest.mark.parametrize("span", ["[2, 30]", "[-3, 10]", "[30, 40]"])
-    def test_span_outside_the_record(self, edited, key, span):
-        path = edited(("span = [2, 18]", f"{key} = {span}"))
-        with pytest.raises(
-            RequestError,
-            match=rf"runs\.second\.{key}: received \[.*\] s, and the record runs from 0 to 20 s\.",
-        ):
-            read_campaign(path).prepare()
-
-    def test_span_that_holds_nothing(self, edited):
-        for span, step in (("span = [2.01, 2.05]", "0.1"), ("record = [2.001, 2.01]", "0.02")):
-            path = edited(("span = [2, 18]", span))
-            with pytest.raises(
-                RequestError, match=rf"holds 0 sample\(s\) at a step of {step} s\. Lengthen"
-            ):
-                read_campaign(path).prepare()
 
     def test_unset_variable(self, edited, monkeypatch):
         monkeypatch.delenv("TANK_FILES", raising=False)

@@ -103,7 +103,6 @@ CALLS = {
     "statistics.band_scores": (statistics.band_scores, TABLE - 1, TABLE + 1, TABLE),
     "statistics.block_length": (lambda x: statistics.block_length(0 * x + NOISE), X),
     "statistics.box_statistics": (statistics.box_statistics, X),
-    "statistics.choose_block_length": (statistics.choose_block_length, X),
     "statistics.conformal_margin": (statistics.conformal_margin, TABLE[None]),
     "statistics.coverage": (statistics.coverage, TABLE - 1, TABLE + 1, TABLE),
     "statistics.coverage_table": (

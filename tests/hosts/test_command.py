@@ -3,6 +3,7 @@
 import pytest
 from drifting import INPUTS, STATES, drifting_run
 
+import seakeep
 from seakeep import HankelDMDc, ProbeAlignment, RequestError, cli
 from seakeep.hosts.program import exportable, timing
 
@@ -25,6 +26,28 @@ def test_sources_take_the_name_of_the_model_and_the_instants_are_told(run, tmp_p
     assert {path.name for path in (tmp_path / "library").iterdir()} == {"my_model.c", "my_model.h"}
     lead = "A step of 0.1 s takes the inputs 16 samples (1.6 s) after the instant that it starts"
     assert lead in said
+
+
+def test_a_reduced_order_is_of_the_matrices_alone_and_states_its_error(make_run, tmp_path, capsys):
+    HankelDMDc(4, 8, 1.0, stable=True).fit(make_run(), ["heave"], ["eta_fwd"]).save(
+        tmp_path / "m.nc"
+    )
+    words = ["export", str(tmp_path / "m.nc"), "--mat", str(tmp_path / "m.mat"), "--order", "4"]
+    assert cli.main(words) == 0
+    assert "The system of order 4 errs by" in capsys.readouterr().err
+    assert cli.main([*words, "--c", str(tmp_path), "--estimator"]) == 2
+    assert "--order reduces the linear system of --mat; an estimator" in capsys.readouterr().err
+
+
+def test_an_ensemble_is_no_estimator_nor_is_a_member(make_run, tmp_path, capsys):
+    ensemble = seakeep.BayesianHankelDMDc(
+        window=None, state_delays=2, input_delays=4, ridge=seakeep.Uniform(1, 2), n_members=2
+    ).fit(make_run(), ["heave"], ["eta_fwd"])
+    ensemble.save(tmp_path / "m.nc")
+    words = ["export", str(tmp_path / "m.nc"), "--c", str(tmp_path), "--estimator"]
+    for more in ((), ("--member", "0")):
+        assert cli.main([*words, *more]) == 2
+        assert "Fit a single model of the same runs" in capsys.readouterr().err
 
 
 def test_waves_that_no_host_can_carry_are_refused_with_the_way_out(make_run, channels):

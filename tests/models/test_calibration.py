@@ -201,7 +201,7 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
     # By hand: the same settings fitted anew on the other runs, which none of them has read.
     judged = [
         held_out(
-            pooled("all", {key: each for key, each in runs.items() if key != name}),
+            {name: pooled("all", {key: each for key, each in runs.items() if key != name})},
             {name: run},
             40,
             0.95,
@@ -246,7 +246,7 @@ def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
         rest = {"before": run.isel(time=slice(0, begin)), "after": run.isel(time=slice(end, None))}
         ensemble = pooled("all", {name: each for name, each in rest.items() if each.sizes["time"]})
         part = {"part": run.isel(time=slice(begin, end))}
-        judged.append(held_out(ensemble, part, 40, 0.95)["part"])
+        judged.append(held_out({"part": ensemble}, part, 40, 0.95)["part"])
     expected, floor, _ = learn_margin(judged, 0.95, "spread")
     np.testing.assert_allclose(found.conformal.margin, expected.margin, rtol=1e-9)  # rounding
     np.testing.assert_allclose(found.floor, floor, rtol=1e-9)

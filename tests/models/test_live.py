@@ -219,17 +219,18 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
         forced[:, 0] += push
         x = signal.lfilter([0.0, 1.0], [1.0, -0.98], forced, axis=0)
         time = 0.1 * np.arange(samples)
-        return make_dataset(time, surge=x[:, 0], heave=x[:, 1], eta_fwd=wave)
+        return make_dataset(time, sway=x[:, 0], heave=x[:, 1], eta_fwd=wave)
 
     model = HankelDMDc(0, 0, 1e-6, delay_rows="exact").fit(
-        sea(1, 0.0, 20_000), ["surge", "heave"], ["eta_fwd"]
+        sea(1, 0.0, 20_000), ["sway", "heave"], ["eta_fwd"]
     )
 
     def after(run):
         live = model.live()
-        for u, y in zip(run["eta_fwd"].values, matrix(run, ["surge", "heave"]), strict=True):
+        for u, y in zip(run["eta_fwd"].values, matrix(run, ["sway", "heave"]), strict=True):
             live.step([u], y)
-        return live.consistency, live.consistency_by_state
+        made = live.forecast(32, np.zeros((32, 1)))
+        return live.consistency, live.consistency_by_state, (live.validity, made)
 
     found = {push: after(sea(2, push)) for push in (0.0, 0.7)}
     # 256 squares of a normal number have a mean of 1 ± 0.09 (SD); those of free runs, which are
@@ -239,9 +240,21 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     assert np.all((found[0.0][1][1] > 0.2) & (found[0.0][1][1] < 2.2))
     np.testing.assert_allclose(found[0.7][1][0], [1.49, 1.0], atol=0.4)
     # At a lead of 64: 0.49 (1 − .98⁶⁴)² / .02² of the push over (1 − .98¹²⁸) / .0396 of w.
-    surge, heave = found[0.7][1][1]
-    assert surge > 5 > 2.2 > heave > 0.2
+    sway, heave = found[0.7][1][1]
+    assert sway > 5 > 2.2 > heave > 0.2
     assert found[0.7][0] == pytest.approx(found[0.7][1].mean())
+    # The state that errs is named, its claims shrink by the errors of late, and the other's not.
+    assert found[0.7][2][0] == Validity.CONSISTENCY
+    assert found[0.0][2][0] == 0
+    (_, calm), (_, pushed) = found[0.0][2], found[0.7][2]
+    assert pushed.attrs["validity"] == "consistency"
+    assert calm.attrs["validity"] == "inside"
+    widened = [
+        (pushed[name].sel(statistic="std") / calm[name].sel(statistic="std")).values[0]
+        for name in ("sway", "heave")
+    ]
+    assert widened == pytest.approx([np.sqrt(sway), 1.0], rel=1e-9)
+    assert pushed.sway.attrs["lead_time"] < calm.sway.attrs["lead_time"]
     # A push of 2 SD that ended six time constants ago is forgotten; over all samples, 3 would stay.
     ended = after(sea(2, np.where(np.arange(3000) < 1500, 2.0, 0.0)))
     assert ended[1][0][0] == pytest.approx(1.0, abs=0.3)
@@ -257,13 +270,15 @@ def test_outside_the_training_the_band_widens_and_says_why(models, run):
         made = live.forecast(STEPS, matrix(each, INPUTS)[START:])
         stds.append(np.stack([made[name].sel(statistic="std") for name in STATES], axis=1))
     assert Validity.HEIGHT in live.conditions.validity
+    assert "a height of" in repr(live.conditions)
+    assert len(repr(live.conditions)) < 500
     assert "height" in made.attrs["validity"]
     waves = matrix(higher, INPUTS)[:START]
     waves = waves - waves.mean(axis=0)
     heights = 4 * np.sqrt(np.mean(waves**4, axis=0) / (3 * np.mean(waves**2, axis=0)))
     np.testing.assert_allclose(made.attrs["height"], heights, rtol=1e-12)
     ratio = np.max(heights / made.attrs["trained_height"])
-    of_late = np.maximum(live.consistency_by_state[1], ratio**2)
+    of_late = np.maximum(live.consistency_by_state.max(axis=0), ratio**2)
     # Beside the rounding, nothing but the two reasons widens the band.
     np.testing.assert_allclose(stds[1], np.sqrt(of_late) * stds[0], rtol=1e-12)
     assert ratio > 1.3
@@ -524,6 +539,7 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does(thrusted):
     for at in range(300, 320):
         live.step([np.nan, u[at, 1]], y[at])  # the probe is dead; the thrust is known
         assert live._known_inputs()[-1, 1] == u[at, 1]
+    assert not live.conditions.reasons[:, 1].any()
     live.step({"eta": u[320, 0]}, y[320])  # the thrust was not measured
     assert live._known_inputs()[-1, 1] == u[319, 1]
     plan, steps = np.sin(np.arange(40)), 40
@@ -538,6 +554,12 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does(thrusted):
     with pytest.raises(RequestError, match="roles names 'eat', which the model does not know"):
         model.live(roles={"eat": "known"})
     # A constant stays; waves that are given count though the other column is not.
+    constant, wave = model.live(roles={"thrust": "constant"}), model.live()
+    for at in range(300):
+        for each in (constant, wave):
+            each.step([u[at, 0], 9 * np.sin(0.3 * at)], y[at])  # a thrust as none in training
+    assert Validity.HEIGHT in wave.conditions.validity
+    assert not constant.conditions.validity
     constant = model.live(roles={"thrust": "constant"})
     for at in range(300):
         constant.step(u[at], y[at])

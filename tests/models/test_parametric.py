@@ -7,6 +7,8 @@ import pytest
 import xarray as xr
 
 from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning, load_model
+from seakeep.hosts.program import exportable
+from seakeep.models import specs
 
 DT = 0.1
 ON_STATE = np.array([1.5, -0.9]), np.array([0.2, -0.03])
@@ -99,6 +101,20 @@ def test_free_runs_choose_between_the_parameter_and_one_pooled_model():
     assert "a pooled one" in same.selection
 
 
+def test_what_grows_in_the_trained_range_is_passed_over(model, monkeypatch):
+    wide = replace(model, variation=replace(model.variation, high=3.3))
+    a = ON_STATE[0] + 3.3 * ON_STATE[1]
+    radius = np.abs(np.roots([1.0, *-a])).max()
+    # As the coefficients.
+    assert specs._largest_radius(wide) == pytest.approx(radius, abs=1e-7)
+    assert specs._largest_radius(model) < 1.0 < radius
+    largest = specs._largest_radius
+    monkeypatch.setattr(specs, "_largest_radius", lambda m: 1.0 if m.variation else largest(m))
+    spec = replace(SPEC, ridge="rollout", ridge_scale="per_snapshot", standardize=True)
+    runs = [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
+    assert spec.fit(runs, ["heave"], ["eta"]).settings.parameter == ""
+
+
 def test_words(model):
     run = vessel(0.7, 3)
     with pytest.raises(RequestError, match=r"does not state the parameter rig\.draught"):
@@ -107,6 +123,10 @@ def test_words(model):
         model.forecast(run.assign_attrs(rig={"draught": 1.2}), 5.0, 10)
     with pytest.raises(RequestError, match=r"model\.at\(parameter=…\)"):
         model.live()
+    with pytest.raises(RequestError, match=r"varies with rig\.draught\. Export it at a value"):
+        exportable(model)
+    at_centre = model.at(parameter=model.variation.centre).summary().splitlines()
+    assert model.summary().splitlines()[-2:] == at_centre[-2:]
     with pytest.raises(RequestError, match="does not vary with a parameter"):
         model.at(parameter=0.5).at(parameter=0.5)
     with pytest.raises(DataError, match=r"all runs have rig\.draught = 0\.7"):

@@ -12,7 +12,7 @@ from seakeep.campaign.settings import is_elevation
 from seakeep.signals.waves import paper_welch
 from seakeep.study import judge, read_study
 from seakeep.study.reproduce import ACTS, Size, study_text
-from seakeep.study.resolve import build_spec, can_align, resolve_model
+from seakeep.study.resolve import can_align, resolve_model
 
 pytest.importorskip("numba", reason="the campaign is the virtual tank's")
 
@@ -59,7 +59,7 @@ def through_fit(folder, preset):
         kind="bayesian_hankel_dmdc", preset=preset, states=single.states, inputs=single.inputs
     )
     aligned = can_align(campaign.settings, single.inputs)
-    specs = [build_spec(each, PERIOD, DT, aligned=aligned) for each in (single, several)]
+    specs = [resolve_model(each, PERIOD, DT, aligned=aligned).spec for each in (single, several)]
     return SimpleNamespace(campaign=campaign, specs=specs, study=None)
 
 

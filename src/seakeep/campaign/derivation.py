@@ -59,16 +59,17 @@ def derive(
 def _derived(dataset: Channels, name: str, settings: DerivedSettings, dt: float) -> xr.Variable:
     canonical = canonical_channel(name)
     label = f"the derived channel '{name}'"
+    source = {} if settings.source is None else dataset[settings.source].attrs
     if settings.expression is not None:
         expression = parse(settings.expression)
         values = expression.evaluate({n: dataset[n].to_numpy() for n in expression.channels})
         unit = settings.unit or (canonical.units if canonical else "-")
         origin = settings.expression
     else:
-        if settings.step in ("transfer", "remove_gravity", "complementary_filter"):
-            values, unit, origin = _body_step(dataset, name, settings, dt)
-        else:
-            values, unit, origin = _step(dataset[str(settings.source)], settings, dt)
+        values, unit, words = _step(dataset, name, settings, dt)
+        origin = f"{settings.source}, {words}"
+        if settings.step == "envelope_squared":
+            origin = f"squared envelope of {settings.source}"
         if settings.unit is not None:
             conversion(unit, settings.unit, label)
     target = canonical.units if canonical else si_unit(unit)
@@ -78,80 +79,74 @@ def _derived(dataset: Channels, name: str, settings: DerivedSettings, dt: float)
         "long_name": long_name_of(name, settings.long_name),
         "derived_from": origin,
     }
-    if settings.step in ("low_pass", "band_pass"):  # the same reading, in a band
-        source = dataset[str(settings.source)].attrs
-        attributes |= {key: source[key] for key in ("accuracy",) if key in source}
+    if settings.step in ("low_pass", "band_pass") and "accuracy" in source:
+        attributes["accuracy"] = source["accuracy"]  # the same reading, in a band
     return xr.Variable("time", values, attributes)
 
 
-def _step(source: xr.Variable, settings: DerivedSettings, dt: float) -> tuple[FloatArray, str, str]:
-    """Values, unit and description of a named step."""
-    series, unit, name = source.to_numpy(), source.attrs["units"], settings.source
-    if settings.step == "integrate":
-        times, band = settings.times or 1, settings.band or (0.0, 0.0)
-        described = f"{name}, integrated {times} time(s) in {band[0]:g} to {band[1]:g} Hz"
-        return integrate(series, dt, band, times), si_unit(f"({unit}) * s^{times}"), described
-    if settings.step == "differentiate":
-        return differentiate(series, dt), si_unit(f"({unit}) / s"), f"{name}, differentiated"
-    if settings.step == "band_pass":
-        band = settings.band or (0.0, 0.0)
-        return band_pass(series, dt, band), unit, f"{name}, {band[0]:g} to {band[1]:g} Hz"
-    if settings.step == "low_pass":
-        passband = settings.passband or 0.0
-        described = f"{name}, low-passed at {passband:g} Hz"
-        return low_pass(series, dt, passband, settings.stopband), unit, described
-    squared = envelope_squared(series, dt)
-    return squared, si_unit(f"({unit})^2"), f"squared envelope of {name}"
+def _step(
+    dataset: Channels, name: str, settings: DerivedSettings, dt: float
+) -> tuple[FloatArray, str, str]:
+    """Values and unit of a named step, and what it does to its source."""
+    source = dataset[str(settings.source)]
+    series, unit = source.to_numpy(), str(source.attrs["units"])
+    times, band = settings.times or 1, settings.band or (0.0, 0.0)
+    passband, crossover = settings.passband or 0.0, settings.crossover or 0.0
+    integrated = f"({unit}) * s^{times}"
+    match settings.step:
+        case "integrate":
+            words = f"integrated {times} time(s) in {band[0]:g} to {band[1]:g} Hz"
+            return integrate(series, dt, band, times), si_unit(integrated), words
+        case "differentiate":
+            return differentiate(series, dt), si_unit(f"({unit}) / s"), "differentiated"
+        case "band_pass":
+            return band_pass(series, dt, band), unit, f"{band[0]:g} to {band[1]:g} Hz"
+        case "low_pass":
+            low = low_pass(series, dt, passband, settings.stopband)
+            return low, unit, f"low-passed at {passband:g} Hz"
+        case "envelope_squared":
+            return envelope_squared(series, dt), si_unit(f"({unit})^2"), ""
+        case "complementary_filter":
+            slow = dataset[str(settings.position)].to_numpy()
+            both = complementary_filter(slow, series, dt, crossover, times)
+            words = f"integrated {times} time(s) above {crossover:g} Hz, {settings.position} below"
+            return both, si_unit(integrated), words
+        case _:
+            return _body_step(dataset, name, settings, series, unit)
 
 
 def _body_step(
-    dataset: Channels, name: str, settings: DerivedSettings, dt: float
+    dataset: Channels, name: str, settings: DerivedSettings, series: FloatArray, unit: str
 ) -> tuple[FloatArray, str, str]:
-    """Values, unit and description of a step that needs several channels."""
-    source = dataset[str(settings.source)]
-    series, unit = source.to_numpy(), str(source.attrs["units"])
-    if settings.step == "complementary_filter":
-        times, crossover = settings.times or 1, settings.crossover or 0.0
-        slow = dataset[str(settings.position)].to_numpy()
-        described = (
-            f"{settings.source}, integrated {times} time(s) above {crossover:g} Hz, "
-            f"{settings.position} below"
-        )
-        return (
-            complementary_filter(slow, series, dt, crossover, times),
-            si_unit(f"({unit}) * s^{times}"),
-            described,
-        )
+    """Result of a step that depends on how the body turns: the transfer, or gravity removed."""
     axis = _axis(name, settings)
     angles = _three(dataset)
     if settings.step == "remove_gravity":
-        measured = [name for name in TURNS if name in dataset]
-        described = f"{settings.source}, gravity removed by {', '.join(measured)}"
+        words = f"gravity removed by {', '.join(name for name in TURNS if name in dataset)}"
         if settings.components is not None:
             force = np.column_stack([dataset[each].to_numpy() for each in settings.components])
             moved = remove_gravity(force, angles, zeroed=bool(settings.zeroed))
-            return _afloat(moved[:, axis], axis), unit, described
+            return _afloat(moved[:, axis], axis), unit, words
         # One accelerometer alone: what gravity adds along its axis; that it turns is left out.
         felt = GRAVITY * rotation_matrix(angles)[:, 2, axis]
         at_rest = GRAVITY if settings.zeroed and axis == 2 else 0.0
-        return _afloat(series + at_rest - felt, axis), unit, described
+        return _afloat(series + at_rest - felt, axis), unit, words
     offset = settings.offset or (0.0, 0.0, 0.0)
-    described = f"{settings.source}, {offset} m from where it was measured"
     vector = np.zeros((series.size, 3))
     vector[:, axis] = series
     if unit == "m":
-        return transfer_position(vector, angles, offset)[:, axis], unit, described
-    rates = _three(dataset, "_rate")
-    if unit == "m/s":
-        return transfer_velocity(vector, angles, rates, offset)[:, axis], unit, described
-    if unit != "m/s^2":
+        moved = transfer_position(vector, angles, offset)
+    elif unit == "m/s":
+        moved = transfer_velocity(vector, angles, _three(dataset, "_rate"), offset)
+    elif unit == "m/s^2":
+        rates, turning = _three(dataset, "_rate"), _three(dataset, "_acceleration")
+        moved = transfer_acceleration(vector, angles, rates, turning, offset)
+    else:
         raise RequestError(
             f"'{settings.source}' is measured in '{unit}'; positions (m), velocities (m/s) and "
             "accelerations (m/s^2) are transferred. Choose another channel."
         )
-    turning = _three(dataset, "_acceleration")
-    moved = transfer_acceleration(vector, angles, rates, turning, offset)
-    return moved[:, axis], unit, described
+    return moved[:, axis], unit, f"{offset} m from where it was measured"
 
 
 def _afloat(acceleration: FloatArray, axis: int) -> FloatArray:

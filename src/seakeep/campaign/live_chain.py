@@ -21,7 +21,7 @@ from seakeep.campaign.pipeline import Logger, Run, cleaned, derived, mapped, res
 from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.conventions import conversion
 from seakeep.errors import RequestError, SeakeepError, did_you_mean
-from seakeep.files import load_sealed, write_sealed_array
+from seakeep.files import load_sealed, write_sealed
 
 STATE = "state of a live chain"
 """Kind of the files of :meth:`LiveChain.save`."""
@@ -118,7 +118,8 @@ class LiveChain:
         """
         rows = [values for table in self._rows.values() for values in table.values()]
         states = [self._columns(), self._origin, self._given, [len(values) for values in rows]]
-        return write_sealed_array(np.concatenate(rows), {"kept": json.dumps(states)}, path, STATE)
+        kept = xr.Dataset({"values": ("number", np.concatenate(rows))})
+        return write_sealed(kept.assign_attrs(kept=json.dumps(states)), path, STATE)
 
     def resume(self, path: str | Path) -> None:
         """Go on from a state that :meth:`save` wrote, as if the process had never stopped.

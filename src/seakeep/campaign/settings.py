@@ -275,9 +275,8 @@ class DerivedSettings(Table):
     def _one_way(self) -> DerivedSettings:
         if (self.expression is None) == (self.step is None):
             raise ValueError("a derived channel needs either 'expression', or 'from' and 'step'")
-        keys = {"times", "band", "passband", "stopband", "position", "crossover", "offset", "axis",
-                "components", "zeroed"}  # fmt: skip
-        given = {key for key in keys if getattr(self, key) is not None}
+        keys = {"position"}.union(*({needed, *others} for needed, others, _ in _STEPS.values()))
+        given = {key for key in keys - {""} if getattr(self, key) is not None}
         if self.step is None:
             if self.source is not None or given:
                 raise ValueError("'from' and the keys of steps do not go with 'expression'")

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Progress
@@ -146,15 +144,4 @@ def _fresh(campaign: Campaign, files: Mapping[str, Path]) -> Iterator[tuple[str,
             "campaign": campaign.name,
         }
         if all(run.attrs.get(key) == value for key, value in expected.items()):
-            parts: list[Any] = [run, *run.variables.values()]
-            for each in parts:
-                each.attrs = {k: _plain(v) for k, v in each.attrs.items() if k != "_FillValue"}
-                each.encoding = {}
             yield name, run
-
-
-def _plain(value: Any) -> Any:
-    """Turn an attribute, as NetCDF gives it, into what was written."""
-    if isinstance(value, np.ndarray):
-        return tuple(value.tolist())
-    return value.item() if isinstance(value, np.generic) else value

@@ -72,7 +72,7 @@ def export(
     _check_beside(
         steps is not None, onnx or follows, "--steps belongs to --onnx FILE, or --fmu --estimator"
     )
-    _check_beside(order is not None, mat, "--order belongs to --mat FILE")
+    _check_order(order, estimator, mat)
     _check_beside(estimator, c or fmu, "--estimator belongs to --c DIR or --fmu FILE")
     for path, suffix in ((fmu, ".fmu"), (onnx, ".onnx"), (mat, ".mat")):
         if path is not None:
@@ -80,7 +80,7 @@ def export(
     from seakeep.hosts import write_c, write_estimator, write_fmu, write_onnx
     from seakeep.hosts.program import exportable, timing
 
-    linear = exportable(_single(model, member))
+    linear = exportable(_single(model, member), estimator)
     written: list[Path] = []
     if c is not None:
         written += (write_estimator if estimator else write_c)(linear, c, model.stem)
@@ -90,7 +90,7 @@ def export(
         written.append(write_onnx(linear, onnx, steps or 1))
     if mat is not None:
         written.append(linear.to_mat(mat, order))
-    say(f"Wrote {', '.join(map(str, written))}.")
+    say(f"Wrote {', '.join(map(str, written))}.{_bound(mat, order)}")
     if fmu is not None:
         say(_binary(fmu))
     say(timing(linear, estimator and not onnx and not mat))
@@ -99,6 +99,29 @@ def export(
 def _check_beside(is_given: bool, target: Path | None, option: str) -> None:
     if is_given and target is None:
         raise RequestError(f"{option}. Leave it out, or give both.")
+
+
+def _check_order(order: int | None, estimator: bool, mat: Path | None) -> None:
+    _check_beside(order is not None, mat, "--order belongs to --mat FILE")
+    if estimator and order is not None:
+        raise RequestError(
+            "--order reduces the linear system of --mat; an estimator corrects measured states and "
+            "their delays, which a reduced system no longer holds. Leave out --order, or "
+            "--estimator."
+        )
+
+
+def _bound(mat: Path | None, order: int | None) -> str:
+    """How far a reduced system errs, as a sentence after another one."""
+    if mat is None or order is None:
+        return ""
+    from scipy.io import loadmat
+
+    bound = loadmat(mat, variable_names="ErrorBound")["ErrorBound"].item()
+    return (
+        f" The system of order {order} errs by {bound:.3g} SD of its outputs per SD of its inputs, "
+        "at most, at any frequency."
+    )
 
 
 def _single(file: Path, member: int | None) -> Model:

@@ -145,7 +145,7 @@ def forecast(
         write_forecast,
     )
     from seakeep.signals.time_axis import instant_text
-    from seakeep.study import forecast_at_full_scale, with_degrees
+    from seakeep.study import to_full_scale, with_degrees
     from seakeep.study.comparison import instant_of, samples_of
     from seakeep.study.fit import warn_of_waves
 
@@ -181,7 +181,7 @@ def forecast(
     scaled = ""
     if full_scale:
         scale = _scale(read)
-        result = forecast_at_full_scale(result, scale)
+        result = to_full_scale(result, scale)
         scaled = f" Times are at full scale (1:{scale:g}); --start and --steps at model scale."
     if degrees:
         result = with_degrees(result)

@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -35,33 +34,6 @@ QUIET_LAGS = 5
 """K of Politis & White: max(5, √log₁₀ T), which is five below 10²⁵ samples."""
 FEWEST_SAMPLES = 8
 """A shorter series has no block length: its quarter holds one sample."""
-
-
-@dataclass(frozen=True)
-class BlockChoice:
-    """A block length and the rule that chose it.
-
-    Attributes
-    ----------
-    samples : int
-        Length to use, between 1 and `cap`.
-    optimum : float
-        Length that the rule asks for, samples; infinite where the lag-one correlation is 1.
-    cap : int
-        Longest length allowed: a quarter of the series, or its shortest segment.
-    rule : str
-        Rule that was asked.
-    """
-
-    samples: int
-    optimum: float
-    cap: int
-    rule: BlockRule
-
-    @property
-    def capped(self) -> bool:
-        """Whether the rule asked for longer blocks than the series allows."""
-        return self.optimum > self.cap + 0.5
 
 
 def _as_segments(segments: Sequence[int] | None, samples: int) -> IntArray:
@@ -144,46 +116,6 @@ def _politis_white(x: FloatArray, segments: IntArray) -> float:
     return float(np.cbrt(2.0 * slope**2 / variance * n))
 
 
-def choose_block_length(
-    series: npt.ArrayLike,
-    rule: BlockRule = "carlstein",
-    *,
-    segments: Sequence[int] | None = None,
-) -> BlockChoice:
-    r"""Block length of a series with what the rule asked for; warns of nothing.
-
-    Parameters
-    ----------
-    series, rule, segments
-        As for :func:`block_length`.
-
-    Returns
-    -------
-    BlockChoice
-
-    Raises
-    ------
-    RequestError, DataError
-        As :func:`block_length`.
-    """
-    if rule not in RULES:
-        raise RequestError(
-            f"unknown rule '{rule}' of the block length.{did_you_mean(str(rule), RULES)} "
-            f"There are: {', '.join(RULES)}."
-        )
-    x = _varying(series)
-    pieces = _as_segments(segments, x.size)
-    cap = min(x.size // 4, int(pieces.min()))
-    if rule == "carlstein":
-        phi = abs(lag_one_correlation(x, segments))
-        odds = 2.0 * phi / ((1.0 - phi) * (1.0 + phi)) if phi < 1.0 else math.inf
-        optimum = float(odds ** (2.0 / 3.0) * np.cbrt(x.size))
-    else:
-        optimum = _politis_white(x, pieces)
-        cap = min(cap, math.ceil(min(3.0 * math.sqrt(x.size), x.size / 3.0)))
-    return BlockChoice(int(np.clip(round(min(optimum, cap)), 1, cap)), optimum, cap, rule)
-
-
 def block_length(
     series: npt.ArrayLike,
     rule: BlockRule = "carlstein",
@@ -233,19 +165,28 @@ def block_length(
     >>> block_length(x), block_length(x, "politis_white")
     (1, 1)
     """
-    choice = choose_block_length(series, rule, segments=segments)
-    if choice.capped:
-        warn(too_long(choice, np.size(series)))
-    return choice.samples
-
-
-def too_long(choice: BlockChoice, samples: int) -> str:
-    """Word the warning of a rule that asked for longer blocks than a series allows."""
-    return (
-        f"the rule '{choice.rule}' asks for blocks of {choice.optimum:.0f} samples; cut to "
-        f"{choice.cap}, the longest that a series of {samples} samples allows. So few blocks make "
-        "an interval too narrow: take a longer series."
-    )
+    if rule not in RULES:
+        raise RequestError(
+            f"unknown rule '{rule}' of the block length.{did_you_mean(str(rule), RULES)} "
+            f"There are: {', '.join(RULES)}."
+        )
+    x = _varying(series)
+    pieces = _as_segments(segments, x.size)
+    cap = min(x.size // 4, int(pieces.min()))
+    if rule == "carlstein":
+        phi = abs(lag_one_correlation(x, segments))
+        odds = 2.0 * phi / ((1.0 - phi) * (1.0 + phi)) if phi < 1.0 else math.inf
+        optimum = float(odds ** (2.0 / 3.0) * np.cbrt(x.size))
+    else:
+        optimum = _politis_white(x, pieces)
+        cap = min(cap, math.ceil(min(3.0 * math.sqrt(x.size), x.size / 3.0)))
+    if optimum > cap + 0.5:
+        warn(
+            f"the rule '{rule}' asks for blocks of {optimum:.0f} samples; cut to {cap}, the "
+            f"longest that a series of {x.size} samples allows. So few blocks make an interval too "
+            "narrow: take a longer series."
+        )
+    return int(np.clip(round(min(optimum, cap)), 1, cap))
 
 
 def resolve_block_length(
@@ -254,7 +195,7 @@ def resolve_block_length(
     """Return a block length as it is, or by the rule that it names."""
     if isinstance(block, str):
         return block_length(series, block, segments=segments)
-    return whole_number(block, "block_length")
+    return block
 
 
 def bootstrap_indices(

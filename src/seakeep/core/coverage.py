@@ -70,18 +70,15 @@ def coverage(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayLike
     (0.5, 0.25, 1.0)
     """
     low, high, m = _triple(lower, upper, measured)
-    plain = m.ndim == 1
     finite(m, "measured")
-    if plain:
-        low, high, m = low[:, None], high[:, None], m[:, None]
-    lost = (np.isnan(low) | np.isnan(high)).any(axis=-2)
-    below, above = (m < low).mean(axis=-2), (m > high).mean(axis=-2)
-    width = (high - low).mean(axis=-2)
-    spread = np.where(np.ptp(m, axis=-2) > 0, m.std(axis=-2, ddof=1), np.nan)
-    inside = ((m >= low) & (m <= high)).mean(axis=-2)
+    time = -min(m.ndim, 2)
+    lost = (np.isnan(low) | np.isnan(high)).any(axis=time)
+    below, above = (m < low).mean(axis=time), (m > high).mean(axis=time)
+    width = (high - low).mean(axis=time)
+    spread = np.where(np.ptp(m, axis=time) > 0, m.std(axis=time, ddof=1), np.nan)
+    inside = ((m >= low) & (m <= high)).mean(axis=time)
     results = (inside, below, above, width, width / spread)
-    masked = [np.where(lost, np.nan, item) for item in results]
-    return BandCoverage(*[item[..., 0] if plain else item for item in masked])
+    return BandCoverage(*(np.where(lost, np.nan, item) for item in results))
 
 
 @dataclass(frozen=True)
@@ -334,8 +331,6 @@ def box_statistics(values: npt.ArrayLike) -> BoxStatistics:
 
     Raises
     ------
-    RequestError
-        If `reach` is negative.
     DataError
         If no value is finite.
 

@@ -34,6 +34,8 @@ MOST_BINS = 2**21
 """Bins of a density, which fit into 16 MB; finer ones are summed directly."""
 
 Bandwidth = Literal["paper", "silverman"] | float
+FACTORS = {"paper": (1.06, 1.0), "silverman": (0.9, 1.34)}
+"""Factor of a rule, and divisor of its inter-quartile range."""
 
 BINS_PER_BANDWIDTH = 64
 """Linear binning then errs by at most 1/(8·64²) = 3.1e-5 of the peak of one kernel."""
@@ -86,38 +88,31 @@ def _as_grid(values: npt.ArrayLike) -> FloatArray:
     return grid
 
 
-def _bandwidths(x: FloatArray, bandwidth: Bandwidth) -> FloatArray:
-    # (series, time) → (series,); zero where a series is constant.
-    if isinstance(bandwidth, str):
-        if bandwidth not in ("paper", "silverman"):
-            raise RequestError(
-                f"unknown bandwidth '{bandwidth}'."
-                f"{did_you_mean(bandwidth, ('paper', 'silverman'))} "
-                "There are: paper, silverman, or a number in the unit of the series."
-            )
-        factor, scale = (1.06, 1.0) if bandwidth == "paper" else (0.9, 1.34)
+def _bandwidths(
+    x: FloatArray, bandwidth: Bandwidth, of_constant: float | FloatArray = 0.0
+) -> FloatArray:
+    """Bandwidth of each series (series, time); a constant one is refused, or has another's."""
+    if isinstance(bandwidth, str) and bandwidth in FACTORS:
+        factor, scale = FACTORS[bandwidth]
         spread = np.where(np.ptp(x, axis=-1) > 0, x.std(axis=-1, ddof=1), 0.0)
         upper, lower = np.quantile(x, [0.75, 0.25], axis=-1)
         inner = (upper - lower) / scale
         width = np.where(inner > 0, np.minimum(spread, inner), spread)
-        return np.asarray(factor * width * x.shape[-1] ** -0.2)
-    if not 0 < bandwidth < math.inf:
+        h = factor * width * x.shape[-1] ** -0.2
+        h = np.where(h > 0, h, of_constant)
+    elif not isinstance(bandwidth, str) and 0 < bandwidth < math.inf:
+        h = np.full(x.shape[0], float(bandwidth))
+    else:
         raise RequestError(
-            "a bandwidth must be 'paper', 'silverman' or a positive number; received "
-            f"{bandwidth!r:.60}."
+            "a bandwidth must be 'paper', 'silverman' or a positive number in the unit of the "
+            f"series; received {bandwidth!r:.60}.{did_you_mean(str(bandwidth), FACTORS)}"
         )
-    return np.full(x.shape[0], float(bandwidth))
-
-
-def _positive_bandwidths(x: FloatArray, bandwidth: Bandwidth) -> FloatArray:
-    h = _bandwidths(x, bandwidth)
-    if np.any(h <= 0):
-        where = int(np.argmax(h <= 0))
+    if not h.all():
         raise DataError(
-            f"the series is constant ({x[where, 0]:g}); it has no correlation, block length or "
-            "density. Leave the channel out."
+            f"the series is constant ({x[np.argmin(h), 0]:g}); it has no correlation, block length "
+            "or density. Leave the channel out."
         )
-    return h
+    return np.asarray(h)
 
 
 def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> float:
@@ -150,42 +145,34 @@ def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> f
     >>> round(kernel_bandwidth([0.0, 1.0, 2.0, 3.0, 4.0], "silverman"), 4)
     0.9736
     """
-    return float(_positive_bandwidths(as_series(series)[None], bandwidth)[0])
-
-
-def _bins(grid: FloatArray, h: float) -> tuple[int, int, int]:
-    # Bins between two grid points, beyond either end of the grid, and altogether.
-    step = (grid[-1] - grid[0]) / (grid.size - 1)
-    fine = math.ceil(min(step / h * BINS_PER_BANDWIDTH, MOST_BINS))
-    beyond = math.ceil(min(REACH * h * fine / step, MOST_BINS))
-    return fine, beyond, (grid.size - 1) * fine + 1 + 2 * beyond
-
-
-def _binned(x: FloatArray, grid: FloatArray, h: float) -> FloatArray:
-    # Share each sample between the two nearest of fine bins, then convolve with the kernel.
-    fine, beyond, bins = _bins(grid, h)
-    width = (grid[-1] - grid[0]) / ((grid.size - 1) * fine)
-    position = (x - grid[0]) / width + beyond
-    position = position[(position >= 0) & (position <= bins - 1)]
-    left = np.minimum(position.astype(np.intp), bins - 2)
-    share = position - left
-    size = int(fft.next_fast_len(bins, real=True))
-    counts = np.bincount(left, 1.0 - share, minlength=size)
-    counts += np.bincount(left + 1, share, minlength=size)
-    angular = 2.0 * np.pi * fft.rfftfreq(size, width)
-    smooth = fft.irfft(fft.rfft(counts) * np.exp(-0.5 * (h * angular) ** 2), n=size)
-    inner = smooth[beyond : beyond + (grid.size - 1) * fine + 1 : fine]
-    return np.asarray(np.maximum(inner, 0.0) / (x.size * width))
+    return float(_bandwidths(as_series(series)[None], bandwidth)[0])
 
 
 def _densities(x: FloatArray, grid: FloatArray, h: FloatArray) -> FloatArray:
-    even = np.allclose(np.diff(grid), (grid[-1] - grid[0]) / (grid.size - 1), rtol=1e-6, atol=0.0)
+    span, steps = grid[-1] - grid[0], grid.size - 1
+    even = np.allclose(np.diff(grid), span / steps, rtol=1e-6, atol=0.0)
     out = np.empty((x.shape[0], grid.size))
     for row, (values, width) in enumerate(zip(x, h, strict=True)):
-        if even and _bins(grid, float(width))[2] <= MOST_BINS:
-            out[row] = _binned(values, grid, float(width))
-        else:
+        # Bins between two grid points, beyond either end of the grid, and altogether.
+        fine = math.ceil(min(span / steps / width * BINS_PER_BANDWIDTH, MOST_BINS))
+        bin_width = span / (steps * fine)
+        beyond = math.ceil(min(REACH * width / bin_width, MOST_BINS))
+        bins = steps * fine + 1 + 2 * beyond
+        if not even or bins > MOST_BINS:
             out[row] = gaussian_kde(values, width / values.std(ddof=1))(grid)
+            continue
+        # Share each sample between the two nearest of fine bins, then convolve with the kernel.
+        position = (values - grid[0]) / bin_width + beyond
+        position = position[(position >= 0) & (position <= bins - 1)]
+        left = np.minimum(position.astype(np.intp), bins - 2)
+        share = position - left
+        size = int(fft.next_fast_len(bins, real=True))
+        counts = np.bincount(left, 1.0 - share, minlength=size)
+        counts += np.bincount(left + 1, share, minlength=size)
+        angular = 2.0 * np.pi * fft.rfftfreq(size, bin_width)
+        smooth = fft.irfft(fft.rfft(counts) * np.exp(-0.5 * (width * angular) ** 2), n=size)
+        inner = smooth[beyond : beyond + steps * fine + 1 : fine]
+        out[row] = np.maximum(inner, 0.0) / (values.size * bin_width)
     return out
 
 
@@ -231,7 +218,7 @@ def kernel_density(
     1.0
     """
     x, points = as_bundle(series, "the series"), _as_grid(grid)
-    out = _densities(x, points, _positive_bandwidths(x, bandwidth))
+    out = _densities(x, points, _bandwidths(x, bandwidth))
     return out[0] if np.ndim(series) == 1 else out
 
 
@@ -267,7 +254,7 @@ def density_grid(
     """
     whole_number(points, "points", 2)
     all_of_them = [as_bundle(item, "the series") for item in series]
-    widths = np.concatenate([_positive_bandwidths(x, bandwidth) for x in all_of_them])
+    widths = np.concatenate([_bandwidths(x, bandwidth) for x in all_of_them])
     low = float(min(map(np.min, all_of_them)) - margin * widths.max())
     high = float(max(map(np.max, all_of_them)) + margin * widths.max())
     narrow = float(widths.min())
@@ -304,10 +291,8 @@ def bootstrapped_densities(
     series: FloatArray, positions: IntArray, grid: FloatArray, bandwidth: Bandwidth
 ) -> FloatArray:
     """Densities of one series redrawn at the given positions."""
-    own = _positive_bandwidths(series[None], bandwidth)
-    drawn = series[positions]
-    h = _bandwidths(drawn, bandwidth)
-    return _densities(drawn, grid, np.where(h > 0, h, own))
+    drawn, own = series[positions], _bandwidths(series[None], bandwidth)
+    return _densities(drawn, grid, _bandwidths(drawn, bandwidth, own))
 
 
 def density_interval(

@@ -309,7 +309,9 @@ def _square_propagator(
     for _ in range(times):
         # Newest first: the second half of the steps stands above the first.
         output_input = tuple(
-            np.concatenate([_later(output_state @ own, first, K * q), _wider(first, K * q)])
+            np.concatenate(
+                [_later(output_state @ own, first, K * q), np.pad(first, [(0, 0), (K * q, 0)])]
+            )
             for own, first, q in zip(b, output_input, channels, strict=True)
         )
         output_state = np.concatenate([output_state @ a, output_state])
@@ -320,13 +322,9 @@ def _square_propagator(
 
 def _later(early: FloatArray, late: FloatArray, pad: int) -> FloatArray:
     """[late 0] + [0 early], apart by `pad` columns."""
-    out = _wider(early, pad)
+    out = np.pad(early, [(0, 0), (pad, 0)])
     out[:, : late.shape[1]] += late
     return out
-
-
-def _wider(values: FloatArray, pad: int) -> FloatArray:
-    return np.concatenate([np.zeros((len(values), pad)), values], axis=1)
 
 
 def _run(propagator: _Propagator, start: FloatArray, inputs: Arrays, steps: int) -> FloatArray:

@@ -44,7 +44,7 @@ def write_estimator(
     RequestError
         If the model cannot be exported, or a file is there that seakeep did not write.
     """
-    linear, name = exportable(model), identifier(name)
+    linear, name = exportable(model, follows=True), identifier(name)
     return write_sources(followed(linear, name, noise, roles), folder)
 
 

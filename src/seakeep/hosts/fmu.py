@@ -63,7 +63,7 @@ def write_fmu(model: Model, path: str | Path, ahead: int | None = None) -> Path:
     """
     target = Path(path)
     check_output(target, KIND)
-    linear, name = exportable(model), identifier(target.stem)
+    linear, name = exportable(model, ahead is not None), identifier(target.stem)
     files = sources(linear, name) if ahead is None else followed(linear, name)
     digest = hashlib.sha256("".join(files.values()).encode()).digest()
     content: dict[str, Any] = {

@@ -261,7 +261,7 @@ def _forcing(graph: _Graph, u: _Value, model: HankelDMDcModel, steps: int) -> _V
         groups.append(windows.reshape(steps, (z + 1) * n))
         parts.append(weights[:, : (z + 1) * n])
     if observed is not None and observed.slopes.size:
-        terms = [term for each in observed.bound if not each.delayed for term in each.terms]
+        terms = [term for each in observed.groups[1] for term in each.terms]
         values = np.concatenate(
             [_column(graph, term, u, now, steps, observed) for term in terms], axis=1
         )
@@ -278,7 +278,7 @@ def _with_delayed(observed: Observed | None, rows: _Value) -> _Value:
     """Inputs beside the columns that take the input delays."""
     columns = [rows]
     if observed is not None:
-        terms = [term for each in observed.bound if each.delayed for term in each.terms]
+        terms = [term for each in observed.groups[0] for term in each.terms]
         columns += [term.columns(rows, observed.limits) for term in terms]
     return np.concatenate(columns, axis=1)
 

@@ -15,13 +15,15 @@ from seakeep.models import HankelDMDcModel, Model, is_ensemble, labelled
 from seakeep.models.registry import is_linear
 
 
-def exportable(model: Model) -> HankelDMDcModel:
+def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
     """A model that hosts can run.
 
     Parameters
     ----------
     model : Model
         A single linear model.
+    follows : bool
+        Whether it is to follow a vessel, for which a model must keep its errors in training.
 
     Returns
     -------
@@ -34,6 +36,13 @@ def exportable(model: Model) -> HankelDMDcModel:
         If the model is an ensemble or another kind, is driven by waves that are carried to a
         measured surge, or has an observable that was added from outside.
     """
+    if follows and (is_ensemble(model) or (is_linear(model) and model.errors is None)):
+        raise RequestError(
+            "an estimator is one model and its errors in training, and an ensemble keeps those of "
+            "all its members together. Fit a single model of the same runs (kind = 'hankel_dmdc'; "
+            "a recommended ensemble is centred on it) and export that, or leave --estimator out "
+            "and export a member as a simulator: --member 0."
+        )
     if is_ensemble(model):
         raise RequestError(
             f"an ensemble of {model.n_members} members cannot be exported as one model. Export one "
@@ -43,6 +52,11 @@ def exportable(model: Model) -> HankelDMDcModel:
         raise RequestError(
             f"a model of kind '{model.kind}' cannot be exported; those of delayed states and "
             "inputs can: hankel_dmdc, arx, fir."
+        )
+    if model.variation is not None:
+        raise RequestError(
+            f"the model varies with {model.signature.parameter}. Export it at a value: in Python, "
+            "model.at(parameter=…)."
         )
     input_map = model.signature.input_map
     aligned, observed = input_map.alignment, input_map.observed
@@ -131,6 +145,6 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
                 f"{max(stop - at - 1, 0)} after it. Choose an instant further inside the run."
             )
         values = labelled.channel_matrix(run, names, name, slice(first, stop))
-        labelled.check_finite(values, names, name, first, time)
+        labelled.check_finite(values, names, run, name, first)
         rows.append(values)
     return rows[0], rows[1]

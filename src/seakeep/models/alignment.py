@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Self
+from functools import cache
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -170,15 +171,22 @@ class ProbeAlignment:
             )
         last = slice(None if window is None else -window, None)
         windows = {name: run.isel(time=last) for name, run in runs.items()}
-        depth = _common_depth(runs)
+        depth, dt = _common_depth(runs), labelled.run_step(first, first_name)
         celerity = None if self.celerity == "common" else self.celerity
         limit = None
         elevations = [channel for channel, yes in zip(inputs, carried, strict=True) if yes]
         if self.mode == "dispersion":
-            depth = depth_of(first, first_name, depth)
-            limit = float(
-                np.median([_band(run, name, elevations) for name, run in windows.items()])
-            )
+            if depth is None:
+                raise RequestError(
+                    f"alignment: mode = 'dispersion' needs the water depth and {first_name} has no "
+                    "attribute 'water_depth'. State water_depth (m, inf for deep water) in [rig], "
+                    "or set run.attrs['water_depth']."
+                )
+            limits = [
+                band_limit(labelled.sound_matrix(run, elevations, name), dt)
+                for name, run in windows.items()
+            ]
+            limit = float(np.median(limits))
         elif celerity is None:
             celerity = _celerity(runs, elevations, depth)
         return FittedAlignment(
@@ -221,6 +229,17 @@ class ProbeAlignment:
         return ""
 
 
+class Rig(NamedTuple):
+    """Distances by which inputs are carried, positions of their probes, and depth, m.
+
+    A position that is not stated is None, a depth NaN.
+    """
+
+    offsets: tuple[float, ...]
+    positions: tuple[float | None, ...]
+    depth: float
+
+
 @dataclass(frozen=True)
 class FittedAlignment:
     """A fitted alignment.
@@ -257,18 +276,13 @@ class FittedAlignment:
         every = enumerate(zip(self.carried, self.positions, strict=True))
         return tuple(column for column, (yes, at) in every if yes and at is not None)
 
-    @property
-    def reads_surge(self) -> bool:
-        """Whether the measured surge is read after the start."""
-        return self.settings.surge == "measured"
-
     def look_ahead(self, run: xr.Dataset) -> float:
         """Time that the slowest waves take over the constant distance they are carried upstream, s.
 
         A surge upstream reads nothing more: the record is continued by linear prediction there.
         """
-        places = zip(self.offsets(run), self.carried, strict=True)
-        farthest = min((float(distance) for distance, yes in places if yes), default=0.0)
+        places = zip(self.rig(run).offsets, self.carried, strict=True)
+        farthest = min(distance for distance, yes in places if yes)
         return max(0.0, -farthest) / self._speed(run)
 
     def celerity_of(self, run: xr.Dataset) -> float | None:
@@ -281,8 +295,7 @@ class FittedAlignment:
         if (celerity := self.celerity_of(run)) is not None:
             return celerity
         assert self.highest_frequency is not None
-        depth = depth_of(run, "the run", self.water_depth)
-        return float(group_speed(2 * np.pi * self.highest_frequency, depth))
+        return float(group_speed(2 * np.pi * self.highest_frequency, self.rig(run).depth))
 
     def notes(self, run: xr.Dataset) -> dict[str, str | float]:
         """Mode, surge, celerity, the run's probe offset, with measured surge ``conditional_on``."""
@@ -316,25 +329,25 @@ class FittedAlignment:
             )
         return lines
 
-    def offsets(self, run: xr.Dataset) -> FloatArray:
-        """Constant distance by which each input of a run is carried, m."""
-        own = float(run.attrs.get("probe_offset", 0.0))
-        out = np.full(len(self.inputs), self.settings.offset + own)
-        for column, channel in enumerate(self.inputs):
-            here, reference = run[channel].attrs.get("x_position"), self.positions[column]
-            if here is not None and reference is not None:
-                out[column] += reference - float(here)
-        return out
+    def rig(self, run: xr.Dataset | None = None) -> Rig:
+        """Offsets, positions and depth of a run; what it does not state is as in training."""
+        places, attrs, depth = self.positions, {}, self.water_depth
+        if run is not None:
+            stated = zip(
+                (_position(run, each) for each in self.inputs), self.positions, strict=True
+            )
+            places = tuple(trained if here is None else here for here, trained in stated)
+            attrs, depth = run.attrs, run.attrs.get("water_depth", depth)
+        offset = self.settings.offset + float(attrs.get("probe_offset", 0.0))
+        offsets = [
+            offset if trained is None or here is None else offset + (trained - here)
+            for here, trained in zip(places, self.positions, strict=True)
+        ]
+        return Rig(tuple(offsets), places, math.nan if depth is None else float(depth))
 
     def carries_in(self, run: xr.Dataset) -> bool:
         """Whether waves are carried at all in a run."""
-        return self.settings.carries or bool(np.any(self.offsets(run)))
-
-    def positions_in(self, run: xr.Dataset) -> tuple[float | None, ...]:
-        """Position of each input's probe in a run, m; that in training where it states none."""
-        positions = [_position(run, channel) for channel in self.inputs]
-        pairs = zip(positions, self.positions, strict=True)
-        return tuple(trained if here is None else here for here, trained in pairs)
+        return self.settings.carries or any(self.rig(run).offsets)
 
     def carry(self, run: xr.Dataset, spans: Sequence[Span]) -> FloatArray:
         """Inputs of a run, elevations carried to the vessel where spans read them.
@@ -346,64 +359,46 @@ class FittedAlignment:
         ndarray, shape (time, Q)
             Elevations are NaN where no span reads them.
         """
-        name, settings = labelled.run_name(run, "the run"), self.settings
+        name, settings, rig = labelled.run_name(run, "the run"), self.settings, self.rig(run)
         dt = labelled.run_step(run, name)
         last = max(span.stop for span in spans) + math.ceil(self.look_ahead(run) / dt)
         values = labelled.channel_matrix(run, self.inputs, name)[:last]
         surge, reach = np.zeros(len(values)), (0.0, 0.0)
-        if settings.surge != "none":
-            time = np.asarray(run["time"].values, dtype=float)
-            surge = labelled.channel_matrix(run, [settings.surge_channel], name)[:, 0]
-            every = []
-            for span in spans:  # read where it is allowed, and no further
-                every.append(surge[span.first : span.stop])
-                channel = [settings.surge_channel]
-                labelled.check_finite(every[-1][:, None], channel, name, span.first, time)
-            reach = float(np.min(np.concatenate(every))), float(np.max(np.concatenate(every)))
-        elevations, offsets = np.flatnonzero(self.carried), self.offsets(run)
+        if settings.surge != "none":  # read where it is allowed, and no further
+            channel = [settings.surge_channel]
+            surge = labelled.channel_matrix(run, channel, name)[:, 0]
+            for span in spans:
+                known = surge[span.first : span.stop, None]
+                labelled.check_finite(known, channel, run, name, span.first)
+            every = np.concatenate([surge[span.first : span.stop] for span in spans])
+            reach = float(every.min()), float(every.max())
+        elevations = np.flatnonzero(self.carried)
+
+        @cache
+        def carriers(begin: int, end: int) -> list[CarriedElevation]:
+            out = []
+            for column in elevations:
+                series, offset = values[begin:end, column], rig.offsets[column]
+                given = series, dt, (reach[0] + offset, reach[1] + offset)
+                if settings.mode == "effective":
+                    out.append(carry_by_celerity(*given, self._speed(run)))
+                else:
+                    out.append(carry_by_dispersion(*given, rig.depth, self.highest_frequency))
+            return out
+
         gaps = np.flatnonzero(~np.all(np.isfinite(values), axis=1))
-        by_pair: dict[tuple[int, int], list[CarriedElevation]] = {}
         out = values.copy()
         out[:, elevations] = np.nan
-        for first, stop in _merged(spans):
+        wanted = np.zeros(last + 2, dtype=bool)
+        for span in spans:
+            wanted[span.first + 1 : span.stop + 1] = True
+        for first, stop in np.flatnonzero(np.diff(wanted)).reshape(-1, 2).tolist():
             begin = int(max(gaps[gaps < first], default=-1)) + 1
             end = int(min(gaps[gaps >= stop], default=len(values)))
-            if (begin, end) not in by_pair:
-                by_pair[begin, end] = [
-                    self._carrier(run, values[begin:end, column], dt, reach, offsets[column])
-                    for column in elevations
-                ]
-            inside = slice(first - begin, stop - begin)
-            for column, carrier in zip(elevations, by_pair[begin, end], strict=True):
-                at = surge[first:stop] + offsets[column]
-                out[first:stop, column] = carrier.at(at, inside)[:, 0]
+            for column, carrier in zip(elevations, carriers(begin, end), strict=True):
+                at = surge[first:stop] + rig.offsets[column]
+                out[first:stop, column] = carrier.at(at, slice(first - begin, stop - begin))[:, 0]
         return out
-
-    def _carrier(
-        self,
-        run: xr.Dataset,
-        series: FloatArray,
-        dt: float,
-        reach: tuple[float, float],
-        offset: float,
-    ) -> CarriedElevation:
-        """An elevation that can be read at surge + offset."""
-        places = (reach[0] + offset, reach[1] + offset)
-        if self.settings.mode == "effective":
-            return carry_by_celerity(series, dt, places, self._speed(run))
-        depth = depth_of(run, labelled.run_name(run, "the run"), self.water_depth)
-        return carry_by_dispersion(series, dt, places, depth, self.highest_frequency)
-
-
-def _merged(spans: Sequence[Span]) -> list[tuple[int, int]]:
-    """Samples of spans as stretches that do not overlap."""
-    out: list[tuple[int, int]] = []
-    for first, _, stop in sorted(spans):
-        if out and first <= out[-1][1]:
-            out[-1] = (out[-1][0], max(out[-1][1], stop))
-        else:
-            out.append((first, stop))
-    return out
 
 
 def _elevations(
@@ -435,31 +430,9 @@ def _position(run: xr.Dataset, channel: str) -> float | None:
     return None if value is None else float(value)
 
 
-def depth_of(run: xr.Dataset, name: str, otherwise: float | None) -> float:
-    """Water depth of a run, m: its own, or another one where it states none."""
-    depth = run.attrs.get("water_depth", otherwise)
-    if depth is None:
-        raise RequestError(
-            f"alignment: mode = 'dispersion' needs the water depth and {name} has no attribute "
-            "'water_depth'. State water_depth (m, inf for deep water) in [rig], or set "
-            "run.attrs['water_depth']."
-        )
-    return float(depth)
-
-
 def _common_depth(runs: Mapping[str, xr.Dataset]) -> float | None:
     stated = [run.attrs["water_depth"] for run in runs.values() if "water_depth" in run.attrs]
     return float(stated[0]) if stated else None
-
-
-def _sound(run: xr.Dataset, name: str, channels: Sequence[str]) -> FloatArray:
-    values = labelled.channel_matrix(run, channels, name)
-    labelled.check_finite(values, channels, name, 0, np.asarray(run["time"].values, dtype=float))
-    return values
-
-
-def _band(run: xr.Dataset, name: str, elevations: Sequence[str]) -> float:
-    return band_limit(_sound(run, name, elevations), labelled.run_step(run, name))
 
 
 def _celerity(
@@ -481,7 +454,7 @@ def _celerity(
             )
         first, last = min(placed, key=placed.__getitem__), max(placed, key=placed.__getitem__)
         apart = placed[last] - placed[first]
-        values = _sound(run, name, [first, last])
+        values = labelled.sound_matrix(run, [first, last], name)
         try:
             celerity = effective_celerity(
                 values[:, 0], values[:, 1], labelled.run_step(run, name), apart, depth

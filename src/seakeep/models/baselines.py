@@ -145,17 +145,23 @@ class HoldLast(Constant):
 
 
 @dataclass(frozen=True)
-class LinearSpec(HankelSettings):
-    """A linear model of delayed states and inputs: it finds coefficients, the rest is common."""
+class Plain(HankelSettings):
+    """Settings with exact delay rows, of a model without truncation, read-outs and memory."""
 
     n_members: ClassVar[int] = 1
-    may_choose: ClassVar[bool] = True
-    opened: ClassVar[tuple[str, ...]] = ()
     delay_rows: DelayRows = field(default="exact", init=False, repr=False)
     rank: int | None = field(default=None, init=False, repr=False)
     readouts: ReadOuts = field(default=(), init=False, repr=False)
     stable: bool | float = field(default=False, init=False, repr=False)
     memory: int = field(default=0, init=False, repr=False)
+
+
+@dataclass(frozen=True)
+class LinearSpec(Plain):
+    """A linear model of delayed states and inputs: it finds coefficients, the rest is common."""
+
+    may_choose: ClassVar[bool] = True
+    opened: ClassVar[tuple[str, ...]] = ()
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
@@ -288,7 +294,7 @@ class FIR(LinearSpec):
 
 
 @dataclass(frozen=True)
-class Subspace(HankelSettings):
+class Subspace(Plain):
     r"""State-space model by subspace identification (N4SID).
 
     :math:`z_{j+1} = A z_j + B u_j`, :math:`x_{j+1} = C z_j + D u_j` with a latent state that is a
@@ -310,14 +316,8 @@ class Subspace(HankelSettings):
     """
 
     kind: ClassVar[str] = "subspace"
-    n_members: ClassVar[int] = 1
     ridge: float = 1e-3
-    delay_rows: DelayRows = field(default="exact", init=False, repr=False)
     ridge_scale: RidgeScale = field(default="per_snapshot", init=False, repr=False)
-    rank: int | None = field(default=None, init=False, repr=False)
-    readouts: ReadOuts = field(default=(), init=False, repr=False)
-    stable: bool | float = field(default=False, init=False, repr=False)
-    memory: int = field(default=0, init=False, repr=False)
     order: int | None = field(default=None, kw_only=True)
     future: int | None = None
 

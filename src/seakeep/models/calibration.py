@@ -187,7 +187,7 @@ def calibrate(
         del named[name], sources[name]
         for part, piece, source in _parts(ensemble, name, run):
             named[part], sources[part] = piece, source
-    judged = _judged(sources, named, steps, level, executor, progress)
+    judged = held_out(sources, named, steps, level, executor, progress)
     history = ensemble.signature.history_samples
     if not judged:
         ahead = max(ensemble.signature.lead_samples - 1, 0)
@@ -246,26 +246,27 @@ def learn_margin(
 
 
 def held_out(
-    ensemble: Ensemble,
+    ensembles: Mapping[str, Ensemble],
     runs: Mapping[str, xr.Dataset],
     steps: int,
     level: float,
     executor: Executor | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Judged]:
     """Forecasts of windows end to end, none of which a member has read, and the measurement.
 
     Parameters
     ----------
-    ensemble : Ensemble
-        The ensemble.
+    ensembles : mapping of str to Ensemble
+        What forecasts each run.
     runs : mapping of str to Dataset
         Runs, or parts of runs, under the names by which they trained.
     steps : int
         Instants of a window.
     level : float
         Probability between the bounds.
-    executor : Executor, optional
-        As in :meth:`HankelEnsemble.forecast`.
+    executor, progress : optional
+        As in :meth:`HankelEnsemble.forecast`; a step of progress is a member in one run.
 
     Returns
     -------
@@ -273,24 +274,13 @@ def held_out(
         Runs in which there is such a window.
     """
     level = fraction(level, "level")
-    return _judged(dict.fromkeys(runs, ensemble), runs, steps, level, executor)
-
-
-def _judged(
-    sources: Mapping[str, Ensemble],
-    runs: Mapping[str, xr.Dataset],
-    steps: int,
-    level: float,
-    executor: Executor | None,
-    progress: Progress | None = None,
-) -> dict[str, Judged]:
-    """Forecasts of the free windows of each run; a step of progress is a member in one run."""
-    free = {name: _free_samples(sources[name], name, run, steps) for name, run in runs.items()}
+    free = {name: _free_samples(ensembles[name], name, run, steps) for name, run in runs.items()}
     free = {name: places for name, places in free.items() if places}
     judged: dict[str, Judged] = {}
-    done, total = 0, sum(sources[name].n_members for name in free)
+    done, total = 0, sum(ensembles[name].n_members for name in free)
     for name, places in free.items():
-        ensemble, signature, run = sources[name], sources[name].signature, runs[name]
+        ensemble, run = ensembles[name], runs[name]
+        signature = ensemble.signature
         tell = None if progress is None else _counted(progress, done, total, name)
         done += ensemble.n_members
         time = np.asarray(run["time"].values, dtype=float)

@@ -127,6 +127,19 @@ class Dynamics:
     direct_scale: Scale
     follows: Following | None = None
 
+    @classmethod
+    def of(cls, coefficients: FloatArray, signature: Signature) -> Dynamics:
+        """Of coefficients, and what else a model knows."""
+        return cls(
+            coefficients,
+            signature.state_delays,
+            signature.input_delays,
+            signature.state_scale,
+            signature.input_scale,
+            signature.direct_scale,
+            signature.input_map.follows,
+        )
+
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Regressed rows of Â and B̂."""
@@ -396,7 +409,7 @@ class _Opened:
         values = self.read(signature.inputs, first, stop)
         for each in read:
             wanted = values[each.first - first : max(each.stop - first, 0)]
-            labelled.check_finite(wanted, signature.inputs, self.name, each.first, self.time)
+            labelled.check_finite(wanted, signature.inputs, self.run, self.name, each.first)
         surge = None
         if (follows := signature.input_map.follows) is not None:
             last = max(span.known for span in spans) + 1  # no later state is read
@@ -407,7 +420,7 @@ class _Opened:
         """States up to the start."""
         first = span.known + 1 - signature.state_samples
         states = self.read(signature.states, first, span.known + 1)
-        labelled.check_finite(states, signature.states, self.name, first, self.time)
+        labelled.check_finite(states, signature.states, self.run, self.name, first)
         return states
 
     def read(self, names: Sequence[str], first: int, stop: int) -> FloatArray:

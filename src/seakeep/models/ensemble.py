@@ -36,11 +36,11 @@ from seakeep.models.forecasts import (
     counted,
     forecast_notes,
     label_channels,
-    lost_instants,
     one_run,
+    outcome,
     outside,
+    status_text,
     statuses,
-    verdict,
     window_coords,
     with_units,
 )
@@ -210,9 +210,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         if self.identified:
             return self.identified[number]
         settings, data, solution = self._identified(number)
-        delays = settings.state_reach, settings.input_delays
-        scales = data.state_scale, data.input_scale, data.direct_scale
-        return Dynamics(solution.coefficients, *delays, *scales, data.input_map.follows)
+        return Dynamics.of(solution.coefficients, data.signature(settings))
 
     def member(self, number: int) -> HankelDMDcModel:
         """One member as a model of its own.
@@ -397,20 +395,7 @@ class HankelEnsemble(Forecaster, store.Saved):
         """
         windows = self.read_windows(*one_run(run, [start]), steps, ahead)
         with member_series(self, windows, executor, progress) as (series, lost):
-            values = np.array(series[:, 0])
-        variables = label_channels(self.signature, values, ("member", "time"))
-        variables["status"] = ("member", statuses(lost[:, 0], windows, 0, self.dt))
-        return xr.Dataset(
-            variables,
-            coords={
-                "member": np.arange(self.n_members),
-                "diverged_at": lost_instants(lost[:, 0], windows),
-                "time": windows.time[0],
-            },
-            attrs=self._notes(windows)
-            | verdict(lost, windows, self.dt, outside(self, run, windows, values))
-            | {"start": windows.places[0][1]},
-        )
+            return self._single(run, windows, np.array(series[:, 0]), lost, "member")
 
     def forecast_summary(
         self,
@@ -447,22 +432,39 @@ class HankelEnsemble(Forecaster, store.Saved):
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows, values, lost = self._reduced(
-            run, [start], steps, level, band, ahead, executor, progress
-        )
-        variables = label_channels(self.signature, values[0], ("statistic", "time"))
+        windows = self.read_windows(*one_run(run, [start]), steps, ahead)
+        values, lost = self._banded(windows, level, band, executor, progress)
+        forecast = self._single(run, windows, values[0], lost, "statistic")
+        forecast = forecast.assign_coords(statistic=self._statistics(level, band))
+        return forecast.assign_attrs(self._counts(level, band))
+
+    def _single(
+        self,
+        run: xr.Dataset,
+        windows: Windows,
+        values: FloatArray,
+        lost: npt.NDArray[np.int64],
+        dimension: str,
+    ) -> xr.Dataset:
+        """Dataset of one window: values of shape (members or statistics, steps, N)."""
+        variables = label_channels(self.signature, values, (dimension, "time"))
         variables["status"] = ("member", statuses(lost[:, 0], windows, 0, self.dt))
-        counts = {"start": windows.places[0][1]} | self._counts(level, band)
-        counts |= verdict(lost, windows, self.dt, outside(self, run, windows, values[0, 0]))
+        time, gone = windows.time[0], lost[:, 0]
+        words = {"units": "s", "long_name": "first instant at which the member is lost"}
+        facts = {
+            "diverged": int(np.count_nonzero(gone >= 0)),
+            "members": self.n_members,
+            **outside(self, run, windows, values if dimension == "member" else values[:1]),
+        }
+        status = status_text(facts | outcome(windows, 0), self.dt)
         return xr.Dataset(
             variables,
             coords={
-                "statistic": self._statistics(level, band),
                 "member": np.arange(self.n_members),
-                "diverged_at": lost_instants(lost[:, 0], windows),
-                "time": windows.time[0],
+                "diverged_at": ("member", np.where(gone >= 0, time.values[gone], np.nan), words),
+                "time": time,
             },
-            attrs=self._notes(windows) | counts,
+            attrs=self._notes(windows) | {"status": status, **facts, "start": windows.places[0][1]},
         )
 
     def forecast_windows(
@@ -538,9 +540,8 @@ class HankelEnsemble(Forecaster, store.Saved):
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows, values, lost = self._reduced(
-            run, starts, steps, level, band, ahead, executor, progress
-        )
+        windows = self.read_windows(*one_run(run, starts), steps, ahead)
+        values, lost = self._banded(windows, level, band, executor, progress)
         variables = label_channels(self.signature, values, ("window", "statistic", "lead"))
         variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
         coords = window_coords(windows, self.dt)
@@ -549,24 +550,20 @@ class HankelEnsemble(Forecaster, store.Saved):
             variables, coords=coords, attrs=self._notes(windows) | self._counts(level, band)
         )
 
-    def _reduced(
+    def _banded(
         self,
-        run: xr.Dataset,
-        starts: Sequence[float],
-        steps: int | None,
+        windows: Windows,
         level: float,
         band: Band,
-        ahead: str,
-        executor: Executor | None,
-        progress: Progress | None,
-    ) -> tuple[Windows, FloatArray, npt.NDArray[np.int64]]:
-        """Windows, statistics (window, 4, steps, N), and where members were lost."""
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Statistics (window, 4, steps, N) of all members, and where these were lost."""
         level = fraction(level, "level")
         check_band(self.calibration, level, band)
-        windows = self.read_windows(*one_run(run, starts), steps, ahead)
         with member_series(self, windows, executor, progress) as (series, lost):
             values = reduce_members(series, lost, level)
-        return windows, widened(self.calibration, values, band, self.signature, windows), lost
+        return widened(self.calibration, values, band, self.signature, windows), lost
 
     def _statistics(self, level: float, band: Band) -> xr.Variable:
         """Coordinate of the statistics, with what the bounds of a calibrated band are."""
@@ -596,9 +593,8 @@ class HankelEnsemble(Forecaster, store.Saved):
             exact delay rows, and s + 1 times as many with regressed ones.
         """
         numbers = range(len(self._taught))
-        return replace(
-            self, identified=tuple(in_order(_dynamics, self, numbers, executor, progress))
-        )
+        members = in_order(HankelEnsemble.dynamics, self, numbers, executor, progress)
+        return replace(self, identified=tuple(members))
 
     def forecast_arrays(
         self,
@@ -642,12 +638,8 @@ class HankelEnsemble(Forecaster, store.Saved):
         RequestError
             If a shape or name does not fit, or there is no such band.
         """
-        level = fraction(level, "level")
-        check_band(self.calibration, level, band)
         windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
-        with member_series(self, windows) as (series, lost):
-            values = reduce_members(series, lost, level)
-        values = widened(self.calibration, values, band, self.signature, windows)
+        values, lost = self._banded(windows, level, band)
         mean, std, lower, upper = values[0]
         return BandForecast(mean, std, lower, upper, int(np.count_nonzero(lost >= 0)))
 
@@ -885,10 +877,6 @@ class HankelEnsemble(Forecaster, store.Saved):
             selection=str(dataset.attrs["selection"]),
             centre=centre,
         )
-
-
-def _dynamics(ensemble: HankelEnsemble, number: int) -> Dynamics:
-    return ensemble.dynamics(number)
 
 
 def _spectral_radius(ensemble: HankelEnsemble, number: int) -> float:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 import xarray as xr
@@ -20,7 +20,7 @@ from seakeep.arrays import FloatArray, IntArray
 from seakeep.core.recursion import Place
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
-from seakeep.models.alignment import FittedAlignment, depth_of
+from seakeep.models.alignment import FittedAlignment, Rig
 from seakeep.models.labelled import ChannelLabel
 from seakeep.signals.carriers import carriers, mean_spectrum, position_taps
 from seakeep.waves import wavenumber
@@ -111,9 +111,8 @@ class Following:
             )
         records, surges = [], []
         for name, run in windows.items():
-            time = np.asarray(run["time"].values, dtype=float)
-            values = labelled.channel_matrix(run, [*names, alignment.settings.surge_channel], name)
-            labelled.check_finite(values, [*names, alignment.settings.surge_channel], name, 0, time)
+            channels = [*names, alignment.settings.surge_channel]
+            values = labelled.sound_matrix(run, channels, name)
             records.append(values[:, :-1])
             surges.append(values[:, -1])
         highest = alignment.highest_frequency
@@ -160,7 +159,7 @@ class Following:
         RequestError
             If the probes of the run stand beyond the reach of the carriers.
         """
-        rig = self._rig(run)
+        rig = self.alignment.rig(run)
         computed = _banks(self, rig)
         for bank in computed:
             if bank.errors[self._known].min() > REACH:
@@ -182,7 +181,7 @@ class Following:
         placed : tuple of int
             Elevations at stated positions, by their places among the inputs.
         """
-        rig, placed = self._rig(run), self._placed
+        rig, placed = self.alignment.rig(run), self._placed
         at = [rig.positions[column] or 0.0 for column in placed]
         leads = np.repeat(np.arange(1, count + 1), len(at))
         taps, _ = self._carriers(rig, placed, np.tile(at, count), 0, leads)
@@ -207,7 +206,7 @@ class Following:
         placed : tuple of int
             Probes that are read, by their places among the inputs.
         """
-        return _lines(self, self._rig(run), places)
+        return _lines(self, self.alignment.rig(run), places)
 
     @property
     def _placed(self) -> tuple[int, ...]:
@@ -230,20 +229,6 @@ class Following:
             leads=leads,
         )
 
-    def _rig(self, run: xr.Dataset | None) -> Rig:
-        """Offsets, positions and depth of a run; those of training without one."""
-        aligned, depth = self.alignment, self.alignment.water_depth
-        offsets, here = np.full(len(aligned.inputs), aligned.settings.offset), aligned.positions
-        if run is not None:
-            offsets, here = aligned.offsets(run), aligned.positions_in(run)
-            depth = depth_of(run, "the run", depth)
-        assert depth is not None
-        return Rig(tuple(offsets.tolist()), here, depth)
-
-    @property
-    def _trained(self) -> tuple[Bank, ...]:
-        return _banks(self, self._rig(None))
-
     @property
     def _known(self) -> slice:
         """Places of the grid that training reached."""
@@ -251,16 +236,21 @@ class Following:
         return slice(int(margin), self.place.count - int(margin))
 
     @cached_property
+    def errors(self) -> FloatArray:
+        """Largest error of a carrier at each place in the rig of training, per SD of the waves."""
+        banks = _banks(self, self.alignment.rig())
+        result: FloatArray = np.max([bank.errors for bank in banks], axis=0)
+        return result
+
+    @property
     def reach(self) -> tuple[float, float]:
         """Places between which every carrier errs less than ``REACH``, m."""
-        errors = np.max([bank.errors for bank in self._trained], axis=0)
-        sound = self.place.grid[errors <= REACH]
+        sound = self.place.grid[self.errors <= REACH]
         return (float(sound[0]), float(sound[-1])) if sound.size else (0.0, 0.0)
 
     def describe(self, dt: float) -> list[str]:
         """Lines of a summary."""
-        low, high = self.reach
-        known = np.max([bank.errors[self._known] for bank in self._trained], axis=0)
+        (low, high), known = self.reach, self.errors[self._known]
         return [
             f"  alignment     mode {self.alignment.settings.mode}; surge predicted, in each step",
             f"    carriers    {self.back * dt:.3g} s back and {self.ahead * dt:.3g} s ahead of all "
@@ -268,14 +258,6 @@ class Following:
             f"    reach       {low:.3g} to {high:.3g} m of slow surge, where they err less than "
             f"{REACH:g} SD",
         ]
-
-
-class Rig(NamedTuple):
-    """Distances by which inputs are carried, positions of their probes, and depth, m."""
-
-    offsets: tuple[float, ...]
-    positions: tuple[float | None, ...]
-    depth: float
 
 
 @lru_cache(maxsize=16)

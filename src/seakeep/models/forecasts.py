@@ -377,21 +377,6 @@ def statuses(lost: IntArray, windows: Windows, window: int, dt: float) -> npt.ND
     return np.array(texts, dtype=str)
 
 
-def lost_instants(lost: IntArray, windows: Windows) -> xr.Variable:
-    """Coordinate over ``member``: from when on each is lost in a single window, NaN for never."""
-    instants = np.where(lost >= 0, windows.time[0].values[lost], np.nan)
-    words = {"units": "s", "long_name": "first instant at which the member is lost"}
-    return xr.Variable(("member",), instants, words)
-
-
-def verdict(
-    lost: IntArray, windows: Windows, dt: float, facts: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Attributes of a single window: facts, and the number of members that were lost."""
-    facts = {"diverged": int(np.count_nonzero(lost >= 0)), "members": len(lost), **facts}
-    return {"status": status_text(facts | outcome(windows, 0), dt), **facts}
-
-
 def counted(number: int, thing: str) -> str:
     """A number and a word, in the plural where it must be."""
     return f"{number} {thing}{'' if number == 1 else 's'}"

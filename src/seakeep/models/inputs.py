@@ -65,13 +65,11 @@ class InputMap:
     @cached_property
     def _around(self) -> tuple[int, int, int]:
         """Samples that rows read: before those with delays, before those without, after both."""
-        bound = () if self.observed is None else self.observed.bound
-        direct = [each for each in bound if not each.delayed]
+        delayed, direct = ((), ()) if self.observed is None else self.observed.groups
         if self.follows is not None:
             back = max(self.follows.back, self.follows.place.taps.size - 1)
             ahead = self.follows.ahead
         else:
-            delayed = [each for each in bound if each.delayed]
             back = max((each.before for each in delayed), default=0)
             ahead = self.lead + max((each.ahead for each in delayed), default=0)
         before = max((each.before for each in direct), default=0)
@@ -109,10 +107,7 @@ class InputMap:
         self, inputs: tuple[ChannelLabel, ...]
     ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
         """Labels of the delayed and of the direct regressors made of these inputs."""
-        delayed: tuple[ChannelLabel, ...] = ()
-        direct: tuple[ChannelLabel, ...] = ()
-        if self.observed is not None:
-            delayed, direct = self.observed.labels
+        delayed, direct = ((), ()) if self.observed is None else self.observed.labels
         return inputs + delayed, direct + (SQUARED,) * (self.follows is not None)
 
     def reads(self, span: Span) -> Span:

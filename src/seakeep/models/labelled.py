@@ -194,14 +194,22 @@ def check_channels(run: xr.Dataset, names: Sequence[str], name: str) -> list[xr.
     return out
 
 
+def sound_matrix(run: xr.Dataset, names: Sequence[str], name: str) -> FloatArray:
+    """Channels of a run side by side; gaps raise a DataError."""
+    values = channel_matrix(run, names, name)
+    check_finite(values, names, run, name)
+    return values
+
+
 def check_finite(
-    values: FloatArray, names: Sequence[str], name: str, first: int, time: FloatArray
+    values: FloatArray, names: Sequence[str], run: xr.Dataset, name: str, first: int = 0
 ) -> None:
-    """Refuse gaps; `first` is the sample of the first row."""
+    """Refuse gaps in channels of a run; `first` is the sample of the first row."""
     bad = ~np.isfinite(values)
     if not bad.any():
         return
     row, column = (int(index) for index in np.argwhere(bad)[0])
+    time = run["time"].values.astype(float)
     instant = instant_text(time[first + row], _spacing(time))
     raise DataError(
         f"channel '{names[column]}' of {name} has {int(bad[:, column].sum())} missing or infinite "

@@ -256,21 +256,12 @@ class HankelDMDcModel(SingleModel, store.Saved):
     @cached_property
     def dynamics(self) -> Dynamics:
         """What a free run needs."""
-        signature = self.signature
         if self.variation is not None:
             raise RequestError(
-                f"the model varies with {signature.parameter}, whose value is not known here. Take "
-                "the model at a value: model.at(parameter=…)."
+                f"the model varies with {self.signature.parameter}, whose value is not known here. "
+                "Take the model at a value: model.at(parameter=…)."
             )
-        return Dynamics(
-            self.coefficients,
-            signature.state_delays,
-            signature.input_delays,
-            signature.state_scale,
-            signature.input_scale,
-            signature.direct_scale,
-            signature.input_map.follows,
-        )
+        return Dynamics.of(self.coefficients, self.signature)
 
     def aligned_inputs(self, run: xr.Dataset) -> xr.Dataset:
         """Inputs of a run as the model wants them: carried to the measured position.
@@ -298,8 +289,7 @@ class HankelDMDcModel(SingleModel, store.Saved):
         values = labelled.channel_matrix(run, self.inputs, name)
         alignment = self.alignment
         if alignment is not None and self.signature.input_map.follows is None:
-            time = np.asarray(run["time"].values, dtype=float)
-            labelled.check_finite(values, self.inputs, name, 0, time)
+            labelled.check_finite(values, self.inputs, run, name)
             span = Span(0, len(values) - 1, len(values))
             values = alignment.carry(run, [span])
         variables = {

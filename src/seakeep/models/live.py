@@ -34,7 +34,7 @@ from seakeep.arrays import (
 from seakeep.core.kalman import DelayFilter, process_noise
 from seakeep.core.recursion import read_table
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.files import load_sealed, write_sealed_array
+from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.checks import check_choice
@@ -46,7 +46,7 @@ from seakeep.models.inputs import Drive
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import Span
 from seakeep.models.summaries import statistic_coordinate
-from seakeep.models.validity import Conditions, Coverage
+from seakeep.models.validity import Conditions, Coverage, Validity
 from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
 
 STATE = "live state"
@@ -62,6 +62,8 @@ CONSISTENCY = 256
 lasts, at least, where it is that of free runs."""
 SPIKE = 100.0
 """What a single sample adds to the consistency at most: a spike tells of a sensor, for a while."""
+ALARM = 2.0
+"""Consistency of a state above which errors of late are no longer those of training."""
 SMALL = 0.5
 """Part of the training SD below which an error stays over the lead time."""
 RIG = ("water_depth", "celerity", "probe_offset")
@@ -291,11 +293,30 @@ class Live:
 
     @property
     def conditions(self) -> Conditions | None:
-        """Waves and mean surge of the record against the training; None before 4 samples."""
+        """Waves and mean surge of the record against the training; None before 4 samples.
+
+        Known and constant inputs are no waves, and are not judged.
+        """
         taken = self._count.taken
         if taken < 4 or not self.signature.inputs:
             return None
-        return self.model.coverage.conditions(self._known_inputs(), self.signature, self._surge)
+        return self.model.coverage.conditions(
+            self._known_inputs(), self.signature, self._surge, waves=self._waves
+        )
+
+    @property
+    def validity(self) -> Validity:
+        """What lies outside the training: waves, mean surge, or errors of late.
+
+        Errors do where :attr:`consistency_by_state` exceeds two for a state, one step ahead or in
+        free runs.
+        """
+        return self._validity(self.conditions)
+
+    def _validity(self, conditions: Conditions | None) -> Validity:
+        outside = Validity(0) if conditions is None else conditions.validity
+        alarm = bool(np.any(self.consistency_by_state > ALARM))
+        return outside | Validity.CONSISTENCY if alarm else outside
 
     @property
     def _surge(self) -> FloatArray | None:
@@ -625,8 +646,10 @@ class Live:
             known. Where waves are predicted, the mean tends to that of training as ``std`` comes
             near the SD there, so that no lead errs more than the mean. Where waves or mean surge of
             late lie outside the training, the errors are raised to those of late and by the square
-            of the height: ``attrs["validity"]`` names what does
-            (:class:`seakeep.models.validity.Validity`), beside the numbers and ``trained_`` ones.
+            of the height; where the consistency of a state exceeds two, its errors are raised by
+            it, and its lead time shrinks. ``attrs["validity"]`` names what lies outside
+            (:class:`seakeep.models.validity.Validity`), beside the numbers and ``trained_`` ones;
+            ``attrs["consistency"]`` is the larger one of each state, at least one.
             ``attrs["predictable"]`` is the time for which
             the waves at the probe farthest down-wave are known from the one farthest up-wave, s
             (:func:`seakeep.signals.prediction.predictable_time`); 0 without positions and depth.
@@ -649,9 +672,11 @@ class Live:
         windows = self._windows(count, futures)
         with engine.member_series(self.model, windows) as (values, lost):
             complete = values[lost.max(axis=1) < 0].reshape(-1, *values.shape[2:])
-        conditions, wider = self.conditions, np.ones(len(signature.states))
+        conditions, (late, free) = self.conditions, self.consistency_by_state
+        worst = np.fmax(np.fmax(late, free), 1.0)
+        wider = np.where(worst > ALARM, worst, 1.0)
         if conditions is not None and conditions.validity:
-            wider = np.fmax(conditions.beyond**2, np.fmax(self.consistency_by_state[1], 1.0))
+            wider = np.fmax(np.fmax(wider, free), conditions.beyond**2)
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(complete):
             spread = (
@@ -671,11 +696,12 @@ class Live:
             variables[label.name][2]["lead_time"] = int(samples) * signature.dt
         words = "the mean minus and plus a quantile times std"
         time = self._time + signature.dt * np.arange(1, count + 1)
-        attrs = {"start": self._time, "level": level, "known_input": known}
+        attrs: dict[str, Any] = {"start": self._time, "level": level, "known_input": known}
         attrs |= {"diverged": len(values) - len(complete) // values.shape[1]}
         attrs |= {"predictable": self._predictable()}
         if conditions is not None:
             attrs |= conditions.attrs()
+        attrs |= {"validity": self._validity(conditions).words, "consistency": worst}
         return xr.Dataset(
             variables,
             coords={
@@ -775,7 +801,7 @@ class Live:
         bits = np.packbits(values != 0)
         bits.resize(-4 * (-bits.size // 4))
         whole = np.concatenate([bits.view(np.uint32), values[values != 0]])
-        return write_sealed_array(whole, attrs, path, STATE)
+        return write_sealed(xr.Dataset({"values": ("number", whole)}, attrs=attrs), path, STATE)
 
     def _pending(self) -> list[_Update]:
         """Updates of the samples whose estimates are not final."""
@@ -942,7 +968,7 @@ def _places(
     if depth is None:
         return np.full(len(signature.inputs), math.nan), math.nan
     if alignment is not None:
-        return np.array(alignment.positions_in(rig), dtype=float), depth
+        return np.array(alignment.rig(rig).positions, dtype=float), depth
     places = [rig[name].attrs.get("x_position") for name in signature.inputs]
     return np.array(places, dtype=float), depth  # None becomes NaN
 

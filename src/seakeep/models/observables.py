@@ -151,7 +151,9 @@ def _column(inputs: Sequence[ChannelLabel], name: str, what: str) -> int:
     return names.index(name)
 
 
-def _numbers(value: Any, what: str, meant: str, low: float, high: float = math.inf) -> Any:
+def _numbers(
+    value: Any, what: str, meant: str, low: float, high: float = math.inf, whole: bool = False
+) -> tuple[Any, ...]:
     """Numbers in a list, each once and within bounds; one number is a list of it."""
     given = value if isinstance(value, Iterable) else (value,)
     numbers = tuple(each.item() if isinstance(each, np.generic) else each for each in given)
@@ -159,14 +161,11 @@ def _numbers(value: Any, what: str, meant: str, low: float, high: float = math.i
         check_number(what, number, meant, low, high)
     if not numbers or len(set(numbers)) < len(numbers):
         raise RequestError(f"{what} must be {meant}, each once; received {value!r:.{SHOWN}}.")
-    return numbers
-
-
-def _integers(value: Any, what: str, meant: str, low: int, high: int) -> tuple[int, ...]:
-    numbers = _numbers(value, what, meant, low, high + 1)
+    if not whole:
+        return numbers
     if strange := [each for each in numbers if each != int(each)]:
         raise RequestError(f"{what} must be {meant}; received {strange[0]!r}.")
-    return tuple(int(each) for each in numbers)
+    return tuple(map(int, numbers))
 
 
 def _inputs(value: Any, what: str) -> tuple[str, ...]:
@@ -218,7 +217,7 @@ class SlowSquares:
     kind: ClassVar[str] = "slow_squares"
 
     def __post_init__(self) -> None:
-        orders = _integers(self.orders, "slow_squares: orders", "0, 1 or 2", 0, 2)
+        orders = _numbers(self.orders, "slow_squares: orders", "0, 1 or 2", 0, 3, whole=True)
         lags = _numbers(self.lags, "slow_squares: lags", "encounter periods from 0", 0)
         for name, value in (
             ("of", _inputs(self.of, self.kind)),
@@ -299,7 +298,7 @@ class Powers:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "of", _inputs(self.of, self.kind))
-        powers = _integers(self.powers, "powers: powers", "integers from 2 to 5", 2, 5)
+        powers = _numbers(self.powers, "powers: powers", "integers from 2 to 5", 2, 6, whole=True)
         object.__setattr__(self, "powers", powers)
 
     def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
@@ -495,16 +494,21 @@ class Observed:
         return result
 
     @cached_property
+    def groups(self) -> tuple[tuple[Bound, ...], tuple[Bound, ...]]:
+        """The observables with the input delays, and those without."""
+        delayed = tuple(each for each in self.bound if each.delayed)
+        return delayed, tuple(each for each in self.bound if not each.delayed)
+
+    @cached_property
     def slopes(self) -> FloatArray:
         """Slope of each column without delays above the largest value of training."""
-        return np.array([b.slope for b in self.bound if not b.delayed for _ in b.labels])
+        return np.array([each.slope for each in self.groups[1] for _ in each.labels])
 
     @cached_property
     def labels(self) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
         """Labels of the columns with delays, and of those without."""
         delayed, direct = (
-            tuple(label for b in self.bound if b.delayed == wanted for label in b.labels)
-            for wanted in (True, False)
+            tuple(label for each in group for label in each.labels) for group in self.groups
         )
         return delayed, direct
 
@@ -512,19 +516,19 @@ class Observed:
     def stretch(self) -> tuple[FloatArray, FloatArray]:
         """Factors of the standard deviations that inputs and columns are divided by."""
         delayed, direct = (
-            [math.sqrt(b.stiffness) for b in self.bound if b.delayed == wanted for _ in b.labels]
-            for wanted in (True, False)
+            [math.sqrt(each.stiffness) for each in group for _ in each.labels]
+            for group in self.groups
         )
         return np.array([1.0] * len(self.inputs) + delayed), np.array(direct)
 
     def with_delayed(self, inputs: FloatArray) -> FloatArray:
         """Inputs, shape (time, Q), beside the columns that take the input delays."""
-        more = [bound.of(inputs, self.limits) for bound in self.bound if bound.delayed]
+        more = [each.of(inputs, self.limits) for each in self.groups[0]]
         return np.concatenate([inputs, *more], axis=1)
 
     def direct(self, inputs: FloatArray) -> FloatArray:
         """Columns that stand as they are, of inputs of shape (time, Q)."""
-        parts = [bound.of(inputs, self.limits) for bound in self.bound if not bound.delayed]
+        parts = [each.of(inputs, self.limits) for each in self.groups[1]]
         columns = np.concatenate([np.empty((len(inputs), 0)), *parts], axis=1)
         if self.tops:
             columns -= (1.0 - self.slopes) * np.maximum(columns - self.tops, 0.0)

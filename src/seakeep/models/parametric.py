@@ -238,7 +238,7 @@ def varying_then_pooled(
             taken,
             f"on {what} that are held out, a model that varies with {parameter} errs "
             f"{means[each]:.3f} ({each.ridge_text(float(each.ridge))}) and a pooled one "
-            f"{means[pooled]:.3f}, which is taken unless the other errs 5 % less and does not grow",
+            f"{means[pooled]:.3f}; pooled unless the other errs 5 % less and does not grow\n",
         )
         for taken, each in zip((*better, pooled), (*better, order[0]), strict=True)
     ]

@@ -1108,7 +1108,7 @@ def _alignments(
             continue  # no depth, no positions, or no surge among the states
         assert isinstance(fitted, FittedAlignment)
         if alignment.surge == "predicted" or any(
-            np.any(fitted.offsets(run)) for run in given[0].values()
+            any(fitted.rig(run).offsets) for run in given[0].values()
         ):
             alignments.append(alignment)
     alignments.append(None)

@@ -62,8 +62,8 @@ def periods_to_samples(periods: float, encounter_period: float, dt: float) -> in
     RequestError
         If period or step are not positive, or the step is as long as the period.
     """
-    check_seconds("encounter_period", encounter_period)
-    check_seconds("dt", dt)
+    for name, value in (("encounter_period", encounter_period), ("dt", dt)):
+        check_number(name, value, "a positive number of seconds", TINY)
     if dt >= encounter_period:
         raise RequestError(
             f"the time step dt = {dt:g} s is no shorter than the encounter period of "
@@ -128,30 +128,9 @@ def as_length(name: str, value: Any, least: int = 0, optional: bool = False) -> 
     return None if value is None else int(value)
 
 
-def check_seconds(name: str, value: object) -> None:
-    """Refuse a period or a step that is not a positive number."""
-    check_number(name, value, "a positive number of seconds", TINY)
-
-
-def check_ridge(value: object, may_choose: bool = False) -> None:
-    """Refuse a λ that is not a number, zero or positive, nor "rollout" where λ can be chosen."""
-    if may_choose and isinstance(value, str) and value == "rollout":
-        return
-    word = ", or the word rollout" * may_choose
-    hint = " The paper uses 100; 0 asks for the solution of least norm."
-    check_number("ridge", value, f"a number, zero or positive{word}", 0, hint=hint)
-
-
 STABLE_RADIUS = 0.999
 """Radius of ``stable=True``: a mode there decays to a third in a thousand steps, some thirty
 encounter periods."""
-
-
-def check_stable(value: object) -> None:
-    """Refuse what is neither true nor false nor a radius."""
-    if not isinstance(value, bool):
-        meant = "True, False or a radius above 0 and below 1, to which eigenvalues are clipped"
-        check_number("stable", value, meant, TINY, 1.0, f" True is {STABLE_RADIUS:g}.")
 
 
 Folds = Literal["auto", "run", "sea_state"]
@@ -271,7 +250,10 @@ class HankelSettings:
         check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))
         check_flag("standardize", self.standardize)
-        check_stable(self.stable)
+        if not isinstance(self.stable, bool):
+            meant = "True, False or a radius above 0 and below 1, to which eigenvalues are clipped"
+            hint = f" True is {STABLE_RADIUS:g}."
+            check_number("stable", self.stable, meant, TINY, 1.0, hint)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
         object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "readouts", readouts_of(self.readouts))
@@ -293,7 +275,10 @@ class HankelSettings:
         """A length or λ, checked; an ensemble takes priors too."""
         value = getattr(self, name)
         if name == "ridge":
-            check_ridge(value, self.may_choose)
+            if not (self.may_choose and isinstance(value, str) and value == "rollout"):
+                meant = "a number, zero or positive" + ", or the word rollout" * self.may_choose
+                hint = " The paper uses 100; 0 asks for the solution of least norm."
+                check_number(name, value, meant, 0, hint=hint)
             return value
         return as_length(name, value, self.lengths[name], name == "window")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Literal, Self, get_args
+from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, get_args
 
 import numpy as np
 import xarray as xr
@@ -58,8 +58,168 @@ STATED = "nothing: all is stated; seakeep tune finds the error without each obse
 """How the settings of a model were chosen that leave nothing open, where it has observables."""
 
 
+Fitted = TypeVar("Fitted", HankelDMDcModel, HankelEnsemble)
+
+
 @dataclass(frozen=True)
-class HankelDMDc(HankelSettings):
+class Choosing(HankelSettings, Generic[Fitted]):
+    """Settings of which free runs choose what is left open."""
+
+    role: ClassVar[Role] = "model"
+    may_choose: ClassVar[bool] = True
+    select: Select | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "select", Select.of(self.select))
+
+    @property
+    def is_open(self) -> bool:
+        """Whether something is left to be chosen by free runs."""
+        return isinstance(self.ridge, str) or self.select is not None
+
+    def central(self, dt: float) -> HankelDMDc:
+        """The single model at the middle of what is fitted."""
+        raise NotImplementedError
+
+    def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[Self]:
+        """These settings with what was chosen for :meth:`central`."""
+        raise NotImplementedError
+
+    def _variants(
+        self, settings: Self, runs: dict[str, xr.Dataset], states: list[str], inputs: list[str]
+    ) -> list[tuple[Self, str]]:
+        """Settings to fit until a model does not grow, each with words on its choice."""
+        return [(settings, "")]
+
+    def _fitted(
+        self,
+        runs: dict[str, xr.Dataset],
+        states: list[str],
+        inputs: list[str],
+        readouts: tuple[FittedReadOut, ...],
+    ) -> Fitted:
+        """What settings that leave nothing to be chosen give of runs cut where training ends."""
+        raise NotImplementedError
+
+    def settled(
+        self,
+        runs: Runs,
+        states: Sequence[str],
+        inputs: Sequence[str],
+        stop: Stop = None,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+    ) -> Selected[Self]:
+        """Choose by free runs what the settings leave to be chosen; nothing is fitted.
+
+        Parameters
+        ----------
+        runs, states, inputs, stop
+            As in :meth:`fit`.
+        executor : concurrent.futures.Executor, optional
+            Works on several candidates side by side; the result is the same.
+        progress : callable, optional
+            Called as ``progress(done, total, what)``.
+
+        Returns
+        -------
+        Selected
+            ``settings``, complete; ``rows``, what was tried; ``describe()``.
+
+        Raises
+        ------
+        RequestError, DataError
+            As :meth:`fit`.
+        """
+        named = until(as_runs(runs), stop)
+        check_names(states, inputs)
+        channels = list(states), list(inputs)
+        spec = self.resolved_in(named, inputs)
+        central = spec.central(labelled.common_step(named))
+        choice = settle(
+            central, central.select, named, *channels, executor=executor, progress=progress
+        )
+        return spec._adopt(choice)
+
+    def fit(
+        self,
+        runs: Runs,
+        states: Sequence[str],
+        inputs: Sequence[str],
+        stop: Stop = None,
+        *,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+        selected: Selected[HankelDMDc] | None = None,
+    ) -> Fitted:
+        """Identify a model; the settings are not changed by it.
+
+        Parameters
+        ----------
+        runs : Dataset, sequence of Dataset, or mapping of names to Datasets
+            Runs with the dimension ``time`` (s, uniform, the same step in all) and one variable
+            per channel. Several are pooled.
+        states : sequence of str
+            Channels to forecast.
+        inputs : sequence of str
+            Channels that drive them; may be empty (autonomous Hankel DMD).
+        stop : float, sequence or mapping of float, optional
+            Last instant of the training window, s; one for all runs, or one per run. By default
+            each run's end.
+        executor, progress
+            As in :meth:`settled`, where something is to be chosen.
+        selected : Selected, optional
+            What the settled :meth:`central` found in these runs, so that it is not looked for
+            again.
+
+        Returns
+        -------
+        HankelDMDcModel
+            The model, immutable; its ``settings`` are complete.
+
+        Raises
+        ------
+        RequestError
+            If a channel is unknown, or `stop` lies outside a run.
+        DataError
+            If a run is too short, has gaps or times that are not uniform, another step than the
+            first, or a constant channel while ``standardize`` is set; if the model that was chosen
+            grows.
+        """
+        named = until(as_runs(runs), stop)
+        check_names(states, inputs)
+        states, inputs = list(states), list(inputs)
+        spec = self.resolved_in(named, inputs)
+        if not self.is_open:
+            readouts: tuple[FittedReadOut, ...] = ()
+            if self.readouts:
+                central = spec.central(labelled.common_step(named))
+                readouts = readouts_for(central, named, states, inputs)
+            choice = Selected(spec, (), STATED if self.observables else "", readouts)
+        elif selected is not None:
+            choice = spec._adopt(selected)
+        else:
+            choice = spec.settled(named, states, inputs, executor=executor, progress=progress)
+        if not self.is_open:
+            model = choice.settings._fitted(named, states, inputs, choice.readouts)
+            return replace(model, selection=choice.describe())
+        for settings, words in self._variants(choice.settings, named, states, inputs):
+            model = settings._fitted(named, states, inputs, choice.readouts)
+            radius = _largest_radius(model) if isinstance(model, HankelDMDcModel) else 0.0
+            if radius < 1.0:
+                return replace(model, selection=words + choice.describe())
+        raise DataError(
+            f"the model that was chosen grows: its spectral radius is {radius:.6f} at "
+            f"{settings.ridge_text(float(settings.ridge))}. Look for transients at the ends of the "
+            "training runs, use fewer state delays, clip eigenvalues (stable=True), or state the "
+            "ridge to have it as it is."
+        )
+
+
+@dataclass(frozen=True)
+class HankelDMDc(Choosing[HankelDMDcModel]):
     r"""Settings of a Hankel dynamic mode decomposition with control.
 
     The model is :math:`\hat x_{j+1} = \hat A \hat x_j + \hat B \hat u_j` with
@@ -149,15 +309,11 @@ class HankelDMDc(HankelSettings):
     """
 
     kind: ClassVar[str] = "hankel_dmdc"
-    role: ClassVar[Role] = "model"
     n_members: ClassVar[int] = 1
-    may_choose: ClassVar[bool] = True
-    select: Select | None = None
     parameter: str = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "select", Select.of(self.select))
         if self.parameter and (
             self.delay_rows != "exact" or self.rank is not None or self.stable is not False
         ):
@@ -270,141 +426,44 @@ class HankelDMDc(HankelSettings):
         """Itself: the single model at the middle of what is fitted."""
         return self
 
-    def settled(
-        self,
-        runs: Runs,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        stop: Stop = None,
-        *,
-        executor: Executor | None = None,
-        progress: Progress | None = None,
-    ) -> Selected[HankelDMDc]:
-        """Choose by free runs what the settings leave to be chosen; nothing is fitted.
-
-        Parameters
-        ----------
-        runs, states, inputs, stop
-            As in :meth:`fit`.
-        executor : concurrent.futures.Executor, optional
-            Works on several candidates side by side; the result is the same.
-        progress : callable, optional
-            Called as ``progress(done, total, what)``.
-
-        Returns
-        -------
-        Selected
-            ``settings``, complete; ``rows``, what was tried; ``describe()``.
-
-        Raises
-        ------
-        RequestError, DataError
-            As :meth:`fit`.
-        """
-        check_names(states, inputs)
-        named = until(as_runs(runs), stop)
-        channels = list(states), list(inputs)
-        spec = self.resolved_in(named, inputs)
-        choice = settle(spec, self.select, named, *channels, executor=executor, progress=progress)
+    def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[HankelDMDc]:
         return replace(choice, settings=replace(choice.settings, select=None))
 
-    def fit(
+    def _variants(
         self,
-        runs: Runs,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        stop: Stop = None,
-        *,
-        executor: Executor | None = None,
-        progress: Progress | None = None,
-        selected: Selected[HankelDMDc] | None = None,
-    ) -> HankelDMDcModel:
-        """Identify a model; the settings are not changed by it.
-
-        Parameters
-        ----------
-        runs : Dataset, sequence of Dataset, or mapping of names to Datasets
-            Runs with the dimension ``time`` (s, uniform, the same step in all) and one variable
-            per channel. Several are pooled.
-        states : sequence of str
-            Channels to forecast.
-        inputs : sequence of str
-            Channels that drive them; may be empty (autonomous Hankel DMD).
-        stop : float, sequence or mapping of float, optional
-            Last instant of the training window, s; one for all runs, or one per run. By default
-            each run's end.
-        executor, progress
-            As in :meth:`settled`, where something is to be chosen.
-        selected : Selected, optional
-            What :meth:`settled` found in these runs, so that it is not looked for again.
-
-        Returns
-        -------
-        HankelDMDcModel
-            The model, immutable; its ``settings`` are complete.
-
-        Raises
-        ------
-        RequestError
-            If a channel is unknown, or `stop` lies outside a run.
-        DataError
-            If a run is too short, has gaps or times that are not uniform, another step than the
-            first, or a constant channel while ``standardize`` is set; if the model that was chosen
-            grows.
-        """
-        named = as_runs(runs)
-        if left_open(self):
-            choice = selected or self.settled(
-                named, states, inputs, stop, executor=executor, progress=progress
-            )
-            tried = [(choice.settings, "")]
-            if self.parameter:
-                parts = SMALLER if isinstance(self.ridge, str) else (1.0,)
-                ridge = float(choice.settings.ridge)
-                tried = varying_then_pooled(
-                    lambda spec, runs: spec._fitted(runs, states, inputs, None, ()),
-                    replace(choice.settings, parameter=""),
-                    [replace(choice.settings, ridge=part * ridge) for part in parts],
-                    until(named, stop),
-                    inputs,
-                )
-            for settings, words in tried:
-                model = settings._fitted(named, states, inputs, stop, choice.readouts)
-                if (radius := _largest_radius(model)) < 1.0:
-                    return replace(model, selection=f"{words}\n{choice.describe()}".lstrip())
-            raise DataError(
-                f"the model that was chosen grows: its spectral radius is {radius:.6f} at "
-                f"{settings.ridge_text(float(settings.ridge))}. Look for transients at the ends of "
-                "the training runs, use fewer state delays, clip eigenvalues (stable=True), or "
-                "state the ridge to have it as it is."
-            )
-        spec = self.resolved_in(named, inputs)
-        readouts: tuple[FittedReadOut, ...] = ()
-        if self.readouts:
-            check_names(states, inputs)
-            readouts = readouts_for(spec, until(named, stop), list(states), list(inputs))
-        model = spec._fitted(named, states, inputs, stop, readouts)
-        return replace(model, selection=STATED if self.observables else "")
+        settings: HankelDMDc,
+        runs: dict[str, xr.Dataset],
+        states: list[str],
+        inputs: list[str],
+    ) -> list[tuple[HankelDMDc, str]]:
+        if not self.parameter:
+            return [(settings, "")]
+        parts = SMALLER if isinstance(self.ridge, str) else (1.0,)
+        return varying_then_pooled(
+            lambda spec, runs: spec._fitted(runs, states, inputs, ()),
+            replace(settings, parameter=""),
+            [replace(settings, ridge=part * float(settings.ridge)) for part in parts],
+            runs,
+            inputs,
+        )
 
     def _fitted(
         self,
-        named: dict[str, xr.Dataset],
-        states: Sequence[str],
-        inputs: Sequence[str],
-        stop: Stop,
+        runs: dict[str, xr.Dataset],
+        states: list[str],
+        inputs: list[str],
         readouts: tuple[FittedReadOut, ...],
     ) -> HankelDMDcModel:
-        """The model of settings that leave nothing to be chosen."""
-        data = gather(named, states, inputs, stop, self)
+        data = gather(runs, states, inputs, None, self)
         if self.parameter:
-            values = [parameter_of(run, self.parameter, name) for name, run in named.items()]
+            values = [parameter_of(run, self.parameter, name) for name, run in runs.items()]
             solution, data, variation = regress_varying(data, self, self.parameter, values)
             signature = replace(data.signature(self), readouts=readouts, parameter=self.parameter)
-            model = HankelDMDcModel.fitted(self, data, signature, solution, named)
+            model = HankelDMDcModel.fitted(self, data, signature, solution, runs)
             return replace(model, variation=variation)
         solution = data.regress(self, self.state_delays, all_rows=self.delay_rows == "ridge")
         signature = replace(data.signature(self), readouts=readouts)
-        return HankelDMDcModel.fitted(self, data, signature, solution, named)
+        return HankelDMDcModel.fitted(self, data, signature, solution, runs)
 
 
 def _largest_radius(model: HankelDMDcModel) -> float:
@@ -423,7 +482,7 @@ training (docs/howto/bands.md)."""
 
 
 @dataclass(frozen=True)
-class BayesianHankelDMDc(HankelSettings):
+class BayesianHankelDMDc(Choosing[HankelEnsemble]):
     r"""Settings of a Bayesian ensemble of Hankel models (paper, section UQ through ensembling).
 
     The settings are those of :class:`HankelDMDc`; window, delays and ridge may be priors. These are
@@ -482,9 +541,7 @@ class BayesianHankelDMDc(HankelSettings):
     """
 
     kind: ClassVar[str] = "bayesian_hankel_dmdc"
-    role: ClassVar[Role] = "model"
     is_ensemble: ClassVar[bool] = True
-    may_choose: ClassVar[bool] = True
     state_delays: Prior | int  # type: ignore[assignment]
     input_delays: Prior | int  # type: ignore[assignment]
     ridge: Prior | float | Literal["rollout"]  # type: ignore[assignment]
@@ -496,7 +553,6 @@ class BayesianHankelDMDc(HankelSettings):
     train_on: TrainOn = "all"
     centred: bool = False
     dt: float | None = None
-    select: Select | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -507,7 +563,6 @@ class BayesianHankelDMDc(HankelSettings):
         check_choice("sampling", self.sampling, ("monte_carlo", "sobol"))
         check_choice("train_on", self.train_on, get_args(TrainOn))
         check_flag("centred", self.centred)
-        object.__setattr__(self, "select", Select.of(self.select))
         if isinstance(seed := self.seed, np.random.Generator):
             object.__setattr__(self, "seed", int(seed.integers(2**63)))
         _seed_sequence(self.seed)
@@ -661,39 +716,6 @@ class BayesianHankelDMDc(HankelSettings):
             select=Select(True, True, True, True, period=encounter_period),
         )
 
-    def settled(
-        self,
-        runs: Runs,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        stop: Stop = None,
-        *,
-        executor: Executor | None = None,
-        progress: Progress | None = None,
-    ) -> Selected[BayesianHankelDMDc]:
-        """Choose what is left to be chosen, at the medians of the priors; see HankelDMDc.settled.
-
-        Parameters
-        ----------
-        runs, states, inputs, stop, executor, progress
-            As in :meth:`HankelDMDc.settled`.
-
-        Returns
-        -------
-        Selected
-            ``settings``, with a prior for λ.
-
-        Raises
-        ------
-        RequestError, DataError
-            As :meth:`HankelDMDc.fit`.
-        """
-        named = as_runs(runs)
-        central = self.resolved_in(named, inputs).central(labelled.common_step(named))
-        return self._adopt(
-            central.settled(runs, states, inputs, stop, executor=executor, progress=progress)
-        )
-
     def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[BayesianHankelDMDc]:
         """Priors around what :meth:`central` found."""
         ridge, scale = self.ridge, self.ridge_scale
@@ -708,56 +730,6 @@ class BayesianHankelDMDc(HankelSettings):
             select=None,
         )
         return Selected(spec, choice.rows, choice.note, choice.readouts)
-
-    def fit(
-        self,
-        runs: Runs,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        stop: Stop = None,
-        *,
-        executor: Executor | None = None,
-        progress: Progress | None = None,
-        selected: Selected[HankelDMDc] | None = None,
-    ) -> HankelEnsemble:
-        """Draw the members and gather what they learn from; their matrices are made on demand.
-
-        Parameters
-        ----------
-        runs, states, inputs, stop, executor, progress
-            As in :meth:`HankelDMDc.fit`.
-        selected : Selected, optional
-            What the settled :meth:`central` found in these runs, so that it is not looked for
-            again.
-
-        Returns
-        -------
-        HankelEnsemble
-            The ensemble, immutable. The same settings give the same draws for every training
-            window that all of them fit into.
-
-        Raises
-        ------
-        RequestError, DataError
-            As :meth:`HankelDMDc.fit`; DataError too if no draw fits the runs.
-        """
-        named = as_runs(runs)
-        check_names(states, inputs)
-        spec = self.resolved_in(named, inputs)
-        if left_open(spec):
-            choice = (
-                spec.settled(named, states, inputs, stop, executor=executor, progress=progress)
-                if selected is None
-                else spec._adopt(selected)
-            )
-            ensemble = choice.settings._drawn(named, states, inputs, stop, choice.readouts)
-            return replace(ensemble, selection=choice.describe())
-        readouts: tuple[FittedReadOut, ...] = ()
-        if spec.readouts:
-            central = spec.central(labelled.common_step(named))
-            readouts = readouts_for(central, until(named, stop), list(states), list(inputs))
-        ensemble = spec._drawn(named, states, inputs, stop, readouts)
-        return replace(ensemble, selection=STATED if self.observables else "")
 
     def resolved_in(self, runs: dict[str, xr.Dataset], inputs: Sequence[str]) -> Self:
         """Settings with the encounter period of some runs, where it counts and none is stated."""
@@ -776,31 +748,27 @@ class BayesianHankelDMDc(HankelSettings):
             return replace(self, train_on="all")
         return replace(self, train_on="windows", window=self.window or WINDOW)
 
-    def _drawn(
+    def _fitted(
         self,
-        named: dict[str, xr.Dataset],
-        states: Sequence[str],
-        inputs: Sequence[str],
-        stop: Stop,
+        runs: dict[str, xr.Dataset],
+        states: list[str],
+        inputs: list[str],
         readouts: tuple[FittedReadOut, ...],
     ) -> HankelEnsemble:
-        """The ensemble of settings that leave nothing to be chosen."""
-        dt = labelled.common_step(named)
-        named = until(named, stop)
+        dt = labelled.common_step(runs)
         shared = self.shared(dt)
-        labels = labelled.common_labels(named, states), labelled.common_labels(named, inputs)
-        states, inputs = list(states), list(inputs)
-        input_map = shared.input_map(named, states, inputs, None)
-        samples = [run.sizes["time"] for run in named.values()]
-        spec = self._taught_by(named.values(), min(samples) * dt)
+        labels = labelled.common_labels(runs, states), labelled.common_labels(runs, inputs)
+        input_map = shared.input_map(runs, states, inputs, None)
+        samples = [run.sizes["time"] for run in runs.values()]
+        spec = self._taught_by(runs.values(), min(samples) * dt)
         members, centre = draw_members(spec, dt, samples, input_map), spec.centre(dt)
         every = members if centre is None else [*members, centre]
         reads = [
             (min(draw.first(run, count, input_map) for draw in every), count)
             for run, count in enumerate(samples)
         ]
-        arrays = TrainingArrays.read(named, states, inputs, reads, input_map)
-        parts = zip(named.items(), reads, strict=True)
+        arrays = TrainingArrays.read(runs, states, inputs, reads, input_map)
+        parts = zip(runs.items(), reads, strict=True)
         trained = [
             labelled.channel_matrix(run, inputs, name, slice(*read))
             for (name, run), read in parts
@@ -841,9 +809,7 @@ class BayesianHankelDMDc(HankelSettings):
 
 def left_open(spec: Spec) -> HankelDMDc | BayesianHankelDMDc | None:
     """The spec, where it leaves something to be chosen by free runs."""
-    if not isinstance(spec, HankelDMDc | BayesianHankelDMDc):
-        return None
-    return spec if isinstance(spec.ridge, str) or spec.select is not None else None
+    return spec if isinstance(spec, HankelDMDc | BayesianHankelDMDc) and spec.is_open else None
 
 
 def _seed_sequence(seed: object) -> np.random.SeedSequence:
@@ -866,8 +832,8 @@ def _step_of(dt: float | None, runs: Runs | None) -> float:
         if dt is None:
             raise RequestError("neither dt (s) nor runs are given. Give one of them.")
         return dt
-    named = as_runs(runs)
-    step = labelled.common_step(named)
+    runs = as_runs(runs)
+    step = labelled.common_step(runs)
     if dt is not None:
-        labelled.check_step(*next((run, name) for name, run in named.items()), dt)
+        labelled.check_step(*next((run, name) for name, run in runs.items()), dt)
     return step

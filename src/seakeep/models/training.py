@@ -218,7 +218,7 @@ def gather(
         _check_length(place, cut.stop - 1, name, window, reach, history)
         begin, here = cut.start, labelled.channel_matrix(run, states, name, cut)
         needed = min(place.first, place.first_column - state_delays)
-        labelled.check_finite(here[needed - begin :], states, name, needed, time)
+        labelled.check_finite(here[needed - begin :], states, run, name, needed)
         needed = min(place.first, place.first_column - input_delays)
         span = Span(begin, place.last, place.last + 1 - input_map.lead_samples)
         regressors = run_regressors(input_map, run, states, inputs, name, span, needed)
@@ -334,7 +334,7 @@ class TrainingArrays:
         for (name, run), (first, end) in zip(runs.items(), samples, strict=True):
             time = np.asarray(run["time"].values, dtype=float)
             x = labelled.channel_matrix(run, states, name, slice(first, end))
-            labelled.check_finite(x, states, name, first, time)
+            labelled.check_finite(x, states, run, name, first)
             span = Span(first, end - 1, max(end - input_map.lead_samples, first))
             u, v = run_regressors(input_map, run, states, inputs, name, span)
             for values in (x, u, v):
@@ -404,9 +404,8 @@ def run_regressors(
     span = span._replace(first=span.first + missing)
     read = input_map.reads(span)
     values = labelled.channel_matrix(run, inputs, name)
-    time = np.asarray(run.variables["time"].values, dtype=float)
     first = read.first if needed is None or not input_map.is_identity else needed
-    labelled.check_finite(values[first : read.stop], inputs, name, first, time)
+    labelled.check_finite(values[first : read.stop], inputs, run, name, first)
     surge = None
     if (follows := input_map.follows) is not None:
         surge = labelled.channel_matrix(run, [states[follows.column]], name)[:, 0]

@@ -30,12 +30,22 @@ CYCLES = 5.0
 
 
 class Validity(IntFlag):
-    """What of the waves, or of the mean surge, lies outside the training; 0 where nothing does."""
+    """What lies outside the training; 0 where nothing does.
+
+    Period, height and steepness are those of waves, surge is its mean, and consistency that of
+    errors of late, of a model in service.
+    """
 
     PERIOD = 1
     HEIGHT = 2
     STEEPNESS = 4
     SURGE = 8
+    CONSISTENCY = 16
+
+    @property
+    def words(self) -> str:
+        """Names of the flags, or "inside"."""
+        return (self.name or "INSIDE").lower().replace("|", ", ")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +70,8 @@ class Conditions:
         Mean, m.
     reach : ndarray, shape (2,)
         Lowest and highest surge in training, m.
+    units : tuple of str
+        Units of the channels.
     """
 
     trained: Coverage
@@ -71,6 +83,10 @@ class Conditions:
     reasons: BoolArray
     surge: float | None
     reach: FloatArray
+    units: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({'; '.join(self.sentences()) or self.validity.words})"
 
     @property
     def validity(self) -> Validity:
@@ -88,7 +104,7 @@ class Conditions:
     def attrs(self) -> dict[str, Any]:
         """Attributes of a forecast: validity by name, numbers of each input, and those trained."""
         out: dict[str, Any] = {
-            "validity": str(self.validity.name or "INSIDE").lower().replace("|", ", "),
+            "validity": self.validity.words,
             "height": self.heights,
             "trained_height": self.trained.heights,
             "steepness": self.steepnesses,
@@ -100,10 +116,10 @@ class Conditions:
             out |= {"mean_surge": self.surge, "trained_surge": self.reach}
         return out
 
-    def sentences(self, units: Sequence[str]) -> list[str]:
+    def sentences(self) -> list[str]:
         """A sentence for each reason: periods, heights, steepnesses, mean surge."""
         texts: list[list[str]] = [[], [], []]
-        for at, (channel, unit) in enumerate(zip(self.trained.channels, units, strict=True)):
+        for at, (channel, unit) in enumerate(zip(self.trained.channels, self.units, strict=True)):
             peak, taught = self.peak[at], self.trained.shares[at] >= TRAINED
             known, trained = self.trained.known[at], np.flatnonzero(taught)
             if self.reasons[0, at]:
@@ -187,9 +203,8 @@ class Coverage:
         ndarray of bool, shape (channel, frequency)
         """
         edges = band_edges(self.first, self.shares.shape[1])
-        band = np.searchsorted(edges, frequency, side="right") - 1
-        inside = (band >= 0) & (band < self.shares.shape[1])
-        result: BoolArray = inside & self.known[:, np.clip(band, 0, self.shares.shape[1] - 1)]
+        known = np.pad(self.known, ((0, 0), (1, 1)))  # nothing below and above the bands
+        result: BoolArray = known[:, np.searchsorted(edges, frequency, side="right")]
         return result
 
     def conditions(
@@ -198,8 +213,11 @@ class Coverage:
         signature: Signature,
         surge: FloatArray | None = None,
         duration: float | None = None,
+        waves: Sequence[int] | None = None,
     ) -> Conditions:
         """Compare inputs (time, channel) with those of training, over a `duration` in s.
+
+        Judged are those that are `waves`, by their places; by default all.
 
         The height of n irregular waves scatters by about 0.85/√n (one SD): two of that, and a
         tenth, are no reason. What moves for five periods or less is not judged.
@@ -223,11 +241,16 @@ class Coverage:
             ]
         )
         reasons &= taught.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
+        if waves is not None:
+            reasons &= np.isin(np.arange(len(self.channels)), waves)
         mean, reach, scale = None, np.array([-np.inf, np.inf]), signature.state_scale
         if surge is not None and "surge" in signature.states and np.isfinite(surge).any():
             at, mean = signature.states.index("surge"), float(np.nanmean(surge))
             reach = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
-        return Conditions(self, periods, peak, unseen, heights, steepnesses, reasons, mean, reach)
+        units = tuple(label.units for label in signature.input_labels)
+        return Conditions(
+            self, periods, peak, unseen, heights, steepnesses, reasons, mean, reach, units
+        )
 
     def to_variables(self) -> dict[str, Any]:
         """Variables of a file."""
@@ -284,8 +307,7 @@ def outside_training(
     duration = steps * model.dt
     if surge is None and "surge" in run:
         surge = run["surge"].values[(time > start) & (time <= start + duration + 1e-6)]
-    conditions = coverage.conditions(values, model.signature, surge, duration)
-    return conditions.sentences([label.units for label in model.signature.input_labels])
+    return coverage.conditions(values, model.signature, surge, duration).sentences()
 
 
 def _shares(energy: FloatArray) -> FloatArray:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from statistics import median_high, median_low
-from typing import Any
 
 import numpy as np
 
@@ -105,45 +104,38 @@ def clocks(record: Record) -> Iterator[Finding]:
     """Gaps, jitter, rates that differ from the stated one, clocks that are not certain."""
     for name, group in record.groups.items():
         label, clock, step = name or "time", record.clocks[name], step_of(group)
-        run = record.run
-        details: dict[str, Any] = {}
         if (gaps := int(group.attrs.get("time_gaps", 0))) > 0:
-            details = {"gaps": gaps, "missing": int(group.attrs["time_missing"])}
-            yield Finding(ClocksKind.TIME_GAPS, run, label, details=details)
+            missing = int(group.attrs["time_missing"])
+            yield record.finding(ClocksKind.TIME_GAPS, label, gaps=gaps, missing=missing)
         if (jitter := float(group.attrs.get("time_jitter_rms", 0.0))) > 0:
-            details = {"jitter": 1e3 * jitter}
-            yield Finding(ClocksKind.JITTER, run, label, jitter, unit="s", details=details)
+            yield record.finding(ClocksKind.JITTER, label, jitter, unit="s", jitter=1e3 * jitter)
         if (rate := record.rates.get(name)) is not None:
             aside = float(group.attrs.get("time_column_step", 1 / rate.stated))
             if abs(aside * rate.stated - 1) > RATE_TOLERANCE:
-                kind, number = ClocksKind.TIMES_ASIDE, 1 / aside
-                yield Finding(kind, run, label, number, rate.stated, "Hz")
+                yield record.finding(ClocksKind.TIMES_ASIDE, label, 1 / aside, rate.stated, "Hz")
             elif abs(step * rate.stated - 1) > RATE_TOLERANCE:
-                yield Finding(ClocksKind.OTHER_RATE, run, label, 1 / step, rate.stated, "Hz")
+                yield record.finding(ClocksKind.OTHER_RATE, label, 1 / step, rate.stated, "Hz")
         if clock.method == ASSUMED:
-            yield Finding(ClocksKind.ASSUMED_CLOCK, run, label)
-        if clock.offset_error > 0.25 * step or clock.residual > 0.5 * step:
-            details = {"described": clock.describe()}
-            value, limit = clock.offset_error, 0.25 * step
-            yield Finding(
-                ClocksKind.UNCERTAIN_CLOCK, run, label, value, limit, "s", details=details
-            )
+            yield record.finding(ClocksKind.ASSUMED_CLOCK, label)
+        if clock.offset_error > (limit := 0.25 * step) or clock.residual > 0.5 * step:
+            yield record.finding(
+                ClocksKind.UNCERTAIN_CLOCK, label, clock.offset_error, limit, "s",
+                described=clock.describe(),
+            )  # fmt: skip
         if abs(clock.drift) > LARGEST_DRIFT:
             drift, limit = 1e6 * clock.drift, 1e6 * LARGEST_DRIFT
-            yield Finding(ClocksKind.CLOCK_DRIFT, run, label, drift, limit, "1")
+            yield record.finding(ClocksKind.CLOCK_DRIFT, label, drift, limit, "1")
 
 
 def rates(record: Record) -> Iterator[Finding]:
     """Loggers whose rate is a guess, or whose times may count samples."""
     for name, group in record.groups.items():
         rate, label = record.rates.get(name), name or "time"
-        details = {"table": f"instruments.{name}" if name else "files"}
+        table = f"instruments.{name}" if name else "files"
         if group.attrs.get("time_counts"):
-            yield Finding(ClocksKind.COUNTED, record.run, label, details=details)
+            yield record.finding(ClocksKind.COUNTED, label, table=table)
         if rate is not None and rate.counted and rate.assumed:
-            yield Finding(
-                ClocksKind.RATE, record.run, label, rate.stated, unit="Hz", details=details
-            )
+            yield record.finding(ClocksKind.RATE, label, rate.stated, unit="Hz", table=table)
 
 
 def records(record: Record) -> Iterator[Finding]:
@@ -160,9 +152,9 @@ def records(record: Record) -> Iterator[Finding]:
     limit = LOST * (last - first)
     for name, (start, end) in spans.items():
         if start - first > limit:
-            yield Finding(ClocksKind.STARTS_LATE, record.run, name, start, first, "s", start)
+            yield record.finding(ClocksKind.STARTS_LATE, name, start, first, "s", start)
         if last - end > limit:
-            yield Finding(ClocksKind.ENDS_EARLY, record.run, name, end, last, "s", end)
+            yield record.finding(ClocksKind.ENDS_EARLY, name, end, last, "s", end)
 
 
 def steps(record: Record) -> Iterator[Finding]:
@@ -173,7 +165,7 @@ def steps(record: Record) -> Iterator[Finding]:
     own = {name: step_of(group) for name, group in record.groups.items()}
     finest = min(own.values())
     if round(finest / dt, 3) > FINER:
-        yield Finding(ClocksKind.FINE_STEP, record.run, "time", 1 / dt, 1 / finest, "Hz")
+        yield record.finding(ClocksKind.FINE_STEP, "time", 1 / dt, 1 / finest, "Hz")
     # A filter halves amplitudes in the middle between its pass band and the Nyquist frequency.
     edge = (0.5 * (PASSBAND + 1.0) if record.anti_alias else 1.0) * 0.5 / dt
     fate = "is damped or lost" if record.anti_alias else "is folded into slower waves"
@@ -187,19 +179,18 @@ def steps(record: Record) -> Iterator[Finding]:
         for kind, cut in cuts:
             share, period = energy_above(x, own[logger], cut)
             if share > LOST_ENERGY and noise_share(x) < 0.5:
-                details = {"share": 100 * share, "period": period, "fate": fate}
-                yield Finding(kind, record.run, name, 1 / dt, cut, "Hz", details=details)
+                yield record.finding(
+                    kind, name, 1 / dt, cut, "Hz", share=100 * share, period=period, fate=fate
+                )
 
 
 def periods(record: Record) -> Iterator[Finding]:
     """A counted period that is not a period of the waves."""
     if record.period is not None and record.wave_channel is not None:
-        counted, energy = record.period
-        yield Finding(ClocksKind.PERIOD, record.run, record.wave_channel, counted, energy, "s")
+        yield record.finding(ClocksKind.PERIOD, record.wave_channel, *record.period, "s")
 
 
 def others(record: Record) -> Iterator[Finding]:
     """Runs left out of the pooled period and clocks."""
     for run, words in record.left_out.items():
-        details = {"words": words}
-        yield Finding(ClocksKind.LEFT_OUT, record.run, f"run {run}", details=details)
+        yield record.finding(ClocksKind.LEFT_OUT, f"run {run}", words=words)

@@ -248,6 +248,19 @@ class Record:
     anti_alias: bool = True
     left_out: Mapping[str, str] = field(default_factory=dict)
 
+    def finding(
+        self,
+        kind: Kind,
+        channel: str,
+        value: float | None = None,
+        limit: float | None = None,
+        unit: str = "",
+        place: float | None = None,
+        **details: Any,
+    ) -> Finding:
+        """Return a :class:`Finding` about this run."""
+        return Finding(kind, self.run, channel, value, limit, unit, place, details)
+
     def recorded(self) -> Iterator[tuple[str, xr.Dataset, str, xr.Variable]]:
         """Logger, its channels, and each of them by its name: those that were not derived."""
         for logger, group in self.groups.items():

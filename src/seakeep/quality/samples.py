@@ -85,30 +85,31 @@ def flagged(record: Record) -> Iterator[Finding]:
                 longer = f"a gap of {max(inner, default=0):.3g} s is longer than {limit}"
                 why = longer if inner else "it stands at an end of the record"
                 done = f"; not bridged: {why}"
-            details = {
-                "samples": int(hit.sum()),
-                "places": len(parts),
-                "share": 100 * float(hit.mean()),
-                "longest": max(end - begin for begin, end in parts) * dt,
-                "done": done,
-            }
-            start = float(group["time"][parts[0][0]])
-            yield Finding(kind, record.run, name, place=start, details=details)
+            yield record.finding(
+                kind,
+                name,
+                place=float(group["time"][parts[0][0]]),
+                samples=int(hit.sum()),
+                places=len(parts),
+                share=100 * float(hit.mean()),
+                longest=max(end - begin for begin, end in parts) * dt,
+                done=done,
+            )
 
 
 def constant(record: Record) -> Iterator[Finding]:
     """Channels that never change."""
     for _, _, name, channel in record.recorded():
         if not np.ptp(channel.to_numpy()):
-            value, unit = float(channel[0]), str(channel.attrs["units"])
-            yield Finding(SamplesKind.CONSTANT, record.run, name, value, unit=unit)
+            unit = str(channel.attrs["units"])
+            yield record.finding(SamplesKind.CONSTANT, name, float(channel[0]), unit=unit)
 
 
 def noise(record: Record) -> Iterator[Finding]:
     """Channels most of whose variance has no memory, such as a record of random readings."""
     for _, group, name, _ in record.recorded():
         if (share := noise_share(sound(group, name))) > 0.5:
-            yield Finding(SamplesKind.NOISE, record.run, name, details={"share": 100 * share})
+            yield record.finding(SamplesKind.NOISE, name, share=100 * share)
 
 
 def levels(record: Record) -> Iterator[Finding]:
@@ -125,7 +126,7 @@ def levels(record: Record) -> Iterator[Finding]:
         limit = 0.5 * float(x.std())
         if abs(change) > limit and ratio > 5:
             unit = str(channel.attrs["units"])
-            yield Finding(SamplesKind.DRIFT, record.run, name, change, limit, unit)
+            yield record.finding(SamplesKind.DRIFT, name, change, limit, unit)
 
 
 def impossible(record: Record) -> Iterator[Finding]:
@@ -142,9 +143,9 @@ def impossible(record: Record) -> Iterator[Finding]:
             continue
         vertical = depth is not None and (name == "heave" or is_elevation(name))
         if name in ("roll", "pitch") and (far := _reached(x)) > np.pi / 2:
-            yield Finding(SamplesKind.IMPOSSIBLE, record.run, name, far, np.pi / 2, "rad")
+            yield record.finding(SamplesKind.IMPOSSIBLE, name, far, np.pi / 2, "rad")
         elif vertical and depth is not None and (far := _reached(x - x.mean())) > depth:
-            yield Finding(SamplesKind.OUT_OF_WATER, record.run, name, far, depth, "m")
+            yield record.finding(SamplesKind.OUT_OF_WATER, name, far, depth, "m")
 
 
 def _reached(x: FloatArray) -> float:
@@ -154,11 +155,11 @@ def _reached(x: FloatArray) -> float:
 def units(record: Record) -> Iterator[Finding]:
     """Units that are guesses, and motions that are read from columns of waves."""
     for name, column in record.wave_columns.items():
-        yield Finding(SamplesKind.WAVE_COLUMN, record.run, name, details={"column": column})
+        yield record.finding(SamplesKind.WAVE_COLUMN, name, column=column)
     for name, unit in record.assumed_units.items():
         if name in record.whole:
             stated = "a number without a unit" if unit == "-" else unit
-            yield Finding(SamplesKind.UNIT, record.run, name, details={"stated": stated})
+            yield record.finding(SamplesKind.UNIT, name, stated=stated)
 
 
 def level_drift(x: FloatArray, dt: float, period: float) -> tuple[float, float]:

@@ -85,22 +85,25 @@ def redundant(record: Record) -> Iterator[Finding]:
     for (name, other), agreement in compared(run, record.redundant).items():
         unit = str(run[name].attrs["units"])
         for kind, value, limit, its_unit in _faults(agreement, unit):
-            details = {
-                "other": other,
-                "correlation": agreement.correlation,
-                "spread": agreement.lag_spread,
-                "spanned": agreement.spanned,
-                "so": f"so that the NRMSE between the two is {agreement.nrmse:.2f}",
-            }
-            yield Finding(kind, record.run, name, value, limit, its_unit, details=details)
+            yield record.finding(
+                kind,
+                name,
+                value,
+                limit,
+                its_unit,
+                other=other,
+                correlation=agreement.correlation,
+                spread=agreement.lag_spread,
+                spanned=agreement.spanned,
+                so=f"so that the NRMSE between the two is {agreement.nrmse:.2f}",
+            )
         x, dt = filled(run[name]), step_of(run)
         stuck = find_held(x, dt, filled(run[other]))
         if stuck.any() and np.isfinite(agreement.period):
             start, length = float(run["time"][int(np.argmax(stuck))]), float(stuck.sum()) * dt
-            yield Finding(
-                SensorsKind.HELD, record.run, name, length, agreement.period, "s", start,
-                {"other": other},
-            )  # fmt: skip
+            yield record.finding(
+                SensorsKind.HELD, name, length, agreement.period, "s", start, other=other
+            )
 
 
 def _faults(agreement: Agreement, unit: str) -> Iterator[tuple[SensorsKind, float, float, str]]:
@@ -142,16 +145,17 @@ def positions(record: Record) -> Iterator[Finding]:
     series = {name: filled(run[name]) for name in places}
     for each in misplaced_probes(series, places, step_of(run), depth):
         separation = each.separation
-        details = {
-            "other": each.other,
-            "spread": separation.spread,
-            "error": separation.input_error,
-            "unsure": "" if each.certain else ", or the other probe is misplaced",
-        }
-        yield Finding(
-            SensorsKind.POSITION, record.run, each.probe, separation.separation,
-            separation.stated, "m",            details=details,
-        )  # fmt: skip
+        yield record.finding(
+            SensorsKind.POSITION,
+            each.probe,
+            separation.separation,
+            separation.stated,
+            "m",
+            other=each.other,
+            spread=separation.spread,
+            error=separation.input_error,
+            unsure="" if each.certain else ", or the other probe is misplaced",
+        )
 
 
 LEAST_CORRELATION = 0.8

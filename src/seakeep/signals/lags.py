@@ -105,8 +105,7 @@ def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float
     best = int(np.nanargmax(coefficient))
     shift, peak = float(best), float(coefficient[best])
     if 0 < best < coefficient.size - 1:
-        part, peak = parabola_peak(*coefficient[best - 1 : best + 2])
-        shift += part
+        shift, peak = parabola_peak(coefficient, best)
     return shift - reach, min(peak, 1.0)
 
 
@@ -163,14 +162,8 @@ def correlation_peak(
             "stands upstream, their positions, and the water depth."
         )
     best = int(peaks[np.argmax(values[peaks])])
-    shift, height = parabola_peak(*values[best - 1 : best + 2])
-    return float((lags[best] + shift) * step), height
-
-
-def peak_place(values: FloatArray) -> float:
-    """Place of the highest value, counted in steps, by the parabola through its neighbours."""
-    at = int(np.clip(np.argmax(values), 1, values.size - 2))
-    return at + float(np.clip(parabola_peak(*values[at - 1 : at + 2])[0], -0.5, 0.5))
+    place, height = parabola_peak(values, best)
+    return float((lags[0] + place) * step), height
 
 
 def _correlation(a: FloatArray, b: FloatArray, lags: IntArray) -> FloatArray:
@@ -188,13 +181,18 @@ def _correlation(a: FloatArray, b: FloatArray, lags: IntArray) -> FloatArray:
     return np.asarray(covariance / np.sqrt(np.maximum(power_a * power_b, 1e-300)))
 
 
-def parabola_peak(before: float, here: float, after: float) -> tuple[float, float]:
-    """Peak of the parabola through three values: steps from the middle one, and height."""
+def parabola_peak(values: FloatArray, at: int | None = None) -> tuple[float, float]:
+    """Place, counted in steps, and height of a peak, by the parabola through three values.
+
+    The peak is the one `at` a place, by default the highest; at most half a step beside it.
+    """
+    at = int(np.clip(np.argmax(values) if at is None else at, 1, values.size - 2))
+    before, here, after = values[at - 1 : at + 2]
     bend = before - 2 * here + after
     if not bend < 0:
-        return 0.0, float(here)
-    shift = 0.5 * (before - after) / bend
-    return float(shift), float(here - 0.25 * (before - after) * shift)
+        return float(at), float(here)
+    shift = float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5))
+    return at + shift, float(here - 0.25 * (before - after) * shift)
 
 
 SHORTEST = 16

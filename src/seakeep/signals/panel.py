@@ -24,6 +24,8 @@ SATURATED = 250
 """A pixel is saturated where red, green and blue are all at least this."""
 SMALLEST = 20
 """A component of fewer pixels has no orientation worth a name."""
+OPENING, CLOSING = 5, 9
+"""Sides of the squares of opening and closing, pixels."""
 MARGIN = 8
 """Pixels around a component in which its background is looked at."""
 EDGE, CLEAR = 5, 11
@@ -61,13 +63,8 @@ class TrackingSettings:
         and heave over the first `rest` seconds zero.
     rest : float
         s, where `origin` is None.
-    lower, upper : (int, int, int)
-        Smallest and largest red, green and blue of the panel, 0 to 255.
-    opening, closing : int
-        Sides of the squares of opening and closing, pixels; 0 leaves the step out.
-    refine : bool
-        Whether pixels at the panel's edge count by their brightness; False is the paper's binary
-        mask, with about five times the error in pitch.
+    lower : (int, int, int)
+        Smallest red, green and blue of the panel, 0 to 255.
     region : (int, int, int, int) or None
         Part of the picture that is searched: left, top, width, height in pixels.
     lamp : (float, float, float) or None
@@ -79,9 +76,8 @@ class TrackingSettings:
         The panel's greatest speed, m/s; further from its neighbours a frame is flagged.
     bridge : float
         Gaps up to this length (s) are bridged by monotone cubics; the default bridges none.
-    passband, stopband : float or None
-        Edges of the low-pass filter, Hz; a `passband` of None filters nothing, a `stopband` of
-        None is 1.5 times the `passband`.
+    passband : float or None
+        Edge of the low-pass filter, Hz, which stops at 1.5 times that; None filters nothing.
     """
 
     metres_per_pixel: float | None = None
@@ -92,21 +88,16 @@ class TrackingSettings:
     origin: tuple[float, float] | None = None
     rest: float = 1.0
     lower: tuple[int, int, int] = (150, 150, 150)
-    upper: tuple[int, int, int] = (255, 255, 255)
-    opening: int = 5
-    closing: int = 9
-    refine: bool = True
     region: tuple[int, int, int, int] | None = None
     lamp: tuple[float, float, float] | None = None
     tolerance: float = 0.02
     max_speed: float = 3.0
     bridge: float = 0.0
     passband: float | None = 4.0
-    stopband: float | None = None
 
     def __post_init__(self) -> None:
         units = {"metres_per_pixel": "m", "tolerance": "a part", "max_speed": "m/s",
-                 "passband": "Hz", "stopband": "Hz"}  # fmt: skip
+                 "passband": "Hz"}  # fmt: skip
         for name, unit in units.items():
             if getattr(self, name) is not None:
                 positive(getattr(self, name), name, unit)
@@ -123,7 +114,7 @@ class TrackingSettings:
     @property
     def stop(self) -> float | None:
         """Edge of the stop band in use, Hz; None where nothing is filtered."""
-        return None if self.passband is None else self.stopband or 1.5 * self.passband
+        return None if self.passband is None else 1.5 * self.passband
 
 
 def opencv(doing: str = "reading") -> Any:
@@ -155,10 +146,9 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     panel = dict.fromkeys(FIELDS, np.nan) | {"area": 0.0, "cut": 0.0}
     panel["saturation"] = float(cv2.countNonZero(cv2.inRange(part, (SATURATED,) * 3, (255,) * 3)))
     panel["brightness"] = float(np.mean(cv2.mean(part)[:3]))
-    mask = cv2.inRange(part, how.lower[::-1], how.upper[::-1])
-    for side, step in ((how.opening, cv2.MORPH_OPEN), (how.closing, cv2.MORPH_CLOSE)):
-        if side > 1:
-            mask = cv2.morphologyEx(mask, step, np.ones((side, side), np.uint8))
+    mask = cv2.inRange(part, how.lower[::-1], (255,) * 3)
+    for side, step in ((OPENING, cv2.MORPH_OPEN), (CLOSING, cv2.MORPH_CLOSE)):
+        mask = cv2.morphologyEx(mask, step, np.ones((side, side), np.uint8))
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
         return panel
@@ -172,7 +162,7 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     area = float(cv2.countNonZero(filled))
     if area < SMALLEST:
         return panel
-    weights = _weights(patch, filled) if how.refine else None
+    weights = _weights(patch, filled)
     moments = cv2.moments(filled if weights is None else weights, binaryImage=weights is None)
     mass = moments["m00"]
     centre = moments["m10"] / mass, moments["m01"] / mass

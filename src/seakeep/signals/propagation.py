@@ -30,7 +30,7 @@ from seakeep.arrays import (
 )
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
-from seakeep.signals.lags import correlation_peak, peak_place
+from seakeep.signals.lags import correlation_peak, parabola_peak
 from seakeep.signals.waves import encounter_period, is_regular, welch_segments
 from seakeep.waves import group_speed, phase_speed, wavenumber
 
@@ -256,10 +256,6 @@ class ProbeSeparation:
     stated: float
     input_error: float
 
-    def reversed(self) -> ProbeSeparation:
-        """Return the same from the second probe to the first."""
-        return replace(self, separation=-self.separation, stated=-self.stated)
-
     @property
     def known(self) -> bool:
         """Whether the records match well enough to determine a separation."""
@@ -359,7 +355,9 @@ def misplaced_probes(
     out: dict[tuple[str, ...], Misplaced] = {}
     for a, b in sorted(against, key=lambda pair: separations[pair].spread):
         if a not in backed and b in backed:
-            out.setdefault((a,), Misplaced(a, b, separations[a, b].reversed(), certain=True))
+            own = separations[a, b]
+            back = replace(own, separation=-own.separation, stated=-own.stated)
+            out.setdefault((a,), Misplaced(a, b, back, certain=True))
         else:
             certain = b not in backed and a in backed
             out.setdefault((b,) if certain else (a, b), Misplaced(b, a, separations[a, b], certain))
@@ -446,7 +444,7 @@ def probe_separation(
     scores = _scores(cross, power, k, fine)
     total = scores.sum(axis=0)
     separation, *without = (
-        fine[0] + peak_place(values) * step / FINER for values in (total, *(total - scores))
+        fine[0] + parabola_peak(values)[0] * step / FINER for values in (total, *(total - scores))
     )
     left_out = np.array(without)
     count = GROUPS

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import RequestError
@@ -62,15 +63,7 @@ def rotation_matrix(angles: npt.ArrayLike) -> FloatArray:
     >>> bool(bow[2] > 0)  # a positive pitch lifts the bow, which points against the waves
     True
     """
-    roll, pitch, yaw = _vectors(angles=angles)[0].T
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    cy, sy = np.cos(yaw), np.sin(yaw)
-    rows = [
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
+    return np.asarray(Rotation.from_euler("xyz", _vectors(angles=angles)[0]).as_matrix())
 
 
 def transfer_position(

@@ -7,7 +7,7 @@ between two related signals, window by window.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,15 +98,13 @@ def _error(value: float, digits: int) -> str:
 
 def _line(own: FloatArray, reference: FloatArray, errors: FloatArray | None) -> Clock:
     """Straight line of one clock over another, outliers left out."""
-    inliers = np.ones(own.size, dtype=bool)
+    late, inliers = own - reference, np.ones(own.size, dtype=bool)
     for _ in range(5):
-        centre = float(reference[inliers].mean())
-        x = reference[inliers] - centre
-        y = own[inliers] - reference[inliers]
-        spread = float(x @ x)
-        drift = float(x @ y) / spread if x.size > 1 and spread > 0 else 0.0
-        level = float(y.mean())
-        residual = (own - reference) - level - drift * (reference - centre)
+        centre, level = float(reference[inliers].mean()), float(late[inliers].mean())
+        away = reference - centre
+        spread = float(away[inliers] @ away[inliers])
+        drift = float(away[inliers] @ late[inliers]) / spread if spread > 0 else 0.0
+        residual = late - level - drift * away
         scale = 1.4826 * float(np.median(np.abs(residual[inliers]))) + 1e-9
         updated = np.abs(residual) <= 5.0 * scale
         if inliers.sum() < 5 or updated.sum() < 3 or np.array_equal(updated, inliers):
@@ -121,6 +119,28 @@ def _line(own: FloatArray, reference: FloatArray, errors: FloatArray | None) -> 
     return Clock(
         level - drift * centre, drift, offset_error, drift_error, "", count, rms, centre=centre
     )
+
+
+def _adjusted(
+    values: FloatArray, shape: FloatArray, *slopes: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Least squares of values by a shape with a gain, a level, and shifts along its slopes.
+
+    Returns
+    -------
+    shifts, errors : ndarray, shape (slope,)
+        Shifts, and their standard errors per standard deviation of what is left.
+    left : ndarray
+        What the fit leaves of the values.
+    gain : float
+    """
+    design = np.column_stack([shape, np.ones(shape.size), *slopes])
+    solution = np.linalg.lstsq(design, values, rcond=None)[0]
+    gain = float(solution[0]) or 1.0
+    variances = np.diagonal(np.linalg.pinv(design.T @ design))[2:]
+    errors: FloatArray = np.sqrt(variances) / abs(gain)
+    shifts = np.asarray(solution[2:] / gain, dtype=np.float64)
+    return shifts, errors, np.asarray(values - design @ solution), gain
 
 
 def clock_from_pulses(
@@ -293,54 +313,38 @@ def clock_from_shared(
     if turned:
         (a, c), (b, t) = (b, t), (a, c)
         offset, drift = _inverse(offset, drift)
-    (offset, drift), (offset_error, drift_error), rms, count = _refined(
-        a, c, scipy.interpolate.CubicSpline(t, b), (t[0], t[-1]), (offset, drift)
-    )
+    other = scipy.interpolate.CubicSpline(t, b)
+    centre = float(c.mean())
+    for _ in range(6):
+        instants = (c - offset) / (1 + drift)
+        inside = (instants >= t[0]) & (instants <= t[-1])
+        slope = other(instants[inside], 1)
+        turn = -slope * (c[inside] - centre)
+        (shift, stretch), errors, left, gain = _adjusted(
+            a[inside], other(instants[inside]), -slope, turn
+        )
+        offset, drift = float(offset + shift - stretch * centre), float(drift + stretch)
+        if abs(shift) < 1e-9 and abs(stretch) < 1e-12:
+            break
+    # Samples of a residual that is itself a wave count less than once each.
+    power = float(left @ left)
+    whiteness = float(left[1:] @ left[:-1]) / max(power, 1e-300)
+    inflation = np.sqrt((1 + max(whiteness, 0.0)) / max(1 - whiteness, 1e-3))
+    level_error, drift_error = (
+        errors * np.sqrt(power / max(left.size - 4, 1)) * inflation
+    ).tolist()
+    rms = float(np.sqrt(np.mean(left**2)) / (abs(gain) * float(np.std(slope)) + 1e-300))
     if turned:
         offset, drift = _inverse(offset, drift)
-    errors = offset_error, drift_error
-    centre = float(c.mean())
-    return Clock(offset, drift, *errors, "shared channel", count, rms, centre=centre)
+    offset_error = float(np.hypot(level_error, centre * drift_error))
+    return Clock(
+        offset, drift, offset_error, drift_error, "shared channel", left.size, rms, centre=centre
+    )
 
 
 def _inverse(offset: float, drift: float) -> tuple[float, float]:
     """Offset and drift of the reference's clock against this one."""
     return -offset / (1 + drift), 1 / (1 + drift) - 1
-
-
-def _refined(
-    values: FloatArray,
-    readings: FloatArray,
-    other: Callable[..., FloatArray],
-    span: tuple[float, float],
-    start: tuple[float, float],
-) -> tuple[tuple[float, float], tuple[float, float], float, int]:
-    """Least squares of ``values ≈ g · other((c − offset) / (1 + drift)) + level``."""
-    offset, drift = start
-    centre = float(readings.mean())
-    for _ in range(6):
-        instants = (readings - offset) / (1 + drift)
-        inside = (instants >= span[0]) & (instants <= span[1])
-        t, y = instants[inside], values[inside]
-        shape, slope = other(t), other(t, 1)
-        away = readings[inside] - centre
-        design = np.column_stack([shape, np.ones(t.size), -slope, -slope * away])
-        solution, *_ = np.linalg.lstsq(design, y, rcond=None)
-        gain = solution[0] if solution[0] != 0 else 1.0
-        shift, stretch = solution[2] / gain, solution[3] / gain
-        offset, drift = offset + shift - stretch * centre, drift + stretch
-        if abs(shift) < 1e-9 and abs(stretch) < 1e-12:
-            break
-    residual = y - design @ solution
-    # Samples of a residual that is itself a wave count less than once each.
-    whiteness = float(residual[1:] @ residual[:-1] / max(residual @ residual, 1e-300))
-    inflation = np.sqrt((1 + max(whiteness, 0.0)) / max(1 - whiteness, 1e-3))
-    sigma = float(np.sqrt(residual @ residual / max(t.size - 4, 1))) * inflation
-    covariance = np.linalg.pinv(design.T @ design) * (sigma / gain) ** 2
-    drift_error = float(np.sqrt(covariance[3, 3]))
-    offset_error = float(np.hypot(np.sqrt(covariance[2, 2]), centre * drift_error))
-    rms = float(np.sqrt(np.mean(residual**2)) / (abs(gain) * float(np.std(slope)) + 1e-300))
-    return (float(offset), float(drift)), (offset_error, drift_error), rms, int(t.size)
 
 
 def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
@@ -547,20 +551,12 @@ def time_pulses(
             if near.sum() < 5:
                 break
             away = time[near] - at
-            shape = template(away)
-            design = np.column_stack([shape, np.ones(away.size), -slope(away)])
-            solution, *_ = np.linalg.lstsq(design, trigger[near], rcond=None)
-            if solution[0] == 0:
-                break
-            move = float(np.clip(solution[2] / solution[0], -0.25 * reach, 0.25 * reach))
+            (shift,), (error,), left, _ = _adjusted(trigger[near], template(away), -slope(away))
+            move = float(np.clip(shift, -0.25 * reach, 0.25 * reach))
             at += move
             if abs(move) < 1e-9:
                 break
         if near.sum() < 5 or abs(at - centre) > 0.5 * reach:
             continue
-        residual = trigger[near] - design @ solution
-        variance = float(residual @ residual) / max(near.sum() - 3, 1)
-        instants[pulse] = at
-        covariance = np.linalg.pinv(design.T @ design)[2, 2]
-        errors[pulse] = np.sqrt(variance * covariance) / abs(solution[0])
+        instants[pulse], errors[pulse] = at, error * np.sqrt(left @ left / max(left.size - 3, 1))
     return instants, errors

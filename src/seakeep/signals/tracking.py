@@ -77,10 +77,9 @@ LEAST_FILL = 0.85
 """Least fill of what is taken for the panel; a turned rectangle of pixels has about 0.97."""
 FILL_DROP = 0.05
 """Fill below the run's median that is flagged."""
-CORNER_DROP, BINARY_CORNER_DROP = 0.01, 0.035
+CORNER_DROP = 0.01
 """Part of a corner's square below the run's median that is flagged: a hidden corner that large
-turns a panel three times as long as high by 0.2 degrees, the accuracy asked of the pitch; and by
-0.7 degrees, by which the steps of a binary mask turn a sound one."""
+turns a panel three times as long as high by 0.2 degrees, the accuracy asked of the pitch."""
 CORNER_NOISE = 6.0
 """Robust standard deviations of the corners seen that are never flagged, for panels of few pixels;
 Gaussian noise reaches 4.3 in one of 100 000 frames."""
@@ -294,7 +293,7 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
         raise RequestError(
             f"{video.path} has {video.rate:g} frames per second, so the low-pass filter cannot "
             f"stop at {stop:g} Hz. Lower the passband (--passband) so that the stopband, 1.5 times "
-            f"as high unless stated, lies below {0.5 * video.rate:g} Hz, or filter nothing "
+            f"as high, lies below {0.5 * video.rate:g} Hz, or filter nothing "
             "(passband None; --passband 0)."
         )
 
@@ -391,8 +390,7 @@ def _judge(
     tolerance, panel_area = how.tolerance * usual["length"], usual["length"] * usual["height"]
     excess = np.nan_to_num(seen["saturation"] - usual["saturation"])
     corners = usual["corners"][:, None] - np.stack([seen[name] for name in CORNERS])
-    least = CORNER_DROP if how.refine else BINARY_CORNER_DROP
-    drop = max(least, CORNER_NOISE * usual["corner_noise"])
+    drop = max(CORNER_DROP, CORNER_NOISE * usual["corner_noise"])
     hidden = np.max(np.nan_to_num(corners, nan=np.inf), axis=0) / drop
     deviations = (
         hidden,

@@ -24,7 +24,7 @@ from seakeep.arrays import (
     whole_number,
 )
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.lags import peak_place
+from seakeep.signals.lags import parabola_peak
 from seakeep.signals.time_axis import over_gaps
 
 
@@ -509,7 +509,7 @@ def peak_period(series: npt.ArrayLike, dt: float) -> float:
     if np.ptp(x) == 0:
         raise DataError("the record is constant: it has no peak period. Look for a dead probe.")
     frequency, density = wave_spectrum(x, dt)
-    return float(1.0 / (peak_place(density) * frequency[1]))
+    return float(1.0 / (parabola_peak(density)[0] * frequency[1]))
 
 
 def wave_statistics(series: npt.ArrayLike, dt: float) -> WaveStatistics:

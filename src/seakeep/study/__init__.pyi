@@ -5,14 +5,12 @@ from .comparison import (
     compare_models,
     comparison_table,
     difference_table,
-    forecast_at_full_scale,
     in_degrees,
     to_full_scale,
     with_degrees,
 )
 from .fit import fit_baselines, fit_campaign, training_runs
 from .nowcast import nowcast, nowcasts
-from .resolve import build_spec
 from .run import run_study
 from .settings import Study, StudySettings, read_study
 from .store import StorageError, StudyResult, read_result
@@ -24,14 +22,12 @@ __all__ = [
     "StudyResult",
     "StudySettings",
     "at_full_scale",
-    "build_spec",
     "compare",
     "compare_models",
     "comparison_table",
     "difference_table",
     "fit_baselines",
     "fit_campaign",
-    "forecast_at_full_scale",
     "in_degrees",
     "nowcast",
     "nowcasts",

@@ -106,13 +106,13 @@ def in_degrees(comparison: Comparison) -> Comparison:
     return _converted(comparison, with_degrees)
 
 
-def _converted(
-    comparison: Comparison, convert: Callable[[xr.Dataset], xr.Dataset], **changes: xr.Dataset
-) -> Comparison:
-    for part in {"forecast", "measured", "inputs", "band"} - set(changes):
-        if data := getattr(comparison, part):  # a model may have no inputs, and no band
-            changes[part] = convert(data)
-    return replace(comparison, **changes)  # type: ignore[arg-type]
+def _converted(comparison: Comparison, convert: Callable[[xr.Dataset], xr.Dataset]) -> Comparison:
+    parts: dict[str, Any] = {
+        part: convert(data)  # a model may have no inputs, and no band
+        for part in ("forecast", "measured", "inputs", "band")
+        if (data := getattr(comparison, part))
+    }
+    return replace(comparison, **parts)
 
 
 def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
@@ -135,45 +135,7 @@ def at_full_scale(comparison: Comparison, scale: float) -> Comparison:
     RequestError
         If the unit of a channel does not scale.
     """
-    forecast = forecast_at_full_scale(comparison.forecast, scale)
-    return _converted(comparison, lambda run: to_full_scale(run, scale), forecast=forecast)
-
-
-def forecast_at_full_scale(forecast: xr.Dataset, scale: float) -> xr.Dataset:
-    """Convert a forecast to full scale by Froude's law, its status with it.
-
-    Parameters
-    ----------
-    forecast : Dataset
-        Of a model, or of an ensemble: its members, or their statistics.
-    scale : float
-        Scale factor, full-scale length over model length.
-
-    Returns
-    -------
-    Dataset
-        Times and values at full scale, also where the status names an instant.
-
-    Raises
-    ------
-    RequestError
-        If the unit of a channel does not scale.
-    """
-    clock, own = froude_factor("s", scale), ["status", "diverged_at"]
-    out = to_full_scale(forecast.drop_vars(own, errors="ignore"), scale)
-    dt = float(np.diff(out["time"].values[:2]).sum())
-    out.attrs["status"] = status_text(out.attrs, dt)
-    if "status" in forecast:
-        lost = clock * forecast["diverged_at"].variable
-        facts = {key: out.attrs[key] for key in out.attrs.keys() & {"input_predicted_from"}}
-        words = [
-            status_text(facts if np.isnan(at) else facts | {"diverged_at": at}, dt)
-            for at in lost.values
-        ]
-        out = out.assign_coords(diverged_at=lost.copy())
-        out["status"] = (lost.dims, words, forecast["status"].attrs)
-        out["diverged_at"].attrs = dict(forecast["diverged_at"].attrs)
-    return out
+    return _converted(comparison, lambda run: to_full_scale(run, scale))
 
 
 def with_degrees(run: xr.Dataset) -> xr.Dataset:
@@ -572,7 +534,7 @@ ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s
 
 
 def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> xr.Dataset:
-    """Convert a run, or a forecast, from model to full scale.
+    """Convert a run, or a forecast and its status, from model to full scale.
 
     Parameters
     ----------
@@ -609,7 +571,7 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
     clock = froude_factor("s", scale)
     out = run.assign_coords(time=run["time"] * clock)
     out["time"].attrs = dict(run["time"].attrs)
-    for name, variable in run.data_vars.items():
+    for name, variable in run.drop_vars("status", errors="ignore").data_vars.items():
         factor = froude_factor(str(variable.attrs.get("units", "1")), scale, density_ratio)
         out[name] = times(variable.assign_coords(time=out["time"]), factor)
         if "x_position" in variable.attrs:
@@ -620,7 +582,22 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
         value = run.attrs[key]
         pair = isinstance(value, tuple | list)
         out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
+    if "status" in run.attrs:
+        _state_again(out)
     return out
+
+
+def _state_again(forecast: xr.Dataset) -> None:
+    """Write the status of a forecast, and of its members, anew: it names instants."""
+    dt, facts = float(np.diff(forecast["time"].values[:2]).sum()), forecast.attrs
+    facts["status"] = status_text(facts, dt)
+    if "status" in forecast:
+        shared = {key: facts[key] for key in facts.keys() & {"input_predicted_from"}}
+        words = [
+            status_text(shared if np.isnan(at) else shared | {"diverged_at": at}, dt)
+            for at in forecast["diverged_at"].values
+        ]
+        forecast["status"] = forecast["status"].copy(data=words)
 
 
 def times(channel: xr.DataArray, factor: float) -> xr.DataArray:

@@ -14,15 +14,7 @@ from seakeep.arrays import Progress
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, warn
-from seakeep.models import (
-    KINDS,
-    BayesianHankelDMDc,
-    HankelDMDc,
-    HankelEnsemble,
-    Model,
-    Spec,
-    outside_training,
-)
+from seakeep.models import KINDS, Model, Spec, is_ensemble, outside_training
 from seakeep.models.conditions import disagreements
 from seakeep.models.labelled import mean_period
 from seakeep.models.settings import Select
@@ -32,7 +24,7 @@ from seakeep.models.validity import warn_of_slow_motions
 from seakeep.quality import warn_of_runs
 from seakeep.signals import find_leakage
 from seakeep.study.plan import between
-from seakeep.study.resolve import build_spec, can_align, counts_in_periods, mistakes_of
+from seakeep.study.resolve import can_align, counts_in_periods, mistakes_of, resolve_model
 from seakeep.toml import Length, refusal
 
 MAPS = {"alignment", "lead", "observables"}
@@ -126,12 +118,8 @@ def fit_campaign(
     spec, prepared, runs, stop = read_training(campaign, model, progress)
     dt = float(next(iter(prepared.values())).attrs["dt"])
     channels = list(settings.states), list(settings.inputs)
-    if isinstance(spec, HankelDMDc | BayesianHankelDMDc):
-        identified: Model = spec.fit(
-            runs, *channels, stop=stop, executor=executor, progress=progress
-        )
-    else:
-        identified = spec.fit(runs, *channels, stop=stop)
+    how: dict[str, Any] = {"executor": executor, "progress": progress} if left_open(spec) else {}
+    identified: Model = spec.fit(runs, *channels, stop=stop, **how)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
     for name, run in (both | _prepared_tests(campaign, both)).items():
@@ -146,11 +134,9 @@ def fit_campaign(
         )
     if getattr(spec, "standardize", False):
         _warn_of_slow_model(identified, runs)
-    single = identified.settings
-    if isinstance(identified, HankelEnsemble):
-        single = None if identified.centre is None else identified.centre.settings
-    if isinstance(single, HankelDMDc):
-        for each in disagreements(single, until(runs, stop), *channels):
+    single: Any = identified.centre if is_ensemble(identified) else identified
+    if single is not None and single.settings.role == "model":
+        for each in disagreements(single.settings, until(runs, stop), *channels):
             warn(each.describe())
     return identified
 
@@ -182,7 +168,7 @@ def read_training(
     dt = float(next(iter(prepared.values())).attrs["dt"])
     period = campaign.encounter_period() if counts_in_periods(settings) else None
     aligned = can_align(campaign.settings, settings.inputs)
-    spec = build_spec(settings, period, dt, aligned=aligned)
+    spec = resolve_model(settings, period, dt, aligned=aligned).spec
     if period is not None and (open_spec := left_open(spec)):
         chosen = open_spec.select or Select()
         spec = replace(open_spec, select=replace(chosen, period=chosen.period or period))

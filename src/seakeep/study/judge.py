@@ -316,34 +316,29 @@ def band_tables(
     known = "wave_height" in test and np.isfinite(test["wave_height"]).all()
     waves = cells("wave_height") if known else None
     bands = {"members": None} | ({} if calibration is None else {"calibrated": calibration})
-    rows, parts = {}, {}
-    for cell in product(ensembles, bands):
-        lower, upper = (bound[judged] for bound in band_of(test, cell[0], bands[cell[1]]))
-        rows[cell] = [_coverage_row(lower, upper, each) for each in against.values()]
+    shares: dict[str, list[Any]] = defaultdict(list)
+    parts = {}
+    for model, band in product(ensembles, bands):
+        lower, upper = (bound[judged] for bound in band_of(test, model, bands[band]))
+        rows = [_coverage_row(lower, upper, each) for each in against.values()]
+        prefix = "" if band == "members" else f"{band}_"
+        for key, values in zip(COVERAGE, zip(*rows, strict=True), strict=True):
+            shares[prefix + key].append(values)
         if not np.isnan(lower).any(axis=(1, 2)).all():  # lost, or nothing to calibrate on
-            parts[cell] = statistics.coverage_table(lower, upper, against["measured"], level, waves)
-    coords = {"model": ensembles, "against": list(against), "channel": _names(test)}
-    tables = []
-    for band in bands:
-        keys = [key if band == "members" else f"{band}_{key}" for key in COVERAGE]
-        values = [rows[model, band] for model in ensembles]
-        tables.append(_table(values, ("model", "against", "number", "channel"), keys, coords))
-    out = {"coverage": xr.merge(tables)}
+            parts[model, band] = statistics.coverage_table(
+                lower, upper, against["measured"], level, waves
+            )
+    over = {"model": ensembles, "against": list(against), "channel": _names(test)}
+    out = {"coverage": xr.Dataset({key: (tuple(over), each) for key, each in shares.items()}, over)}
     if parts:
-        names = next(iter(parts.values())).parts
-        nothing = np.full((len(PARTS), len(names), test.sizes["channel"]), np.nan)
-        values_of = {
-            cell: np.stack([getattr(each, key) for key in PARTS]) for cell, each in parts.items()
-        }
-        grid = [[values_of.get((model, band), nothing) for band in bands] for model in ensembles]
-        coords = {
-            "model": ensembles,
-            "band": list(bands),
-            "part": list(names),
-            "channel": test["channel"].values,
-        }
-        dims = ("model", "band", "number", "part", "channel")
-        out["bands"] = _table(grid, dims, PARTS, coords)
+        names = list(next(iter(parts.values())).parts)
+        nothing = dict.fromkeys(PARTS, np.full((len(names), test.sizes["channel"]), np.nan))
+        grid = [
+            [[vars(parts[at])[key] if at in parts else nothing[key] for key in PARTS] for at in row]
+            for row in ([(model, band) for band in bands] for model in ensembles)
+        ]
+        over = {"model": ensembles, "band": list(bands), "part": names, "channel": test["channel"]}
+        out["bands"] = _table(grid, ("model", "band", "number", "part", "channel"), PARTS, over)
     return out
 
 
@@ -456,32 +451,30 @@ def density_tables(
     """Divergences of forecasts from the measurement, and the densities, per model and channel."""
     windows, steps = test.sizes["window"], test.sizes["time"]
     items, diverged = {}, []
-    for model in settings.models:
+    for m, model in enumerate(settings.models):
         predicted, measured, lost = joined(test, model)
         diverged.append(lost)
         for c, channel in enumerate(channels if len(predicted) else ()):
             # Contiguous, as they are in a worker: sums are then the same to the last bit.
-            p, m = predicted[:, :, c].copy("C"), measured[:, c].copy()
-            moves = np.ptp(p.reshape(-1, windows, steps), axis=2).max(axis=1) > 0
-            if moves.all() and np.ptp(m) > 0:  # what stands still has no density
-                items[model, channel] = channel, p, m
+            forecasts, truth = predicted[:, :, c].copy("C"), measured[:, c].copy()
+            moves = np.ptp(forecasts.reshape(-1, windows, steps), axis=2).max(axis=1) > 0
+            if moves.all() and np.ptp(truth) > 0:  # what stands still has no density
+                items[m, c] = channel, forecasts, truth
+    coords = {"model": list(settings.models), "channel": list(channels)}
+    shape = len(diverged), len(channels)
+    table = np.full((*shape, len(VARIANTS), len(DIVERGENCE)), np.nan)
+    curves = np.full((*shape, len(CURVES), 512), np.nan)
     data = settings, name, [steps] * windows
-    known = {}
     rows = in_order(_channel_densities, data, list(items.values()), executor)
-    for (model, channel), each in zip(items, rows, strict=True):
+    for (m, c), each in zip(items, rows, strict=True):
         if isinstance(each, str):
             warn(
-                f"the densities of {channel} as forecast by '{model}' and as measured, over "
-                f"the windows of '{name}', cannot be compared and are left out: {each}"
+                f"the densities of {channels[c]} as forecast by '{coords['model'][m]}' and as "
+                f"measured, over the windows of '{name}', cannot be compared and are left out: "
+                f"{each}"
             )
         else:
-            known[model, channel] = each
-    nothing = np.full((len(VARIANTS), len(DIVERGENCE)), np.nan), np.full((len(CURVES), 512), np.nan)
-    table, curves = (
-        [[known.get((m, c), nothing)[part] for c in channels] for m in settings.models]
-        for part in (0, 1)
-    )
-    coords = {"model": list(settings.models), "channel": list(channels)}
+            table[m, c], curves[m, c] = each
     both = {**coords, "variant": list(VARIANTS)}
     divergence = _table(table, (*both, "number"), DIVERGENCE, both)
     divergence["diverged_series"] = ("model", diverged)
@@ -546,49 +539,41 @@ def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
     the measurement, degrees.
     """
     data = groups[f"tests/{test}"]
-    parts = []
-    for model in data["model"].values:
-        squares, answer = (
-            each[..., data["judged"].values, :] for each in _responses(groups, test, model)
-        )
-        with warnings.catch_warnings(), np.errstate(invalid="ignore"):
-            # A constant forecast has no phase, and nothing judged no mean.
-            warnings.simplefilter("ignore", RuntimeWarning)
-            errors = np.sqrt(np.nanmean(np.maximum(squares, 0.0), axis=1))
-            phase = np.degrees(np.angle(np.nanmean(answer / np.abs(answer), axis=0)))
-            parts.append([*errors, np.nanmedian(np.abs(answer), axis=0), phase])
+    squares, answer = (each[..., data["judged"].values, :] for each in _responses(groups, test))
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+        # A constant forecast has no phase, and nothing judged no mean.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        errors = np.sqrt(np.nanmean(np.maximum(squares, 0.0), axis=2))
+        phase = np.degrees(np.angle(np.nanmean(answer / np.abs(answer), axis=1)))
+        ratio = np.nanmedian(np.abs(answer), axis=1)
     coords = {"model": data["model"], "channel": data["channel"]}
-    return _table(parts, ("model", "number", "channel"), RESPONSE, coords)
+    return _table([*errors, ratio, phase], ("number", "model", "channel"), RESPONSE, coords)
 
 
-def _responses(
-    groups: Mapping[str, xr.Dataset], test: str, model: str
-) -> tuple[FloatArray, ComplexArray]:
+def _responses(groups: Mapping[str, xr.Dataset], test: str) -> tuple[FloatArray, ComplexArray]:
     """Squared error by parts, and forecast over measurement in the wave.
 
     Returns
     -------
-    squares : ndarray, shape (3, training, window, channel)
+    squares : ndarray, shape (3, model, training, window, channel)
         Of the offset, of the wave and of the rest; NaN where a cell or a channel is not judged.
-    answer : ndarray of complex, shape (training, window, channel)
+    answer : ndarray of complex, shape (model, training, window, channel)
     """
-    data = groups[f"tests/{test}"].sel(model=model)
+    data = groups[f"tests/{test}"]
     time, measured, mean = (data[key].values for key in ("time", "measured", "mean"))
+    turn = 2 * np.pi * _frequencies(groups, test)[:, None] * time
+    basis = np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=-1)
+    orthonormal, triangle = np.linalg.qr(basis)  # of each window
+    onto = orthonormal.swapaxes(1, 2)
+    inside = (onto @ (mean - measured)) ** 2
+    parts = inside[..., 0, :], inside[..., 1:, :].sum(axis=-2)
+    total = np.sum((mean - measured) ** 2, axis=-2)
+    squares = np.stack([*parts, total - sum(parts)]) / (time.size * measured.var(axis=1, ddof=1))
+    # The first of an orthonormal basis of (1, cos, sin) is the mean; amplitudes need (1, …).
+    own, known = (np.linalg.solve(triangle, onto @ x) for x in (mean, measured))
+    amplitudes = (each[..., 1, :] - 1j * each[..., 2, :] for each in (own, known))
+    answer = np.divide(*amplitudes)
     slack = np.isnan(data["error"].sel(measure="nrmse").values)
-    squares = np.full((3, *slack.shape), np.nan)
-    answer = np.full(slack.shape, np.nan, dtype=complex)
-    for window, frequency in enumerate(_frequencies(groups, test)):
-        turn = 2 * np.pi * frequency * time
-        basis = np.stack([np.ones_like(time), np.cos(turn), np.sin(turn)], axis=1)
-        orthonormal, triangle = np.linalg.qr(basis)
-        truth, forecasts = measured[window], mean[:, window]
-        error = forecasts - truth
-        inside, total = (orthonormal.T @ error) ** 2, np.sum(error**2, axis=1)
-        parts = inside[:, 0], inside[:, 1:].sum(axis=1), total - inside.sum(axis=1)
-        squares[:, :, window] = np.stack(parts) / (time.size * truth.var(axis=0, ddof=1))
-        # The first of an orthonormal basis of (1, cos, sin) is the mean; amplitudes need (1, …).
-        own, known = (np.linalg.solve(triangle, orthonormal.T @ x) for x in (forecasts, truth))
-        answer[:, window] = (own[:, 1] - 1j * own[:, 2]) / (known[1] - 1j * known[2])
     squares[:, slack], answer[slack] = np.nan, np.nan
     return squares, answer
 
@@ -598,4 +583,6 @@ def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> Floa
 
     NaN where a cell or a channel is not judged.
     """
-    return np.degrees(np.angle(_responses(groups, test, model)[1]))
+    place = list(groups[f"tests/{test}"]["model"].values).index(model)
+    leads: FloatArray = np.degrees(np.angle(_responses(groups, test)[1][place]))
+    return leads

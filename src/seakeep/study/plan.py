@@ -322,7 +322,7 @@ class Plan:
     @property
     def ensembles(self) -> list[str]:
         """Names of the models that have members."""
-        return [name for name, each in self.models.items() if each.is_ensemble]
+        return [name for name, each in self.models.items() if each.spec.is_ensemble]
 
 
 def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dict[str, xr.Dataset]]:

@@ -56,11 +56,6 @@ class ResolvedModel:
     sources: Mapping[str, Source]
 
     @property
-    def is_ensemble(self) -> bool:
-        """Whether the model has members."""
-        return self.spec.is_ensemble
-
-    @property
     def n_members(self) -> int:
         """Number of members, 1 of a single model."""
         return int(getattr(self.spec, "n_members", 1))
@@ -72,7 +67,7 @@ class ResolvedModel:
             "kind": self.kind,
             "preset": self.preset,
             "role": self.spec.role,
-            "ensemble": self.is_ensemble,
+            "ensemble": self.spec.is_ensemble,
             "n_members": self.n_members,
             "settings": {
                 key: {"value": value, "source": self.sources[key]} for key, value in values.items()
@@ -113,36 +108,6 @@ def can_align(campaign: CampaignSettings, inputs: Sequence[str]) -> bool:
     return surge and campaign.rig.water_depth is not None and len(places) > 1
 
 
-def build_spec(
-    settings: ModelSettings, encounter_period: float | None, dt: float, *, aligned: bool = False
-) -> Spec:
-    """Turn the table of a model into the settings of a model, or of an ensemble of them.
-
-    Parameters
-    ----------
-    settings : ModelSettings
-        The table: a preset, keys of the constructor, or a preset with keys that override it.
-    encounter_period : float or None
-        Mean encounter period, s; a preset and an ensemble need it.
-    dt : float
-        Time step of the prepared runs, s.
-    aligned : bool, optional
-        Whether the alignment of the preset is taken, :func:`can_align`.
-
-    Returns
-    -------
-    Spec
-        The settings.
-
-    Raises
-    ------
-    RequestError
-        If there is no encounter period to count in, or a key that has no default is missing or
-        out of range.
-    """
-    return resolve_model(settings, encounter_period, dt, aligned=aligned).spec
-
-
 def resolve_model(
     settings: ModelSettings,
     encounter_period: float | None,
@@ -153,7 +118,26 @@ def resolve_model(
     aligned: bool = False,
     folds: Folds = "auto",
 ) -> ResolvedModel:
-    """Fill in, key by key, what the table of a model does not state."""
+    """Turn the table of a model into its settings: fill in, key by key, what it does not state.
+
+    Parameters
+    ----------
+    settings : ModelSettings
+        The table: a preset, keys of the constructor, or a preset with keys that override it.
+    encounter_period : float or None
+        Mean encounter period, s; a preset and an ensemble need it.
+    dt : float
+        Time step of the prepared runs, s.
+    preset, seed, folds : optional
+        Those of a study, for what the table does not state.
+    aligned : bool, optional
+        Whether the alignment of the preset is taken, :func:`can_align`.
+
+    Raises
+    ------
+    RequestError
+        If there is no encounter period to count in, or a key is unknown, missing or out of range.
+    """
     kind = _kind_of(settings)
     ensemble = kind.is_ensemble
     if settings.preset not in (None, *presets_of(kind)):

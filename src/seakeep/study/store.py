@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -14,23 +13,27 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 from filelock import FileLock, Timeout
 
-from seakeep.errors import SHOWN, RequestError, SeakeepError, warn
-from seakeep.files import check_report, is_there, read_bytes, read_sealed, replacing, write_whole
-from seakeep.study.settings import FORMAT
+from seakeep.errors import RequestError, SeakeepError, warn
+from seakeep.files import (
+    check_report,
+    head_of,
+    is_there,
+    load_groups,
+    read_bytes,
+    replacing,
+    write_netcdf,
+)
 
 RESULT = "study.nc"
-NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."
 HEADER = "study.json"
 LOCK = "study.lock"
 UNITS = "units"
 
-OF_HDF5 = frozenset({"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"})
-"""Attributes that tie variables to their dimensions."""
-
+STUDY, UNIT = "study", "unit of a study"
+"""Kinds of these files."""
 Groups = dict[str, xr.Dataset]
 
 
@@ -59,98 +62,12 @@ def storing(folder: Path) -> Iterator[None]:
         ) from error
 
 
-def write_groups(path: Path, attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]) -> None:
-    """Write groups into one sealed NetCDF-4 file, renamed into place.
-
-    h5netcdf would take a hundred times as long for the groups of a study.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    attrs : mapping
-        Attributes of the file.
-    groups : mapping of str to Dataset
-        What goes into it.
-
-    Raises
-    ------
-    RequestError, StorageError
-        As :func:`storing`.
-    """
-    # Here, so that commands that write no result start without HDF5.
-    import h5py
-
-    layout = {
-        name: [{str(k): each.dims for k, each in part.items()} for part in (group, group.coords)]
-        for name, group in groups.items()
-    }
-    buffer = io.BytesIO()
-    with h5py.File(buffer, "w", libver="latest", track_order=True) as file:
-        file.attrs.update({**attrs, "layout": json.dumps(layout)})
-        for name, group in groups.items():
-            place = file.create_group(name, track_order=True)
-            place.attrs.update(group.attrs)
-            for dim in group.sizes:
-                if dim not in group.variables:
-                    place.create_dataset(dim, (group.sizes[dim],), ">f4").make_scale(NO_VARIABLE)
-            for key, each in group.variables.items():
-                x, text = each.values, each.dtype.kind in "OU"
-                packing: dict[str, Any] = {"dtype": h5py.string_dtype()} if text else {}
-                if each.size > 4096 and each.dtype.kind == "f":
-                    packing = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-                as_type = {"b": "i1", "U": "O"}.get(each.dtype.kind, each.dtype)
-                variable = place.create_dataset(key, data=x.astype(as_type), **packing)
-                variable.attrs.update(
-                    each.attrs | ({"dtype": "bool"} if x.dtype.kind == "b" else {})
-                )
-                if each.dims == (key,):
-                    variable.make_scale(key)
-            for key, each in group.variables.items():
-                for number, dim in enumerate(each.dims if each.dims != (key,) else ()):
-                    place[key].dims[number].attach_scale(place[dim])
+def write_groups(
+    path: Path, kind: str, attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]
+) -> None:
+    """Write groups into one sealed file, renamed into place; errors as :func:`storing`."""
     with storing(path.parent), replacing(path) as temporary:
-        write_whole(temporary, buffer)
-
-
-def read_groups(path: Path) -> tuple[dict[str, Any], Groups]:
-    """Attributes and groups of a file of :func:`write_groups`, in memory.
-
-    Raises
-    ------
-    RequestError
-        If there is no such file, or one of another format.
-    DataError
-        If it is damaged, or was altered since it was written.
-    """
-    # Here, so that commands that read no result start without HDF5.
-    import h5py
-
-    with h5py.File(read_sealed(path), "r") as file:
-        attrs = {key: _plain(value) for key, value in file.attrs.items()}
-        if attrs.get("format") != FORMAT:
-            raise RequestError(
-                f"{path} was written in format {attrs.get('format')!s:.{SHOWN}}, and this version "
-                f"of seakeep reads format {FORMAT}. Run the study again in another folder."
-            )
-        groups = {}
-        for name, parts in json.loads(attrs.pop("layout")).items():
-            variables, coords = (
-                {k: _variable(file[name][k], d) for k, d in p.items()} for p in parts
-            )
-            facts = {key: _plain(value) for key, value in file[name].attrs.items()}
-            groups[name] = xr.Dataset(variables, coords, facts)
-    return attrs, groups
-
-
-def _variable(stored: Any, dims: list[str]) -> xr.Variable:
-    attrs = {key: _plain(value) for key, value in stored.attrs.items() if key not in OF_HDF5}
-    values = (stored.asstr() if stored.dtype.kind == "O" else stored)[()]
-    return xr.Variable(dims, np.asarray(values, attrs.pop("dtype", None)), attrs)
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+        write_netcdf(temporary, xr.Dataset(attrs={**head_of(kind), **attrs}), groups, packed=True)
 
 
 @dataclass(frozen=True)
@@ -259,15 +176,15 @@ class UnitFolder:
 
     def write(self, name: str, groups: Groups) -> None:
         """Keep the groups of a finished unit; errors as :func:`write_groups`."""
-        write_groups(self._path(name), {"format": FORMAT, "digest": self.digest}, groups)
+        write_groups(self._path(name), UNIT, {"digest": self.digest}, groups)
 
     def read(self, name: str) -> Groups | None:
         """Groups of a finished unit; None where it is not finished, or damaged."""
         try:
-            attrs, groups = read_groups(self._path(name))
+            groups = load_groups(self._path(name), UNIT)
         except SeakeepError:
             return None
-        return groups if attrs["digest"] == self.digest else None
+        return groups if groups.pop("").attrs["digest"] == self.digest else None
 
     def clear(self) -> None:
         """Remove the units; for when all of them are in the result."""
@@ -382,10 +299,10 @@ def write_result(
 ) -> StudyResult:
     """Write a result into its folder, once it was handed to `finished`; errors as there."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    result = StudyResult(folder, {"format": FORMAT, "created": created, **attrs}, dict(groups))
+    result = StudyResult(folder, {"created": created, **attrs}, dict(groups))
     if finished is not None:
         finished(result)
-    write_groups(folder / RESULT, result.attrs, result.groups)
+    write_groups(folder / RESULT, STUDY, result.attrs, result.groups)
     return result
 
 
@@ -405,9 +322,9 @@ def read_result(folder: Path | str) -> StudyResult:
     Raises
     ------
     RequestError
-        If there is no finished study, or one of another format.
+        If there is no finished study.
     DataError
-        If its file is damaged, or was altered since it was written.
+        If its file is damaged, was altered since it was written, or has another format.
     """
     folder = Path(folder)
     if not is_there(folder / RESULT):
@@ -420,4 +337,5 @@ def read_result(folder: Path | str) -> StudyResult:
                 else "Give the folder that 'seakeep study' or 'seakeep reproduce' wrote."
             )
         )
-    return StudyResult(folder, *read_groups(folder / RESULT))
+    groups = load_groups(folder / RESULT, STUDY)
+    return StudyResult(folder, groups.pop("").attrs, groups)

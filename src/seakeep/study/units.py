@@ -137,7 +137,7 @@ def compute(
     words = {"units": "s", "long_name": "waves read after the instant that is forecast"}
     chosen = {"words": getattr(fitted, "selection", ""), "look_ahead": ((), ahead, words)}
     out = {"chosen": xr.Dataset(chosen)}
-    is_ensemble = plan.models[unit.model].is_ensemble
+    is_ensemble = plan.specs[unit.model].is_ensemble
     frequency = 1.0 / (settings.statistics.split_period * plan.encounter_period)
     tested = tested_windows(plan, unit.training)
     for test, series, lost, envelope in _series(plan, runs, fitted, tested):
@@ -231,7 +231,7 @@ def regularisation(
 def _of_first(plan: Plan, unit: Unit, fitted: Any) -> Groups:
     """What is kept of a model of the first training set alone."""
     out = {}
-    if plan.models[unit.model].is_ensemble:
+    if plan.specs[unit.model].is_ensemble:
         out["draws"] = fitted.draws
     if plan.settings.output.eigenvalues:
         values = [np.linalg.eigvals(matrix) for matrix in fitted.system_matrices()]
@@ -314,10 +314,12 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
             if rest and tests:
                 others = TrainingSet(f"{training.name}, calibration", rest)
                 ensemble = fit_training(plan, runs, unit.model, others, spec)
-                judged += held_out(ensemble, tests, steps, statistics.level).values()
+                judged += held_out(
+                    dict.fromkeys(tests, ensemble), tests, steps, statistics.level
+                ).values()
     else:
         parts = {n: between(runs[n], runs[n].attrs["train_span"]) for n in plan.calibrated_on}
-        judged += held_out(fitted, parts, steps, statistics.level).values()
+        judged += held_out(dict.fromkeys(parts, fitted), parts, steps, statistics.level).values()
     keys = ("margin", "blocks", "warranted")
     nothing = np.full(len(plan.states), np.nan)
     out: dict[str, Any] = dict.fromkeys(keys, ("channel", nothing))

@@ -98,8 +98,7 @@ def _decimals(column: xr.DataArray) -> int:
 def write_dataset(data: xr.Dataset, path: Path) -> None:
     """Write a Dataset to NetCDF, compressed, under a temporary name, then rename it."""
     with replacing(path) as temporary:
-        packed = {str(name): {"zlib": True, "complevel": 4} for name in data.data_vars}
-        write_netcdf(temporary, data, packed)
+        write_netcdf(temporary, data, packed=True)
 
 
 def _filtered(settings: TankSettings) -> dict[str, str]:

@@ -444,6 +444,8 @@ int {{ name }}_validity({{ name }}_estimator *e)
         double energy[BANDS] = { 0.0 }, total = 0.0, unseen = 0.0, height, steepness, repeats, margin;
         const double *taught = shares + q * BANDS;
         int peak = 0, moves = 0;
+        if (!waves[q])
+            continue;
         for (int t = 0; t < size; t++)
             mean += input(e, t)[q] / size;
         for (int t = 0; t < size; t++) {
