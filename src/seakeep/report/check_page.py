@@ -20,11 +20,13 @@ from seakeep.report.tables import (
     Number,
     Table,
     change,
+    entries,
     interval,
     number,
     numbers,
     percent,
     probability,
+    row,
     short,
     table,
     to,
@@ -120,11 +122,12 @@ def _change(one: xr.Dataset, baseline: str) -> Number:
 def _by_run(result: xr.Dataset, one: str) -> Table:
     """ANRMSE of each test, of the model with its interval and of the baselines."""
     rows, averages, models = [], [], [str(name) for name in result["model"].values]
-    for kind in result["waves"].values:
-        for run in result["run"].values[result["kind"].values == kind]:
-            rows.append((str(run), *_cells(result.sel(run=run), "anrmse")))
+    for own in entries(result, "waves"):
+        kind = str(own["waves"].values)
+        of_kind = entries(result.sel(run=result["kind"] == kind), "run")
+        rows += [(*row(at, "run"), *_cells(at, "anrmse")) for at in of_kind]
         averages.append(len(rows))
-        rows.append((f"mean, {kind} waves", *_cells(result.sel(waves=kind, state="all"), "nrmse")))
+        rows.append((f"mean, {kind} waves", *_cells(own.sel(state="all"), "nrmse")))
     note = (
         "Baselines are fitted to the training runs with their recommended settings and the model's "
         "look-ahead, alignment and observables."
@@ -142,14 +145,12 @@ def _cells(at: xr.Dataset, key: str) -> list[Number]:
 def _by_state(result: xr.Dataset) -> Table:
     """Mean error of each state, the best baseline, and the verdict."""
     rows = []
-    for kind in result["waves"].values:
-        for state in result["state"].values[1:]:
-            one = result.sel(waves=kind, state=state)
-            beside: tuple[str, ...] = (MISSING, MISSING, MISSING)
-            if best := str(one["best"].values):
-                beside = (best, number(one["nrmse"].sel(model=best)), _change(one, best))
-            use = USES.get(float(one["limit"]), "not judged").partition(" (")[0]
-            rows.append((str(state), str(kind), *_cells(one, "nrmse")[:2], *beside, use))
+    for one in entries(result.isel(state=slice(1, None)), "waves", "state"):
+        beside: tuple[str, ...] = (MISSING, MISSING, MISSING)
+        if best := str(one["best"].values):
+            beside = (best, number(one["nrmse"].sel(model=best)), _change(one, best))
+        use = USES.get(float(one["limit"]), "not judged").partition(" (")[0]
+        rows.append((*row(one, "state", "waves"), *_cells(one, "nrmse")[:2], *beside, use))
     return table("verdicts", rows)
 
 
@@ -198,50 +199,51 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
 
 def _points_table(measured: xr.Dataset, result: xr.Dataset) -> Table:
     """Measured response in regular waves; irregular ones stand in the figure."""
-    at = measured.isel(point=np.flatnonzero(measured["kind"].values == "regular"))
+    at = measured.sel(point=measured["kind"] == "regular")
     at = at.assign_coords(units=("state", result["units"].isel(input=-1).values))
     rows = [
         (
-            str(own["run"].values),
-            number(own["frequency"]),
-            number(own["wave_amplitude"], 4),
-            state,
-            uncertain(factor * own["amplitude"], factor * own["amplitude_uncertainty"]),
+            *row(own, "run", frequency=3, wave_amplitude=4),
+            *row(own, "shown"),
+            uncertain(own["amplitude"], own["amplitude_uncertainty"]),
             uncertain(own["phase"], own["phase_uncertainty"]),
         )
-        for point in range(at.sizes["point"])
-        for own, factor, state in _states(at.isel(point=point))
+        for own in entries(_as_shown(at, "amplitude", "amplitude_uncertainty"), "point", "state")
     ]
     return table("measured_response", rows)
 
 
-def _states(result: xr.Dataset) -> Iterator[tuple[xr.Dataset, float, str]]:
-    """Results of each state, the factor to the unit that is shown, and its name with that unit."""
-    for state, unit in zip(result["state"].values, result["units"].values, strict=True):
-        factor, shown = displayed(str(unit))
-        yield result.sel(state=state), factor, f"{state} [{shown_unit(shown)}]"
+def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
+    """Some variables in the units that are shown, and ``shown``: each state with its unit."""
+    factors, units = zip(*map(displayed, result["units"].values.astype(str)), strict=True)
+    factor = xr.DataArray(list(factors), dims="state")
+    names = [
+        f"{state} [{shown_unit(unit)}]"
+        for state, unit in zip(result["state"].values, units, strict=True)
+    ]
+    scaled = {key: result[key] * factor for key in keys}
+    return result.assign(scaled).assign_coords(shown=("state", names))
 
 
 def _validation_table(result: xr.Dataset) -> Table:
     """E and u_val of each state: over the regular runs one by one, irregular points together."""
     rows = []
-    for own, factor, state in _states(result):
+    for own in entries(_as_shown(result, "error", "uncertainty"), "state"):
         for kind in ("regular", "irregular"):
-            known = (own["kind"].values == kind) & np.isfinite(own["error"].values)
-            if not known.any():
+            at = own.sel(point=(own["kind"] == kind) & np.isfinite(own["error"]))
+            if not at.sizes["point"]:
                 continue
-            at = own.isel(point=np.flatnonzero(known))
-            error, allowed = factor * at["error"].values, factor * at["uncertainty"].values
-            worst = int(np.argmax(np.abs(error) - allowed))
+            error = at["error"]
+            worst = at.isel(point=(abs(error) - at["uncertainty"]).argmax("point"))
             rows.append(
                 (
-                    state,
+                    *row(own, "shown"),
                     kind,
                     number(error.size, 0),
                     number(at["within"].sum(), 0),
                     short(np.sqrt(np.mean(error**2))),
-                    number(at["frequency"][worst]),
-                    uncertain(error[worst], allowed[worst]),
+                    number(worst["frequency"]),
+                    uncertain(worst["error"], worst["uncertainty"]),
                 )
             )
     return table("validation", rows)
@@ -292,7 +294,7 @@ def _bounds(own: xr.Dataset) -> tuple[str, ...]:
     cells = []
     for key in ("linear_bound", "observables_bound"):
         cells += [number(own[key]), interval(own, key)] if key in own else [MISSING] * 2
-    return (str(own["state"].values), own.attrs["of"], number(own["nrmse"]), *cells)
+    return (*row(own, "state"), own.attrs["of"], number(own["nrmse"]), *cells)
 
 
 def _advice(model: float, linear: float, more: float, ahead: bool) -> str:
@@ -344,25 +346,22 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
 
 def _decay_table(result: xr.Dataset, measured: xr.Dataset | None) -> Table:
     """Period and damping of each motion of the model, and of each measured decay."""
-    keys = ("period", "damping_ratio", "p")
-    cases = [(result.sel(motion=each), Number("0"), "model") for each in result["motion"].values]
+    cases = [(own, "model") for own in entries(result.assign(q=0), "motion")]
     if measured is not None:
-        each_run = (measured.sel(run=run) for run in measured["run"].values)
-        cases += [(own, number(own["q"]), str(own["run"].values)) for own in each_run]
+        cases += [(own, str(own["run"].values)) for own in entries(measured, "run")]
     rows = [
-        (str(own["motion"].values), *(number(own[key]) for key in keys), q, of)
-        for own, q, of in cases
+        (*row(own, "motion", period=3, damping_ratio=3, p=3, q=0 if of == "model" else 3), of)
+        for own, of in cases
     ]
     return table("decay", rows)
 
 
 def _modes_table(result: xr.Dataset) -> Table:
-    rows, keys = [], ("period", "damping_ratio", "decay_time", "modulus")
-    for k in range(result.sizes["mode"]):
-        own = result.isel(mode=k)
+    rows = []
+    for own in entries(result, "mode"):
         parts = own["participation"].to_series().sort_values(ascending=False, kind="stable")[:2]
         taking = ", ".join(f"{state} {part:.2f}" for state, part in parts.items())
-        rows.append((*(number(own[key], 4) for key in keys), taking))
+        rows.append((*row(own, period=4, damping_ratio=4, decay_time=4, modulus=4), taking))
     return table("modes", rows, {"modes": result.sizes["mode"]})
 
 
@@ -371,9 +370,16 @@ def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
     lag, period = result["lag"].values, float(result.attrs["encounter_period"])
     trained = checked.results.get("training_residuals")
     shown = [result] if trained is None else [result, trained]
-    rows = [
-        _residuals_row(each.sel(state=state)) for state in result["state"].values for each in shown
-    ]
+    rows = []
+    for own in (each.sel(state=state) for state in result["state"].values for each in shown):
+        beyond = MISSING
+        if "input_correlation" in own:
+            part = (np.abs(own["input_correlation"]) > own["input_limit"]).mean()
+            beyond = Number(f"{percent(part)} %")
+        tests = row(own, one_step=4, ljung_box=0, probability=probability)
+        ages = own["age_nrmse"][[own.sizes["lag"] - 2, -1]]
+        errors = (*numbers(own["band_nrmse"]), *numbers(ages))
+        rows.append((*row(own, "state"), own.attrs["of"], *tests, beyond, *errors))
     words = {
         "oldest": result.sizes["age"] * (lag[1] - lag[0]) / period,
         "lag": lag[-1],
@@ -387,48 +393,25 @@ def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
     )
 
 
-def _residuals_row(own: xr.Dataset) -> tuple[str, ...]:
-    beyond = MISSING
-    if "input_correlation" in own:
-        part = (np.abs(own["input_correlation"]) > own["input_limit"]).mean()
-        beyond = Number(f"{percent(part)} %")
-    return (
-        str(own["state"].values),
-        own.attrs["of"],
-        number(own["one_step"], 4),
-        number(own["ljung_box"], 0),
-        probability(own["probability"]),
-        beyond,
-        *numbers(own["band_nrmse"]),
-        *numbers(own["age_nrmse"][[own.sizes["lag"] - 2, -1]]),
-    )
-
-
 def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the statistics of responses that designers read."""
+    extreme = ("extreme", "extreme_lower", "extreme_upper")
+    scaled = _as_shown(result, "significant_double_amplitude", *extreme)
     rows = []
-    for of_state, factor, state in _states(result):
-        for kind in result["kind"].values:
-            own = of_state.sel(kind=kind)
-            bounds = [factor * float(own[f"extreme_{each}"]) for each in ("lower", "upper")]
-            known = bool(np.isfinite(bounds[0]))
-            rows.append(
-                (
-                    state,
-                    str(kind),
-                    short(factor * own["significant_double_amplitude"]),
-                    number(own["zero_crossing_period"]),
-                    number(own["peaks"], 0),
-                    number(own["weibull_shape"], 2),
-                    short(factor * own["extreme"]) if known else MISSING,
-                    to(bounds, short),
-                    number(own["divergence"], 4) if kind == "forecast" else MISSING,
-                )
+    for own in entries(scaled, "state", "kind"):
+        bounds = to([own[key] for key in extreme[1:]], short)
+        rows.append(
+            (
+                *row(own, "shown", "kind", significant_double_amplitude=short),
+                *row(own, zero_crossing_period=3, peaks=0, weibull_shape=2),
+                MISSING if bounds == MISSING else short(own["extreme"]),
+                bounds,
+                number(own["divergence"], 4) if own["kind"] == "forecast" else MISSING,
             )
+        )
     hours = float(result.attrs["duration"]) / 3600
     figures = [
-        drawing("exceedance", partial(checks.exceedance, result)),
-        drawing("density", partial(checks.density, result)),
+        drawing(key, partial(getattr(checks, key), result)) for key in ("exceedance", "density")
     ]
     tables = [table("statistics", rows, {"of": result.attrs["of"], "hours": hours})]
     return section("statistics", figures=figures, tables=tables)
@@ -436,15 +419,11 @@ def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
 
 def validity_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return where each test lies against the training."""
-    digits = {"height": 3, "period": 2, "steepness": 4, "drift": 3}
     rows = [
-        (str(run), str(part), str(at["waves"].values),
-         *(number(at[key], places) for key, places in digits.items()))
-        for run in result["run"].values
-        for part in result["part"].values
-        for at in [result.sel(run=run, part=part)]
+        row(at, "run", "part", "waves", height=3, period=2, steepness=4, drift=3)
+        for at in entries(result, "run", "part")
         if np.isfinite(at["height"])
-    ]  # fmt: skip
+    ]
     points = [
         f"{run}: {why}. What the model says there is an extrapolation."
         for run, why in _outside(result)
@@ -460,15 +439,17 @@ def validity_section(result: xr.Dataset, checked: Checked) -> Section:
 def drift_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the second order: mean drift and slow response per amplitude squared."""
     rows = []
-    for own, factor, state in _states(result):
-        if "offset" not in own or not np.isfinite(own["slow_response"]).any():
-            continue
-        mean, points = factor * own["slow_response"][0], own["point_frequency"].values
-        modelled = np.interp(points, mean["frequency"], mean, left=np.nan, right=np.nan)
-        for k, (f, value) in enumerate(zip(points, modelled, strict=True)):
-            offset = (factor * own[key][k] for key in ("offset", "offset_uncertainty"))
-            run = str(own["run"].values[k])
-            rows.append((state, run, number(f), number(value, 4), uncertain(*offset)))
+    if "offset" in result:
+        shown = _as_shown(result, "slow_response", "offset", "offset_uncertainty")
+        for own in entries(shown, "state"):
+            mean, points = own["slow_response"][0], own["point_frequency"].values
+            if not np.isfinite(own["slow_response"]).any():
+                continue
+            modelled = np.interp(points, mean["frequency"], mean, left=np.nan, right=np.nan)
+            for value, at in zip(modelled, entries(own, "point"), strict=True):
+                offset = uncertain(at["offset"], at["offset_uncertainty"])
+                place = row(at, "shown", "run", point_frequency=3)
+                rows.append((*place, number(value, 4), offset))
     figure = drawing("drift", partial(checks.drift, result))
     tables = [table("drift", rows)] if rows else []
     return section("drift", result.attrs, figures=[figure], tables=tables)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import binomtest
@@ -111,12 +111,17 @@ def opposite(verdict: bool | None) -> bool | None:
 
 
 def _cells(
-    result: StudyResult, tests: Sequence[str], measure: str = "nrmse", model: str = ENSEMBLE
+    result: StudyResult,
+    tests: Sequence[str],
+    channels: Sequence[str] = (),
+    measure: str = "nrmse",
+    model: str = ENSEMBLE,
 ) -> FloatArray:
     """Errors over (training, window, channel), NaN where not judged; windows of all test sets."""
     order, _ = training_order(result.groups["training"])
+    at = {"model": model, "measure": measure, "channel": list(channels or result.channels)}
     parts = [
-        data["error"].where(data["judged"]).sel(model=model, measure=measure).values
+        data["error"].where(data["judged"]).sel(at).values
         for data in (result.tests[test] for test in tests)
     ]
     return np.concatenate(parts, axis=1)[order]
@@ -167,16 +172,9 @@ def _motions(result: StudyResult) -> list[str]:
     return [name for name in result.channels if name not in LOADS]
 
 
-def error_of(
-    result: StudyResult,
-    tests: Sequence[str],
-    channels: Sequence[str] = (),
-    measure: str = "nrmse",
-    model: str = ENSEMBLE,
-) -> Interval:
-    """Median error of the average over some channels, or over all."""
-    picked = _columns(result, channels or result.channels)
-    return _interval(result, tests, _median, _cells(result, tests, measure, model)[..., picked])
+def error_of(result: StudyResult, tests: Sequence[str], *of: Any, **named: str) -> Interval:
+    """Median of the errors of :func:`_cells`, averaged over the channels."""
+    return _interval(result, tests, _median, _cells(result, tests, *of, **named))
 
 
 def _robust(results: Results) -> Judged:
@@ -213,7 +211,7 @@ def _share(result: StudyResult, measure: str, channels: Sequence[str]) -> Interv
         out: FloatArray = means[:, picked].sum(axis=1) / np.nansum(means, axis=1)
         return out
 
-    return _interval(result, SEA, statistic, _cells(result, SEA, measure))
+    return _interval(result, SEA, statistic, _cells(result, SEA, measure=measure))
 
 
 def _who_errs(results: Results) -> Judged:
@@ -257,14 +255,15 @@ def _against_single(
         with np.errstate(invalid="ignore", divide="ignore"):  # a redraw may hold one cell alone
             return statistic(drawn) / statistic(other)
 
-    both = {key: [_cells(result, tests, key, m) for m in (ENSEMBLE, SINGLE)] for key in MEASURES}
+    both = {
+        key: [_cells(result, tests, (), key, m) for m in (ENSEMBLE, SINGLE)] for key in MEASURES
+    }
     return {MEASURES[key]: _interval(result, tests, ratio, *each) for key, each in both.items()}
 
 
 def _better(results: Results, statistic: Statistic) -> Judged:
     differences = _against_single(results["paper"], SEA, statistic)
-    words = ", ".join(f"{words} {each.change()}" for words, each in differences.items())
-    return words, all_of(each.below(1.0) for each in differences.values())
+    return _changes(differences), all_of(each.below(1.0) for each in differences.values())
 
 
 def _always_better(results: Results) -> Judged:
@@ -354,11 +353,10 @@ def _against_irregular(results: Results) -> Judged:
         return ours / sea
 
     differences = {
-        words: _interval(result, tests, ratio, _cells(result, tests, key), labels)
+        words: _interval(result, tests, ratio, _cells(result, tests, measure=key), labels)
         for key, words in MEASURES.items()
     }
-    words = ", ".join(f"{words} {each.change()}" for words, each in differences.items())
-    return words, all_of(
+    return _changes(differences), all_of(
         [opposite(differences["ANRMSE"].below(1.0)), differences["NAMMAE"].below(1.0)]
     )
 
@@ -452,3 +450,8 @@ CLAIMS: dict[str, Callable[[Results], Judged]] = {
     "stern": _stern,
 }
 """What judges each claim, in the order of the paper; ``words.toml`` has the words."""
+
+
+def _changes(ratios: Mapping[str, Interval]) -> str:
+    """Text of the changes of both measures."""
+    return ", ".join(f"{words} {each.change()}" for words, each in ratios.items())

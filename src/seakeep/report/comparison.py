@@ -8,7 +8,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,14 +22,17 @@ from seakeep.files import MARK, replacing, write_netcdf
 from seakeep.models import HankelEnsemble
 from seakeep.models.forecasts import counted
 from seakeep.report.tables import (
+    Form,
     Number,
     Table,
     band_verdict,
     change,
+    entries,
     interval,
     number,
     numbers,
     plain_cell,
+    row,
     short,
 )
 from seakeep.study.judge import verdict
@@ -59,20 +64,18 @@ HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Comparison of forecasts with measurements, tables per run that fit a terminal."""
     shown = {name: each for name, each in _SHOWN.items() if name in table}
-    heads = [heading for heading, _, _ in shown.values()]
-    for run in table["run"].values:
-        at = table.sel(run=run)
+    heads, _, of_all = zip(*shown.values(), strict=True)
+    digits = {name: each[1] for name, each in shown.items()}
+    for at in entries(table, "run"):
         title = "forecast against measurement"
         if "scale" in at:
             title += f", full scale (1:{float(at['scale_factor']):g})"
         if "level" in at:
             title += f", {_band_words(at)}"
-        means = [number(at[mean], digits) if mean else "" for _, digits, mean in shown.values()]
-
-        def errors(one: xr.Dataset) -> Iterator[str]:
-            return (number(one[key], digits) for key, (_, digits, _) in shown.items())
-
-        yield _by_channel(at, "comparison", title, heads, errors, means, _note(at))
+        decimals = zip(of_all, digits.values(), strict=True)
+        means = [number(at[mean], places) if mean else "" for mean, places in decimals]
+        cells = partial(row, **digits)
+        yield _by_channel(at, "comparison", title, heads, cells, means, _note(at))
         yield _by_channel(
             at,
             "intervals",
@@ -95,7 +98,7 @@ def _by_channel(
 ) -> Table:
     """A row per channel of a run, with the averages over the channels last."""
     run = at["run"].values
-    rows = [(str(each), *cells(at.sel(channel=each))) for each in at["channel"].values]
+    rows = [(*row(one, "channel"), *cells(one)) for one in entries(at, "channel")]
     last = [len(rows)] if averages else []
     if averages:
         rows.append(("average", *averages))
@@ -105,11 +108,10 @@ def _by_channel(
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
     shown = {name: heading for name, heading in _IN_UNITS.items() if name in at}
-
-    def cells(one: xr.Dataset) -> list[str]:
-        return [str(one["channel_units"].values), *(short(one[key]) for key in shown)]
-
-    return _by_channel(at, "extremes", title, ("unit", *shown.values()), cells)
+    forms: dict[str, Form] = dict.fromkeys(shown, short)
+    cells = partial(row, **forms)
+    heads = ("unit", *shown.values())
+    return _by_channel(at, "extremes", title, heads, lambda one: cells(one, "channel_units"))
 
 
 def _note(at: xr.Dataset) -> str:
@@ -130,34 +132,22 @@ def _note(at: xr.Dataset) -> str:
 
 def model_blocks(tables: Mapping[str, xr.Dataset]) -> Iterator[Table]:
     """Several models beside each other, a table of averages and one of channels per run."""
-    first, *_ = tables.values()
+    name, first = next(iter(tables.items()))
     heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
     for run in first["run"].values:
-        of_run = {name: table.sel(run=run) for name, table in tables.items()}
-        rows = [
-            (
-                name,
-                number(at["anrmse"]),
-                interval(at, "anrmse"),
-                *(number(at[key]) for key in ("training_anrmse", "mean_nammae")),
-            )
-            for name, at in of_run.items()
-        ]
-        status = {name: str(at["status"].values) for name, at in of_run.items()}
-        ahead = {n: look_ahead_words(float(at["look_ahead"])) for n, at in of_run.items()}
-        texts = [f"{name}: {words}" for name, words in status.items() if words != "ok"]
-        texts += [f"{name} {words}" for name, words in ahead.items() if words]
+        rows, status, ahead = [], [], []
+        for model, at in ((model, table.sel(run=run)) for model, table in tables.items()):
+            error, *others = row(at, anrmse=3, training_anrmse=3, mean_nammae=3)
+            rows.append((model, error, interval(at, "anrmse"), *others))
+            if at["status"] != "ok":
+                status.append(f"{model}: {at['status'].values}")
+            if words := look_ahead_words(float(at["look_ahead"])):
+                ahead.append(f"{model} {words}")
         title = f"{run}: models against measurement"
-        yield Table(f"models_{run}", title, heads, rows, "; ".join(texts))
-        name, at = next(iter(of_run.items()))
-        every = (("model", "channel"), [each["nrmse"].values for each in of_run.values()])
-        yield _by_channel(
-            at.assign(every=every),
-            "channels",
-            "NRMSE",
-            [*of_run],
-            lambda one: numbers(one["every"]),
-        )
+        yield Table(f"models_{run}", title, heads, rows, "; ".join(status + ahead))
+        every = [table["nrmse"].sel(run=run).values for table in tables.values()]
+        at = first.sel(run=run).assign(every=(("model", "channel"), every))
+        yield _by_channel(at, "channels", "NRMSE", [*tables], lambda one: numbers(one["every"]))
         yield _extremes(at, f"extremes of {name}")
 
 
@@ -264,22 +254,22 @@ def nowcast_blocks(nowcasts: Mapping[str, xr.Dataset]) -> Iterator[Table]:
     for model, of_model in nowcasts.items():
         share, lead = float(of_model.attrs["share"]), of_model["lead"].values
         places = [max(round(len(lead) * part) - 1, 0) for part in (0.05, 0.2, 0.5, 1.0)]
-        times = (f"at {number(each)} s" for each in lead[places])
-        columns = ("channel", "lead time s", *times, "in band %")
+        times = [f"at {number(each)} s" for each in lead[places]]
+        heads = ("lead time s", *times, "in band %")
         note = (
             f"errors in training SD over {int(of_model.attrs['starts'])} forecasts, no wave after "
             f"a start known; lead time: error below {share:g} SD"
         )
-        for run in of_model["run"].values:
-            rows = []
-            for name in of_model["channel"].values:
-                at = of_model.sel(run=run, channel=name)
-                lead_time = number(at["lead_time"])
-                if float(at["lead_time"]) >= lead[-1] - 1e-9:
-                    lead_time = Number(f"at least {number(lead[-1])}")
-                inside = number(at["coverage"].mean(), 0)
-                rows.append((str(name), lead_time, *numbers(at["error"][places]), inside))
-            yield Table(f"nowcast_{model}_{run}", f"{run}: {model} in service", columns, rows, note)
+
+        def cells(at: xr.Dataset, lead: Any = lead, places: Any = places) -> Iterator[str]:
+            whole = float(at["lead_time"]) >= lead[-1] - 1e-9
+            yield Number(f"at least {number(lead[-1])}") if whole else number(at["lead_time"])
+            yield from numbers(at["error"][places])
+            yield number(at["coverage"].mean(), 0)
+
+        for at in entries(of_model, "run"):
+            title = f"{model} in service"
+            yield _by_channel(at, f"nowcast_{model}", title, heads, cells, note=note)
 
 
 def band_findings(table: xr.Dataset) -> list[str]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import resources
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsFloat
 
@@ -224,6 +225,29 @@ def to(bounds: Iterable[SupportsFloat], form: Form = number) -> Number:
     """
     texts = [form(each) for each in bounds]
     return MISSING if MISSING in texts else Number(" to ".join(texts))
+
+
+def entries(data: xr.Dataset, *dims: str) -> Iterator[xr.Dataset]:
+    """Entries of a dataset over some of its dimensions, the last of them first."""
+    for place in product(*(data[dim].values for dim in dims)):
+        yield data.sel(dict(zip(dims, place, strict=True)))
+
+
+def row(at: xr.Dataset, /, *words: str, **forms: int | Form) -> tuple[str, ...]:
+    """Cells of an entry: its words, then its numbers, each with its decimals or form.
+
+    Examples
+    --------
+    >>> at = xr.Dataset({"run": "first", "height": 0.0612, "mean": 1234.5})
+    >>> row(at, "run", height=2, mean=short)
+    ('first', '0.06', '1234')
+    """
+    texts = (str(at[key].values) for key in words)
+    numbers = (
+        number(at[key], form) if isinstance(form, int) else form(at[key])
+        for key, form in forms.items()
+    )
+    return (*texts, *numbers)
 
 
 def interval(at: xr.Dataset, key: str) -> Number:

@@ -14,7 +14,7 @@ from seakeep.report.figures.runs import spectrum_figure
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.quality_sheet import clock_rows, other_findings, run_row
 from seakeep.report.style import model_words, shown_unit
-from seakeep.report.tables import Table, number, percent, table
+from seakeep.report.tables import Table, entries, number, percent, row, table
 from seakeep.study import StudyResult
 from seakeep.study.plan import windows_overlap
 from seakeep.waves import phase_speed
@@ -35,20 +35,19 @@ def wave_tables(result: StudyResult) -> list[Table]:
     tables, run = [], next(iter(result.prepared.values()))
     if "spectra" in result.groups:
         tables.append(_wave_table(result))
-    used = {str(name) for name in result.groups["channels"]["name"].values}
+    channels = result.groups["channels"]
     rows = [
         (
             str(name),
             str(channel.attrs.get("long_name", name)),
             number(channel.attrs["x_position"], 2),
-            "yes" if name in used else "",
+            "yes" * (name in channels["name"]),
         )
         for name, channel in run.data_vars.items()
         if "x_position" in channel.attrs
     ]
     if rows:
-        frame = str(result.groups["channels"].attrs.get("frame", ""))
-        tables.append(table("positions", rows, {"frame": frame}))
+        tables.append(table("positions", rows, {"frame": str(channels.attrs.get("frame", ""))}))
     return tables
 
 
@@ -82,31 +81,26 @@ def _wave_table(result: StudyResult) -> Table:
 
 def data(result: StudyResult) -> Section:
     """Return channels, and what preparation found in each run."""
-    tables = [_sign_table(result), _run_table(result)]
-    clocks = [(n, *row) for n, run in result.prepared.items() for row in clock_rows(run)]
+    channels = result.groups["channels"]
+    signs = []
+    for at in entries(channels, "name"):
+        name, use, unit, *others = row(at, "name", "use", "units", "positive", "source")
+        signs.append((result.words_of(name), use, shown_unit(unit), *others))
+    frame = channels.attrs.get("frame", "")
+    runs = []
+    for name, run in result.prepared.items():
+        _, span, count, kinds = run_row(name, run)
+        sea = row(result.groups["runs"].sel(run=name), "sea_state")
+        findings = "; ".join(other_findings(run))
+        runs.append((name, *sea, str(span), count, kinds.replace("_", " ") or "none", findings))
+    tables = [
+        table("signs", signs, {"frame": frame and f"Frame: {frame}."}),
+        table("quality_of_runs", runs, name="runs"),
+    ]
+    clocks = [(n, *each) for n, run in result.prepared.items() for each in clock_rows(run)]
     if clocks:
         tables.append(table("clocks", clocks))
     return section("data", tables=tables)
-
-
-def _sign_table(result: StudyResult) -> Table:
-    channels, rows = result.groups["channels"], []
-    for name in map(str, channels["name"].values):
-        at = channels.sel(name=name)
-        use, unit, *others = (str(at[k].values) for k in ("use", "units", "positive", "source"))
-        rows.append((result.words_of(name), use, shown_unit(unit), *others))
-    frame = channels.attrs.get("frame", "")
-    return table("signs", rows, {"frame": frame and f"Frame: {frame}."})
-
-
-def _run_table(result: StudyResult) -> Table:
-    rows = []
-    for name, run in result.prepared.items():
-        _, span, count, kinds = run_row(name, run)
-        sea = str(result.groups["runs"]["sea_state"].sel(run=name).values)
-        others = "; ".join(other_findings(run))
-        rows.append((name, sea, str(span), count, kinds.replace("_", " ") or "none", others))
-    return table("quality_of_runs", rows, name="runs")
 
 
 APART = 0.005
@@ -354,11 +348,9 @@ def versions(result: StudyResult) -> Section:
 def chosen(result: StudyResult) -> Section | None:
     """Return how settings were chosen; None where all are stated and no model looks ahead."""
     rows = []
-    for model in result.models:
-        data = result.groups["chosen"].sel(model=model)
-        columns = (data[key].values for key in ("training", "words", "look_ahead"))
-        for name, text, ahead in zip(*columns, strict=True):
-            if text or ahead > 0:
-                words = "; ".join(map(str.strip, str(text or "stated").splitlines()))
-                rows.append((model_words(model), str(name), number(ahead, 2), words))
+    for at in entries(result.groups["chosen"].sel(model=result.models), "model", "training"):
+        model, name, text = row(at, "model", "training", "words")
+        if text or at["look_ahead"] > 0:
+            words = "; ".join(map(str.strip, (text or "stated").splitlines()))
+            rows.append((model_words(model), name, *row(at, look_ahead=2), words))
     return section("chosen", tables=(table("chosen", rows),)) if rows else None

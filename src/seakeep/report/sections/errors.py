@@ -27,8 +27,10 @@ from seakeep.report.tables import (
     Number,
     Table,
     beside,
+    entries,
     number,
     percent,
+    row,
     short,
     signed,
     small_number,
@@ -38,7 +40,7 @@ from seakeep.report.tables import (
     words as known_words,
 )
 from seakeep.study import StudyResult
-from seakeep.study.judge import VARIANTS, average_of
+from seakeep.study.judge import VARIANTS
 
 SELDOM = 0.01
 """Part of a run's samples below which a slack line is not worth a word."""
@@ -142,17 +144,15 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
     for test in tests:
         label = result.label_of(test).removeprefix("regular, ")
         columns += [f"{label}: {key}" for key in ("amplitude", "phase [°]", "offset [SD]", "share")]
-    for name in result.channels:
-        for model in judged_models(result):
-            row = [result.words_of(name), model_words(model)]
-            for test in tests:
-                at = response.sel(test=test, channel=name, model=model)
-                offset, *others = (float(at[f"error_{key}"]) for key in ("offset", "wave", "rest"))
-                total = float(np.sum(np.square([offset, *others])))
-                share = Number(f"{percent(offset**2 / total)} %") if total > 0 else number(np.nan)
-                row += [number(at["amplitude_ratio"], 2), signed(at["phase_lead"])]
-                row += [number(offset, 2), share]
-            rows.append(tuple(row))
+    judged = response.sel(channel=result.channels, model=judged_models(result))
+    for of_model in entries(judged, "channel", "model"):
+        cells = [result.words_of(str(of_model["channel"].values)), _model_of(of_model)]
+        for at in entries(of_model, "test"):
+            offset, *others = (float(at[f"error_{key}"]) for key in ("offset", "wave", "rest"))
+            total = float(np.sum(np.square([offset, *others])))
+            share = Number(f"{percent(offset**2 / total)} %") if total > 0 else MISSING
+            cells += [*row(at, amplitude_ratio=2, phase_lead=signed, error_offset=2), share]
+        rows.append(tuple(cells))
     return table("response", rows, columns=columns, more=conditional(result))
 
 
@@ -174,61 +174,64 @@ def _slack_words(result: StudyResult, tests: list[str]) -> str:
     )
 
 
+def _model_of(at: xr.Dataset) -> str:
+    """Words of the model of an entry."""
+    return model_words(str(at["model"].values))
+
+
+def _test_of(result: StudyResult, at: xr.Dataset) -> str:
+    """Words of the test set of an entry."""
+    return result.label_of(str(at["test"].values))
+
+
 def bands(result: StudyResult) -> Section | None:
     """Return coverage and scores of bands by wave height, horizon and channel."""
     if "statistics/bands" not in result.groups:
         return None
     groups, tables = result.groups["statistics/bands"], []
+    level = short(100 * float(result.settings["statistics"]["level"]))
     for model in filter(result.is_ensemble, result.models):
-        for band in (each for each in ("members", "calibrated") if each in groups["band"].values):
-            at = groups.sel(model=model, band=band)
-            parts = {
-                str(test): at.sel(test=test).dropna("part", how="all", subset=["inside"])
-                for test in at["test"].values
-            }
-            parts = {test: data for test, data in parts.items() if data.sizes["part"]}
-            if parts:
-                level = short(100 * float(result.settings["statistics"]["level"]))
+        for at in entries(groups.sel(model=model), "band"):
+            at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
+            if at.sizes["test"]:
+                band = str(at["band"].values)
                 kind = "calibrated " * (band == "calibrated")
                 title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
                 name = f"bands_{band}_{model}"
-                tables += [
-                    _by_part(result, parts, name, title),
-                    _of_all(result, parts, name, title),
-                ]
+                tables += [_by_part(result, at, name, title), _of_all(result, at, name, title)]
     return section("bands", tables=tables) if tables else None
 
 
-def _by_part(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title: str) -> Table:
+def _by_part(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table:
     """Averages over the channels, a row per test set and part."""
+    scale = at["relative_width"] / at["width"]  # one over the measured SD
+    scores = at[["winkler", "crps"]] * scale
+    at = at.assign(scores)
     rows = []
-    for test, data in parts.items():
-        scale = data["relative_width"] / data["width"]  # one over the measured SD
-        scores = [data["relative_width"], *(data[key] * scale for key in ("winkler", "crps"))]
-        scores = [each.where(np.isfinite(each)) for each in scores]  # of channels that move
-        for part in data["part"].values:
-            inside = data["inside"].sel(part=part)
-            least = inside[int(np.nanargmin(inside.values))]
-            named = result.words_of(str(least["channel"].values))
-            means = (average_of(each.sel(part=part).values) for each in scores)
-            row = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
-            rows.append((result.label_of(test), str(part), *row, *(number(m, 2) for m in means)))
+    for one in entries(at, "test", "part"):
+        inside = one["inside"]
+        if inside.isnull().all():
+            continue
+        least = inside[int(np.nanargmin(inside.values))]
+        named = result.words_of(str(least["channel"].values))
+        moving = one[["relative_width", "winkler", "crps"]].map(lambda x: x.where(np.isfinite(x)))
+        means = row(moving.mean("channel"), relative_width=2, winkler=2, crps=2)
+        covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
+        rows.append((_test_of(result, one), *row(one, "part"), *covered, *means))
     return table("bands", rows, {"band": title}, conditional(result), name=name)
 
 
-def _of_all(result: StudyResult, parts: dict[str, xr.Dataset], name: str, title: str) -> Table:
+def _of_all(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table:
     """All instants, a row per test set and channel."""
-    units = result.groups["channels"]["units"]
+    units, three = result.groups["channels"]["units"], partial(short, digits=3)
     rows = [
         (
-            result.label_of(test),
+            _test_of(result, one),
             f"{result.words_of(channel)} [{units.sel(name=channel).item()}]",
-            *(number(one[key], 2) for key in ("inside", "relative_width")),
-            *(short(one[key], 3) for key in ("winkler", "crps")),
+            *row(one, inside=2, relative_width=2, winkler=three, crps=three),
         )
-        for test, data in parts.items()
-        for channel in result.channels
-        for one in [data.sel(part="all", channel=channel)]
+        for one in entries(at.sel(part="all"), "test", "channel")
+        for channel in row(one, "channel")
     ]
     words = {"band": title}
     return table("bands_by_channel", rows, words, conditional(result), name=f"{name}_channels")
@@ -238,26 +241,21 @@ def age(result: StudyResult) -> Section:
     """Return the error over the age of a forecast."""
     split = float(result.settings["statistics"]["split_period"])
     figure = drawing("error_over_time", partial(error_over_time_figure, result), {"split": split})
-    return section("time", figures=(figure,), tables=(_trend_table(result, split),))
-
-
-def _trend_table(result: StudyResult, split: float) -> Table:
-    rows, trend = [], result.groups["statistics/trend"]
-    seconds = split * float(result.attrs["encounter_period"])
-    for test in result.tests:
-        for band, words in BAND_WORDS.items():
-            for model in judged_models(result):
-                at = trend.sel(test=test, model=model, band=band)
-                rows.append(
-                    (
-                        result.label_of(test),
-                        words,
-                        model_words(model),
-                        number(at["error_mean"].mean()),
-                        Number(growth_text(at)),
-                    )
-                )
-    return table("trend", rows, {"split": split, "seconds": seconds}, conditional(result))
+    trend = result.groups["statistics/trend"].sel(model=judged_models(result))
+    rows = [
+        (
+            _test_of(result, at),
+            BAND_WORDS[str(at["band"].values)],
+            _model_of(at),
+            number(at["error_mean"].mean()),
+            Number(growth_text(at)),
+        )
+        for at in entries(trend, "test", "band", "model")
+    ]
+    words = {"split": split, "seconds": split * float(result.attrs["encounter_period"])}
+    return section(
+        "time", figures=[figure], tables=[table("trend", rows, words, conditional(result))]
+    )
 
 
 def coverage(result: StudyResult) -> Section | None:

@@ -74,12 +74,37 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
         ]
         for group in (result.channels, _elevations(result))
     )
+    models = [
+        {
+            "name": model,
+            "label": words,
+            "mean": f"{words} mean" if result.is_ensemble(model) else words,
+            "colour": line["color"],
+            "dash": list(line["linestyle"][1]),
+        }
+        for model in judged_models(result)
+        for line, words in [(line_of(result, model), model_words(model))]
+    ]
+    tests = [
+        {
+            "name": name,
+            "label": result.label_of(name),
+            "steps": data.sizes["time"],
+            "training": data["training"].values.tolist(),
+            "windows": [
+                f"{run} from {start:.1f} s"
+                for run, start in zip(data["run"].values, data["start"].values, strict=True)
+            ],
+            "judged": data["judged"].values.astype(int).tolist(),
+        }
+        for name, data in result.tests.items()
+    ]
     return {
         "step": float(result.attrs["dt"]),
         "channels": channels,
         "waves": waves,
-        "models": [_model(result, model) for model in judged_models(result)],
-        "tests": [_test(result, name) for name in result.tests],
+        "models": models,
+        "tests": tests,
         "open": {
             "test": list(result.tests).index(test),
             "training": training,
@@ -113,30 +138,6 @@ def _shown(result: StudyResult) -> dict[str, tuple[float, str]]:
     """Factor to the unit in which each channel is shown, and that unit."""
     units = result.groups["channels"]["units"]
     return dict(zip(units["name"].values, map(displayed, units.values), strict=True))
-
-
-def _model(result: StudyResult, model: str) -> dict[str, Any]:
-    line, words = line_of(result, model), model_words(model)
-    return {
-        "name": model,
-        "label": words,
-        "mean": f"{words} mean" if result.is_ensemble(model) else words,
-        "colour": line["color"],
-        "dash": list(line["linestyle"][1]),
-    }
-
-
-def _test(result: StudyResult, name: str) -> dict[str, Any]:
-    data = result.tests[name]
-    places = zip(data["run"].values, data["start"].values, strict=True)
-    return {
-        "name": name,
-        "label": result.label_of(name),
-        "steps": int(data.sizes["time"]),
-        "training": [str(each) for each in data["training"].values],
-        "windows": [f"{run} from {start:.1f} s" for run, start in places],
-        "judged": data["judged"].values.astype(int).tolist(),
-    }
 
 
 def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[str, Any]:

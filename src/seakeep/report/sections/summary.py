@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,10 @@ from seakeep.report.tables import (
     Number,
     Table,
     band_verdict,
+    entries,
     number,
-    numbers,
     percent,
+    row,
     short,
     signed,
     table,
@@ -121,15 +123,14 @@ def overview_table(result: StudyResult) -> Table:
     """Both measures of each model in each test set, averages over the channels."""
     rows = []
     boxes = result.groups["statistics/boxes"].sel(channel="average")
-    for test in result.tests:
-        for model in result.models:
-            at, row = boxes.sel(test=test, model=model), [result.label_of(test), model_words(model)]
-            for measure in HEADING:
-                one = at.sel(measure=measure)
-                row += numbers([one["median"], one["upper_quartile"] - one["lower_quartile"]])
-            scaled = at["median"].sel(measure="training_nrmse")
-            row += [number(scaled), number(at["count"].sel(measure="nrmse"), 0)]
-            rows.append(tuple(row))
+    boxes["spread"] = boxes["upper_quartile"] - boxes["lower_quartile"]
+    for at in entries(boxes, "test", "model"):
+        test, model = row(at, "test", "model")
+        measures = (row(at.sel(measure=key), median=3, spread=3) for key in HEADING)
+        scaled = row(at.sel(measure="training_nrmse"), median=3)
+        count = row(at.sel(measure="nrmse"), count=0)
+        errors = chain(*measures, scaled, count)
+        rows.append((result.label_of(test), model_words(model), *errors))
     return table("overview", rows, more=conditional(result))
 
 
