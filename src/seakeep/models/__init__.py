@@ -3,8 +3,9 @@
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.ensemble import BandForecast, HankelEnsemble
 from seakeep.models.executor import processes
+from seakeep.models.forecasts import Model, Spec
 from seakeep.models.inputs import InputMap
-from seakeep.models.interface import Model, Needs, Signature, Spec
+from seakeep.models.interface import Needs, Signature
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live, load_live

@@ -17,13 +17,12 @@ from seakeep.arrays import FloatArray
 from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
-from seakeep.models import store
 from seakeep.models.checks import Json, check_integer, check_keys
 from seakeep.models.engine import Windows, cut_lost
-from seakeep.models.forecasts import SingleModel, counted
+from seakeep.models.forecasts import Model, counted
 from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs, common_step, mean_period
-from seakeep.models.linear import HankelDMDcModel, packed, unpacked
+from seakeep.models.linear import HankelDMDcModel, LinearKind, packed, unpacked
 from seakeep.models.readouts import ReadOuts
 from seakeep.models.selection import RIDGES, select
 from seakeep.models.settings import DelayRows, HankelSettings, RidgeScale, periods_to_samples
@@ -41,7 +40,7 @@ ORDER = 40
 
 
 @dataclass(frozen=True)
-class Constant:
+class Constant(LinearKind):
     """A model of nothing but the last state: its deviation from the mean, times a factor.
 
     Parameters
@@ -99,11 +98,6 @@ class Constant:
         check_keys(cls, content)
         return cls(**content)
 
-    @classmethod
-    def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
-        """Rebuild the model that a file holds."""
-        return HankelDMDcModel.from_dataset(dataset, cls.from_json(content(dataset, "settings")))
-
 
 class Mean(Constant):
     """The mean of each state over the training windows, at all instants (climatology).
@@ -157,7 +151,7 @@ class Plain(HankelSettings):
 
 
 @dataclass(frozen=True)
-class LinearSpec(Plain):
+class LinearSpec(LinearKind, Plain):
     """A linear model of delayed states and inputs: it finds coefficients, the rest is common."""
 
     may_choose: ClassVar[bool] = True
@@ -193,11 +187,6 @@ class LinearSpec(Plain):
     def solve(self, data: TrainingData) -> Solution:
         """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""
         raise NotImplementedError
-
-    @classmethod
-    def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
-        """Rebuild the model that a file holds."""
-        return HankelDMDcModel.from_dataset(dataset, cls.from_json(content(dataset, "settings")))
 
 
 @dataclass(frozen=True)
@@ -382,7 +371,7 @@ class Subspace(Plain):
 
 
 @dataclass(frozen=True, eq=False)
-class SubspaceModel(SingleModel, store.Saved):
+class SubspaceModel(Model):
     """Model fitted by :class:`Subspace`.
 
     Parameters

@@ -31,7 +31,7 @@ from seakeep.models.draws import Draw, draws_dataset, draws_of
 from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
 from seakeep.models.executor import in_order
 from seakeep.models.forecasts import (
-    Forecaster,
+    Model,
     check_arrays,
     counted,
     forecast_notes,
@@ -45,7 +45,6 @@ from seakeep.models.forecasts import (
     with_units,
 )
 from seakeep.models.growth import LeadErrors, Stretch, lead_errors
-from seakeep.models.html import text_html
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
@@ -83,7 +82,7 @@ class BandForecast(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class HankelEnsemble(Forecaster, store.Saved):
+class HankelEnsemble(Model):
     """Ensemble of models that differ in their settings or their training data.
 
     Made by :meth:`BayesianHankelDMDc.fit` or :func:`seakeep.load_model`. It holds draws and
@@ -131,10 +130,6 @@ class HankelEnsemble(Forecaster, store.Saved):
             f"{type(self).__name__}(n_members={self.n_members}, states={self.states}, "
             f"inputs={self.inputs}, dt={self.dt:g}; print(ensemble.summary()) says more)"
         )
-
-    def _repr_html_(self) -> str:
-        """Summary, for notebooks."""
-        return text_html(self.summary())
 
     @property
     def n_members(self) -> int:
@@ -196,7 +191,9 @@ class HankelEnsemble(Forecaster, store.Saved):
         """How the wave input is aligned to the vessel; the training arrays are aligned."""
         return self.signature.input_map.alignment
 
-    def free_runs(self, groups: Sequence[Windows], members: Sequence[int]) -> list[FloatArray]:
+    def free_runs(
+        self, groups: Sequence[Windows], members: Sequence[int] = (0,)
+    ) -> list[FloatArray]:
         """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
         runs = [self.dynamics(number) for number in members]
         return linear_runs(runs, groups, self.signature.readouts)

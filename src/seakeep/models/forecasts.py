@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from typing import Any, ClassVar
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -12,22 +13,44 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray, IntArray, Progress, as_real, whole_number
 from seakeep.errors import RequestError, warn
-from seakeep.models import engine
-from seakeep.models.checks import check_choice
+from seakeep.files import write_sealed
+from seakeep.models import engine, store
+from seakeep.models.checks import Json, check_choice
 from seakeep.models.engine import Windows, first_lost
 from seakeep.models.html import text_html
-from seakeep.models.interface import Signature
-from seakeep.models.labelled import ChannelLabel, run_name
+from seakeep.models.interface import Needs, Role, Signature
+from seakeep.models.labelled import ChannelLabel, Runs, Stop, run_name
 from seakeep.models.training import Training
 from seakeep.models.validity import outside_training
 from seakeep.signals.prediction import predict_waves
 from seakeep.signals.time_axis import instant_text, span_text
 
 
-class Forecaster:
-    """What models, ensembles and held members report about themselves, from their signature."""
+class Model:
+    """A fitted model: here of one member, and an ensemble says what differs.
+
+    It adds a signature, settings, ``training``, ``free_runs``, ``summary`` and ``to_dataset``.
+    """
 
     signature: Signature
+    settings: Any
+    training: Training
+
+    @property
+    def kind(self) -> str:
+        """Word of its spec in TOML files and in :data:`seakeep.models.registry.KINDS`."""
+        kind: str = self.settings.kind
+        return kind
+
+    @property
+    def n_members(self) -> int:
+        """Number of members."""
+        return 1
+
+    @property
+    def is_centred(self) -> bool:
+        """Whether the mean of the members is the forecast of a single model of all runs."""
+        return False
 
     @property
     def dt(self) -> float:
@@ -89,21 +112,6 @@ class Forecaster:
         """What forecasts from several starts, in several runs, read: (run, start in s) each."""
         return engine.read_windows(self.signature, runs, places, steps, ahead)
 
-
-class SingleModel(Forecaster):
-    """Methods of every model with one member; it adds a signature and ``free_runs``."""
-
-    n_members: ClassVar[int] = 1
-    is_centred: ClassVar[bool] = False
-    settings: Any
-    training: Training
-
-    @property
-    def kind(self) -> str:
-        """Word of its settings in :data:`seakeep.models.registry.KINDS`."""
-        kind: str = self.settings.kind
-        return kind
-
     def free_runs(
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
     ) -> list[FloatArray]:
@@ -113,6 +121,31 @@ class SingleModel(Forecaster):
     def summary(self) -> str:
         """Text that says what the model is."""
         raise NotImplementedError
+
+    def to_dataset(self) -> xr.Dataset:
+        """All that :meth:`save` writes."""
+        raise NotImplementedError
+
+    def save(self, path: str | Path) -> Path:
+        """Write the model as NetCDF, to a temporary name first.
+
+        Parameters
+        ----------
+        path : str or Path
+            File; another model there is replaced.
+
+        Returns
+        -------
+        Path
+            The file; :func:`seakeep.load_model` reads it, running no code from it.
+
+        Raises
+        ------
+        RequestError
+            If the file cannot be written, or another one than a model is there.
+        """
+        dataset = self.to_dataset().assign_attrs(seakeep_kind=self.kind)
+        return write_sealed(dataset, path, store.MODEL)
 
     def _repr_html_(self) -> str:
         """Summary, for notebooks."""
@@ -256,6 +289,46 @@ class SingleModel(Forecaster):
             coords=window_coords(windows, signature.dt),
             attrs=forecast_notes(signature, windows),
         )
+
+
+class Spec(Protocol):
+    """Settings that are fitted to runs; frozen, with JSON values.
+
+    Attributes
+    ----------
+    kind : str
+        Its word in TOML files and in :data:`seakeep.models.registry.KINDS`.
+    role : {"model", "reference"}
+        Whether it is to be judged, or is what others are compared with.
+    is_ensemble : bool
+        Whether what it fits has several members.
+    """
+
+    kind: ClassVar[str]
+    role: ClassVar[Role]
+    is_ensemble: ClassVar[bool]
+
+    def resolved(self, dt: float, encounter_period: float | None) -> Self:
+        """Settings whose lengths are samples."""
+
+    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
+        """Samples that it asks of its runs at a time step and an encounter period, s."""
+
+    def fit(
+        self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
+    ) -> Model:
+        """Identify a model from training runs."""
+
+    def to_json(self) -> Json:
+        """Settings as JSON values."""
+
+    @classmethod
+    def from_json(cls, content: Json) -> Self:
+        """Settings from JSON values; unknown or missing ones raise an error."""
+
+    @classmethod
+    def restore(cls, dataset: xr.Dataset) -> Model:
+        """Rebuild the model that a file holds."""
 
 
 def outside(model: Any, run: xr.Dataset, windows: Windows, values: FloatArray) -> dict[str, str]:

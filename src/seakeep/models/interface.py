@@ -1,24 +1,15 @@
-"""Interfaces of specs and models.
-
-Helpers take a :class:`Signature`, never a whole model. A new model is a ``Spec``, a
-``Model`` and one line in :data:`seakeep.models.registry.KINDS`.
-"""
+"""What a forecast knows of a model: its signature, and the samples that a spec asks for."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, ClassVar, Literal, Protocol, Self
+from typing import Literal
 
 import numpy as np
-import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.models.checks import Json
 from seakeep.models.inputs import InputMap
-from seakeep.models.labelled import ChannelLabel, Runs, Stop
+from seakeep.models.labelled import ChannelLabel
 from seakeep.models.readouts import FittedReadOut
 
 
@@ -154,106 +145,4 @@ class Needs:
     lead: int = 0
 
 
-class Model(Protocol):
-    """A fitted model, as compare, study and report use it."""
-
-    @property
-    def kind(self) -> str:
-        """Word of its spec in TOML files and in :data:`seakeep.models.registry.KINDS`."""
-
-    @property
-    def settings(self) -> Any:
-        """Settings that it was fitted with; of an ensemble, those that its members share."""
-
-    @property
-    def signature(self) -> Signature:
-        """Time step, labels, delays, scales and input map."""
-
-    @property
-    def n_members(self) -> int:
-        """Number of members; 1 for a single model."""
-
-    @property
-    def dt(self) -> float:
-        """Time step, s."""
-
-    @property
-    def states(self) -> list[str]:
-        """Names of the states."""
-
-    @property
-    def inputs(self) -> list[str]:
-        """Names of the measured inputs."""
-
-    @property
-    def history_samples(self) -> int:
-        """Samples a forecast needs up to its start."""
-
-    @property
-    def training_spans(self) -> dict[str, tuple[float, float]]:
-        """First and last instant of the training windows of each run, s."""
-
-    def forecast(
-        self, run: xr.Dataset, start: float, steps: int | None = None, *, ahead: str = "refuse"
-    ) -> xr.Dataset:
-        """Free run from an instant on."""
-
-    def forecast_windows(
-        self,
-        run: xr.Dataset,
-        starts: Sequence[float],
-        steps: int,
-        *,
-        ahead: str = "refuse",
-        executor: Executor | None = None,
-    ) -> xr.Dataset:
-        """Free runs from several instants, side by side."""
-
-    def summary(self) -> str:
-        """Text that describes the model."""
-
-    def save(self, path: str | Path) -> Path:
-        """Write the model as NetCDF."""
-
-
 Role = Literal["model", "reference"]
-
-
-class Spec(Protocol):
-    """Settings that are fitted to runs; frozen, with JSON values.
-
-    Attributes
-    ----------
-    kind : str
-        Its word in TOML files and in :data:`seakeep.models.registry.KINDS`.
-    role : {"model", "reference"}
-        Whether it is to be judged, or is what others are compared with.
-    is_ensemble : bool
-        Whether what it fits has several members.
-    """
-
-    kind: ClassVar[str]
-    role: ClassVar[Role]
-    is_ensemble: ClassVar[bool]
-
-    def resolved(self, dt: float, encounter_period: float | None) -> Self:
-        """Settings whose lengths are samples."""
-
-    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
-        """Samples that it asks of its runs at a time step and an encounter period, s."""
-
-    def fit(
-        self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
-    ) -> Model:
-        """Identify a model from training runs."""
-
-    def to_json(self) -> Json:
-        """Settings as JSON values."""
-
-    @classmethod
-    def from_json(cls, content: Json) -> Self:
-        """Settings from JSON values; unknown or missing ones raise an error."""
-
-    @classmethod
-    def restore(cls, dataset: xr.Dataset) -> Model:
-        """Rebuild the model that a file holds."""

@@ -18,7 +18,7 @@ from seakeep.errors import RequestError, warn
 from seakeep.models import engine, export, labelled, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
-from seakeep.models.forecasts import SingleModel, check_arrays, counted, one_run, rows_by_name
+from seakeep.models.forecasts import Model, check_arrays, counted, one_run, rows_by_name
 from seakeep.models.growth import LeadErrors, training_errors
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class HankelDMDcModel(SingleModel, store.Saved):
+class HankelDMDcModel(Model):
     """An identified model; made by :meth:`HankelDMDc.fit` or :func:`seakeep.load_model`.
 
     Parameters
@@ -593,11 +593,16 @@ class HankelDMDcModel(SingleModel, store.Saved):
             errors = self.variation.to_variables()
         return dataset.assign(errors).assign_attrs(selection=self.selection)
 
+
+class LinearKind:
+    """A spec that fits a :class:`HankelDMDcModel`."""
+
     @classmethod
-    def from_dataset(cls, dataset: xr.Dataset, settings: Any) -> Self:
-        """Rebuild a model from :meth:`to_dataset`; it is equal to the last bit."""
-        return cls(
-            settings=settings,
+    def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
+        """Rebuild the model that a file holds; it is equal to the last bit."""
+        spec: Any = cls
+        return HankelDMDcModel(
+            settings=spec.from_json(store.content(dataset, "settings")),
             coefficients=store.numbers(dataset, "coefficients"),
             learnt=LeadErrors.from_dataset(dataset),
             selection=str(dataset.attrs["selection"]),

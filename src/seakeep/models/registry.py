@@ -9,7 +9,7 @@ from seakeep.errors import DataError, RequestError
 from seakeep.models import store
 from seakeep.models.baselines import ARX, FIR, HoldLast, Mean, Subspace
 from seakeep.models.ensemble import HankelEnsemble
-from seakeep.models.interface import Model, Spec
+from seakeep.models.forecasts import Model, Spec
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 

@@ -18,9 +18,10 @@ from seakeep.models.checks import Json, check_choice, check_flag, check_integer
 from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members
 from seakeep.models.engine import parameter_of
 from seakeep.models.ensemble import HankelEnsemble, spectral_radius
-from seakeep.models.interface import Needs, Role, Signature, Spec
+from seakeep.models.forecasts import Spec
+from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
-from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.linear import HankelDMDcModel, LinearKind
 from seakeep.models.observables import Observable
 from seakeep.models.parametric import SMALLER, regress_varying, varying_then_pooled
 from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
@@ -219,7 +220,7 @@ class Choosing(HankelSettings, Generic[Fitted]):
 
 
 @dataclass(frozen=True)
-class HankelDMDc(Choosing[HankelDMDcModel]):
+class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
     r"""Settings of a Hankel dynamic mode decomposition with control.
 
     The model is :math:`\hat x_{j+1} = \hat A \hat x_j + \hat B \hat u_j` with
@@ -339,13 +340,6 @@ class HankelDMDc(Choosing[HankelDMDcModel]):
         needs, period = super().needs(dt, period or select.period), period or select.period
         most = round(MEMORY * period / dt) if select.memory and period else 0
         return replace(needs, history=max(needs.history, most))
-
-    @classmethod
-    def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
-        """Rebuild the model that a file holds."""
-        return HankelDMDcModel.from_dataset(
-            dataset, cls.from_json(store.content(dataset, "settings"))
-        )
 
     @classmethod
     def paper(cls, encounter_period: float, dt: float) -> Self:

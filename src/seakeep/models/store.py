@@ -12,7 +12,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import MissingFileError, RequestError
-from seakeep.files import load_sealed, write_sealed
+from seakeep.files import load_sealed
 from seakeep.models.checks import Json, plain
 from seakeep.models.inputs import InputMap
 from seakeep.models.interface import Scale, Signature
@@ -23,35 +23,6 @@ MODEL = "model"
 """Kind of these files."""
 SCALES = ("state", "input", "direct")
 MOMENTS = ("mean", "std", "spread", "centre", "reach")
-
-
-class Saved:
-    """A model that a NetCDF file can hold; it has a ``kind`` and ``to_dataset``."""
-
-    def to_dataset(self) -> xr.Dataset:
-        """All that :meth:`save` writes."""
-        raise NotImplementedError
-
-    def save(self, path: str | Path) -> Path:
-        """Write the model as NetCDF, to a temporary name first.
-
-        Parameters
-        ----------
-        path : str or Path
-            File; another model there is replaced.
-
-        Returns
-        -------
-        Path
-            The file; :func:`seakeep.load_model` reads it, running no code from it.
-
-        Raises
-        ------
-        RequestError
-            If the file cannot be written, or another one than a model is there.
-        """
-        dataset = self.to_dataset().assign_attrs(seakeep_kind=self.kind)  # type: ignore[attr-defined]
-        return write_sealed(dataset, path, MODEL)
 
 
 def pack_signature(signature: Signature) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from seakeep.conventions import is_elevation
 from seakeep.core.bands import PER_OCTAVE, band_edges, band_energy, split_bands
 from seakeep.errors import warn
 from seakeep.models import labelled, store
-from seakeep.models.interface import Model, Signature
+from seakeep.models.interface import Signature
 from seakeep.waves import GRAVITY
 
 TRAINED = 0.01
@@ -272,7 +272,7 @@ class Coverage:
 
 
 def outside_training(
-    model: Model, run: xr.Dataset, start: float, steps: int, surge: FloatArray | None = None
+    model: Any, run: xr.Dataset, start: float, steps: int, surge: FloatArray | None = None
 ) -> list[str]:
     """Say in what a forecast lies outside the training: period, height, steepness, mean surge.
 
