@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -23,6 +23,7 @@ from seakeep.models.growth import LeadErrors, training_errors
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.live import Live
+from seakeep.models.readouts import FittedReadOut
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import Training, TrainingData
 from seakeep.models.validity import Coverage
@@ -69,17 +70,18 @@ class HankelDMDcModel(Model):
         cls,
         settings: Any,
         data: TrainingData,
-        signature: Signature,
         solution: Solution,
         runs: Mapping[str, xr.Dataset],
+        readouts: tuple[FittedReadOut, ...] = (),
     ) -> Self:
         """The model that a regression on data of these runs found."""
+        signature = data.signature
         return cls(
             settings=settings,
             coefficients=solution.coefficients,
-            signature=signature,
+            signature=replace(signature, readouts=readouts),
             training=data.training(solution),
-            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
+            coverage=Coverage.of(signature.inputs, data.inputs, signature.dt),
             learnt=(data, runs),
         )
 

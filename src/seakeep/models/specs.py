@@ -396,8 +396,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
     ) -> HankelDMDcModel:
         data = gather(runs, states, inputs, None, self)
         solution = data.regress(self, self.state_delays, all_rows=self.delay_rows == "ridge")
-        signature = replace(data.signature(self), readouts=readouts)
-        return HankelDMDcModel.fitted(self, data, signature, solution, runs)
+        return HankelDMDcModel.fitted(self, data, solution, runs, readouts)
 
 
 def _check_growth(model: HankelDMDcModel) -> None:
