@@ -64,6 +64,13 @@ def test_accuracy_is_kept_in_si_units(edited):
     assert "accuracy" not in run["eta_fwd"].attrs
 
 
+def test_parameters_of_a_run_are_its_attributes(edited):
+    stated = "span = [2, 18]\nparameters = { draught = 0.083, water_depth = 3.0 }"
+    runs = read_campaign(edited(("span = [2, 18]", stated))).prepare()
+    assert (runs["second"].attrs["draught"], runs["second"].attrs["water_depth"]) == (0.083, 3.0)
+    assert "draught" not in runs["first"].attrs
+
+
 def test_prepared_runs(campaign):
     calls = []
     runs = campaign.prepare(progress=lambda *call: calls.append(call))

@@ -794,6 +794,7 @@ def attributes_of(
             f"clock_{logger}_drift_ppm": 1e6 * clock.drift,
             f"clock_{logger}_drift_error_ppm": 1e6 * clock.drift_error,
         }
+    attributes |= settings.parameters
     return {key: value for key, value in attributes.items() if value is not None}
 
 

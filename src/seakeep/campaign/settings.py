@@ -405,6 +405,9 @@ class RunSettings(Table):
     probe_offset: Finite | None = optional(
         "metres by which this run's elevations are carried, positive downstream"
     )
+    parameters: dict[str, Finite] = optional(
+        "attribute = number, such as draught = 0.083, for the 'parameter' of a model", {}
+    )
 
     @property
     def serves(self) -> str:

@@ -53,6 +53,11 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             f"a model of kind '{model.kind}' cannot be exported; those of delayed states and "
             "inputs can: hankel_dmdc, arx, fir."
         )
+    if model.variation is not None:
+        raise RequestError(
+            f"the model varies with {model.signature.parameter}. Export it at a value: in Python, "
+            "model.at(parameter=…)."
+        )
     input_map = model.signature.input_map
     aligned, observed = input_map.alignment, input_map.observed
     if input_map.follows is None and aligned is not None and aligned.settings.carries:

@@ -81,6 +81,8 @@ class Windows:
         First step of each window that reads predicted input, or −1.
     waves : ndarray, shape (window, steps, line, 2), optional
         Elevation and rate of the wave at the line of each load that reads it.
+    parameters : tuple of float
+        Parameter of the run of each window, where the model varies with one.
     """
 
     places: tuple[tuple[str, float], ...]
@@ -95,6 +97,7 @@ class Windows:
     starts: IntArray | None = None
     predicted: tuple[int, ...] = ()
     waves: FloatArray | None = None
+    parameters: tuple[float, ...] = ()
 
     def __len__(self) -> int:
         return len(self.histories)
@@ -236,6 +239,11 @@ def _driven(
         look_ahead=tuple(maps.look_ahead(run.run, dt) for run in runs),
         notes=maps.notes(runs[0].run),
         predicted=tuple(run.first_predicted(signature, span) for run, span in pairs),
+        parameters=tuple(
+            parameter_of(run.run, signature.parameter, run.name)
+            for run in runs
+            if signature.parameter
+        ),
         **_regressors(signature, drives, spans),
     )
 
@@ -272,6 +280,36 @@ def _regressors(
         waves = [drive.waves(lines, span.known, span.stop) for drive, span in pairs]
         out["waves"] = np.stack(waves)
     return out | {"table": table, "starts": at}
+
+
+def parameter_of(run: xr.Dataset, parameter: str, name: str) -> float:
+    """Value of a parameter in the attributes of a run.
+
+    Parameters
+    ----------
+    run : Dataset
+        The run.
+    parameter : str
+        Attribute; a dot leads into an attribute that is a mapping.
+    name : str
+        What messages call the run.
+
+    Raises
+    ------
+    RequestError
+        If the run has no such number.
+    """
+    value: Any = run.attrs.get(parameter)
+    if value is None:
+        value = run.attrs
+        for key in parameter.split("."):
+            value = value.get(key) if isinstance(value, Mapping) else None
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        raise RequestError(
+            f"{name} does not state the parameter {parameter} as a number; received {value!r}. "
+            f"Set run.attrs['{parameter}'], or take the model at a value: model.at(parameter=…)."
+        )
+    return float(value)
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,6 +72,8 @@ class Signature:
         windows; for an ensemble over all that its members learn from.
     readouts : tuple of FittedReadOut
         Channels that are read off the free runs.
+    parameter : str
+        Attribute of runs that the model varies with, if it does.
     """
 
     dt: float
@@ -84,6 +86,7 @@ class Signature:
     input_scale: Scale = field(repr=False)
     direct_scale: Scale = field(repr=False)
     readouts: tuple[FittedReadOut, ...] = field(default=(), repr=False)
+    parameter: str = ""
 
     @property
     def states(self) -> list[str]:

@@ -23,6 +23,7 @@ from seakeep.models.growth import LeadErrors, training_errors
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.live import Live
+from seakeep.models.parametric import Variation, nearest_data
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import Training, TrainingData
@@ -53,6 +54,8 @@ class HankelDMDcModel(Model):
         What it was fitted to, or its errors there; a member of an ensemble has neither.
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
+    variation : Variation, optional
+        How it varies with the parameter of its settings.
     """
 
     settings: Any
@@ -64,6 +67,7 @@ class HankelDMDcModel(Model):
         default=None, repr=False
     )
     selection: str = ""
+    variation: Variation | None = field(default=None, repr=False)
 
     @classmethod
     def fitted(
@@ -195,15 +199,70 @@ class HankelDMDcModel(Model):
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
-        return linear_runs([self.dynamics], groups, self.signature.readouts)
+        if self.variation is None or not all(each.parameters for each in groups):
+            return linear_runs([self.dynamics], groups, self.signature.readouts)
+        runs = [np.empty((1, len(each), each.steps, len(self.states))) for each in groups]
+        for value in sorted({value for each in groups for value in each.parameters}):
+            there = [np.array(each.parameters) == value for each in groups]
+            computed = self.at(parameter=value).free_runs(groups)
+            for values, own, here in zip(runs, computed, there, strict=True):
+                values[:, here] = own[:, here]
+        return runs
+
+    def at(self, *, parameter: float) -> Self:
+        """The ordinary model at a value of its parameter, for :meth:`live`, exports and arrays.
+
+        Parameters
+        ----------
+        parameter : float
+            Value of the attribute that ``settings.parameter`` names.
+
+        Returns
+        -------
+        HankelDMDcModel
+
+        Raises
+        ------
+        RequestError
+            If the model does not vary with a parameter.
+
+        Warns
+        -----
+        SeakeepWarning
+            If the value lies outside those of the training.
+        """
+        if self.variation is None:
+            raise RequestError(
+                "the model does not vary with a parameter. Use it as it is, or fit one with "
+                "parameter = '…', an attribute of the runs."
+            )
+        coefficients, signature = self.variation.at(self.coefficients, self.signature, parameter)
+        settings = replace(self.settings, parameter="")
+        learnt = self.learnt
+        if isinstance(learnt, tuple):  # its errors are those of the runs at the nearest value
+            learnt = nearest_data(learnt[0], learnt[1], self.signature.parameter, parameter)
+        return replace(
+            self,
+            settings=settings,
+            coefficients=coefficients,
+            signature=signature,
+            learnt=learnt,
+            variation=None,
+        )
 
     def system_matrices(self) -> Iterator[FloatArray]:
-        """Â of each member."""
-        yield self.A
+        """Â of each member, in the middle of the training where it varies with a parameter."""
+        varies = self.variation
+        yield self.A if varies is None else self.at(parameter=varies.centre).A
 
     @cached_property
     def dynamics(self) -> Dynamics:
         """What a free run needs."""
+        if self.variation is not None:
+            raise RequestError(
+                f"the model varies with {self.signature.parameter}, whose value is not known here. "
+                "Take the model at a value: model.at(parameter=…)."
+            )
         return Dynamics.of(self.coefficients, self.signature)
 
     def aligned_inputs(self, run: xr.Dataset) -> xr.Dataset:
@@ -502,7 +561,14 @@ class HankelDMDcModel(Model):
         ]
         if self.selection:
             lines.append("  chosen        " + self.selection.replace("\n", "\n  "))
-        radius = self.spectral_radius
+        shown = self
+        if (varies := self.variation) is not None:
+            lines.append(
+                f"  parameter     {self.signature.parameter}, trained from {varies.low:g} to "
+                f"{varies.high:g}; below, in the middle, {varies.centre:g}"
+            )
+            shown = self.at(parameter=varies.centre)
+        radius = shown.spectral_radius
         verdict = "stable" if radius < 1 else "UNSTABLE: long forecasts diverge"
         lines.append(f"  stability     spectral radius {radius:.6f} ({verdict})")
         if clipped := self.training.clipped:
@@ -510,7 +576,7 @@ class HankelDMDcModel(Model):
                 f"    {counted(len(clipped), 'eigenvalue')} clipped to {self.settings.radius:g}; "
                 f"the largest was {clipped[0]:.6f}"
             )
-        table = self.modes()
+        table = shown.modes()
         for mode in range(min(5, table.sizes["mode"])):
             at = table.isel(mode=mode)
             lines.append(
@@ -523,7 +589,10 @@ class HankelDMDcModel(Model):
         """The model as a Dataset: what :meth:`save` writes."""
         label = {"long_name": "regressed rows of [A B] on standardised deviations", "units": "1"}
         dataset = packed(self).assign(coefficients=(("row", "regressor"), self.coefficients, label))
-        errors = {} if self.errors is None else self.errors.to_variables()
+        is_plain = self.variation is None
+        errors = self.errors.to_variables() if is_plain and self.errors is not None else {}
+        if self.variation is not None:
+            errors = self.variation.to_variables()
         return dataset.assign(errors).assign_attrs(selection=self.selection)
 
 
@@ -539,6 +608,7 @@ class LinearKind:
             coefficients=store.numbers(dataset, "coefficients"),
             learnt=LeadErrors.from_dataset(dataset),
             selection=str(dataset.attrs["selection"]),
+            variation=Variation.from_dataset(dataset),
             **unpacked(dataset),
         )
 

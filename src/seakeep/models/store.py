@@ -44,6 +44,7 @@ def signature_json(signature: Signature) -> Json:
         "input_delays": signature.input_delays,
         "input_map": signature.input_map.to_json(),
         "readouts": [each.to_json() for each in signature.readouts],
+        "parameter": signature.parameter,
     }
 
 
@@ -66,6 +67,7 @@ def unpack_signature(dataset: xr.Dataset) -> Signature:
         input_scale=input_scale,
         direct_scale=direct_scale,
         readouts=tuple(FittedReadOut.from_json(each) for each in values["readouts"]),
+        parameter=values["parameter"],
     )
 
 

@@ -1,0 +1,277 @@
+r"""Models whose coefficients vary with an attribute of the run, such as a draught.
+
+Means and coefficients are linear in the parameter p, with q = (p − mean)/SD over the snapshots of
+the training, :math:`\hat x_{j+1} = (K_0 + q K_1) [\hat x_j; \hat u_j]`. Both matrices are one ridge
+regression on the regressors and q times the regressors; its Gram matrix is a sum over the runs of
+:math:`[1, q; q, q^2] \otimes C_r`. At a value of the parameter the model is an ordinary one.
+"""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from seakeep.arrays import FloatArray
+from seakeep.core.embedding import block_means, spread_means
+from seakeep.core.gram import Piece, primal_system, ridge_path
+from seakeep.core.metrics import nrmse
+from seakeep.core.solve import Solution
+from seakeep.errors import DataError, SeakeepWarning, warn
+from seakeep.models import labelled
+from seakeep.models.engine import parameter_of
+from seakeep.models.interface import Scale, Signature
+from seakeep.models.settings import HankelSettings
+from seakeep.models.training import TrainingData
+
+GROUPS = ("state", "input", "direct")
+HORIZON = 15.0
+"""Length of the free runs that compare models, encounter periods."""
+SMALLER = (1.0, 0.1, 1e-2, 1e-3)
+"""Parts of the pooled model's λ that are tried: that is large where conditions disagree."""
+BETTER = 0.95
+"""Part of the pooled model's error below which the parameter is worth its coefficients."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variation:
+    """How a model varies with its parameter.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape of the coefficients
+        Their change per unit of q.
+    shifts : tuple of ndarray
+        Changes per unit of q of the means of states, delayed and direct regressors, physical units.
+    centre, spread : float
+        q is (p − centre)/spread.
+    low, high : float
+        Range of the parameter in training.
+    """
+
+    slopes: FloatArray
+    shifts: tuple[FloatArray, FloatArray, FloatArray]
+    centre: float
+    spread: float
+    low: float
+    high: float
+
+    def at(
+        self, coefficients: FloatArray, signature: Signature, value: float
+    ) -> tuple[FloatArray, Signature]:
+        """Coefficients and signature of the ordinary model at a value of the parameter."""
+        if not self.low <= value <= self.high:
+            warn(
+                f"{signature.parameter} = {value:g} lies outside the {self.low:g} to "
+                f"{self.high:g} of the training: the model extrapolates. Train on a run beyond it."
+            )
+        q = (value - self.centre) / self.spread
+        scales: dict[str, Any] = {}
+        for group, shift in zip(GROUPS, self.shifts, strict=True):
+            scale: Scale = getattr(signature, f"{group}_scale")
+            scales[f"{group}_scale"] = replace(scale, mean=scale.mean + q * shift)
+        return coefficients + q * self.slopes, replace(signature, parameter="", **scales)
+
+    def to_variables(self) -> dict[str, Any]:
+        """Variables of a file."""
+        shifts = {
+            f"{group}_slope": (group, shift)
+            for group, shift in zip(GROUPS, self.shifts, strict=True)
+        }
+        numbers = np.array([self.centre, self.spread, self.low, self.high])
+        return {
+            "slopes": (("row", "regressor"), self.slopes),
+            "parameter": ("moment", numbers),
+            **shifts,
+        }
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset) -> Variation | None:
+        """Rebuild from :meth:`to_variables`; None where a file has none."""
+        if "slopes" not in dataset:
+            return None
+        shifts = tuple(dataset[f"{group}_slope"].values for group in GROUPS)
+        return cls(dataset["slopes"].values, shifts, *map(float, dataset["parameter"].values))  # type: ignore[arg-type]
+
+
+def regress_varying(
+    data: TrainingData, settings: HankelSettings, parameter: str, values: Sequence[float]
+) -> tuple[Solution, TrainingData, Variation]:
+    """Regress on the regressors and on q times them.
+
+    Parameters
+    ----------
+    data : TrainingData
+        Gathered runs.
+    settings : HankelSettings
+        Exact delay rows.
+    parameter : str
+        Name of the parameter.
+    values : sequence of float
+        Parameter of each run.
+
+    Returns
+    -------
+    solution : Solution
+        With the coefficients at q = 0.
+    data : TrainingData
+        With the means at q = 0.
+    variation : Variation
+        What varies.
+
+    Raises
+    ------
+    DataError
+        If all runs have the same value.
+    """
+    known, counts = np.array(values), np.array([each.columns for each in data.windows])
+    if np.ptp(known) == 0:
+        raise DataError(
+            f"all runs have {parameter} = {known[0]:g}, so that nothing can be "
+            "learnt of it. Train on runs at two values or more, or leave parameter out."
+        )
+    centre = float(np.average(known, weights=counts))
+    spread = float(np.sqrt(np.average((known - centre) ** 2, weights=counts)))
+    q = (known - centre) / spread
+    series, shifts = [], []
+    scales: dict[str, Any] = {}
+    for group, each in zip(GROUPS, (data.states, data.delayed, data.direct), strict=True):
+        scale: Scale = getattr(data.signature, f"{group}_scale")
+        means = np.stack(
+            [
+                x[window.first_column : window.last + 1].mean(axis=0)
+                for x, window in zip(each, data.windows, strict=True)
+            ]
+        )
+        at_zero, slope = np.average(means, axis=0, weights=counts), (q * counts) @ means
+        slope = slope / counts.sum()  # q has mean 0 and mean square 1
+        if not settings.standardize:
+            at_zero, slope = np.zeros_like(at_zero), np.zeros_like(slope)
+        series.append([x - at_zero - part * slope for x, part in zip(each, q, strict=True)])
+        shifts.append(slope * scale.std)
+        scales[f"{group}_scale"] = replace(scale, mean=scale.mean + at_zero * scale.std)
+    states, delayed, direct = series
+    blocks, delays = settings.blocks, (settings.state_delays, settings.input_delays, 0)
+    gram: Any = 0.0
+    right: Any = 0.0
+    for x, u, w, window, part in zip(states, delayed, direct, data.windows, q, strict=True):
+        groups = (x, u, np.concatenate([w, block_means(x, blocks)], axis=1))
+        there = [number for number, each in enumerate(groups) if each.shape[1]]
+        piece = Piece(x, tuple(groups[n] for n in there), window.first_column, window.columns)
+        system = primal_system([piece], [delays[n] for n in there])
+        own = np.triu(system.gram) + np.triu(system.gram, 1).T
+        gram = gram + np.kron(np.array([[1.0, part], [part, part**2]]), own)
+        right = right + np.concatenate([system.right, part * system.right], axis=1)
+    factor = counts.sum() if settings.ridge_scale == "per_snapshot" else 1.0
+    ridge = factor * float(settings.ridge)
+    both = np.split(ridge_path(gram, right, [ridge])[0], 2, axis=1)
+    size = len(data.signature.states)
+    fixed, slopes = (spread_means(each, size, settings.state_delays, blocks) for each in both)
+    variation = Variation(
+        slopes,
+        (shifts[0], shifts[1], shifts[2]),
+        centre,
+        spread,
+        float(known.min()),
+        float(known.max()),
+    )
+    data = replace(data, signature=replace(data.signature, **scales, parameter=parameter))
+    return Solution(fixed, "primal", ridge, len(gram)), data, variation
+
+
+def varying_then_pooled(
+    fit: Callable[[Any, dict[str, xr.Dataset]], Any],
+    pooled: Any,
+    varying: Sequence[Any],
+    runs: Mapping[str, xr.Dataset],
+    inputs: Sequence[str],
+) -> list[tuple[Any, str]]:
+    """Settings in the order of preference: those that err 5 % less than pooled ones, and these.
+
+    With three values or more, all runs of an inner value are held out in turn; with two, the second
+    half of each run.
+
+    Parameters
+    ----------
+    fit : callable
+        ``fit(settings, runs)`` gives a model.
+    pooled : HankelDMDc
+        Settings without a parameter.
+    varying : sequence of HankelDMDc
+        The same with the parameter, with several λ.
+    runs : mapping of str to Dataset
+        Training runs.
+    inputs : sequence of str
+        Inputs.
+
+    Returns
+    -------
+    list of (HankelDMDc, str)
+        Settings, and words on the errors of both kinds.
+    """
+    parameter = varying[0].parameter
+    values = {name: parameter_of(run, parameter, name) for name, run in runs.items()}
+    inner = sorted(set(values.values()))[1:-1]
+    steps = round(HORIZON * labelled.mean_period(runs, inputs))
+    halves = {name: run.isel(time=slice(run.sizes["time"] // 2)) for name, run in runs.items()}
+    folds = [
+        ({n: runs[n] for n in runs if values[n] != held}, [n for n in runs if values[n] == held])
+        for held in inner
+    ] or [(halves, list(runs))]
+    errors: dict[Any, list[float]] = {each: [] for each in (pooled, *varying)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SeakeepWarning)
+        for (training, judged), each in itertools.product(folds, errors):
+            model = fit(each, dict(training))
+            for name in judged:
+                errors[each].extend(_scores(model, runs[name], name, steps, not inner))
+    means = {each: float(np.mean(scores)) for each, scores in errors.items()}
+    order = sorted(varying, key=means.__getitem__)
+    better = [each for each in order if means[each] < BETTER * means[pooled]]
+    what = "runs of inner values" if inner else "second halves of the runs"
+    return [
+        (
+            taken,
+            f"on {what} that are held out, a model that varies with {parameter} errs "
+            f"{means[each]:.3f} ({each.ridge_text(float(each.ridge))}) and a pooled one "
+            f"{means[pooled]:.3f}; pooled unless the other errs 5 % less and does not grow\n",
+        )
+        for taken, each in zip((*better, pooled), (*better, order[0]), strict=True)
+    ]
+
+
+def _scores(model: Any, run: xr.Dataset, name: str, steps: int, is_half: bool) -> Sequence[float]:
+    """NRMSE, at most one, of each window end to end."""
+    first = max(is_half * run.sizes["time"] // 2, model.history_samples - 1)
+    starts = range(first, run.sizes["time"] - steps - max(model.lead_samples - 1, 0), steps)
+    if not starts:
+        raise DataError(
+            f"{name} is too short to judge whether the parameter is worth its coefficients: no "
+            f"window of {steps} samples can be forecast. Train on longer runs, or state ridge."
+        )
+    time = run["time"].values
+    windows = model.read_windows({name: run}, [(name, float(time[at])) for at in starts], steps)
+    states = labelled.channel_matrix(run, model.states, name)
+    measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
+    predicted = model.free_runs([windows])[0][0]
+    spread = model.signature.state_scale.spread
+    with np.errstate(invalid="ignore"):
+        each = nrmse(predicted=predicted, measured=measured, training_std=spread)
+    scores: FloatArray = np.where(np.isfinite(each), np.minimum(each, 1.0), 1.0).mean(axis=-1)
+    return [float(score) for score in scores]
+
+
+def nearest_data(
+    data: TrainingData, runs: Mapping[str, xr.Dataset], parameter: str, value: float
+) -> tuple[TrainingData, Mapping[str, xr.Dataset]]:
+    """Training data of the runs at the value nearest to one."""
+    off = {name: abs(parameter_of(runs[name], parameter, name) - value) for name in data.names}
+    near = [n for n, name in enumerate(data.names) if off[name] == min(off.values())]
+    per_run = ("names", "states", "delayed", "direct", "windows", "instants", "inputs")
+    cut: dict[str, Any] = {key: tuple(getattr(data, key)[n] for n in near) for key in per_run}
+    return replace(data, **cut), runs

@@ -1,0 +1,135 @@
+"""Models that vary with an attribute of their runs, against an exact family of linear systems."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning, load_model
+from seakeep.hosts.program import exportable
+from seakeep.models import specs
+
+DT = 0.1
+ON_STATE = np.array([1.5, -0.9]), np.array([0.2, -0.03])
+"""Of x(k) and x(k − 1): at a draught of zero, and their change per unit."""
+ON_WAVE = 0.5, 0.4
+SPEC = HankelDMDc(1, 0, 0.0, standardize=False, delay_rows="exact", parameter="rig.draught")
+
+
+def vessel(draught: float, seed: int, samples: int = 400, noise: float = 0.0) -> xr.Dataset:
+    """A heave of second order whose coefficients are linear in the draught."""
+    rng = np.random.default_rng(seed)
+    heave, eta = rng.standard_normal((2, samples))
+    a, b = (fixed + draught * slope for fixed, slope in (ON_STATE, ON_WAVE))
+    for k in range(1, samples - 1):
+        heave[k + 1] = a @ heave[k - 1 : k + 1][::-1] + b * eta[k]
+    heave += noise * rng.standard_normal(samples)
+    return xr.Dataset(
+        {"heave": ("time", heave, {"units": "m"}), "eta": ("time", eta, {"units": "m"})},
+        coords={"time": DT * np.arange(samples)},
+        attrs={"encounter_period": 0.4, "rig": {"draught": draught}},
+    )
+
+
+@pytest.fixture(scope="module")
+def model():
+    return SPEC.fit([vessel(p, 10 + n) for n, p in enumerate((0.0, 0.4, 1.0))], ["heave"], ["eta"])
+
+
+def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
+    run = vessel(0.7, 3)
+    at = model.at(parameter=0.7)
+    # Exact data: λ is the rounding of the Gram matrix, 1e-13 of its largest entry.
+    np.testing.assert_allclose(at.A[0], ON_STATE[0] + 0.7 * ON_STATE[1], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(at.B[0], [ON_WAVE[0] + 0.7 * ON_WAVE[1]], rtol=0, atol=1e-8)
+    forecast = model.forecast(run, start=5.0, steps=200)
+    np.testing.assert_allclose(forecast.heave, run.heave[51:251], rtol=0, atol=1e-6)
+    again = load_model(model.save(tmp_path / "model.nc"))
+    xr.testing.assert_identical(again.forecast(run, start=5.0, steps=200), forecast)
+    assert "parameter     rig.draught, trained from 0 to 1" in again.summary()
+    arrays = at.forecast_arrays(run[["heave"]].to_array().T[:51], run[["eta"]].to_array().T[:51],
+                                run[["eta"]].to_array().T[51:251], 200)  # fmt: skip
+    np.testing.assert_allclose(arrays[:, 0], forecast.heave, rtol=0, atol=1e-9)
+
+
+def test_windows_of_several_runs_take_the_value_of_each(model):
+    runs = {"shallow": vessel(0.2, 5), "deep": vessel(0.9, 6)}
+    places = [("deep", 5.0), ("shallow", 6.0), ("deep", 7.0)]
+    together = model.free_runs([model.read_windows(runs, places, 50)])[0][0]
+    for (name, start), values in zip(places, together, strict=True):
+        alone = model.forecast(runs[name], start, 50)
+        # Windows side by side are summed in another order.
+        np.testing.assert_allclose(values[:, 0], alone.heave, rtol=0, atol=1e-12)
+
+
+def test_means_follow_the_parameter():
+    def shifted(draught, seed):
+        run = vessel(draught, seed, 4000, noise=0.01)
+        return run.assign(heave=run.heave + 3.0 * draught).assign_attrs(run.attrs)
+
+    spec = replace(SPEC, state_delays=6, ridge=1e-4, ridge_scale="per_snapshot", standardize=True)
+    runs = [shifted(p, 20 + n) for n, p in enumerate((0.0, 0.5, 1.0))]
+    model = spec.fit([run.assign_coords(time=run.time) for run in runs], ["heave"], ["eta"])
+    mean = model.at(parameter=0.75).state_mean[0]
+    # The mean of 4,000 samples of a heave of SD 2 to 6 is known to about a tenth.
+    assert mean == pytest.approx(2.25, abs=0.3)
+
+
+def test_free_runs_choose_between_the_parameter_and_one_pooled_model():
+    spec = HankelDMDc(
+        2, 1, "rollout", delay_rows="exact", ridge_scale="per_snapshot", parameter="rig.draught"
+    )
+    draughts = (0.0, 0.3, 0.6, 1.0)
+    runs = [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate(draughts)]
+    varying = spec.fit(runs, ["heave"], ["eta"])
+    assert varying.settings.parameter == "rig.draught"
+    pooled = replace(spec, parameter="").fit(runs, ["heave"], ["eta"])
+    nearest = replace(spec, parameter="").fit(runs[1], ["heave"], ["eta"])
+    run = vessel(0.45, 40, 800)
+    errors = [
+        float(np.sqrt(((each.forecast(run, 5.0, 200).heave - run.heave[51:251]) ** 2).mean()))
+        for each in (varying, pooled, nearest)
+    ]
+    assert errors[0] < 0.5 * min(errors[1:])
+    alike = [
+        vessel(0.5, 50 + n, 800, 0.05).assign_attrs(rig={"draught": p})
+        for n, p in enumerate(draughts)
+    ]
+    same = spec.fit(alike, ["heave"], ["eta"])
+    assert same.settings.parameter == ""
+    assert "a pooled one" in same.selection
+
+
+def test_what_grows_in_the_trained_range_is_passed_over(model, monkeypatch):
+    wide = replace(model, variation=replace(model.variation, high=3.3))
+    a = ON_STATE[0] + 3.3 * ON_STATE[1]
+    radius = np.abs(np.roots([1.0, *-a])).max()
+    # As the coefficients.
+    assert specs._largest_radius(wide) == pytest.approx(radius, abs=1e-7)
+    assert specs._largest_radius(model) < 1.0 < radius
+    largest = specs._largest_radius
+    monkeypatch.setattr(specs, "_largest_radius", lambda m: 1.0 if m.variation else largest(m))
+    spec = replace(SPEC, ridge="rollout", ridge_scale="per_snapshot", standardize=True)
+    runs = [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
+    assert spec.fit(runs, ["heave"], ["eta"]).settings.parameter == ""
+
+
+def test_words(model):
+    run = vessel(0.7, 3)
+    with pytest.raises(RequestError, match=r"does not state the parameter rig\.draught"):
+        model.forecast(run.assign_attrs(rig={}), 5.0, 10)
+    with pytest.warns(SeakeepWarning, match="lies outside the 0 to 1 of the training"):
+        model.forecast(run.assign_attrs(rig={"draught": 1.2}), 5.0, 10)
+    with pytest.raises(RequestError, match=r"model\.at\(parameter=…\)"):
+        model.live()
+    with pytest.raises(RequestError, match=r"varies with rig\.draught\. Export it at a value"):
+        exportable(model)
+    at_centre = model.at(parameter=model.variation.centre).summary().splitlines()
+    assert model.summary().splitlines()[-2:] == at_centre[-2:]
+    with pytest.raises(RequestError, match="does not vary with a parameter"):
+        model.at(parameter=0.5).at(parameter=0.5)
+    with pytest.raises(DataError, match=r"all runs have rig\.draught = 0\.7"):
+        SPEC.fit([run, vessel(0.7, 4)], ["heave"], ["eta"])
+    with pytest.raises(RequestError, match="parameter takes delay_rows = 'exact'"):
+        replace(SPEC, delay_rows="ridge")
