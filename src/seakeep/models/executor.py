@@ -10,16 +10,18 @@ import functools
 import multiprocessing
 import os
 import pickle
+import platform
 import re
 import signal
 import threading
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from concurrent.futures import ProcessPoolExecutor as Pool
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from importlib import metadata
 from itertools import islice
 from multiprocessing.connection import wait as wait_for
 from typing import Any, TypeVar
@@ -41,6 +43,8 @@ AHEAD = 16
 """Pieces handed out at a time: enough for as many workers, few enough that results stay few."""
 PATIENCE = 10.0
 """Seconds in which a Dask scheduler must answer, and after which silent workers are looked for."""
+ALIKE = ("seakeep", "numpy", "scipy")
+"""Packages whose versions must be the same everywhere, so that arrays are."""
 
 
 class WorkerLostError(SeakeepError):
@@ -257,6 +261,12 @@ def _dask(scheduler: str) -> Iterator[Executor]:
         yield client.get_executor(pure=False)
 
 
+def versions() -> dict[str, str]:
+    """Versions that must be the same everywhere, of this process."""
+    python = ".".join(platform.python_version_tuple()[:2])
+    return {"python": python, **{name: metadata.version(name) for name in ALIKE}}
+
+
 @contextmanager
 def submitting(
     function: Function[Data, Item, Result], data: Data, executor: Executor
@@ -265,7 +275,7 @@ def submitting(
 
     Except in a pool of processes: it fails over a cancelled future when its workers are killed.
     """
-    payload, token = pickle.dumps(data, protocol=5), uuid.uuid4().hex
+    payload, token = pickle.dumps((data, versions()), protocol=5), uuid.uuid4().hex
     under_way: set[Future[list[Result]]] = set()  # not the finished: they hold their results
 
     def submit(items: Sequence[Item]) -> Future[list[Result]]:
@@ -331,6 +341,23 @@ def _work(
     """Results of some items in a worker, which reads the data once."""
     global _received
     if (received := _received)[0] != token:
-        received = _received = token, pickle.loads(payload)
+        data, expected = pickle.loads(payload)
+        _check_versions(expected)
+        received = _received = token, data
     with one_blas_thread():
         return [function(received[1], item) for item in items]
+
+
+def _check_versions(expected: Mapping[str, str]) -> None:
+    """Refuse to work with other versions: the arrays would not be those of the caller."""
+    installed = versions()
+    other = [
+        f"{name} {installed[name]} (here {version})"
+        for name, version in expected.items()
+        if installed.get(name) != version
+    ]
+    if other:
+        raise RequestError(
+            f"the worker {platform.node()} would not compute the same arrays: it has "
+            f"{', '.join(other)}. Install the same versions everywhere."
+        )
