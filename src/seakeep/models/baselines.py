@@ -83,10 +83,10 @@ class Constant(LinearKind):
         named = as_runs(runs)
         settings = self._settings.resolved_in(named, [])
         data = gather(named, states, [], stop, settings)
-        size = len(data.state_labels)
+        size = len(data.signature.states)
         solution = Solution(self.factor * np.eye(size), "svd", 0.0, size * bool(self.factor))
         spec = replace(self, window=settings.window)
-        return HankelDMDcModel.fitted(spec, data, data.signature(settings), solution, named)
+        return HankelDMDcModel.fitted(spec, data, solution, named)
 
     def to_json(self) -> Json:
         """Settings as JSON values."""
@@ -165,7 +165,7 @@ class LinearSpec(LinearKind, Plain):
         spec = self.resolved_in(named, inputs)
         if self.ridge != "rollout":
             data = gather(named, states, inputs, stop, spec)
-            return HankelDMDcModel.fitted(spec, data, data.signature(spec), spec.solve(data), named)
+            return HankelDMDcModel.fitted(spec, data, spec.solve(data), named)
         read = named = until(named, stop)
         if spec.window is not None:  # what the model reads, and no more
             dt = common_step(named)
@@ -332,12 +332,12 @@ class Subspace(Plain):
         """Identify a model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
         data = gather(as_runs(runs), states, inputs, stop, self)
         future = self.state_delays + 1 if self.future is None else self.future
-        most = future * len(data.state_labels)
+        most = future * len(data.signature.states)
         order = min(ORDER, most) if self.order is None else self.order
         if order > most:
             raise RequestError(
                 f"order = {order} is more than the {most} values of {future} future instants "
-                f"of {counted(len(data.state_labels), 'state')}. In the table of the "
+                f"of {counted(len(data.signature.states), 'state')}. In the table of the "
                 "model, lower the key order, or raise the key future."
             )
         space = identify_subspace(
@@ -353,13 +353,13 @@ class Subspace(Plain):
         )
         columns = sum(window.columns for window in data.windows)
         solution = Solution(space.A, "svd", float(self.ridge) * columns, order)
-        signature = data.signature(self)
+        signature = data.signature
         return SubspaceModel(
             settings=replace(self, order=order),
             space=space,
             signature=signature,
             training=data.training(solution),
-            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
+            coverage=Coverage.of(signature.inputs, data.inputs, signature.dt),
         )
 
     @classmethod

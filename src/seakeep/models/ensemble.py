@@ -206,8 +206,8 @@ class HankelEnsemble(Model):
         """What a free run of a member needs, or of what they are centred on: number n_members."""
         if self.identified:
             return self.identified[number]
-        settings, data, solution = self._identified(number)
-        return Dynamics.of(solution.coefficients, data.signature(settings))
+        _, data, solution = self._identified(number)
+        return Dynamics.of(solution.coefficients, data.signature)
 
     def member(self, number: int) -> HankelDMDcModel:
         """One member as a model of its own.
@@ -237,7 +237,7 @@ class HankelEnsemble(Model):
         return HankelDMDcModel(
             settings=settings,
             coefficients=solution.coefficients,
-            signature=replace(data.signature(settings), readouts=self.signature.readouts),
+            signature=replace(data.signature, readouts=self.signature.readouts),
             training=data.training(solution),
             coverage=self.coverage,
         )

@@ -208,16 +208,13 @@ def training_errors(
     stretches = []
     for number, name in enumerate(data.names):
         window = data.windows[number]
-        begin = data.first_instants[number] - window.first * data.dt
         follows = signature.input_map.follows is not None
         stretches.append(
             Stretch(
-                data.state_scale.physical(data.states[number]),
-                data.input_scale.physical(data.delayed[number]),
-                data.direct_scale.physical(data.direct[number]),
+                *data.physical(number),
                 window.first_column,
                 window.last,
-                Source(signature, name, runs[name], begin) if follows else None,
+                Source(signature, name, runs[name], data.begin(number)) if follows else None,
             )
         )
     return lead_errors([dynamics], stretches, signature.readouts)

@@ -24,6 +24,7 @@ from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.live import Live
 from seakeep.models.parametric import Variation, nearest_data
+from seakeep.models.readouts import FittedReadOut
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import Training, TrainingData
 from seakeep.models.validity import Coverage
@@ -73,17 +74,18 @@ class HankelDMDcModel(Model):
         cls,
         settings: Any,
         data: TrainingData,
-        signature: Signature,
         solution: Solution,
         runs: Mapping[str, xr.Dataset],
+        readouts: tuple[FittedReadOut, ...] = (),
     ) -> Self:
         """The model that a regression on data of these runs found."""
+        signature = data.signature
         return cls(
             settings=settings,
             coefficients=solution.coefficients,
-            signature=signature,
+            signature=replace(signature, readouts=readouts),
             training=data.training(solution),
-            coverage=Coverage.of(signature.inputs, data.inputs, data.dt),
+            coverage=Coverage.of(signature.inputs, data.inputs, signature.dt),
             learnt=(data, runs),
         )
 

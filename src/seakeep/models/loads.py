@@ -78,17 +78,21 @@ def fit_readouts(
     RequestError
         If waves are not carried to the predicted surge, and the kind is "wave".
     """
-    names = [label.name for label in data.state_labels]
-    states = [data.state_scale.physical(values) for values in data.states]
+    signature = data.signature
+    states = [signature.state_scale.physical(values) for values in data.states]
     windows = zip(states, data.windows, strict=True)
     seen = np.concatenate([values[window.samples] for values, window in windows])
-    follows, out = data.input_map.follows, []
+    follows, out = signature.input_map.follows, []
     spacing = 0.0 if follows is None else follows.place.spacing
     places: FloatArray = STEP * spacing * np.arange(-REACH, REACH + 1.0)
     waves = [_waves(data, runs, number, places) for number in range(len(states) * bool(follows))]
     for channel, asked in readouts.items():
-        column, columns = names.index(channel), motions_of(data.state_labels, channel)
-        floor, units = floor_of(seen, seen[:, column], columns), data.state_labels[column].units
+        column = signature.states.index(channel)
+        columns = motions_of(signature.state_labels, channel)
+        floor, units = (
+            floor_of(seen, seen[:, column], columns),
+            signature.state_labels[column].units,
+        )
         kind: ReadOutKind = "none" if asked == "auto" else asked
         scores: dict[str, float] = {}
         load = None
@@ -116,19 +120,19 @@ def _waves(
 
     Shape (time, place, 2); NaN where the record does not tell them.
     """
-    name, follows = data.names[number], data.input_map.follows
+    name, input_map = data.names[number], data.signature.input_map
+    follows = input_map.follows
     assert follows is not None
     run = runs[name]
-    values = labelled.channel_matrix(run, [label.name for label in data.input_labels], name)
+    values = labelled.channel_matrix(run, data.signature.inputs, name)
     time = np.asarray(run["time"].values, dtype=float)
-    begin = data.first_instants[number] - data.windows[number].first * data.dt
     # The wave of a sample is that an instant after the one from which the step to it starts.
-    offset = labelled.nearest_sample(time, begin, name) - 1
+    offset = labelled.nearest_sample(time, data.begin(number), name) - 1
     count = len(data.states[number])
     first = max(offset, follows.back)
     stop = min(offset + count, len(values) - follows.ahead)
     out = np.full((count, len(places), 2), np.nan)
-    drive = data.input_map.drive(values, [], run=run)
+    drive = input_map.drive(values, [], run=run)
     out[first - offset : stop - offset] = drive.waves(tuple(places.tolist()), first, stop)
     return out
 
@@ -162,7 +166,7 @@ class _Line:
         columns: list[int],
     ) -> None:
         self.waves, self.places, self.column, self.columns = waves, places, column, columns
-        self.spread = data.state_scale.spread[[column]]
+        self.spread = data.signature.state_scale.spread[[column]]
         self.pieces = []  # motions, wave and load of each run, shape (place, sample, …)
         for window, x, wave in zip(data.windows, states, waves, strict=True):
             inside = slice(window.first_column + 1, window.last + 1)

@@ -141,7 +141,7 @@ def regress_varying(
     series, shifts = [], []
     scales: dict[str, Any] = {}
     for group, each in zip(GROUPS, (data.states, data.delayed, data.direct), strict=True):
-        scale: Scale = getattr(data, f"{group}_scale")
+        scale: Scale = getattr(data.signature, f"{group}_scale")
         means = np.stack(
             [
                 x[window.first_column : window.last + 1].mean(axis=0)
@@ -170,7 +170,7 @@ def regress_varying(
     factor = counts.sum() if settings.ridge_scale == "per_snapshot" else 1.0
     ridge = factor * float(settings.ridge)
     both = np.split(ridge_path(gram, right, [ridge])[0], 2, axis=1)
-    size = len(data.state_labels)
+    size = len(data.signature.states)
     fixed, slopes = (spread_means(each, size, settings.state_delays, blocks) for each in both)
     variation = Variation(
         slopes,
@@ -180,7 +180,8 @@ def regress_varying(
         float(known.min()),
         float(known.max()),
     )
-    return Solution(fixed, "primal", ridge, len(gram)), replace(data, **scales), variation
+    data = replace(data, signature=replace(data.signature, **scales, parameter=parameter))
+    return Solution(fixed, "primal", ridge, len(gram)), data, variation
 
 
 def varying_then_pooled(
@@ -271,7 +272,6 @@ def nearest_data(
     """Training data of the runs at the value nearest to one."""
     off = {name: abs(parameter_of(runs[name], parameter, name) - value) for name in data.names}
     near = [n for n, name in enumerate(data.names) if off[name] == min(off.values())]
-    per_run = ("names", "states", "delayed", "direct", "windows")
-    per_run += ("first_instants", "last_instants", "inputs")  # type: ignore[assignment]
+    per_run = ("names", "states", "delayed", "direct", "windows", "instants", "inputs")
     cut: dict[str, Any] = {key: tuple(getattr(data, key)[n] for n in near) for key in per_run}
     return replace(data, **cut), runs

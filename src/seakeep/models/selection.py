@@ -206,7 +206,7 @@ class Problem:
     @property
     def reader(self) -> Signature:
         """What windows are read for; units were compared when the runs were gathered."""
-        signature = self.data.signature(self.widest)
+        signature = self.data.signature
         states, inputs = (
             tuple(replace(label, units="") for label in labels)
             for labels in (signature.state_labels, signature.input_labels)
@@ -215,14 +215,14 @@ class Problem:
 
     def parts(self, candidate: HankelSettings) -> tuple[BoolArray, BoolArray, BoolArray]:
         """Which states (all), delayed and direct regressors a candidate has."""
-        chain, direct = self.data.input_map, list[bool]()
-        delayed = [True] * len(self.data.input_labels)
+        signature, direct = self.data.signature, list[bool]()
+        chain, delayed = signature.input_map, [True] * len(signature.inputs)
         bound = () if chain.observed is None else chain.observed.bound
         for observable, each in zip(self.widest.observables, bound, strict=True):
             columns = [observable in candidate.observables] * len(each.labels)
             (delayed if each.delayed else direct).extend(columns)
         direct += [True] * (chain.follows is not None)  # the slow surge squared
-        states = np.ones(len(self.data.state_labels), dtype=bool)
+        states = np.ones(len(signature.states), dtype=bool)
         return states, np.array(delayed, dtype=bool), np.array(direct, dtype=bool)
 
     def models(
@@ -230,22 +230,16 @@ class Problem:
     ) -> tuple[Dynamics, FloatArray]:
         """Models of some runs: the first of them, and coefficients, shape (level, N, p)."""
         data, parts = self.data, self.parts(candidate)
+        chain, labels = data.signature.input_map, data.signature.state_labels
         delays = candidate.state_delays, candidate.input_delays, 0
         windows = [data.windows[run] for run in runs]
-        labels = data.state_labels, *data.input_map.regressors(data.input_labels)
-        names = [[label.name for label in group] for group in labels]
-        series = [
-            [scale.physical(values[run]) for run in runs]
-            for scale, values in (
-                (data.state_scale, data.states),
-                (data.input_scale, data.delayed),
-                (data.direct_scale, data.direct),
-            )
-        ]
+        groups_of = labels, *chain.regressors(data.signature.input_labels)
+        names = [[label.name for label in group] for group in groups_of]
+        series = [list(group) for group in zip(*map(data.physical, runs), strict=True)]
         scales = [
             Scale(*(getattr(scale, each.name)[part] for each in fields(scale)))
             for scale, part in zip(
-                scales_of(series, windows, names, True, data.input_map.stretch), parts, strict=True
+                scales_of(series, windows, names, True, chain.stretch), parts, strict=True
             )
         ]
         # Later by the samples that a row looks ahead too far.
@@ -254,7 +248,7 @@ class Problem:
             [scale.deviations(each[:, part]) for each in group]
             for group, scale, part in zip(series, scales, parts, strict=True)
         ]
-        blocks, count = candidate.blocks, len(data.state_labels)
+        blocks, count = candidate.blocks, len(labels)
         groups[2] = [
             np.concatenate([direct, block_means(states, blocks)], axis=1)
             for direct, states in zip(groups[2], groups[0], strict=True)
@@ -280,7 +274,7 @@ class Problem:
         x, u, w = scales
         if candidate.is_filter:
             path = np.pad(path, ((0, 0), (0, 0), (len(x.mean), 0)))
-        return Dynamics(path[0], *reach, x, u, w, data.input_map.follows), path
+        return Dynamics(path[0], *reach, x, u, w, chain.follows), path
 
     def grows(self, candidate: HankelSettings, level: float) -> bool:
         """Whether the model that a candidate gives of all runs grows."""
@@ -307,13 +301,11 @@ class Problem:
         rest = [other for other in range(len(self.groups)) if other != run]
         others = [other for other in rest if self.groups[other] != self.groups[run]]
         dynamics, coefficients = self.models(candidate, levels, others or rest)
-        name = data.names[run]
-        begin = data.first_instants[run] - data.windows[run].first * data.dt
-        states = data.state_scale.physical(data.states[run])
+        states = data.signature.state_scale.physical(data.states[run])
         for steps in horizons:
             if not (starts := self.starts(run, steps)).size:
                 continue
-            places = [(name, begin + at * data.dt) for at in starts]
+            places = [(data.names[run], data.begin(run) + at * data.signature.dt) for at in starts]
             windows = read_windows(self.reader, self.runs, places, steps)
             last = windows.delayed.shape[1] - self.ahead(candidate)
             windows = replace(
@@ -1005,7 +997,7 @@ def _learnt(
     if not readouts:
         return ()
     if problem is not None:
-        is_judged = problem.data.input_map.follows is not None
+        is_judged = problem.data.signature.input_map.follows is not None
         judged = list(problem.held_out(candidate, level, steps)) if is_judged else []
         return fit_readouts(readouts, problem.data, problem.runs, judged)
     settings = replace(candidate, ridge=1.0, standardize=True)

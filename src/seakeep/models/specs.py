@@ -452,12 +452,10 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         if self.parameter:
             values = [parameter_of(run, self.parameter, name) for name, run in runs.items()]
             solution, data, variation = regress_varying(data, self, self.parameter, values)
-            signature = replace(data.signature(self), readouts=readouts, parameter=self.parameter)
-            model = HankelDMDcModel.fitted(self, data, signature, solution, runs)
+            model = HankelDMDcModel.fitted(self, data, solution, runs, readouts)
             return replace(model, variation=variation)
         solution = data.regress(self, self.state_delays, all_rows=self.delay_rows == "ridge")
-        signature = replace(data.signature(self), readouts=readouts)
-        return HankelDMDcModel.fitted(self, data, signature, solution, runs)
+        return HankelDMDcModel.fitted(self, data, solution, runs, readouts)
 
 
 def _largest_radius(model: HankelDMDcModel) -> float:

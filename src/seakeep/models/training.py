@@ -75,54 +75,40 @@ class TrainingData:
 
     Parameters
     ----------
+    signature : Signature
+        What a forecast must know of a model that is fitted to these data, without read-outs.
     names : tuple of str
         Runs.
     states, delayed, direct : tuple of ndarray, each (time, channel)
         Standardised deviations of the states and of both kinds of regressors.
     windows : tuple of TrainingWindow
         In samples of these arrays.
-    first_instants, last_instants : tuple of float
+    instants : tuple of (float, float)
         First and last instant of each window, s.
-    dt : float
-        Time step, s.
-    state_labels, input_labels : tuple of ChannelLabel
-        Names and units.
-    state_scale, input_scale, direct_scale : Scale
-        Moments over the windows.
-    input_map : InputMap
-        As fitted.
     inputs : tuple of ndarray, each (time, Q)
         Measured inputs of the windows, physical units.
     """
 
+    signature: Signature
     names: tuple[str, ...]
     states: tuple[FloatArray, ...]
     delayed: tuple[FloatArray, ...]
     direct: tuple[FloatArray, ...]
     windows: tuple[TrainingWindow, ...]
-    first_instants: tuple[float, ...]
-    last_instants: tuple[float, ...]
-    dt: float
-    state_labels: tuple[ChannelLabel, ...]
-    input_labels: tuple[ChannelLabel, ...]
-    state_scale: Scale
-    input_scale: Scale
-    direct_scale: Scale
-    input_map: InputMap
+    instants: tuple[tuple[float, float], ...]
     inputs: tuple[FloatArray, ...] = ()
 
-    def signature(self, settings: HankelSettings) -> Signature:
-        """What a forecast must know of a model that was fitted to these data."""
-        return Signature(
-            dt=self.dt,
-            state_labels=self.state_labels,
-            input_labels=self.input_labels,
-            state_delays=settings.state_reach,
-            input_delays=settings.input_delays,
-            input_map=self.input_map,
-            state_scale=self.state_scale,
-            input_scale=self.input_scale,
-            direct_scale=self.direct_scale,
+    def begin(self, run: int) -> float:
+        """Instant of the first sample of a run's arrays, s."""
+        return self.instants[run][0] - self.windows[run].first * self.signature.dt
+
+    def physical(self, run: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """States and both kinds of regressors of a run, physical units."""
+        own = self.signature
+        return (
+            own.state_scale.physical(self.states[run]),
+            own.input_scale.physical(self.delayed[run]),
+            own.direct_scale.physical(self.direct[run]),
         )
 
     def regress(
@@ -150,7 +136,7 @@ class TrainingData:
             all_rows=all_rows,
             radius=settings.radius,
         )
-        count = len(self.state_labels)
+        count = len(self.signature.states)
         if not blocks:
             return solution
         spread = spread_means(solution.coefficients, count, settings.state_delays, blocks)
@@ -160,8 +146,8 @@ class TrainingData:
         """What a model that was fitted to these data keeps of them."""
         return Training(
             runs=self.names,
-            first=tuple(float(value) for value in self.first_instants),
-            stop=tuple(float(value) for value in self.last_instants),
+            first=tuple(float(first) for first, _ in self.instants),
+            stop=tuple(float(stop) for _, stop in self.instants),
             columns=tuple(window.columns for window in self.windows),
             method=solution.method,
             ridge=solution.ridge,
@@ -225,11 +211,11 @@ def gather(
         instants = time[place.first], time[place.last]
         pieces.append(Piece(name, (here, *regressors), shifted, instants))
         read.append(labelled.channel_matrix(run, inputs, name, place.samples))
-    data = _standardised(pieces, dt, labels, input_map, settings.standardize)
+    data = _standardised(pieces, dt, labels, input_map, settings)
     if len(pieces) > 1:
-        _warn_of_dead(pieces, 0, data.state_scale, [label.name for label in labels[0]])
-        delayed = [label.name for label in input_map.regressors(labels[1])[0]]
-        _warn_of_dead(pieces, 1, data.input_scale, delayed)
+        own = data.signature
+        _warn_of_dead(pieces, 0, own.state_scale, own.states)
+        _warn_of_dead(pieces, 1, own.input_scale, own.regressors)
     return replace(data, inputs=tuple(read))
 
 
@@ -263,37 +249,25 @@ def _standardised(
     dt: float,
     labels: tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]],
     input_map: InputMap,
-    standardize: bool,
+    settings: HankelSettings,
 ) -> TrainingData:
     """Deviations from the moments of these windows (paper, System identification setup)."""
-    series = [
-        [_lengthened(piece.series[group], len(piece.series[0])) for piece in pieces]
-        for group in range(3)
+    names, series, windows, instants = zip(*pieces, strict=True)
+    groups = [
+        [_lengthened(values, len(own[0])) for values, own in zip(group, series, strict=True)]
+        for group in zip(*series, strict=True)
     ]
-    windows = [piece.window for piece in pieces]
-    groups = (labels[0], *input_map.regressors(labels[1]))
-    channels = [[label.name for label in group] for group in groups]
-    scales = scales_of(series, windows, channels, standardize, input_map.stretch)
+    channels = [
+        [label.name for label in group] for group in (labels[0], *input_map.regressors(labels[1]))
+    ]
+    scales = scales_of(groups, windows, channels, settings.standardize, input_map.stretch)
     x, u, w = (
         tuple(scale.deviations(values) for values in each)
-        for scale, each in zip(scales, series, strict=True)
+        for scale, each in zip(scales, groups, strict=True)
     )
-    return TrainingData(
-        names=tuple(piece.name for piece in pieces),
-        states=x,
-        delayed=u,
-        direct=w,
-        windows=tuple(windows),
-        first_instants=tuple(piece.instants[0] for piece in pieces),
-        last_instants=tuple(piece.instants[1] for piece in pieces),
-        dt=dt,
-        state_labels=labels[0],
-        input_labels=labels[1],
-        state_scale=scales[0],
-        input_scale=scales[1],
-        direct_scale=scales[2],
-        input_map=input_map,
-    )
+    reach = settings.state_reach, settings.input_delays
+    signature = Signature(dt, *labels, *reach, input_map, *scales)
+    return TrainingData(signature, names, x, u, w, windows, instants)
 
 
 @dataclass(frozen=True, eq=False)
@@ -386,7 +360,7 @@ class TrainingArrays:
             instants = self.span(each, settings, last, signature.dt)
             pieces.append(Piece(self.names[each], series, shifted, instants))
         labels = signature.state_labels, signature.input_labels
-        return _standardised(pieces, signature.dt, labels, input_map, settings.standardize)
+        return _standardised(pieces, signature.dt, labels, input_map, settings)
 
 
 def run_regressors(
@@ -564,7 +538,7 @@ def scales_of(
     channels: Sequence[Sequence[str]],
     standardize: bool,
     stretch: tuple[FloatArray, FloatArray] | None = None,
-) -> list[Scale]:
+) -> tuple[Scale, Scale, Scale]:
     """Moments of states, delayed and direct regressors.
 
     What regressors are divided by is stretched where λ weighs more on them. Direct ones count from
@@ -573,16 +547,13 @@ def scales_of(
     later = windows
     if channels[2]:
         later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
-    scales = [
+    x, u, w = (
         moments(values, spans, names, standardize)
         for values, spans, names in zip(series, (windows, windows, later), channels, strict=True)
-    ]
-    if stretch is None or not standardize:
-        return scales
-    more = [
-        replace(scale, std=scale.std * by) for scale, by in zip(scales[1:], stretch, strict=True)
-    ]
-    return [scales[0], *more]
+    )
+    if stretch is not None and standardize:
+        u, w = (replace(own, std=own.std * by) for own, by in zip((u, w), stretch, strict=True))
+    return x, u, w
 
 
 def moments(

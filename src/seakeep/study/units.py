@@ -208,7 +208,7 @@ def regularisation(
         begin = process_time()
         solution = data.regress(each, each.state_delays, all_rows=True)
         seconds.append(process_time() - begin)
-        models[name] = HankelDMDcModel.fitted(each, data, data.signature(each), solution, parts)
+        models[name] = HankelDMDcModel.fitted(each, data, solution, parts)
         radius.append(spectral_radius(models[name].dynamics))
     test, numbers = next(iter(tested.items()))
     known = facts[test].isel(window=numbers, training=list(plan.training).index(training))
