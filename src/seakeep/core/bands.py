@@ -82,7 +82,7 @@ def split_bands(
         )
     sections = scipy.signal.butter(ORDER, frequency, fs=1.0 / dt, output="sos")
     reach = min(x.shape[-2] - 1, round(1.0 / (frequency * dt)))
-    low: FloatArray = scipy.signal.sosfiltfilt(sections, x, axis=-2, padtype="even", padlen=reach)
+    low = scipy.signal.sosfiltfilt(sections, x, axis=-2, padtype="even", padlen=reach)
     low = np.where(np.isfinite(x).all(axis=-2, keepdims=True), low, np.nan)
     return low, x - low
 
@@ -170,5 +170,4 @@ def _taper_and_bands(
 
 def band_edges(first: int, count: int) -> FloatArray:
     """Edges of the bands, Hz, shape (count + 1,)."""
-    edges: FloatArray = 2.0 ** ((first + np.arange(count + 1)) / PER_OCTAVE)
-    return edges
+    return 2.0 ** ((first + np.arange(count + 1)) / PER_OCTAVE)

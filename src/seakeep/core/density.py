@@ -112,7 +112,7 @@ def _bandwidths(
             f"the series is constant ({x[np.argmin(h), 0]:g}); it has no correlation, block length "
             "or density. Leave the channel out."
         )
-    return np.asarray(h)
+    return h
 
 
 def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> float:
@@ -422,7 +422,7 @@ def jensen_shannon(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
     second = second / second.sum(axis=-1, keepdims=True)
     middle = 0.5 * (first + second)
     total = rel_entr(first, middle).sum(axis=-1) + rel_entr(second, middle).sum(axis=-1)
-    return np.asarray(np.clip(0.5 * total, 0.0, math.log(2.0)))
+    return np.clip(0.5 * total, 0.0, math.log(2.0))
 
 
 def jsd_interval(

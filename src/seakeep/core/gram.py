@@ -232,7 +232,7 @@ def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int]) -> FloatArray:
             for x, weights in zip(piece.series, newest, strict=True):
                 head[begin:stop] += lagged_response(x, weights, piece.first, piece.count)
     # As above, with blocks of one; each run has a first row, and a first column above it.
-    gram: FloatArray = steps @ signed
+    gram = steps @ signed
     runs = list(pairwise(ends.tolist()))
     for run, (first, last) in enumerate(runs):
         later, above = runs[run + 1 :], gram[first, first:last]

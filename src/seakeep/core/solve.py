@@ -337,12 +337,12 @@ def _factor(gram: FloatArray, ridge: float) -> FloatArray:
             f"the Gram matrix of {size} rows with ridge {ridge:g} is not positive "
             "definite. Raise ridge, or use method='svd'."
         )
-    return np.asarray(factor)
+    return factor
 
 
 def _solved(factor: FloatArray, rows: FloatArray) -> FloatArray:
     """Rows times the inverse of a matrix, by its lower Cholesky factor; in their place."""
-    return np.asarray(lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0]).T
+    return lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0].T
 
 
 def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution:

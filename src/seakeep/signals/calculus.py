@@ -22,7 +22,7 @@ def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
     low, high = band
     rise = np.clip((frequency - 0.75 * low) / (0.5 * low), 0.0, 1.0)
     fall = np.clip((1.1 * high - frequency) / (0.2 * high), 0.0, 1.0)
-    return np.asarray((np.sin(0.5 * np.pi * rise) * np.sin(0.5 * np.pi * fall)) ** 2)
+    return (np.sin(0.5 * np.pi * rise) * np.sin(0.5 * np.pi * fall)) ** 2
 
 
 def reflections(series: FloatArray, order: int) -> FloatArray:
@@ -96,7 +96,7 @@ def predicted_extension(
         )
         return np.concatenate([before[::-1], values, after])
 
-    return np.asarray(np.apply_along_axis(lengthened, 0, array))
+    return np.apply_along_axis(lengthened, 0, array)
 
 
 def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
@@ -106,8 +106,7 @@ def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
     """
     order = max(1, min(order, past.size // 3))
     filter_taps = whitening(reflections(past, order))
-    result: FloatArray = continued(past, filter_taps[None], np.zeros((1, count)))[0]
-    return result
+    return continued(past, filter_taps[None], np.zeros((1, count)))[0]
 
 
 def _check_slowest(frequency: float, dt: float, samples: int, name: str) -> None:
@@ -149,7 +148,7 @@ def _integrated(
     omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
     transfer = (gain / (1j * omega) ** times).reshape((-1,) + (1,) * (array.ndim - 1))
     spectrum = fft.rfft(extended, axis=0) * transfer
-    out: FloatArray = fft.irfft(spectrum, n=extended.shape[0], axis=0)
+    out = fft.irfft(spectrum, n=extended.shape[0], axis=0)
     return out[padding:-padding]
 
 
@@ -259,7 +258,7 @@ def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     """
     x, step = as_series(series, minimum=5, channels=True), time_step(dt)
     # The slope of the quartic through five samples: a filter of Savitzky and Golay.
-    return np.asarray(scipy.signal.savgol_filter(x, 5, 4, deriv=1, delta=step, axis=0))
+    return scipy.signal.savgol_filter(x, 5, 4, deriv=1, delta=step, axis=0)
 
 
 def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
@@ -299,7 +298,7 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     padding = array.shape[0] - 1
     extended = np.pad(array, [(padding, padding)] + [(0, 0)] * (array.ndim - 1), mode="reflect")
     analytic = scipy.signal.hilbert(extended, axis=0)[padding:-padding]
-    return np.asarray(np.abs(analytic) ** 2)
+    return np.abs(analytic) ** 2
 
 
 def complementary_filter(
@@ -383,5 +382,5 @@ def complementary_filter(
     slow = spectrum[:, 0] * (omega if times == 1 else 1.0)
     fast = np.where(weight < 1, spectrum[:, 1] / safe**times, 0.0)
     joined = fft.irfft(weight * slow + (1 - weight) * fast, n=long.shape[0])
-    out: FloatArray = joined[padding:-padding]
+    out = joined[padding:-padding]
     return out + (slope / dt if times == 1 else trend)

@@ -87,7 +87,7 @@ class Expression:
         with np.errstate(all="ignore"):
             out = self.of(arrays.__getitem__)
         # Of means alone it is one number.
-        result: FloatArray = np.array(np.broadcast_to(out, arrays[self.channels[0]].shape))
+        result = np.array(np.broadcast_to(out, arrays[self.channels[0]].shape))
         if not np.all(np.isfinite(result)):
             bad = np.flatnonzero(~np.isfinite(result))
             raise DataError(

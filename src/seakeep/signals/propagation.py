@@ -568,7 +568,7 @@ def carry_by_dispersion(
 
     def numbers(omega: FloatArray) -> FloatArray:
         beyond = np.maximum(omega - edge, 0.0) / group_speed(edge, depth)
-        return np.asarray(wavenumber(np.minimum(omega, edge), depth) + beyond)
+        return wavenumber(np.minimum(omega, edge), depth) + beyond
 
     return _carried(array, dt, distances, numbers)
 

@@ -250,8 +250,7 @@ def _drift_terms(
 def mean_drift(rig: Rig, omega: npt.ArrayLike, losses: FloatArray) -> FloatArray:
     """Mean drift force per metre² of amplitude, N/m², from the balance of energy and momentum."""
     both, force = _drift_terms(rig, np.atleast_1d(np.asarray(omega, dtype=float)), losses)
-    mean: FloatArray = np.maximum(np.sum(both.conj() * force, axis=1).real, 0.0)
-    return mean
+    return np.maximum(np.sum(both.conj() * force, axis=1).real, 0.0)
 
 
 def drift_coefficient(rig: Rig, sea: Sea) -> tuple[FloatArray, FloatArray]:
@@ -400,7 +399,6 @@ def simulate(
 
 def tensions(rig: Rig, position: FloatArray, velocity: FloatArray) -> FloatArray:
     """Tension of each line along a motion of shape (dof, time), N, shape (line, time)."""
-    result: FloatArray = _loop().line_tensions(
+    return _loop().line_tensions(
         rig.lines, np.ascontiguousarray(position), np.ascontiguousarray(velocity)
     )
-    return result

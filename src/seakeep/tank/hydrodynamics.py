@@ -160,8 +160,7 @@ def _passive(matrices: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(0.5 * (matrices + matrices.swapaxes(-1, -2)))
     clipped = np.maximum(values, 0.0)[..., None, :]
     projected = (vectors * clipped) @ vectors.swapaxes(-1, -2)
-    result: FloatArray = 0.5 * (projected + projected.swapaxes(-1, -2))
-    return result
+    return 0.5 * (projected + projected.swapaxes(-1, -2))
 
 
 def passive_damping(hydro: Hydrodynamics) -> tuple[FloatArray, FloatArray]:
@@ -283,8 +282,7 @@ def impedance(
         added, radiated = kernel_coefficients(kernel, wanted)
     w = wanted[:, None, None]
     dynamic = -(w**2) * (hydro.mass + added) - 1j * w * radiated
-    result: ComplexArray = dynamic + hydro.stiffness + np.asarray(stiffness)
-    return result
+    return dynamic + hydro.stiffness + np.asarray(stiffness)
 
 
 def response(
@@ -303,5 +301,4 @@ def response(
     dynamic = impedance(hydro, wanted, stiffness, kernel)
     dynamic = dynamic - 1j * wanted[:, None, None] * np.asarray(damping)
     solved = np.linalg.solve(dynamic, excitation_at(hydro, wanted)[..., None])
-    result: ComplexArray = np.asarray(solved[..., 0], dtype=complex)
-    return result
+    return np.asarray(solved[..., 0], dtype=complex)
