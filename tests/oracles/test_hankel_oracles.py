@@ -85,24 +85,6 @@ def test_forecasts_equal_pykoop(make_run, delay_rows, relift, s, z):
     )
 
 
-@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
-@pytest.mark.parametrize(("samples", "ridge"), [(60, 0.5), (400, 0.5), (400, 20.0)])
-def test_the_first_rows_equal_scikit_learn(make_run, delay_rows, samples, ridge):
-    linear_model = pytest.importorskip("sklearn.linear_model")
-    s, z = 5, 20
-    run = make_run(samples=samples)
-    model = fit(run, s, z, ridge=ridge, delay_rows=delay_rows)
-    x, u = matrix(run, STATES), matrix(run, INPUTS)
-    rows = [
-        np.concatenate([x[j - s : j + 1][::-1].ravel(), u[j - z : j + 1][::-1].ravel()])
-        for j in range(z, samples - 1)
-    ]
-    oracle = linear_model.Ridge(alpha=ridge, fit_intercept=False, solver="cholesky")
-    oracle.fit(np.array(rows), x[z + 1 :])
-    ours = np.concatenate([model.A[:N], model.B[:N]], axis=1)
-    np.testing.assert_allclose(ours, oracle.coef_, rtol=0, atol=SAME_MATRICES)
-
-
 @dataclass(frozen=True)
 class Exported:
     """A model, what drives its exported system, and the forecast to compare with."""
@@ -148,31 +130,6 @@ def test_scipy_simulates_the_exported_system_like_our_forecast(exported, delays)
     # The first output is the measured state at the start; values are of order one.
     np.testing.assert_allclose(physical[0], exported.measured, rtol=0, atol=1e-12)
     np.testing.assert_allclose(physical[1:], exported.forecast, rtol=0, atol=1e-10)
-
-
-def test_the_exported_system_without_standardisation_holds_the_matrices_themselves(make_run):
-    model = fit(make_run(), 2, 0)
-    system = model.to_state_space()
-    np.testing.assert_array_equal(system.A, model.A)
-    np.testing.assert_array_equal(system.B, model.B)
-
-
-@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
-@pytest.mark.parametrize("rank", [4, 12])
-def test_a_rank_equals_truncated_singular_values_in_plain_numpy(make_run, rank, delay_rows):
-    s, z = 3, 8
-    run = make_run(samples=200)
-    model = fit(run, s, z, ridge=0.0, rank=rank, delay_rows=delay_rows)
-    x, u = matrix(run, STATES), matrix(run, INPUTS)
-    columns = np.arange(z, 199)
-    y = np.vstack(
-        [x[columns - lag].T for lag in range(s + 1)] + [u[columns - lag].T for lag in range(z + 1)]
-    )
-    left, values, right = np.linalg.svd(y, full_matrices=False)
-    g = x[columns + 1].T @ right[:rank].T / values[:rank] @ left[:, :rank].T
-    ours = np.concatenate([model.A[:N], model.B[:N]], axis=1)
-    # Singular values kept are above 1e-2 of the largest, so the pseudo-inverse keeps 1e-13.
-    np.testing.assert_allclose(ours, g, rtol=0, atol=SAME_MATRICES)
 
 
 def test_the_papers_formula_in_plain_numpy_at_the_papers_size():

@@ -45,12 +45,6 @@ def test_an_error_is_found_in_its_own_band(slow, fast):
     assert other[INNER].max() < 0.01
 
 
-def test_both_together_are_no_less_than_the_whole():
-    pair = histories(0.5, 0.7)
-    low, wave = statistics.band_error_over_time(**pair, dt=DT, frequency=SPLIT)
-    assert np.all(low + wave >= metrics.error_over_time(**pair) - 1e-12)  # rounding
-
-
 def test_a_diverged_forecast_is_nan_and_a_slack_channel_left_out():
     pair = histories(0.5, 0.5)
     alone = statistics.band_error_over_time(

@@ -5,7 +5,6 @@ import pytest
 from scipy.integrate import cumulative_simpson
 
 from seakeep.errors import RequestError
-from seakeep.signals import zero_up_crossings
 from seakeep.tank.dynamics import (
     DivergenceError,
     assemble_rig,
@@ -17,7 +16,7 @@ from seakeep.tank.dynamics import (
     tensions,
 )
 from seakeep.tank.hydrodynamics import far_field_at, response
-from seakeep.tank.seas import Sea, irregular_sea, regular_sea
+from seakeep.tank.seas import Sea, regular_sea
 from seakeep.tank.settings import DriftSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
 
@@ -55,31 +54,6 @@ def test_response_in_time_is_that_in_frequency(linear_rig):
     # The issue's bound; it grants 4 % to heave at λ/L 1.5, where opposite forces of buoyancy and
     # pool all but cancel.
     assert error.max() < 0.01
-
-
-def test_response_in_time_is_the_loops_own_model(linear_rig):
-    sea = small_sea([2.2, 3.1, 4.4, 5.4, 6.5])
-    motion = simulate(linear_rig, sea, 500.0)
-    found = harmonics(motion, sea, 350.0)
-    damped = linear_rig.linear_damping.copy()
-    damped[0, 0] += linear_rig.lines[:, 6].sum()
-    expected = response(
-        linear_rig.hydro, sea.omega, damped, linear_rig.mooring_stiffness, linear_rig.kernel
-    )
-    # Same A, B, phase included: what is left is the step (0.01 s) and surge's residual swing.
-    assert np.abs(found - expected).max() < 4e-3 * np.abs(expected).max()
-
-
-def test_surge_decays_with_the_period_of_its_springs(ideal_rig, calm):
-    start = np.zeros((2, 5))
-    start[0, 0] = 0.05
-    motion = simulate(ideal_rig, calm, 200.0, start)
-    crossings = zero_up_crossings(motion.position[0], ideal_rig.step)
-    period = np.mean(np.diff(crossings))
-    inertia = ideal_rig.hydro.mass[0, 0] + ideal_rig.hydro.added_mass[0, 0, 0]
-    # The added mass at 0.3 rad/s stands for that at 0.21 rad/s.
-    assert period == pytest.approx(2 * np.pi * np.sqrt(inertia / (1.89 + 1.33)), rel=0.003)
-    assert period == pytest.approx(30.0, abs=0.3)
 
 
 def test_mean_offset_beyond_the_slack_limit(rig):
@@ -154,18 +128,6 @@ def test_drift_is_what_energy_and_momentum_allow(rig, length, height):
     assert drift_coefficient(rig, sea)[0][0] == pytest.approx(allowed, rel=0.03)
 
 
-@pytest.mark.parametrize(("length", "own", "irregular"), [(2.1, 1010, 1067), (4.2, 288, 336)])
-def test_drift_force_per_amplitude_depends_on_the_sea(rig, settings, length, own, irregular):
-    """Quadratic losses of an irregular sea are those of more regular motion at its frequency."""
-    heights = {2.1: 0.105, 4.2: 0.116}
-    regular = regular_sea(length, heights[length], 0.0, 3.6, np.random.default_rng(0))
-    spectrum = settings.runs["irregular_1"].spectrum
-    sea = irregular_sea(spectrum, settings.facility.water_depth, np.random.default_rng(0))
-    # As docs/virtual_tank.md states them, to its last digit.
-    found = [mean_drift(rig, regular.omega, sea_losses(rig, each))[0] for each in (regular, sea)]
-    assert found == pytest.approx([own, irregular], abs=1.5)
-
-
 def slow_force(signs, envelopes, sea, time):
     at_vessel = np.exp(1j * (sea.phase[:, None] - np.outer(sea.omega, time)))
     return signs @ np.abs(envelopes @ at_vessel) ** 2
@@ -221,13 +183,6 @@ def test_radiated_waves_carry_the_power_of_the_damping(hydro):
     band = (hydro.omega > 2.0) & (hydro.omega < 7.5)
     # Pressure at the hull against Kochin's function: the panels leave one to three percent.
     assert far[band][:, :4] == pytest.approx(radiated[band][:, :4], rel=0.03)
-
-
-def test_drift_of_short_waves_is_that_of_a_wall(rig):
-    wave = Sea(np.array([12.0]), np.array([0.01]), np.zeros(1), wavenumber([12.0], 3.6))
-    wall = 0.5 * 1000 * 9.81 * 0.86
-    # A superellipse reflects nearly all, most of it back.
-    assert 0.6 * wall < drift_coefficient(rig, wave)[0][0] < wall
 
 
 def test_runs_start_anywhere_on_the_time_axis(linear_rig):

@@ -167,14 +167,6 @@ def test_truth_holds_what_the_chain_is_judged_against(played, short):
     assert slope[5:-5] == pytest.approx(data["heave_rate"].values[5:-5], abs=1e-3)
 
 
-def test_instruments_interpolate_the_motion_exactly_at_its_steps(played):
-    at = played.motion.time[500:600]
-    q, v, a = played.states(at)
-    assert q == pytest.approx(played.motion.position[:, 500:600], abs=1e-13)
-    assert v == pytest.approx(played.motion.velocity[:, 500:600], abs=1e-12)
-    assert a == pytest.approx(played.motion.acceleration[:, 500:600], abs=1e-11)
-
-
 @pytest.mark.parametrize("line", [0, 1])
 def test_a_pitch_that_lifts_the_bow_lifts_the_eye_of_its_line(played, line):
     """A line's middle under still water: eye and pole at the waterline, the vessel pitched."""
