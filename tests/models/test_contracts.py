@@ -20,7 +20,7 @@ from seakeep.models import (
     outside_training,
 )
 from seakeep.models.draws import Draw
-from seakeep.models.engine import group_series, read_groups
+from seakeep.models.engine import member_series, read_groups
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.observables import OBSERVABLES
 from seakeep.models.terms import Bound
@@ -174,7 +174,7 @@ class TestOneEngine:
         places = [("a", 20.0), ("b", 21.0), ("a", 30.0)]
         groups = [(places, 20), (places[:1], 30)]
         windows = read_groups(fitted.signature, {"a": test, "b": runs[0]}, groups)
-        with group_series(fitted, windows) as found:
+        with member_series(fitted, windows) as found:
             assert [series.shape for series, _ in found] == [(5, 3, 20, 2), (5, 1, 30, 2)]
         assert len(carries) == 2 * len(INPUTS)
 
