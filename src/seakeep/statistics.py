@@ -114,16 +114,22 @@ def moving_block_bootstrap(
     n_series: int,
     block_length: int,
     rng: np.random.Generator,
+    *,
+    segments: Sequence[int] | None = None,
 ) -> Any:
     """Take DataArrays and Datasets too; the docstring shown is that of the array function."""
     if not isinstance(series, xr.DataArray | xr.Dataset):
-        return bootstrap.moving_block_bootstrap(series, n_series, block_length, rng)
+        return bootstrap.moving_block_bootstrap(
+            series, n_series, block_length, rng, segments=segments
+        )
     alone = isinstance(series, xr.DataArray)
     whole: Any = series.to_dataset(name="series") if alone else series
     whole = whole[channel_names(whole, "series")]
     for name, channel in whole.items():
         finite(channel.transpose("time", ...).values, f"channel '{name}'")
-    positions = bootstrap.bootstrap_indices(whole.sizes["time"], n_series, block_length, rng)
+    positions = bootstrap.bootstrap_indices(
+        whole.sizes["time"], n_series, block_length, rng, segments
+    )
     at = xr.DataArray(positions, dims=("draw", "time"))
     drawn = whole.drop_vars("time", errors="ignore").isel(time=at)
     if "time" in whole.coords:

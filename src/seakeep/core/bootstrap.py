@@ -36,6 +36,19 @@ FEWEST_SAMPLES = 8
 """A shorter series has no block length: its quarter holds one sample."""
 
 
+def _as_segments(segments: Sequence[int] | None, samples: int) -> IntArray:
+    """Return the lengths of the pieces of which a series was joined; None is one piece."""
+    if segments is None:
+        return np.array([samples], dtype=np.intp)
+    lengths = np.array([whole_number(item, "a segment") for item in segments], dtype=np.intp)
+    if int(lengths.sum()) != samples:
+        raise RequestError(
+            f"the segments add up to {int(lengths.sum())} samples and the series has {samples}. "
+            "Give the length of each joined piece, in order."
+        )
+    return lengths
+
+
 def _varying(series: npt.ArrayLike) -> FloatArray:
     x = as_series(series, "the series", minimum=FEWEST_SAMPLES)
     if x.min() == x.max():
@@ -46,18 +59,23 @@ def _varying(series: npt.ArrayLike) -> FloatArray:
     return x
 
 
-def _autocovariance(x: FloatArray, lags: int) -> FloatArray:
-    apart = np.concatenate([x - x.mean(), np.zeros(lags)])
-    return np.array([apart[: x.size] @ apart[k : k + x.size] for k in range(lags + 1)]) / x.size
+def _autocovariance(x: FloatArray, lags: int, segments: IntArray) -> FloatArray:
+    # Zeros between the pieces keep every product inside one of them.
+    centred = x - x.mean()
+    pieces = np.split(centred, np.cumsum(segments)[:-1])
+    apart = np.concatenate([np.concatenate([piece, np.zeros(lags)]) for piece in pieces])
+    return np.array([apart[: apart.size - k] @ apart[k:] for k in range(lags + 1)]) / x.size
 
 
-def lag_one_correlation(series: npt.ArrayLike) -> float:
+def lag_one_correlation(series: npt.ArrayLike, segments: Sequence[int] | None = None) -> float:
     r"""Lag-one correlation :math:`\varphi` of the paper, its denominator squared.
 
     Parameters
     ----------
     series : array_like, shape (time,)
         Uniform samples.
+    segments : sequence of int, optional
+        Lengths of the joined pieces; products across a join are left out.
 
     Returns
     -------
@@ -72,14 +90,15 @@ def lag_one_correlation(series: npt.ArrayLike) -> float:
         If the series is constant, has gaps, or has fewer than eight samples.
     """
     x = _varying(series)
-    zero, one = _autocovariance(x, 1)
-    return float(x.size * one / ((x.size - 1) * zero))
+    pieces = _as_segments(segments, x.size)
+    zero, one = _autocovariance(x, 1, pieces)
+    return float(x.size * one / ((x.size - pieces.size) * zero))
 
 
-def _politis_white(x: FloatArray) -> float:
+def _politis_white(x: FloatArray, segments: IntArray) -> float:
     n = x.size
     longest = min(math.ceil(math.sqrt(n)) + QUIET_LAGS, n - 1)
-    covariance = _autocovariance(x, longest)
+    covariance = _autocovariance(x, longest, segments)
     small = np.abs(covariance[1:] / covariance[0]) < 2.0 * math.sqrt(math.log10(n) / n)
     # m: the first of K insignificant correlations in a row, counted as R's np and arch do.
     quiet = np.lib.stride_tricks.sliding_window_view(small, QUIET_LAGS).all(axis=-1)
@@ -100,6 +119,8 @@ def _politis_white(x: FloatArray) -> float:
 def block_length(
     series: npt.ArrayLike,
     rule: BlockRule = "carlstein",
+    *,
+    segments: Sequence[int] | None = None,
 ) -> int:
     r"""Length of the blocks of a bootstrap.
 
@@ -115,11 +136,14 @@ def block_length(
         White 2004, corrected by Patton, Politis & White 2009), no longer than
         :math:`\min(3\sqrt{\mathcal T}, \mathcal T/3)`; it is the optimum of the circular bootstrap,
         which that of moving blocks shares.
+    segments : sequence of int, optional
+        Lengths of the joined pieces; no product and no block then crosses a join.
 
     Returns
     -------
     int
-        Samples, rounded to the nearest, at least 1 and at most a quarter of the series.
+        Samples, rounded to the nearest, at least 1 and at most a quarter of the series and its
+        shortest segment.
 
     Raises
     ------
@@ -147,13 +171,14 @@ def block_length(
             f"There are: {', '.join(RULES)}."
         )
     x = _varying(series)
-    cap = x.size // 4
+    pieces = _as_segments(segments, x.size)
+    cap = min(x.size // 4, int(pieces.min()))
     if rule == "carlstein":
-        phi = abs(lag_one_correlation(x))
+        phi = abs(lag_one_correlation(x, segments))
         odds = 2.0 * phi / ((1.0 - phi) * (1.0 + phi)) if phi < 1.0 else math.inf
         optimum = float(odds ** (2.0 / 3.0) * np.cbrt(x.size))
     else:
-        optimum = _politis_white(x)
+        optimum = _politis_white(x, pieces)
         cap = min(cap, math.ceil(min(3.0 * math.sqrt(x.size), x.size / 3.0)))
     if optimum > cap + 0.5:
         warn(
@@ -164,30 +189,41 @@ def block_length(
     return int(np.clip(round(min(optimum, cap)), 1, cap))
 
 
-def resolve_block_length(series: npt.ArrayLike, block: int | BlockRule) -> int:
+def resolve_block_length(
+    series: npt.ArrayLike, block: int | BlockRule, segments: Sequence[int] | None = None
+) -> int:
     """Return a block length as it is, or by the rule that it names."""
-    return block_length(series, block) if isinstance(block, str) else block
-
-
-def _joined(starts: IntArray, block: int, size: int) -> IntArray:
-    """Positions of blocks that start there, side by side, the last cut; shape (…, size)."""
-    return (starts[..., None] + np.arange(block)).reshape(len(starts), -1)[:, :size]
+    if isinstance(block, str):
+        return block_length(series, block, segments=segments)
+    return block
 
 
 def bootstrap_indices(
-    n_samples: int, n_series: int, block_length: int, rng: np.random.Generator
+    n_samples: int,
+    n_series: int,
+    block_length: int,
+    rng: np.random.Generator,
+    segments: Sequence[int] | None = None,
 ) -> IntArray:
     """Positions that redraw a series; the same for every series that must keep step with it."""
     whole_number(n_series, "n_series")
     whole_number(block_length, "block_length")
-    if block_length > n_samples:
+    lengths = _as_segments(segments, n_samples)
+    shortest = int(lengths.min())
+    if block_length > shortest:
+        what = "the series" if segments is None else "the shortest segment"
         raise RequestError(
-            f"block_length of {block_length} samples does not fit into the series of {n_samples}. "
-            f"Choose 1 to {n_samples}; block_length(series) proposes one."
+            f"block_length of {block_length} samples does not fit into {what} of {shortest}. "
+            f"Choose 1 to {shortest}; block_length(series) proposes one."
         )
-    shape = n_series, -(-n_samples // block_length)
-    starts = rng.integers(0, n_samples - block_length + 1, size=shape)
-    return _joined(starts, block_length, n_samples)
+    first = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+    allowed = np.concatenate(
+        [np.arange(a, a + n - block_length + 1) for a, n in zip(first, lengths, strict=True)]
+    )
+    blocks = -(-n_samples // block_length)
+    starts = allowed[rng.integers(0, allowed.size, size=(n_series, blocks))]
+    positions = starts[:, :, None] + np.arange(block_length)
+    return positions.reshape(n_series, -1)[:, :n_samples].astype(np.intp, copy=False)
 
 
 def student_interval(
@@ -243,6 +279,8 @@ def moving_block_bootstrap(
     n_series: int,
     block_length: int,
     rng: np.random.Generator,
+    *,
+    segments: Sequence[int] | None = None,
 ) -> FloatArray:
     r"""Redraw a series from its overlapping blocks.
 
@@ -286,7 +324,7 @@ def moving_block_bootstrap(
            [3., 4., 5., 3., 4., 5.]])
     """
     x = as_series(series, "series", minimum=1, channels=True)
-    return x[bootstrap_indices(x.shape[0], n_series, block_length, rng)]
+    return x[bootstrap_indices(x.shape[0], n_series, block_length, rng, segments)]
 
 
 FEWEST = 3.0
@@ -358,7 +396,8 @@ def two_way_interval(
     positions = []  # of redrawn rows and columns, in circular blocks
     for size, block in zip(shape, blocks, strict=True):
         starts = rng.integers(0, size, size=(count, -(-size // block)))
-        positions.append(_joined(starts, block, size) % size)
+        drawn = (starts[:, :, None] + np.arange(block)) % size
+        positions.append(drawn.reshape(count, -1)[:, :size])
     rows, columns = positions
     step = max(1, AT_ONCE // max(each.size for each in tables))
     bounds = []

@@ -304,6 +304,7 @@ def density_interval(
     grid: npt.ArrayLike | None = None,
     bandwidth: Bandwidth = "paper",
     level: float = 0.95,
+    segments: Sequence[int] | None = None,
 ) -> DensityInterval:
     """Mean and interval of the densities of bootstrapped series (paper, U of the PDF).
 
@@ -325,6 +326,8 @@ def density_interval(
         As for :func:`kernel_bandwidth`.
     level : float
         Probability of the interval.
+    segments : sequence of int, optional
+        Lengths of the joined pieces; no block then crosses a join.
 
     Returns
     -------
@@ -340,8 +343,8 @@ def density_interval(
     x = as_bundle(series, "the series")
     level = fraction(level, "level")
     points = checked_grid(grid, [x], bandwidth)
-    block = resolve_block_length(x[0], block_length)
-    positions = bootstrap_indices(x.shape[1], n_series, block, rng)
+    block = resolve_block_length(x[0], block_length, segments)
+    positions = bootstrap_indices(x.shape[1], n_series, block, rng, segments)
     drawn = np.concatenate([bootstrapped_densities(row, positions, points, bandwidth) for row in x])
     lower, upper = np.quantile(drawn, [(1 - level) / 2, (1 + level) / 2], axis=0)
     own = np.atleast_2d(kernel_density(x, points, bandwidth)).mean(axis=0)
@@ -431,6 +434,7 @@ def jsd_interval(
     n_series: int = 100,
     bandwidth: Bandwidth = "paper",
     grid: npt.ArrayLike | None = None,
+    segments: Sequence[int] | None = None,
 ) -> JsdInterval:
     """Divergence of predicted from measured series with its interval and noise floor.
 
@@ -453,6 +457,8 @@ def jsd_interval(
     grid : array_like, shape (grid,), optional
         Evenly spaced values that cover all series; by default 512 over their pooled range and
         three bandwidths on either side. Not with Datasets, whose channels have their own.
+    segments : sequence of int, optional
+        Lengths of the joined pieces; no block then crosses a join.
 
     Returns
     -------
@@ -482,8 +488,8 @@ def jsd_interval(
             "need the same length. Judge where both exist, on one time axis."
         )
     points = checked_grid(grid, [p, m], bandwidth)
-    block = resolve_block_length(m, block_length)
-    positions, others = (bootstrap_indices(m.size, n_series, block, rng) for _ in "ab")
+    block = resolve_block_length(m, block_length, segments)
+    positions, others = (bootstrap_indices(m.size, n_series, block, rng, segments) for _ in "ab")
     truth = bootstrapped_densities(m, positions, points, bandwidth)
     again = bootstrapped_densities(m, others, points, bandwidth)
     drawn = np.stack([bootstrapped_densities(x, positions, points, bandwidth) for x in p])
