@@ -41,6 +41,14 @@ def test_the_lag_one_correlation_is_the_printed_sum_with_its_square():
     assert lag_one_correlation(x) == pytest.approx(by_hand, rel=1e-12)
 
 
+def test_a_join_is_no_neighbour():
+    x = np.concatenate([autoregressive(0.9, 200, 3), 50 + autoregressive(0.9, 200, 4)])
+    centred = x - x.mean()
+    pairs = [i for i in range(399) if i != 199]
+    by_hand = 400 * sum(centred[i + 1] * centred[i] for i in pairs) / (398 * sum(centred**2))
+    assert lag_one_correlation(x, [200, 200]) == pytest.approx(by_hand, rel=1e-12)
+
+
 @pytest.mark.oracle
 @pytest.mark.parametrize("phi", [0.3, 0.6, 0.9])
 def test_politis_white_agrees_with_arch(phi):
@@ -60,6 +68,8 @@ def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
     slow = np.cos(np.linspace(0, np.pi, 400))
     with pytest.warns(SeakeepWarning, match=r"rule 'carlstein' asks for blocks of .* cut to 100"):
         assert block_length(slow) == 100
+    with pytest.warns(SeakeepWarning, match="cut to 60"):  # the shortest segment
+        assert block_length(slow, segments=[140, 60, 200]) == 60
 
 
 # --- the moving-block bootstrap ------------------------------------------------------------------
@@ -93,13 +103,21 @@ def test_channels_keep_step():
     assert np.array_equal(alone, drawn[..., 0])
 
 
+def test_no_block_crosses_a_join_of_segments():
+    which = np.repeat([0.0, 1.0, 2.0], [20, 30, 12])
+    drawn = moving_block_bootstrap(which, 200, 12, np.random.default_rng(0), segments=[20, 30, 12])
+    blocks = drawn[:, :60].reshape(200, 5, 12)
+    assert np.all(blocks == blocks[..., :1])
+    assert set(np.unique(blocks)) == {0.0, 1.0, 2.0}
+
+
 # --- what is refused -----------------------------------------------------------------------------
 
 NOISE = np.random.default_rng(0).standard_normal(100)
 
 
-def redrawn(length):
-    return moving_block_bootstrap(NOISE, 3, length, np.random.default_rng(0))
+def redrawn(length, segments=None):
+    return moving_block_bootstrap(NOISE, 3, length, np.random.default_rng(0), segments=segments)
 
 
 @pytest.mark.parametrize(
@@ -113,6 +131,8 @@ def redrawn(length):
             "unknown rule 'carlsten'.* Did",
         ),
         (lambda: redrawn(101), RequestError, "of 101 samples does not fit into the series of 100"),
+        (lambda: block_length(NOISE, segments=[50, 60]), RequestError, "add up to 110 samples and"),
+        (lambda: redrawn(40, [70, 30]), RequestError, "not fit into the shortest segment of 30"),
         (lambda: redrawn(2.5), RequestError, "block_length must be a whole number of at least 1"),
     ],
 )
