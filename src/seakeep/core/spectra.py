@@ -248,8 +248,7 @@ def ljung_box(correlation: FloatArray, samples: int) -> tuple[FloatArray, FloatA
     lags = np.arange(1, len(correlation))
     weights = samples * (samples + 2) / (samples - lags)
     statistic = weights @ correlation[1:] ** 2
-    probability = stats.chi2.sf(statistic, lags.size)
-    return statistic, probability
+    return statistic, stats.chi2.sf(statistic, lags.size)
 
 
 def input_correlation(
@@ -278,20 +277,14 @@ def input_correlation(
     e, u = autocorrelation(residuals, lags), autocorrelation(inputs, lags)
     both = e[:, :, None] * u[:, None]
     limit = 1.96 * np.sqrt(np.maximum(both[0] + 2 * both[1:].sum(axis=0), 1.0) / samples)
-    total = np.zeros(both.shape)
-    for r, v in zip(residuals, inputs, strict=True):
-        for column in range(v.shape[1]):
-            total[:, :, column] += _products(r, np.broadcast_to(v[:, [column]], r.shape), lags)
+    shaped = ((r[:, :, None], v[:, None]) for r, v in zip(residuals, inputs, strict=True))
+    total = np.sum([_products(*each, lags) for each in shaped], axis=0)
     of_e, of_u = (sum((part**2).sum(axis=0) for part in side) for side in (residuals, inputs))
     with np.errstate(invalid="ignore"):
         return total / np.sqrt(np.multiply.outer(of_e, of_u)), limit
 
 
 def _products(x: FloatArray, past: FloatArray, lags: int) -> FloatArray:
-    """Sums of x at an instant times `past` lag samples before, shape (lags + 1, channel)."""
-    size = len(x)
-    out = np.zeros((lags + 1, x.shape[1]))
-    for column, (a, b) in enumerate(zip(x.T, past.T, strict=True)):
-        products = signal.correlate(a, b, method="fft")[size - 1 : size + lags]
-        out[: len(products), column] = products
-    return out
+    """Sums of x at an instant times `past` lag samples before, shape (lags + 1, …)."""
+    products = signal.fftconvolve(x, past[::-1], axes=0)[len(x) - 1 : len(x) + lags]
+    return np.concatenate([products, np.zeros((lags + 1 - len(products), *products.shape[1:]))])

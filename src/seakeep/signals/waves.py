@@ -724,7 +724,7 @@ def find_leakage(
     length = min(max(length, 1), record.size)
     if _even(waves):
         return None
-    best: Leakage | None = None
+    found: list[Leakage] = []
     repeated = np.zeros(record.size, dtype=bool)
     pool = [as_series(each, minimum=8) for each in training]
     ready = [(index, _analytic(each)) for index, each in enumerate(pool) if each.size >= length]
@@ -734,14 +734,12 @@ def find_leakage(
         for index, reference in ready:
             match = _correlation(reference, piece)
             at = int(np.argmax(np.abs(match)))
-            height = float(np.abs(match[at]))
-            if height < REPEATED:
-                continue
-            repeated[start : start + length] = True
-            if best is None or height > best.correlation:
-                phase = float(np.angle(match[at]))
+            height, phase = float(np.abs(match[at])), float(np.angle(match[at]))
+            if height >= REPEATED:
+                repeated[start : start + length] = True
                 begin = (part.start + start) * step
-                best = Leakage(0.0, height, index, at * step, begin, phase)
+                found.append(Leakage(0.0, height, index, at * step, begin, phase))
+    best = max(found, key=lambda each: each.correlation, default=None)
     return best and replace(best, share=float(repeated.mean()))
 
 

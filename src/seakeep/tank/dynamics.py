@@ -290,9 +290,7 @@ def drift_envelopes(rig: Rig, sea: Sea) -> tuple[FloatArray, ComplexArray]:
     return values[significant], (basis @ vectors[:, significant]).conj().T
 
 
-def linear_response(
-    rig: Rig, omega: FloatArray, losses: FloatArray | None = None
-) -> npt.NDArray[np.complex128]:
+def linear_response(rig: Rig, omega: FloatArray, losses: FloatArray | None = None) -> ComplexArray:
     r"""Linear response of the moored vessel as the time loop sees it, shape (frequency, dof).
 
     Per metre of wave amplitude, q of :math:`(-\omega^2 (M + A) - i\omega (B + C) + K)\,q = X`,
@@ -305,7 +303,8 @@ def linear_response(
     damping = radiated + (rig.linear_damping if losses is None else losses)
     w = omega[:, None, None]
     dynamic = -(w**2) * (rig.hydro.mass + added) - 1j * w * damping
-    return np.linalg.solve(dynamic + rig.hydro.stiffness + rig.mooring_stiffness, force)[..., 0]
+    dynamic = dynamic + rig.hydro.stiffness + rig.mooring_stiffness
+    return np.asarray(np.linalg.solve(dynamic, force)[..., 0], dtype=complex)
 
 
 def _wave_arrays(rig: Rig, sea: Sea) -> tuple[Any, ...]:
