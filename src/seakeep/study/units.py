@@ -23,7 +23,7 @@ from seakeep.core import embed, metrics
 from seakeep.errors import DataError, SeakeepError
 from seakeep.formats.netcdf import opened_netcdf
 from seakeep.models.calibration import envelope_of, held_out, learn_margin
-from seakeep.models.engine import Windows, group_series, read_groups
+from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import Selected
@@ -222,7 +222,7 @@ def _free_runs(
         for windows in chosen.values()
     ]
     groups = read_groups(fitted.signature, plan.runs, places)
-    with group_series(fitted, groups) as every:
+    with member_series(fitted, groups) as every:
         for test, (series, lost), windows in zip(tested, every, groups, strict=True):
             yield test, series, lost, windows
 
