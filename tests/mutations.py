@@ -239,7 +239,7 @@ CHANGES = (
     ("signals/rigid_body.py", "rotation_matrix(turn) @ r - r", "rotation_matrix(turn) @ r", "signals/test_rigid_body.py::test_positions_differentiate_to_velocities_and_accelerations"),
     ("signals/synchronisation.py", "_line(instants + lags.lag[good], instants,", "_line(instants - lags.lag[good], instants,", "signals/test_synchronisation.py::test_a_shared_signal"),
     ("signals/synchronisation.py", "offset = level - drift * centre", "offset = level + drift * centre", "signals/test_synchronisation.py::test_pulses_give_offset_and_drift_with_honest_errors"),
-    ("signals/tracking.py", 'pitch = side * seen["angle"].to_numpy()', 'pitch = seen["angle"].to_numpy()', "signals/test_tracking.py::test_a_camera_on_the_other_side"),
+    ("signals/tracking.py", 'pitch = side * seen["angle"]', 'pitch = seen["angle"]', "signals/test_tracking.py::test_a_camera_on_the_other_side"),
     ("check/coherence.py", "1 if names else len(references) + linear", "len(references) + linear", "check/test_coherence.py::test_observables_lower_the_bound"),
     ("check/parts.py", "max(history - 1, _waves_come(run, names))", "history - 1", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),
     ("signals/waves.py", "np.gradient(series) if is_motion else series, 1.0).start", "series, 1.0).stop", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),

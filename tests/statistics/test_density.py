@@ -63,13 +63,6 @@ def test_the_mass_is_one_on_the_stated_grid():
     assert np.trapezoid(kernel_density(NORMAL, grid), grid) == pytest.approx(1.0, abs=1e-4)
 
 
-def test_many_series_have_their_own_bandwidths():
-    grid = np.linspace(-5, 5, 64)
-    both = kernel_density(np.stack([NORMAL, FLAT]), grid)
-    assert np.array_equal(both[0], kernel_density(NORMAL, grid))
-    assert np.array_equal(both[1], kernel_density(FLAT, grid))
-
-
 def test_the_interval_holds_the_smoothed_truth():
     series = np.random.default_rng(4).standard_normal(4000)
     found = density_interval(series, block_length=1, rng=np.random.default_rng(5))

@@ -30,10 +30,10 @@ MARGIN = 8
 """Pixels around a component in which its background is looked at."""
 EDGE, CLEAR = 5, 11
 """Sides of the squares by which a component grows to take in its edge, and to leave it behind."""
-CORNERS = ["left_top", "left_bottom", "right_top", "right_bottom"]
+CORNERS = ("left_top", "left_bottom", "right_top", "right_bottom")
 """Fields that say how much of each corner is seen."""
 FIELDS = ("x", "y", "angle", "length", "height", "area", "fill", "cut", "saturation", "brightness",
-          *CORNERS)  # fmt: skip
+          *CORNERS, "picture", "lamp")  # fmt: skip
 """Measurements of a frame: centroid, pixels; orientation of the long axis, rad in (−π/2, π/2],
 positive clockwise as seen; sides of the rectangle of the same second moments; pixels, holes
 included; area by that of the smallest rectangle around it; one where it touches the border of the

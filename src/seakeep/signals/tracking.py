@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 import scipy
 
 from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
@@ -31,6 +30,8 @@ from seakeep.signals.filters import low_pass
 from seakeep.signals.panel import CORNERS, FIELDS, Image, TrackingSettings, find_panel, opencv
 from seakeep.signals.time_axis import stretches
 
+Seen = dict[str, FloatArray]
+"""Fields of all frames."""
 FLAGS = {
     "good": 0,
     "lost": 1,  # nothing of the panel's colour
@@ -225,7 +226,7 @@ def track_video(
         _check_fit(video, how)
         seen = _measure(video, how, progress)
         size, rate = video.size, video.rate
-    count = len(seen)
+    count = seen["area"].size
     if count < 2:
         raise DataError(f"{path} holds one frame; a motion needs at least two. Export it again.")
     usual = _usual_panel(seen, how, str(path))
@@ -242,19 +243,19 @@ def track_video(
         )
     motion, bridged = _motions(seen, flag == FLAGS["good"], usual, how, rate, str(path))
     panel = ("angle", "length", "height", "area", "fill")
-    channels = {
+    channels: dict[str, npt.NDArray[Any]] = {
         **motion,
-        "centroid_x": seen["x"].to_numpy(),
-        "centroid_y": seen["y"].to_numpy(),
-        **{f"panel_{name}": seen[name].to_numpy() for name in panel},
-        "saturation": seen["saturation"].to_numpy() / pixels,
+        "centroid_x": seen["x"],
+        "centroid_y": seen["y"],
+        **{f"panel_{name}": seen[name] for name in panel},
+        "saturation": seen["saturation"] / pixels,
         "quality": quality,
         "bridged": bridged.astype(np.int8),
-        "picture": seen["picture"].fillna(-1).to_numpy(dtype=int),
+        "picture": np.nan_to_num(seen["picture"], nan=-1.0).astype(int),
         "flag": flag.astype(np.int8),
     }
     if how.lamp is not None:
-        channels["lamp"] = seen["lamp"].to_numpy()
+        channels["lamp"] = seen["lamp"]
     attributes = {
         "source": Path(path).name,
         "frame": "x downstream, z up, pitch positive bow up; motions of the centre of gravity",
@@ -295,37 +296,39 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
         )
 
 
-def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) -> pd.DataFrame:
-    """What was seen of the panel and of the lamp, a row per frame; NaN of one that was dropped."""
+def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) -> Seen:
+    """What was seen of the panel and of the lamp in each frame; NaN of one that was dropped."""
     numbers: list[int] = []
-    rows: list[dict[str, float]] = []
+    rows: list[list[float]] = []
     at_rest = how.origin is None
     if how.lamp is not None:
         x, y, radius = how.lamp
         below, right = np.ogrid[: video.size[1], : video.size[0]]
         disc = np.nonzero((right - x) ** 2 + (below - y) ** 2 <= radius**2)
 
-    def table() -> pd.DataFrame:
-        return pd.DataFrame(rows, numbers, [*FIELDS, "picture", "lamp"], dtype=float)
+    def seen() -> Seen:
+        table = np.full((numbers[-1] + 1, len(FIELDS)), np.nan)
+        table[numbers] = rows
+        return dict(zip(FIELDS, table.T, strict=True))
 
     for number, frame in video.frames():
         if at_rest and rows and number >= how.rest * video.rate:
             at_rest = False  # refuse after the first frames what would be refused after the last
             where = f"first {how.rest:g} s (unless the origin is stated, zero lies there)"
-            _usual_panel(table(), how, f"{video.path}, {where}")
+            _usual_panel(seen(), how, f"{video.path}, {where}")
         row = find_panel(frame, how) | {"picture": len(rows)}
         if how.lamp is not None:
             row["lamp"] = float(np.mean(frame[disc])) / 255.0
         numbers.append(number)
-        rows.append(row)
+        rows.append([row.get(field, np.nan) for field in FIELDS])
         if progress is not None and len(rows) % REPORT_EVERY == 0:
             progress(len(rows), max(video.announced, len(rows)), "frames")
     if progress is not None:
         progress(len(rows), len(rows), "frames")
-    return table().reindex(range(numbers[-1] + 1))
+    return seen()
 
 
-def _usual_panel(seen: pd.DataFrame, how: TrackingSettings, name: str) -> pd.Series[float]:
+def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, float]:
     """Medians over the frames in which the largest component looks like the panel.
 
     Of the fields of a frame; `scale` is m per pixel, `corner_noise` the robust standard deviation
@@ -338,36 +341,36 @@ def _usual_panel(seen: pd.DataFrame, how: TrackingSettings, name: str) -> pd.Ser
         like &= abs(seen["length"] / (panel[0] / known) - 1) < SIZE_BAND
     if not like.any():
         raise DataError(_not_found(seen, how, name))
-    usual = seen[like].median()
-    lowest = (seen.loc[like, CORNERS] - usual[CORNERS]).min(axis=1)
-    usual["corner_noise"] = 1.4826 * (lowest - lowest.median()).abs().median()
+    usual = {field: float(np.median(values[like])) for field, values in seen.items()}
+    lowest = np.min([seen[corner][like] - usual[corner] for corner in CORNERS], axis=0)
+    usual["corner_noise"] = 1.4826 * float(np.median(abs(lowest - np.median(lowest))))
     square = panel[0] * panel[1] / (usual["length"] * usual["height"])
-    usual["scale"] = known or np.sqrt(square)
+    usual["scale"] = known or float(np.sqrt(square))
     return usual
 
 
-def _not_found(seen: pd.DataFrame, how: TrackingSettings, name: str) -> str:
-    there, panel, known = seen[seen["area"] > 0], how.panel, how.metres_per_pixel
+def _not_found(seen: Seen, how: TrackingSettings, name: str) -> str:
+    there, panel, known = seen["area"] > 0, how.panel, how.metres_per_pixel
     wanted = f"{panel[0]:g} × {panel[1]:g} m"
     if known is not None:
         wanted += f", {panel[0] / known:.0f} × {panel[1] / known:.0f} pixels"
-    start = f"{name}: the panel ({wanted}) was not found in any of {len(seen)} frames: "
-    if there.empty:
+    start = f"{name}: the panel ({wanted}) was not found in any of {there.size} frames: "
+    if not there.any():
         return start + (
             "nothing is as bright as the thresholds ask. Reduce the least red, green and blue "
             "(lower; --threshold), or correct the region."
         )
-    length, height = there[["length", "height"]].median()
+    length, height = (np.median(seen[side][there]) for side in ("length", "height"))
     return start + (
         f"the largest bright component measures {length:.0f} × {height:.0f} pixels (median of "
-        f"{len(there)} frames), which is not its shape. Raise the least red, green and blue "
+        f"{there.sum()} frames), which is not its shape. Raise the least red, green and blue "
         "(lower; --threshold), state a region that holds no other bright thing, or correct the "
         "panel's size."
     )
 
 
 def _judge(
-    seen: pd.DataFrame, usual: pd.Series[float], how: TrackingSettings, step: float, pixels: int
+    seen: Seen, usual: Mapping[str, float], how: TrackingSettings, step: float, pixels: int
 ) -> tuple[IntArray, FloatArray]:
     """Flag frames that cannot be trusted, and give each a quality figure.
 
@@ -375,47 +378,46 @@ def _judge(
     the shape is good; 0 where there is nothing to see. A flagged frame has less than 0.5.
     """
     tolerance, panel_area = how.tolerance * usual["length"], usual["length"] * usual["height"]
-    apart = usual - seen
+    less = {field: usual[field] - values for field, values in seen.items()}
     drop = max(CORNER_DROP, CORNER_NOISE * usual["corner_noise"])
-    hidden = apart[CORNERS].max(axis=1, skipna=False).fillna(np.inf) / drop
-    sides = apart[["length", "height"]].abs().max(axis=1, skipna=False) / tolerance
-    deviations = np.stack([hidden, sides, apart["fill"] / FILL_DROP])
-    shape = np.max(np.nan_to_num(deviations, nan=np.inf), axis=0)
-    cut, area, excess = seen["cut"] > 0, seen["area"], (-apart["saturation"]).fillna(0.0)
+    hidden = np.max([less[corner] for corner in CORNERS], axis=0) / drop
+    sides = (abs(less[side]) / tolerance for side in ("length", "height"))
+    shape = np.max([hidden, *sides, less["fill"] / FILL_DROP], axis=0)
+    shape[np.isnan(shape)] = np.inf
+    cut, area, excess = seen["cut"] > 0, seen["area"], np.nan_to_num(-less["saturation"])
     off, glare = (shape > 1) | cut, excess > GLARE * panel_area
     brighter = seen["brightness"] > BRIGHTER * usual["brightness"]
     kinds = {
-        "dropped": area.isna(),
+        "dropped": np.isnan(area),
         "lost": (area == 0) & ~glare,
         "overexposed": (excess > FLOOD * pixels) | ((off | brighter) & glare),
-        "occluded": off & ((area < panel_area) | (hidden > 1) | cut),
+        "occluded": off & ((area < panel_area) | ~(hidden <= 1) | cut),
         "misshapen": off,
     }
-    codes = [FLAGS[kind] for kind in kinds]
-    flag = np.select(list(kinds.values()), codes, FLAGS["good"])
+    flag = np.select(list(kinds.values()), [FLAGS[kind] for kind in kinds], FLAGS["good"])
     # From the middle of the neighbours to either end; twice that where some of them are flagged.
     reach = how.max_speed * step * NEIGHBOURS / usual["scale"] + tolerance
     at = np.flatnonzero(flag == FLAGS["good"])
     if at.size >= NEIGHBOURS:
-        place = seen[["x", "y"]].to_numpy()[at]
-        middle = scipy.ndimage.median_filter(place, (NEIGHBOURS, 1), mode="nearest")
-        flag[at[np.hypot(*(place - middle).T) > reach]] = FLAGS["jump"]
+        place = np.stack([seen["x"][at], seen["y"][at]])
+        middle = scipy.ndimage.median_filter(place, (1, NEIGHBOURS), mode="nearest")
+        flag[at[np.hypot(*(place - middle)) > reach]] = FLAGS["jump"]
     quality = np.clip(1.0 - 0.5 * shape, 0.0, 1.0)
     most = np.where(flag == FLAGS["good"], 1.0, FLAGGED_QUALITY)
     return flag, np.minimum(quality, most)
 
 
 def _motions(
-    seen: pd.DataFrame,
+    seen: Seen,
     good: BoolArray,
-    usual: pd.Series[float],
+    usual: Mapping[str, float],
     how: TrackingSettings,
     rate: float,
     name: str,
 ) -> tuple[dict[str, FloatArray], BoolArray]:
     """Surge, heave and pitch of the centre of gravity, filtered, and what was bridged."""
     side = 1.0 if how.downstream == "right" else -1.0
-    pitch = side * seen["angle"].to_numpy() - how.camera_pitch
+    pitch = side * seen["angle"] - how.camera_pitch
     (along, up), scale = how.panel_place, usual["scale"]
     # Where the panel's centre would be if the vessel had turned about its centre of gravity alone.
     x = side * scale * seen["x"] - along * np.cos(pitch) - up * np.sin(pitch)
