@@ -9,7 +9,6 @@ from seakeep.campaign import draft_campaign, read_campaign, write_prepared
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
-MOTIONS = [f"{m}{k}" for m in ("surge", "heave", "pitch") for k in ("", "_rate", "_acceleration")]
 RUNS = ("irregular_1", "regular_2")
 
 
@@ -21,11 +20,6 @@ def played(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tank")
     play(default_settings(), folder, names=RUNS)
     return folder
-
-
-@pytest.fixture(scope="module")
-def prepared(played):
-    return read_campaign(played / "campaign.toml").prepare()
 
 
 @pytest.fixture
@@ -43,16 +37,6 @@ def copied(played, tmp_path):
         return path
 
     return write
-
-
-def test_drop_outs_are_masked_and_flagged(prepared):
-    run = prepared["irregular_1"]
-    lost = np.isnan(run["eta_us_fwd"].values)
-    assert 0 < lost.mean() < 0.03
-    np.testing.assert_array_equal(lost, (run["eta_us_fwd_flags"].values & 1) > 0)
-    assert run["eta_us_fwd_flags"].attrs["flag_meanings"].split()[0] == "missing"
-    for name in (*MOTIONS, "eta_fwd", "mooring_bow"):
-        assert np.isfinite(run[name].values).all()
 
 
 def test_interrupted_half_way_a_second_call_continues(copied):
