@@ -327,9 +327,7 @@ class TestBadRuns:
             r"folder of the data: export TANK_FILES=",
         ):
             read_campaign(path).prepare(["second"])
-        with pytest.raises(
-            RequestError, match=r"has no run 'secnd'\. Did you mean 'second'"
-        ):
+        with pytest.raises(RequestError, match=r"has no run 'secnd'\. Did you mean 'second'"):
             read_campaign(path).prepare(["secnd"])
         monkeypatch.setenv("TANK_FILES", str(path.parent))
         assert read_campaign(path).prepare(["second"])
