@@ -9,7 +9,7 @@ import pytest
 from small_tank import tank_columns, write_csv
 
 from seakeep.campaign import draft_campaign, read_campaign
-from seakeep.errors import DataError, RequestError, SeakeepWarning
+from seakeep.errors import DataError, SeakeepWarning
 from seakeep.quality import findings_of
 from seakeep.quality.clocks import ClocksKind
 
@@ -154,12 +154,6 @@ class TestSteps:
         with pytest.raises(DataError, match=r"'first': low_pass .* over 41\.8 s, .* lasts 20 s"):
             read_campaign(path).prepare(["first"])
 
-    def test_a_step_finer_than_the_files(self, edited):
-        path = edited(("sampling_rate = 10", "sampling_rate = 200"))
-        found = step_findings(read_campaign(path).prepare(["first"])["first"])
-        assert list(found) == ["time"]
-        assert found["time"].startswith("put on 200 Hz, and no logger records more than 50 Hz")
-
 
 def step_findings(run):
     return {each.channel: each.text for each in findings_of(run) if "STEP" in each.kind.name}
@@ -210,11 +204,6 @@ class TestRecords:
             pytest.raises(DataError, match=message),
         ):
             campaign.prepare()
-
-    def test_so_is_one_outside_the_run_s_span(self, edited):
-        path = edited(("train = [0, 10]", "span = [0, 9]\ntrain = [0, 8]"))
-        with pytest.raises(RequestError, match=r"first\.test: \[10, inf\] s holds 0 .* 0 to 9 s"):
-            read_campaign(path).prepare(["first"])
 
 
 def noisy(folder, noise):

@@ -364,6 +364,20 @@ class TestFiles:
                 k: type(v) for k, v in expected[name].attrs.items()
             }
 
+    def test_interrupted_half_way_a_second_call_continues(self, campaign, tank):
+        def stop(done, total, name):
+            if done == 2:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            write_prepared(campaign, progress=stop)
+        # Each run is written before the next one is begun, and nothing half done stays.
+        (written,) = (tank / "prepared").iterdir()
+        before, calls = written.stat().st_mtime_ns, []
+        write_prepared(campaign, progress=lambda *call: calls.append(call))
+        assert (written.name, written.stat().st_mtime_ns) == ("first.nc", before)
+        assert calls == [(2, 2, "second")]
+
     @pytest.mark.parametrize("change", ["settings", "file", "version", "name"])
     def test_stale_files_are_not_used(self, campaign, tank, edited, change, monkeypatch):
         path = write_prepared(campaign)["second"]
