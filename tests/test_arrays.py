@@ -41,7 +41,7 @@ SOUND = {
     "block_length.series": NOISE, "split_bands.series": TABLE, "A": np.full((1, 2), 0.3),
     "B": np.full((1, 2), 0.5), "histories": np.ones((3, 2)), "inputs": np.ones((3, 9, 2)),
     "frequency": np.abs(X), "wavelength": 1 + np.abs(X), "split_bands.frequency": 0.2,
-    "band_error_over_time.frequency": 0.2, "dt": 0.05, "depth": 3.6, "separation": 1.2,
+    "dt": 0.05, "depth": 3.6, "separation": 1.2,
     "stated": 1.2, "band": (0.1, 2.0), "bounds": (0.0, 1.0), "distances": (0.0, 0.5),
     "celerity": 3.0, "passband": 2.0, "crossover": 0.1, "window": 10.0, "largest_lag": 1.0,
     "longest": 1.0, "count": 20, "block_length": 9, "n_series": 9,
