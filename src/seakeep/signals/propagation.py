@@ -422,7 +422,7 @@ def probe_separation(
     """
     a, b = as_pair(first, second, minimum=64, moving=True)
     interval, place = time_step(dt), number(stated, "the stated separation")
-    cross, power, k = _spectra(a, b, interval, depth)
+    cross, k = _spectra(a, b, interval, depth)
     period = encounter_period(a, interval)
     reach = float(group_speed(2 * np.pi / period, depth)) * REACH * a.size * interval
     reach = max(reach, abs(place) + np.pi / float(k[np.argmax(np.abs(cross))]))
@@ -433,22 +433,19 @@ def probe_separation(
             f"record of {a.size * interval:.4g} s. Correct the positions of the probes (m)."
         )
     coarse = np.arange(-reach, reach, step)
-    scores = _scores(cross, power, k, coarse)
+    scores = _scores(cross, k, coarse)
     best = coarse[_chosen(scores, int(np.argmin(np.abs(coarse - place))))]
     fine = best + step * np.arange(-2 * FINER, 2 * FINER + 1) / FINER
-    scores = _scores(cross, power, k, fine)
+    scores = _scores(cross, k, fine)
     total = scores.sum(axis=0)
     separation, *without = (
         fine[0] + parabola_peak(values)[0] * step / FINER for values in (total, *(total - scores))
     )
-    left_out = np.array(without)
-    count = GROUPS
-    spread = np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean()) ** 2))
     turned = np.abs(1.0 - np.exp(1j * k * (separation - place))) ** 2
     weight = np.abs(cross)
     return ProbeSeparation(
         separation=float(separation),
-        spread=float(spread),
+        spread=float(_jackknife(np.array(without))),
         correlation=float(total.max()),
         stated=place,
         input_error=float(np.sqrt(np.sum(weight * turned) / np.sum(weight))),
@@ -457,34 +454,36 @@ def probe_separation(
 
 def _spectra(
     a: FloatArray, b: FloatArray, dt: float, depth: float
-) -> tuple[ComplexArray, float, FloatArray]:
-    """Cross-spectrum where there is energy, the product of the records' norms, wavenumbers."""
+) -> tuple[ComplexArray, FloatArray]:
+    """Cross-spectrum over the records' norms, and wavenumbers, where there is energy."""
     taper = scipy.signal.windows.tukey(a.size, 0.2)
     first, second = (fft.rfft(taper * (each - each.mean())) for each in (a, b))
     frequency = fft.rfftfreq(a.size, dt)
-    cross = np.conj(first) * second
-    norm = float(np.sqrt(np.sum(np.abs(first[1:]) ** 2) * np.sum(np.abs(second[1:]) ** 2)))
+    cross = np.conj(first) * second / (np.linalg.norm(first[1:]) * np.linalg.norm(second[1:]))
     smooth = np.convolve(np.abs(cross), np.ones(9) / 9, mode="same")
     energetic = (smooth > ENERGY * smooth[1:].max()) & (frequency > 0)
-    return cross[energetic], norm, wavenumber(2 * np.pi * frequency[energetic], depth)
+    return cross[energetic], wavenumber(2 * np.pi * frequency[energetic], depth)
 
 
-def _scores(cross: ComplexArray, norm: float, k: FloatArray, distances: FloatArray) -> FloatArray:
+def _scores(cross: ComplexArray, k: FloatArray, distances: FloatArray) -> FloatArray:
     """Parts of the correlation that the groups of frequencies make, shape (group, distance).
 
     Distances are equally spaced: each is a start and an offset, whose phases multiply.
     """
     group = (np.arange(k.size) // NEIGHBOURS) % GROUPS
     length = int(np.sqrt(distances.size))
-    starts = distances[::length]
-    offsets = distances[:length] - distances[0]
-    out = np.zeros((GROUPS, distances.size))
-    for each in range(GROUPS):
-        own = group == each
-        turned = cross[own] * np.exp(1j * np.outer(starts, k[own]))
-        scores = turned @ np.exp(1j * np.outer(k[own], offsets))
-        out[each] = scores.real.ravel()[: distances.size] / norm
+    starts, offsets = distances[::length], distances[:length] - distances[0]
+    out = np.empty((GROUPS, distances.size))
+    for each, row in enumerate(out):
+        own = k[group == each]
+        turned = cross[group == each] * np.exp(1j * np.outer(starts, own))
+        row[:] = (turned @ np.exp(1j * np.outer(own, offsets))).real.ravel()[: row.size]
     return out
+
+
+def _jackknife(values: FloatArray) -> FloatArray:
+    """Standard error of a sum from its values without, or the parts of, each group."""
+    return np.sqrt((GROUPS - 1) / GROUPS * np.sum((values - values.mean(axis=0)) ** 2, axis=0))
 
 
 def _chosen(scores: FloatArray, stated: int) -> int:
@@ -493,10 +492,8 @@ def _chosen(scores: FloatArray, stated: int) -> int:
     peaks = scipy.signal.find_peaks(total)[0]
     best = peaks[np.argmax(total[peaks])]
     parts = scores[:, [best]] - scores[:, peaks]
-    # Jackknife of a sum over groups: leaving one out leaves its part out.
-    error = np.sqrt((GROUPS - 1) / GROUPS * np.sum((parts - parts.mean(axis=0)) ** 2, axis=0))
-    alike = (total[peaks] >= NEARLY * total[best]) & (parts.sum(axis=0) <= SURELY * error)
-    near = peaks[alike]
+    alike = total[peaks] >= NEARLY * total[best]
+    near = peaks[alike & (parts.sum(axis=0) <= SURELY * _jackknife(parts))]
     return int(near[np.argmin(np.abs(near - stated))])
 
 
