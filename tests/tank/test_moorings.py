@@ -71,3 +71,18 @@ def test_another_kind_of_line_is_one_entry(rig, settings, monkeypatch):
     near = along_surge(other, np.array([-1e-6, 1e-6]))
     slope = (near[0] - near[1])[1] / 2e-6 - (near[0] - near[1])[0] / 2e-6
     assert mooring_stiffness(other.lines)[0, 0] == pytest.approx(slope, rel=1e-6)
+
+
+@pytest.mark.oracle
+def test_tension_is_that_of_a_catenary_solver(rig):
+    catenary = pytest.importorskip("moorpy.Catenary", reason="oracle").catenary
+    unstretched, stiffness = rig.lines[0, 5], rig.lines[0, 4]
+    for offset in (-0.2, 0.0, 0.5, 1.4):
+        reach = 2.95 + offset
+        # A line of 1 mg/m: its sag is far below a millimetre, the solver needs some weight.
+        weight = 1e-5
+        ends = catenary(reach, 0.0, unstretched, stiffness * unstretched, weight, CB=0.0)[0:4]
+        position = np.zeros((5, 1))
+        position[0] = offset
+        ours = tensions(rig, position, np.zeros_like(position))[0, 0]
+        assert ours == pytest.approx(np.hypot(*ends[2:4]), rel=1e-3)
