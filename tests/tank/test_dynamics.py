@@ -6,6 +6,7 @@ from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicSpline
 
 from seakeep.errors import RequestError
+from seakeep.signals import zero_up_crossings
 from seakeep.tank.dynamics import (
     DivergenceError,
     assemble_rig,
@@ -47,7 +48,7 @@ def test_response_in_time_is_that_in_frequency(linear_rig):
     sea = small_sea(wavelength_to_frequency(1.4 * ratios, 3.6))
     motion = simulate(linear_rig, sea, 500.0)
     # Surge swings on its moorings with a decay time of 70 s: the ramp hardly excites it.
-    found = np.abs(harmonics(motion, sea, 350.0))
+    found = harmonics(motion, sea, 350.0)
     stiffness, damping = linear_rig.mooring_stiffness, linear_rig.linear_damping
     damping = damping.copy()
     damping[0, 0] += linear_rig.lines[:, 6].sum()
@@ -59,11 +60,39 @@ def test_response_in_time_is_that_in_frequency(linear_rig):
     dynamic = -(w**2) * (hydro.mass + added) - 1j * w * (radiated + damping)
     force = excitation_at(hydro, sea.omega)[..., None]
     solved = np.linalg.solve(dynamic + hydro.stiffness + stiffness, force)
-    expected = np.abs(solved[..., 0])
-    error = np.abs(found / expected - 1.0)[:, :3]
+    expected = solved[..., 0]
+    error = np.abs(np.abs(found / expected) - 1.0)[:, :3]
     # The bound; it grants 4 % to heave at λ/L 1.5, where opposite forces of buoyancy and
     # pool all but cancel.
     assert error.max() < 0.01
+    # With their phases: surge swings on its moorings for minutes.
+    assert np.all(np.abs(found / expected - 1.0)[:, :3].max(axis=0) < [0.013, 0.007, 0.007])
+
+
+def test_surge_decays_with_the_period_of_its_springs(ideal_rig, calm):
+    start = np.zeros((2, 5))
+    start[0, 0] = 0.05
+    motion = simulate(ideal_rig, calm, 200.0, start)
+    crossings = zero_up_crossings(motion.position[0], ideal_rig.step)
+    period = np.mean(np.diff(crossings))
+    inertia = ideal_rig.hydro.mass[0, 0] + ideal_rig.hydro.added_mass[0, 0, 0]
+    # The added mass at 0.3 rad/s stands for that at 0.21 rad/s.
+    assert period == pytest.approx(2 * np.pi * np.sqrt(inertia / (1.89 + 1.33)), rel=0.003)
+    assert period == pytest.approx(30.0, abs=0.3)
+
+
+def test_mean_offset_beyond_the_slack_limit(rig):
+    sea = regular_sea(2.1, 0.12, 0.0, 3.6, np.random.default_rng(0))
+    no_drag = replace(rig, quadratic=rig.quadratic * [8.0, 1, 1, 1, 1])
+    motion = simulate(no_drag, sea, 500.0)
+    late = motion.time > 400.0
+    force = drift_coefficient(no_drag, sea)[0][0] * sea.amplitude[0] ** 2
+    loads = tensions(no_drag, motion.position, motion.velocity)
+    assert np.all(loads[1, late] == 0.0)  # the stern line is slack
+    offset = motion.position[0, late].mean()
+    assert offset > 1.1 / 1.33  # its pretension over its stiffness
+    # The bow line is level to (heave / length)² = 1e-4, and the slow swing is down to millimetres.
+    assert offset == pytest.approx((force - 1.1) / 1.89, rel=0.02)
 
 
 def energy(rig, motion):
@@ -179,6 +208,13 @@ def test_radiated_waves_carry_the_power_of_the_damping(hydro):
     band = (hydro.omega > 2.0) & (hydro.omega < 7.5)
     # Pressure at the hull against Kochin's function: the panels leave one to three percent.
     assert far[band][:, :4] == pytest.approx(radiated[band][:, :4], rel=0.03)
+
+
+def test_drift_of_short_waves_is_that_of_a_wall(rig):
+    wave = Sea(np.array([12.0]), np.array([0.01]), np.zeros(1), wavenumber([12.0], 3.6))
+    wall = 0.5 * 1000 * 9.81 * 0.86
+    # A superellipse reflects nearly all, most of it back.
+    assert 0.6 * wall < drift_coefficient(rig, wave)[0][0] < wall
 
 
 def test_runs_start_anywhere_on_the_time_axis(linear_rig):
