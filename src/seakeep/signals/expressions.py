@@ -264,9 +264,9 @@ def parse(text: str) -> Expression:
 def _is_exponent(node: ast.expr) -> bool:
     """Whether a node is a number that a physical law may have as an exponent."""
     match node:
-        case ast.UnaryOp(ast.USub(), ast.Constant(float() | int() as size)):
-            return size <= GREATEST_EXPONENT
-        case ast.Constant(float() | int() as size):
+        case ast.Constant(float() | int() as size) | ast.UnaryOp(
+            ast.USub(), ast.Constant(float() | int() as size)
+        ):
             return size <= GREATEST_EXPONENT
     return False
 
