@@ -11,8 +11,9 @@ from seakeep.core.bands import PER_OCTAVE
 from seakeep.hosts.c import content_of, identifier, rendered, sources, write_sources
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
+from seakeep.models.live import DOUBTED
 from seakeep.models.validity import CYCLES, TRAINED
-from seakeep.signals.prediction import MEMORY
+from seakeep.signals.prediction import MEMORY, NOISE
 from seakeep.waves import GRAVITY
 
 
@@ -57,6 +58,7 @@ def followed(
     """Text of the C files of a model and its estimator, by their names."""
     content = content_of(model, name) | model.live(noise=noise, roles=roles).equations
     content |= {"begins": model.history_samples, "memory": MEMORY, "pi": math.pi}
+    content |= {"noise_part": NOISE, "doubted": DOUBTED}
     content |= {"coverage": model.coverage, "trained": TRAINED, "cycles": CYCLES}
     content |= {"gravity": GRAVITY, "per_octave": PER_OCTAVE, "is_elevation": is_elevation}
     files = ("estimator.h", "estimator.c")

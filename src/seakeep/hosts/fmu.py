@@ -48,7 +48,8 @@ def write_fmu(model: Model, path: str | Path, ahead: int | None = None) -> Path:
     ahead : int, optional
         Instants that an estimator forecasts. With it the unit follows a vessel, as
         :func:`seakeep.hosts.write_estimator` says: inputs ``measured.NAME`` are the states, NaN
-        where they were not measured, and outputs their estimates and ``ahead.NAME[1]`` …
+        where they were not measured, and outputs their estimates, ``ahead.NAME[1]`` …, and the
+        standard deviations ``std.NAME[1]`` …
 
     Returns
     -------
@@ -154,9 +155,10 @@ def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
             each | {"name": f"measured.{each['name']}", "is_output": False} for each in answered
         ]
         coming = [
-            each | {"name": f"ahead.{each['name']}[{step}]"}
+            each | {"name": f"{kind}.{each['name']}[{step}]", "start": start}
+            for kind, starts in (("ahead", means[1]), ("std", signature.state_scale.spread))
             for step in range(1, ahead + 1)
-            for each in answered
+            for each, start in zip(answered, starts.tolist(), strict=True)
         ]
         channels, groups = [*given, *measured, *answered, *coming], []
     return {

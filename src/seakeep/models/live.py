@@ -47,12 +47,10 @@ from seakeep.models.interface import Signature
 from seakeep.models.labelled import Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.models.validity import Conditions, Coverage, Validity
-from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
+from seakeep.signals.prediction import Foreseen, foresee, predict_waves, predictable_time
 
 STATE = "live state"
 """Kind of the files of :meth:`Live.save`."""
-PAIRS = 8
-"""Pairs of futures of the waves that are drawn where they are not known."""
 RECORD = 16
 """Record that is kept, in longest delays: what waves are predicted from."""
 LEAST_RECORD = 512
@@ -64,6 +62,9 @@ SPIKE = 100.0
 """What a single sample adds to the consistency at most: a spike tells of a sensor, for a while."""
 ALARM = 2.0
 """Consistency of a state above which errors of late are no longer those of training."""
+DOUBTED = 0.7, 1.2
+"""Squares of errors, claimed, over the variance of training between which a forecast from waves
+that are predicted passes over to the mean: an autoregressive model errs more than it claims."""
 SMALL = 0.5
 """Part of the training SD below which an error stays over the lead time."""
 RIG = ("water_depth", "celerity", "probe_offset")
@@ -439,10 +440,10 @@ class Live:
                 f"{taken}. Start with at least 4 samples of all of u."
             )
         known = self._known_inputs()
+        expected = self._expected(known, 1)[0]
         if self._follows is None and self.ready and np.isfinite(self._places).sum() >= 2:
-            drawn = self._drawn(known, 1, 1, 0)
-            return np.where(lost, drawn.mean(axis=0)[0], inputs)  # the draws lie about it
-        return np.where(lost, self._expected(known, 1)[0], inputs)
+            expected[self._waves] = self._foreseen(known, 1).expected[0]
+        return np.where(lost, expected, inputs)
 
     def _expected(self, known: FloatArray, count: int) -> FloatArray:
         """Inputs of the next samples: in waves as those of training, or from each record."""
@@ -457,16 +458,10 @@ class Live:
             out[:, waves] = predict_waves(known[:, waves], count)
         return out
 
-    def _drawn(self, known: FloatArray, count: int, pairs: int, seed: int) -> FloatArray:
-        """Futures of the inputs, shape (2 pairs, count, Q)."""
-        out = np.tile(known[-1:], (2 * pairs, count, 1))
-        if self._waves:
-            rng, places = np.random.default_rng(seed), self._places[self._waves]
-            series, dt = known[:, self._waves], self.signature.dt
-            out[..., self._waves] = draw_sea(
-                series, count, pairs, rng, dt=dt, positions=places, depth=self._depth
-            )
-        return out
+    def _foreseen(self, known: FloatArray, count: int) -> Foreseen:
+        """Waves to come after samples of the inputs, and how they may depart from it."""
+        places, dt = self._places[self._waves], self.signature.dt
+        return foresee(known[:, self._waves], count, dt=dt, positions=places, depth=self._depth)
 
     def _known_inputs(self) -> FloatArray:
         """Inputs that waves are predicted from: the last ones, always as many once there are."""
@@ -677,10 +672,10 @@ class Live:
                 f"there are {self._count.taken} samples of history and the model needs {needed}. "
                 f"Call step {needed - self._count.taken} more times first."
             )
-        futures, known = self._futures(count, future)
-        windows = self._windows(count, futures)
+        inputs, departures, freedom, known = self._futures(count, future)
+        windows = self._windows(count, [inputs, *(inputs + departures), *(inputs - departures)])
         with engine.member_series(self.model, windows) as (values, lost):
-            complete = values[lost.max(axis=1) < 0].reshape(-1, *values.shape[2:])
+            complete = values[lost.max(axis=1) < 0]
         conditions, (late, free) = self.conditions, self.consistency_by_state
         worst = np.fmax(np.fmax(late, free), 1.0)
         wider = np.where(worst > ALARM, worst, 1.0)
@@ -688,16 +683,17 @@ class Live:
             wider = np.fmax(np.fmax(wider, free), conditions.beyond**2)
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(complete):
-            spread = (
-                complete.var(axis=0, ddof=1) if len(complete) > 1 else np.zeros(table.shape[1:])
-            )
-            table[0] = complete.mean(axis=0) if len(complete) > 1 else complete[0]
-            table[1] = np.sqrt(spread + wider * self._error_variances(count))
-            if len(futures) > 1:
+            table[0], spread = _moments(complete)
+            errors = self._error_variances(count)
+            if len(departures):
                 foreseen = np.arange(count) <= known - self._ahead  # their waves are known
-                weight = np.where(foreseen[:, None], 1.0, _trust(table[1] / scale.spread))
+                low, high = DOUBTED
+                trust = (high - (spread + errors) / scale.spread**2) / (high - low)
+                lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0))
+                weight = np.where(foreseen[:, None], 1.0, lasting)
                 table[0] = scale.centre + weight * (table[0] - scale.centre)
-            half = _quantile(level, spread, table[1] ** 2, len(futures) > 1) * table[1]
+            table[1] = np.sqrt(spread + wider * errors)
+            half = _quantile(level, spread, table[1] ** 2, freedom) * table[1]
             table[2:] = table[0] - half, table[0] + half
         variables = label_channels(signature, table, ("statistic", "time"))
         inside = table[1] <= SMALL * scale.spread
@@ -706,7 +702,7 @@ class Live:
         words = "the mean minus and plus a quantile times std"
         time = self._time + signature.dt * np.arange(1, count + 1)
         attrs: dict[str, Any] = {"start": self._time, "level": level, "known_input": known}
-        attrs |= {"diverged": len(values) - len(complete) // values.shape[1]}
+        attrs |= {"diverged": len(values) - len(complete)}
         attrs |= {"predictable": self._predictable()}
         if conditions is not None:
             attrs |= conditions.attrs()
@@ -728,13 +724,14 @@ class Live:
         apart = float(np.ptp(self._places[order]))
         return predictable_time(record, self.signature.dt, apart, self._depth)
 
-    def _futures(self, steps: int, future: Any) -> tuple[list[FloatArray], int]:
-        """Inputs of the record and after it, of each future, and how many rows were given."""
-        names, record = self.signature.inputs, self._known_inputs()
-        if not names:
-            return [record], 0
+    def _futures(self, steps: int, future: Any) -> tuple[FloatArray, FloatArray, float, int]:
+        """Inputs of the record and after it, departures from them, and how many rows were given.
+
+        A departure is what an innovation of one wave adds where that is first not known.
+        """
+        names, record, waves = self.signature.inputs, self._known_inputs(), self._waves
         given = _plan(future, names, steps - 1 + self._ahead)
-        for column in sorted(set(range(len(names))) - set(self._waves)):
+        for column in sorted(set(range(len(names))) - set(waves)):
             lost = np.isnan(given[:, column])
             if self._roles[names[column]] == "known" and lost.any():
                 raise RequestError(
@@ -745,14 +742,20 @@ class Live:
             whole = np.append(record[-1, column], given[:, column])
             at = np.where(np.isfinite(whole), np.arange(whole.size), 0)
             given[:, column] = whole[np.maximum.accumulate(at)][1:]
-        gaps = np.isnan(given).any(axis=1)
-        count = int(gaps.argmax()) if gaps.any() else len(given)
-        known, rest = np.concatenate([record, given[:count]]), given[count:]
-        if not len(rest):
-            return [known], count
-        drawn = self._drawn(known, len(rest), PAIRS, self._count.taken)
-        drawn = np.where(np.isnan(rest), drawn, rest)
-        return [np.concatenate([known, each]) for each in drawn], count
+        gaps, inputs = np.isnan(given), np.concatenate([record, given])
+        if not gaps.any():
+            return inputs, np.empty((0, *inputs.shape)), math.inf, len(given)
+        count = int(gaps.any(axis=1).argmax())
+        begin, missing, departures = len(record) + count, gaps[count:, waves], []
+        rest, foreseen = inputs[begin:], self._foreseen(inputs[:begin], len(missing))
+        rest[:, waves] = np.where(missing, foreseen.expected, rest[:, waves])
+        for late, of_one in zip(missing.argmax(axis=0), foreseen.departures, strict=True):
+            each = np.zeros_like(inputs)
+            each[begin + late :, waves] = of_one[: len(rest) - late]
+            each[begin:, waves] *= missing
+            if each.any():
+                departures.append(each)
+        return inputs, np.array(departures), foreseen.freedom, count
 
     def _windows(self, steps: int, futures: Sequence[FloatArray]) -> Windows:
         """What a forecast reads, for each future."""
@@ -760,8 +763,6 @@ class Live:
         history = self._rows("x", taken - signature.state_samples, taken)
         back = signature.input_map.history(signature.input_delays) + 1
         inputs = np.stack([each[min(taken, self._record) - back :] for each in futures])
-        if not signature.inputs:
-            inputs = np.zeros((1, signature.input_delays + steps, 0))
         histories = np.broadcast_to(history, (len(inputs), *history.shape))
         rig = None if self._follows is None else self._rig
         return engine.array_windows(signature, histories, inputs, steps, rig)
@@ -906,25 +907,31 @@ def held_samples(inside: BoolArray) -> npt.NDArray[np.intp]:
     return samples
 
 
-def _trust(error: FloatArray) -> FloatArray:
-    """Weight of a forecast against the mean of training, by its error in training SDs.
+def _moments(runs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean and variance over members and waves of runs (member, 1 + 2 departures, steps, N).
 
-    What an autoregressive model continues errs more than the mean where its error, claimed, comes
-    near the SD: all weight up to seven tenths of its square, and none from 1.2 of it on, or after.
+    First come runs of the inputs that are expected, then of departures from them and of their
+    opposites. Innovations of later samples do the same later, so that effects add up over the
+    leads: what squares of waves move the mean by, and the variance. Inputs may depart by the same
+    waves, so that effects of one innovation of each count with one sign.
     """
-    weight = np.clip((1.2 - error**2) / 0.5, 0.0, 1.0)
-    lasting: FloatArray = np.minimum.accumulate(weight)
-    return lasting
+    middle, (plus, minus) = runs[:, 0], np.split(runs[:, 1:], 2, axis=1)
+    apart = 0.5 * np.abs(plus - minus).sum(axis=1)
+    moved = (0.5 * (plus + minus) - middle[:, None]).sum(axis=1)
+    spread: FloatArray = np.cumsum(np.mean(apart**2, axis=0), axis=0)
+    if len(middle) > 1:
+        spread += middle.var(axis=0, ddof=1)
+    return middle.mean(axis=0) + np.cumsum(moved.mean(axis=0), axis=0), spread
 
 
-def _quantile(level: float, spread: FloatArray, variance: FloatArray, drawn: bool) -> FloatArray:
+def _quantile(level: float, spread: FloatArray, variance: FloatArray, freedom: float) -> FloatArray:
     """Half-width of the band in standard deviations: Student's quantile.
 
-    Part of the variance is the `spread` of few futures, where they were `drawn`, and the rest is
-    known from free runs; the degrees of freedom are those of Satterthwaite (1946).
+    Part of the variance is the `spread`, which is known with some degrees of `freedom`, and the
+    rest is known from free runs; those of the sum are Satterthwaite's (1946).
     """
     share = spread / np.maximum(variance, np.finfo(float).tiny)
-    doubt = (1.0 - share) ** 2 / WINDOWS + (share**2 / PAIRS if drawn else 0.0)
+    doubt = (1.0 - share) ** 2 / WINDOWS + share**2 / freedom
     quantile: FloatArray = special.stdtrit(1.0 / np.maximum(doubt, 1e-6), 0.5 + 0.5 * level)
     return quantile
 

@@ -25,8 +25,10 @@ def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
     return np.asarray((np.sin(0.5 * np.pi * rise) * np.sin(0.5 * np.pi * fall)) ** 2)
 
 
-def reflections(series: FloatArray, order: int) -> FloatArray:
+def reflections(series: FloatArray, order: int, noise: float = 0.0) -> FloatArray:
     """Reflection coefficients of an autoregressive model by Burg's method, shape (order,).
+
+    Of a series as if white noise of a part of its power were added to it.
 
     Notes
     -----
@@ -36,47 +38,42 @@ def reflections(series: FloatArray, order: int) -> FloatArray:
     forward, backward = series[1:].copy(), series[:-1].copy()
     out = np.zeros(order)
     # Below this the errors are rounding: a pure tone needs two coefficients and gets no more.
-    floor = np.finfo(float).eps * float(series @ series)
+    whole = float(series @ series)
+    floor, added = np.finfo(float).eps * whole, 2.0 * noise * whole / series.size
     for place in range(order):
         power = float(forward @ forward + backward @ backward)
         if power <= floor:
             break
-        out[place] = -2.0 * float(forward @ backward) / power
+        out[place] = -2.0 * float(forward @ backward) / (power + added * forward.size)
         updated = forward + out[place] * backward
         backward = (backward + out[place] * forward)[:-1]
         forward = updated[1:]
     return out
 
 
-def whitening(reflection: FloatArray) -> FloatArray:
-    """Filters that leave the innovations of a series, shape (…, order + 1).
+def autoregression(series: FloatArray, order: int, noise: float = 0.0) -> tuple[FloatArray, float]:
+    """Filter that leaves the innovations of a series of zero mean (Burg), and their power.
 
-    Levinson's recursion, from reflection coefficients of shape (…, order); those between −1 and 1
-    give filters whose inverses are stable.
+    The order is at most a third of the number of samples. The inverse of the filter is stable. The
+    power is that in data that were not fitted, (n + p)/(n − p) times what is left (Akaike, 1970).
     """
-    order = reflection.shape[-1]
-    out = np.zeros((*reflection.shape[:-1], order + 1))
-    out[..., 0] = 1.0
-    for place in range(order):
-        block = out[..., : place + 2]
-        block += reflection[..., place, None] * block[..., ::-1]
-    return out
+    order = max(1, min(order, series.size // 3))
+    out, reflection = np.zeros(order + 1), reflections(series, order, noise)
+    out[0] = 1.0
+    for place in range(order):  # Levinson's recursion
+        block = out[: place + 2]
+        block += reflection[place] * block[::-1]
+    left = float(np.mean(series**2) * np.prod(1.0 - reflection**2))
+    return out, left * (series.size + order) / (series.size - order)
 
 
-def continued(past: FloatArray, filters: FloatArray, innovations: FloatArray) -> FloatArray:
-    """What innovations make after a series of zero mean, shape (number, count), of as many filters.
-
-    `filters`, shape (number, order + 1), are those of :func:`whitening`.
-    """
-    order = filters.shape[1] - 1
+def continued(past: FloatArray, whitening: FloatArray, count: int) -> FloatArray:
+    """The `count` values that are expected after a series of zero mean."""
+    order = len(whitening) - 1
     lags = scipy.linalg.toeplitz(past[: -order - 1 : -1], np.zeros(order))
-    states = -filters[:, 1:] @ lags
-    return np.stack(
-        [
-            scipy.signal.lfilter([1.0], each, given, zi=state)[0]
-            for each, given, state in zip(filters, innovations, states, strict=True)
-        ]
-    )
+    state = -whitening[1:] @ lags
+    result: FloatArray = scipy.signal.lfilter([1.0], whitening, np.zeros(count), zi=state)[0]
+    return result
 
 
 def predicted_extension(
@@ -100,14 +97,8 @@ def predicted_extension(
 
 
 def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
-    """The `count` values after a series of zero mean, by linear prediction (Burg).
-
-    The order is at most a third of the number of samples.
-    """
-    order = max(1, min(order, past.size // 3))
-    filter_taps = whitening(reflections(past, order))
-    result: FloatArray = continued(past, filter_taps[None], np.zeros((1, count)))[0]
-    return result
+    """The `count` values after a series of zero mean, by linear prediction (Burg)."""
+    return continued(past, autoregression(past, order)[0], count)
 
 
 def _check_slowest(frequency: float, dt: float, samples: int, name: str) -> None:
