@@ -164,7 +164,7 @@ CHANGES = (
     ("models/linear.py", "-poles.real / natural", "-poles.real / frequency", "models/test_stability.py::test_modes_are_natural_frequency_and_damping_of_the_oscillator"),
     ("models/linear.py", ".astype(complex)) / dt", ".astype(complex)) * dt", "models/test_stability.py::test_modes_are_natural_frequency_and_damping_of_the_oscillator"),
     ("models/live.py", "(measured - predicted) / self.errors.at(lead)", "(measured - predicted) / self.errors.at(1)", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
-    ("models/live.py", "self._squares *= np.where(np.isnan(squares), 1.0, self._fade)", "self._squares *= 1.0", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
+    ("models/live.py", "self._squares *= np.where(known, self._fade, 1.0)", "self._squares *= 1.0", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
     ("models/live.py", "middle.var(axis=0, ddof=1)", "middle.var(axis=0, ddof=0)", "models/test_live.py::test_members_that_are_held_give_the_mean_of_the_ensemble"),
     ("models/live.py", "final = at - max(self._ahead - 1, 0)", "final = at", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
     ("models/live.py", "names, steps - 1 + self._ahead)", "names, steps + self._ahead)", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),

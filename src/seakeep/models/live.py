@@ -480,8 +480,9 @@ class Live:
         self._updates.append(update)
         count.complete = count.complete + 1 if is_exact else 0
         if count.complete > self.signature.state_delays:
+            if count.since:  # or it is zero already
+                self._filter.covariance.fill(0.0)
             count.since, count.partly = 0, False
-            self._filter.covariance.fill(0.0)
         elif update is not self._as_it_is:
             count.since += 1
             count.partly = count.partly or bool(seen.any())
@@ -584,9 +585,10 @@ class Live:
                 predicted = self._predicted(self._free, at - 1)
                 self._free[:-1], self._free[-1] = self._free[1:], predicted
                 squares[1] = ((measured - predicted) / self.errors.at(lead)) ** 2
-        self._squares *= np.where(np.isnan(squares), 1.0, self._fade)
-        self._squares[0] += np.fmin(np.nan_to_num(squares, posinf=SPIKE), SPIKE)
-        self._squares[1] += ~np.isnan(squares)
+        known = ~np.isnan(squares)
+        self._squares *= np.where(known, self._fade, 1.0)
+        self._squares[0] += np.where(known, np.minimum(squares, SPIKE), 0.0)
+        self._squares[1] += known
         lead = (lead + 1) % (len(self.errors.rms) + 1) if lead else 0
         if not lead and (update is self._as_it_is or self._noise.any()):
             self._free[:], lead = self._history, 1
