@@ -18,7 +18,6 @@ from typing import Any
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
 from seakeep.hosts.c import identifier, rendered, sources
-from seakeep.hosts.estimator import followed
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
 
@@ -65,7 +64,7 @@ def write_fmu(model: Model, path: str | Path, ahead: int | None = None) -> Path:
     target = Path(path)
     check_output(target, KIND)
     linear, name = exportable(model, ahead is not None), identifier(target.stem)
-    files = sources(linear, name) if ahead is None else followed(linear, name)
+    files = sources(linear, name, None if ahead is None else linear.live())
     digest = hashlib.sha256("".join(files.values()).encode()).digest()
     content: dict[str, Any] = {
         "name": name,

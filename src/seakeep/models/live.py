@@ -38,7 +38,7 @@ from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.checks import check_choice
-from seakeep.models.engine import Dynamics, Runs, Windows
+from seakeep.models.engine import Dynamics, Runs
 from seakeep.models.executor import one_blas_thread
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors
@@ -674,8 +674,17 @@ class Live:
                 f"there are {self._count.taken} samples of history and the model needs {needed}. "
                 f"Call step {needed - self._count.taken} more times first."
             )
-        inputs, departures, freedom, known = self._futures(count, future)
-        windows = self._windows(count, [inputs, *(inputs + departures), *(inputs - departures)])
+        futures, freedom, known = self._futures(count, future)
+        taken = self._count.taken
+        history = self._rows("x", taken - signature.state_samples, taken)
+        back = signature.input_map.history(signature.input_delays) + 1
+        windows = engine.array_windows(
+            signature,
+            np.broadcast_to(history, (len(futures), *history.shape)),
+            futures[:, min(taken, self._record) - back :],
+            count,
+            None if self._follows is None else self._rig,
+        )
         with engine.member_series(self.model, windows) as (values, lost):
             complete = values[lost.max(axis=1) < 0]
         conditions, (late, free) = self.conditions, self.consistency_by_state
@@ -686,8 +695,12 @@ class Live:
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(complete):
             table[0], spread = _moments(complete)
-            errors = self._error_variances(count)
-            if len(departures):
+            # Errors of the model and of the estimate, never above those of the open loop.
+            errors = self.errors.of_forecast(count, self._count.since)
+            if self._count.partly:
+                own = self.errors.of_forecast(count)
+                errors = np.minimum(own + self._filter.ahead(count), errors)
+            if len(futures) > 1:
                 foreseen = np.arange(count) <= known - self._ahead  # their waves are known
                 low, high = DOUBTED
                 trust = (high - (spread + errors) / scale.spread**2) / (high - low)
@@ -720,16 +733,21 @@ class Live:
 
     def _predictable(self) -> float:
         """Time for which the waves at the last probe are known from the first one, s."""
-        order = [place for place in np.argsort(self._places) if np.isfinite(self._places[place])]
-        if not order or not np.ptp(record := self._known_inputs()[:, order[0]]) > 0:
+        placed = np.flatnonzero(np.isfinite(self._places))
+        if not placed.size:
             return 0.0
-        apart = float(np.ptp(self._places[order]))
+        record = self._known_inputs()[:, placed[self._places[placed].argmin()]]
+        if not np.ptp(record) > 0:
+            return 0.0
+        apart = float(np.ptp(self._places[placed]))
         return predictable_time(record, self.signature.dt, apart, self._depth)
 
-    def _futures(self, steps: int, future: Any) -> tuple[FloatArray, FloatArray, float, int]:
-        """Inputs of the record and after it, departures from them, and how many rows were given.
+    def _futures(self, steps: int, future: Any) -> tuple[FloatArray, float, int]:
+        """Inputs of the record and after it, shape (1 + 2 departures, time, Q).
 
-        A departure is what an innovation of one wave adds where that is first not known.
+        First those that are expected, then departures from them and their opposites, of each wave
+        by an innovation where it is first not known; the degrees of freedom of these, and how many
+        rows were given.
         """
         names, record, waves = self.signature.inputs, self._known_inputs(), self._waves
         given = _plan(future, names, steps - 1 + self._ahead)
@@ -746,39 +764,20 @@ class Live:
             given[:, column] = whole[np.maximum.accumulate(at)][1:]
         gaps, inputs = np.isnan(given), np.concatenate([record, given])
         if not gaps.any():
-            return inputs, np.empty((0, *inputs.shape)), math.inf, len(given)
+            return inputs[None], math.inf, len(given)
         count = int(gaps.any(axis=1).argmax())
-        begin, missing, departures = len(record) + count, gaps[count:, waves], []
+        begin, missing = len(record) + count, gaps[count:, waves]
         rest, foreseen = inputs[begin:], self._foreseen(inputs[:begin], len(missing))
         rest[:, waves] = np.where(missing, foreseen.expected, rest[:, waves])
-        for late, of_one in zip(missing.argmax(axis=0), foreseen.departures, strict=True):
-            each = np.zeros_like(inputs)
+        departures = np.zeros((len(waves), *inputs.shape))
+        for each, late, of_one in zip(
+            departures, missing.argmax(axis=0), foreseen.departures, strict=True
+        ):
             each[begin + late :, waves] = of_one[: len(rest) - late]
-            each[begin:, waves] *= missing
-            if each.any():
-                departures.append(each)
-        return inputs, np.array(departures), foreseen.freedom, count
-
-    def _windows(self, steps: int, futures: Sequence[FloatArray]) -> Windows:
-        """What a forecast reads, for each future."""
-        signature, taken = self.signature, self._count.taken
-        history = self._rows("x", taken - signature.state_samples, taken)
-        back = signature.input_map.history(signature.input_delays) + 1
-        inputs = np.stack([each[min(taken, self._record) - back :] for each in futures])
-        histories = np.broadcast_to(history, (len(inputs), *history.shape))
-        rig = None if self._follows is None else self._rig
-        return engine.array_windows(signature, histories, inputs, steps, rig)
-
-    def _error_variances(self, steps: int) -> FloatArray:
-        """Variances of the model's errors and the estimate's, never above the open loop's."""
-        own = self.errors.of_forecast(steps)
-        if not self._filter.covariance.any():
-            return own
-        bound = self.errors.of_forecast(steps, self._count.since)
-        if not self._count.partly:
-            return bound
-        result: FloatArray = np.minimum(own + self._filter.ahead(steps), bound)
-        return result
+        departures[:, begin:, waves] *= missing
+        departures *= missing.any(axis=0)[:, None, None]
+        futures = np.concatenate([inputs[None], inputs + departures, inputs - departures])
+        return futures, foreseen.freedom, count
 
     def save(self, path: str | Path) -> Path:
         """Write all that the object needs to go on (NetCDF), to a temporary name first.

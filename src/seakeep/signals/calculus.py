@@ -25,45 +25,36 @@ def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
     return np.asarray((np.sin(0.5 * np.pi * rise) * np.sin(0.5 * np.pi * fall)) ** 2)
 
 
-def reflections(series: FloatArray, order: int, noise: float = 0.0) -> FloatArray:
-    """Reflection coefficients of an autoregressive model by Burg's method, shape (order,).
+def autoregression(series: FloatArray, order: int, noise: float = 0.0) -> tuple[FloatArray, float]:
+    """Filter that leaves the innovations of a series of zero mean, and their power.
 
-    Of a series as if white noise of a part of its power were added to it.
+    As if white noise of a part of its power were added to the series. The order is at most a third
+    of the number of samples. The inverse of the filter is stable. The power is that in data that
+    were not fitted, (n + p)/(n − p) times what is left (Akaike, 1970).
 
     Notes
     -----
-    J. P. Burg, Maximum entropy spectral analysis (1975): each one minimises the sum of forward and
-    backward prediction errors. All lie between −1 and 1.
-    """
-    forward, backward = series[1:].copy(), series[:-1].copy()
-    out = np.zeros(order)
-    # Below this the errors are rounding: a pure tone needs two coefficients and gets no more.
-    whole = float(series @ series)
-    floor, added = np.finfo(float).eps * whole, 2.0 * noise * whole / series.size
-    for place in range(order):
-        power = float(forward @ forward + backward @ backward)
-        if power <= floor:
-            break
-        out[place] = -2.0 * float(forward @ backward) / (power + added * forward.size)
-        updated = forward + out[place] * backward
-        backward = (backward + out[place] * forward)[:-1]
-        forward = updated[1:]
-    return out
-
-
-def autoregression(series: FloatArray, order: int, noise: float = 0.0) -> tuple[FloatArray, float]:
-    """Filter that leaves the innovations of a series of zero mean (Burg), and their power.
-
-    The order is at most a third of the number of samples. The inverse of the filter is stable. The
-    power is that in data that were not fitted, (n + p)/(n − p) times what is left (Akaike, 1970).
+    J. P. Burg, Maximum entropy spectral analysis (1975): each reflection coefficient minimises the
+    sum of forward and backward prediction errors. All lie between −1 and 1.
     """
     order = max(1, min(order, series.size // 3))
-    out, reflection = np.zeros(order + 1), reflections(series, order, noise)
-    out[0] = 1.0
-    for place in range(order):  # Levinson's recursion
-        block = out[: place + 2]
-        block += reflection[place] * block[::-1]
-    left = float(np.mean(series**2) * np.prod(1.0 - reflection**2))
+    forward, backward, out = series[1:], series[:-1], np.zeros(order + 1)
+    out[0], whole = 1.0, float(series @ series)
+    left, floor = whole / series.size, np.finfo(float).eps * whole
+    added = 2.0 * noise * left
+    for place in range(order):
+        power = float(forward @ forward + backward @ backward)
+        # Below this errors are rounding: a pure tone needs two coefficients and gets no more.
+        if power <= floor:
+            break
+        reflection = -2.0 * float(forward @ backward) / (power + added * forward.size)
+        left *= 1.0 - reflection**2
+        block = out[: place + 2]  # Levinson's recursion
+        block += reflection * block[::-1]
+        forward, backward = (
+            (forward + reflection * backward)[1:],
+            (backward + reflection * forward)[:-1],
+        )
     return out, left * (series.size + order) / (series.size - order)
 
 
