@@ -944,28 +944,26 @@ def _mean_predictor(
 
     Physical units; blocks of a and b are oldest first.
     """
-    count, s, z = len(signature.states), signature.state_delays, signature.input_delays
+    scales = signature.state_scale, signature.input_scale, signature.direct_scale
+    count, blocks = len(signature.states), (signature.state_delays, signature.input_delays, 0)
+    out = [
+        np.zeros((count, each + 1, of.mean.size)) for each, of in zip(blocks, scales, strict=True)
+    ]
     offset = np.zeros(count)
-    a = np.zeros((count, s + 1, count))
-    b = np.zeros((count, z + 1, signature.input_scale.mean.size))
-    d = np.zeros((count, signature.direct_scale.mean.size))
     for member in members:
-        scale, (on_states, on_inputs) = member.state_scale, member.matrices
-        split = (member.input_delays + 1) * b.shape[2]
-        parts = (
-            (a, on_states[:count], scale),
-            (b, on_inputs[:count, :split], member.input_scale),
-            (d[:, None], on_inputs[:count, split:], member.direct_scale),
-        )
-        offset += scale.mean
-        for out, coefficients, own in parts:
-            blocks = coefficients.reshape(count, -1, out.shape[2]) if out.shape[2] else out[:, :0]
-            physical = blocks * scale.std[:, None, None] / own.std
-            offset -= np.einsum("nlc,c->n", physical, own.mean)
-            out[:, out.shape[1] - physical.shape[1] :] += physical[:, ::-1]
-    number = len(members)
-    flat = a.reshape(count, -1) / number, b.reshape(count, -1) / number
-    return offset / number, *flat, d / number
+        own, first = (member.state_scale, member.input_scale, member.direct_scale), 0
+        offset += own[0].mean
+        for whole, of, delays in zip(
+            out, own, (member.state_delays, member.input_delays, 0), strict=True
+        ):
+            shape = delays + 1, of.mean.size
+            columns = member.coefficients[:count, first : first + math.prod(shape)]
+            physical = columns.reshape(count, *shape) * own[0].std[:, None, None] / of.std
+            offset -= np.einsum("nlc,c->n", physical, of.mean)
+            whole[:, whole.shape[1] - shape[0] :] += physical[:, ::-1]
+            first += math.prod(shape)
+    a, b, d = (each.reshape(count, -1) / len(members) for each in out)
+    return offset / len(members), a, b, d
 
 
 def _rig(signature: Signature, like: xr.Dataset | None) -> xr.Dataset:
