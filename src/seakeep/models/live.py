@@ -440,9 +440,11 @@ class Live:
                 f"{taken}. Start with at least 4 samples of all of u."
             )
         known = self._known_inputs()
-        expected = self._expected(known, 1)[0]
         if self._follows is None and self.ready and np.isfinite(self._places).sum() >= 2:
+            expected = known[-1].copy()
             expected[self._waves] = self._foreseen(known, 1).expected[0]
+        else:
+            expected = self._expected(known, 1)[0]
         return np.where(lost, expected, inputs)
 
     def _expected(self, known: FloatArray, count: int) -> FloatArray:
