@@ -22,7 +22,7 @@ from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
 from seakeep.models.live import DOUBTED, Live
-from seakeep.models.observables import SlowSquare, Term
+from seakeep.models.terms import SlowSquare, Term
 from seakeep.models.validity import CYCLES, TRAINED
 from seakeep.signals.expressions import Text
 from seakeep.signals.prediction import MEMORY, NOISE

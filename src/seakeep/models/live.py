@@ -687,7 +687,7 @@ class Live:
             count,
             None if self._follows is None else self._rig,
         )
-        with engine.member_series(self.model, windows) as (values, lost):
+        with engine.member_series(self.model, [windows]) as ((values, lost),):
             complete = values[lost.max(axis=1) < 0]
         conditions, (late, free) = self.conditions, self.consistency_by_state
         worst = np.fmax(np.fmax(late, free), 1.0)
