@@ -144,28 +144,29 @@ def foresee(
         expected[:, column] = values.mean() + continued(deviations, whitening, number)
         departures[column, :, column] = scipy.signal.lfilter([1.0], whitening, first)
 
-    for column in range(channels):
-        follow(column, array[:, column])
     places = np.asarray(positions, dtype=float)
     order = [int(each) for each in np.argsort(places) if np.isfinite(places[each])]
+    for column in set(range(channels)) - set(order[1:]):
+        follow(column, array[:, column])
     for before, here in pairwise(order):
-        if not np.ptp(array[:, before]) > 0:
-            continue
-        apart = float(places[here] - places[before])
-        # Prediction and departures from it, beside one another: carrying is linear.
-        past = np.zeros((size, channels + 1))
-        past[:, 0] = array[:, before]
-        future = np.column_stack([expected[:, before], departures[:, :, before].T])
-        limit = band_limit(array[:, before], dt)
-        both = np.concatenate([past, future])
-        carried = carry_by_dispersion(both, dt, (apart, apart), depth, limit).at(apart)
-        settled = apart / group_speed(2 * np.pi * band_limit(array[:, before], dt, SLOWLY), depth)
-        left = (array[:, here] - carried[:size, 0])[min(int(settled / dt), size // 2) :]
-        if left.std() > UNLIKE * array[:, here].std():
-            continue
-        departures[:, :, here] = carried[size:, 1:].T
+        left = array[:, here]
+        if np.ptp(array[:, before]) > 0:
+            apart, limit = float(places[here] - places[before]), band_limit(array[:, before], dt)
+            # Prediction and departures from it, beside one another: carrying is linear.
+            past = np.zeros((size, channels + 1))
+            past[:, 0] = array[:, before]
+            future = np.column_stack([expected[:, before], departures[:, :, before].T])
+            both = np.concatenate([past, future])
+            carried = carry_by_dispersion(both, dt, (apart, apart), depth, limit).at(apart)
+            slowest = 2 * np.pi * band_limit(array[:, before], dt, SLOWLY)
+            settled = min(int(apart / group_speed(slowest, depth) / dt), size // 2)
+            rest = (left - carried[:size, 0])[settled:]
+            if rest.std() <= UNLIKE * left.std():
+                departures[:, :, here] = carried[size:, 1:].T
+                follow(here, rest)
+                expected[:, here] += carried[size:, 0]
+                continue
         follow(here, left)
-        expected[:, here] += carried[size:, 0]
     return Foreseen(expected, departures, size / max(orders, default=1.0))
 
 
