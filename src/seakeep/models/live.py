@@ -214,7 +214,8 @@ class Live:
             self._foresight = self._follows.foresight(self._rig, max(self._ahead, 1))
         # Rows of samples, `_first` the number of the first; half of the room is always there.
         longest = max(s, signature.input_delays) + 1
-        needed = 2 * (signature.history_samples + self._ahead + 1)
+        self._begins = signature.history_samples
+        needed = 2 * (self._begins + self._ahead + 1)
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
         delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
         widths = {"u": len(signature.inputs), "x": count, "y": count}
@@ -245,7 +246,7 @@ class Live:
     @property
     def ready(self) -> bool:
         """Whether there is enough history to forecast: ``history_samples`` of the model."""
-        return self._count.taken >= self.signature.history_samples
+        return self._count.taken >= self._begins
 
     @property
     def state(self) -> FloatArray:
@@ -473,7 +474,7 @@ class Live:
         """Covariance and gain of a sample."""
         count = self._count
         is_exact = bool(seen.all()) and not self._noise.any()
-        if is_exact and count.since == 0 and at >= self.signature.history_samples:
+        if is_exact and count.since == 0 and at >= self._begins:
             update = self._as_it_is
         else:
             self._predict_covariance(at, count.since, blind=not (count.partly or seen.any()))
@@ -497,7 +498,7 @@ class Live:
         """
         if blind and since >= len(self.errors.rms) + self.signature.state_delays:
             return
-        if at < self.signature.history_samples:
+        if at < self._begins:
             self._filter.shift(np.diag(self.signature.state_scale.spread**2))
             return
         self._filter.shift()
@@ -506,7 +507,7 @@ class Live:
     def _settle(self, at: int) -> None:
         """Bring estimates up to the sample `at`: final ones, then those that waves to come move."""
         count = self._count
-        if at < self.signature.history_samples:
+        if at < self._begins:
             self._advance(self._history, at, at)
             count.final = at
             return
@@ -536,7 +537,7 @@ class Live:
         for at in range(first, last + 1):
             update, measured = self._update_of(at), self._rows("y", at, at + 1)[0]
             predicted = self.signature.state_scale.centre
-            if at >= self.signature.history_samples:
+            if at >= self._begins:
                 self._place(at - 1)
                 predicted = self._predicted(history, at - 1)
             innovation = measured - predicted
@@ -598,7 +599,7 @@ class Live:
 
     def _find_rows(self, stop: int, known: FloatArray) -> None:
         """Regressors of the samples up to before `stop`; `known` ends with inputs to come."""
-        signature, begins = self.signature, self.signature.history_samples
+        signature, begins = self.signature, self._begins
         first = self._count.final
         if first < begins:  # no row was wanted yet
             first = begins - 1 - signature.input_delays
@@ -671,10 +672,9 @@ class Live:
         scale = signature.state_scale
         level = fraction(level, "level")
         if not self.ready:
-            needed = signature.history_samples
             raise RequestError(
-                f"there are {self._count.taken} samples of history and the model needs {needed}. "
-                f"Call step {needed - self._count.taken} more times first."
+                f"there are {self._count.taken} samples of history and the model needs "
+                f"{self._begins}. Call step {self._begins - self._count.taken} more times first."
             )
         futures, freedom, known = self._futures(count, future)
         taken = self._count.taken
