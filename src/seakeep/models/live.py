@@ -777,7 +777,7 @@ class Live:
         ):
             each[begin + late :, waves] = of_one[: len(rest) - late]
         departures[:, begin:, waves] *= missing
-        departures *= missing.any(axis=0)[:, None, None]
+        departures *= missing.max(axis=0)[:, None, None]
         futures = np.concatenate([inputs[None], inputs + departures, inputs - departures])
         return futures, foreseen.freedom, count
 
