@@ -11,20 +11,19 @@ import numpy as np
 
 from seakeep.arrays import Progress
 from seakeep.report.claims import (
-    ENSEMBLE,
     REGULAR,
     SEA,
     SINGLE,
+    Evidence,
     Interval,
     claims_table,
-    error_of,
 )
 from seakeep.report.figures.histories import acts_figure
 from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.errors import divergence_table
 from seakeep.report.style import model_words
-from seakeep.report.tables import Number, Table, number, numbers, percent, short, table
+from seakeep.report.tables import Number, Table, number, numbers, table
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import average_of
@@ -129,8 +128,8 @@ def short_table(results: Results) -> Table:
 
 def finding(results: Results) -> str:
     """The conclusion on irregular waves in one sentence, with 95 % intervals."""
-    errors = {act: error_of(results[act], SEA, model=SINGLE).text() for act in results}
-    still = error_of(list(results.values())[-1], SEA, model="hold_last").text()
+    errors = {act: Evidence(results[act]).error(model=SINGLE).text() for act in results}
+    still = Evidence([*results.values()][-1]).error(model="hold_last").text()
     words = {
         "recommended": "the recommended model errs {} SD of the measurement",
         "raw": "the paper's procedure errs {} on the channels as measured",
@@ -156,17 +155,6 @@ def against_filter(results: Results) -> str:
         "chosen by validation) to the single model, the median error there changes by "
         f"{', '.join(parts)}."
     )
-
-
-def band_sentence(results: Results) -> str:
-    """How much the calibrated band of the recommended ensemble holds; empty without one."""
-    if (result := results.get("recommended")) is None:
-        return ""
-    table = result.groups["statistics/coverage"]["calibrated_inside"]
-    at = table.sel(model=ENSEMBLE, against="measured", channel="average")
-    seas = (f"{percent(at.sel(test=test))} % ({result.label_of(test)})" for test in result.tests)
-    level = short(100 * float(result.settings["statistics"]["level"]))
-    return f"Of the instants, the calibrated {level} % band of (c) holds {', '.join(seas)}."
 
 
 def still_water(results: Results) -> str:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.stats import binomtest
 
 from seakeep.arrays import FloatArray
 from seakeep.core.bands import split_bands
 from seakeep.core.metrics import slack_share
+from seakeep.report.style import HEADING
 from seakeep.report.tables import Form, Table, number, signed, table, words
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
@@ -44,7 +47,6 @@ ALMOST = 0.9
 SLACKER = 0.01
 """Part of the time by which two lines must differ in being slack."""
 SINGLE, ENSEMBLE = "deterministic", "bayesian"
-MEASURES = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 
 
 class Interval(NamedTuple):
@@ -84,11 +86,11 @@ class Interval(NamedTuple):
 def claims_table(results: Results) -> Table:
     """Each claim, our figure, and whether it holds, in the first act."""
     verdicts = {True: "holds", False: "does not", None: "cannot tell"}
-    rows = []
+    limits = {"useful": USEFUL, "aged": 100 * AGED, "almost": 100 * ALMOST}
+    acts, rows = [Evidence(results[act]) for act in ("paper", "raw")], []
     for key, judge in CLAIMS.items():
         claim, how = words()["claims"][key]
-        figure, holds = judge(results)
-        limits = {"useful": USEFUL, "aged": 100 * AGED, "almost": 100 * ALMOST}
+        figure, holds = judge(*acts)
         rows.append((claim, figure, verdicts[holds], how.format(**limits)))
     return table("claims", rows)
 
@@ -110,36 +112,70 @@ def opposite(verdict: bool | None) -> bool | None:
     return None if verdict is None else not verdict
 
 
-def _cells(
-    result: StudyResult,
-    tests: Sequence[str],
-    channels: Sequence[str] = (),
-    measure: str = "nrmse",
-    model: str = ENSEMBLE,
-) -> FloatArray:
-    """Errors over (training, window, channel), NaN where not judged; windows of all test sets."""
-    order, _ = training_order(result.groups["training"])
-    at = {"model": model, "measure": measure, "channel": list(channels or result.channels)}
-    parts = [
-        data["error"].where(data["judged"]).sel(at).values
-        for data in (result.tests[test] for test in tests)
-    ]
-    return np.concatenate(parts, axis=1)[order]
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Cells of an act, training sets in the order of their runs, and statistics of them.
 
+    Parameters
+    ----------
+    result : StudyResult
+        The act.
+    """
 
-def _interval(
-    result: StudyResult,
-    tests: Sequence[str],
-    statistic: Statistic,
-    *cells: FloatArray,
-    signed: bool = False,
-) -> Interval:
-    """A statistic of cells (training, window, …) with its interval."""
-    blocks = blocks_of([result.tests[test] for test in tests], result.groups["training"])
-    rng = random_stream(int(result.attrs["seed"]), "claims")
-    lower, upper = two_way_interval(statistic, *cells, rng=rng, blocks=blocks, signed=signed)
-    value = statistic(*(each[None] for each in cells))[0]
-    return Interval(float(value), float(lower), float(upper))
+    result: StudyResult
+
+    @cached_property
+    def order(self) -> npt.NDArray[np.intp]:
+        """Places of the training sets, run by run."""
+        return training_order(self.result.groups["training"])[0]
+
+    @property
+    def motions(self) -> list[str]:
+        """Channels that are no loads."""
+        return [name for name in self.result.channels if name not in LOADS]
+
+    def columns(self, channels: Sequence[str]) -> list[int]:
+        """Places of channels."""
+        return [self.result.channels.index(name) for name in channels]
+
+    def cells(
+        self,
+        tests: Sequence[str] = SEA,
+        channels: Sequence[str] = (),
+        measure: str = "nrmse",
+        model: str = ENSEMBLE,
+    ) -> FloatArray:
+        """Errors over (training, window, channel), NaN where not judged; windows of all tests."""
+        names = list(channels or self.result.channels)
+        at = {"model": model, "measure": measure, "channel": names}
+        of_tests = [self.result.tests[test] for test in tests]
+        parts = [data["error"].where(data["judged"]).sel(at).values for data in of_tests]
+        return np.concatenate(parts, axis=1)[self.order]
+
+    def interval(
+        self,
+        statistic: Statistic,
+        *cells: FloatArray,
+        tests: Sequence[str] = SEA,
+        signed: bool = False,
+    ) -> Interval:
+        """A statistic of cells (training, window, …) with its interval."""
+        of_tests = [self.result.tests[test] for test in tests]
+        blocks = blocks_of(of_tests, self.result.groups["training"])
+        rng = random_stream(int(self.result.attrs["seed"]), "claims")
+        bounds = two_way_interval(statistic, *cells, rng=rng, blocks=blocks, signed=signed)
+        value = statistic(*(each[None] for each in cells))[0]
+        return Interval(*map(float, (value, *bounds)))
+
+    def error(self, tests: Sequence[str] = SEA, *of: Any, **named: str) -> Interval:
+        """Median of the errors of :meth:`cells`, averaged over the channels."""
+        return self.interval(_median, self.cells(tests, *of, **named), tests=tests)
+
+    def variants(self, key: str) -> dict[str, FloatArray]:
+        """A number of the models with λ, without, and truncated, over (training, 1)."""
+        data = self.result.groups[f"regularisation/{SINGLE}"][key].transpose("variant", "training")
+        names = map(str, data["variant"].values)
+        return dict(zip(names, data.values[:, self.order, None], strict=True))
 
 
 def _flat(drawn: FloatArray) -> FloatArray:
@@ -164,69 +200,52 @@ def _spread(drawn: FloatArray) -> FloatArray:
     return out
 
 
-def _columns(result: StudyResult, channels: Sequence[str]) -> list[int]:
-    return [result.channels.index(name) for name in channels]
-
-
-def _motions(result: StudyResult) -> list[str]:
-    return [name for name in result.channels if name not in LOADS]
-
-
-def error_of(result: StudyResult, tests: Sequence[str], *of: Any, **named: str) -> Interval:
-    """Median of the errors of :func:`_cells`, averaged over the channels."""
-    return _interval(result, tests, _median, _cells(result, tests, *of, **named))
-
-
-def _robust(results: Results) -> Judged:
-    result = results["paper"]
-    own, fir = (error_of(result, SEA, model=model) for model in (ENSEMBLE, "fir"))
-    worst = float(np.nanmax(average_of(_cells(result, SEA))))
+def _robust(paper: Evidence, raw: Evidence) -> Judged:
+    own, fir = (paper.error(model=model) for model in (ENSEMBLE, "fir"))
+    worst = float(np.nanmax(average_of(paper.cells())))
     words = f"median ANRMSE {own.text()}, worst cell {worst:.2f}; FIR {fir.text()}"
     return words, all_of([own.below(USEFUL), worst < 1.0])
 
 
-def _trend(results: Results) -> Judged:
-    growths = {}
-    for act in ("paper", "raw"):
-        at = results[act].groups["statistics/trend"].sel(test="irregular", band="all")
+def _trend(paper: Evidence, raw: Evidence) -> Judged:
+    growths = []
+    for act in (paper, raw):
+        at = act.result.groups["statistics/trend"].sel(test="irregular", band="all")
         each = np.stack([at[key].sel(model=[SINGLE, ENSEMBLE]) for key in BOUNDS], axis=1)
-        growths[act] = [Interval(*(1.0 + row)) for row in each]
-    texts = (" and ".join(each.change() for each in of_act) for of_act in growths.values())
-    within = [v for e in growths["paper"] for v in (e.below(1 + AGED), opposite(e.below(1 - AGED)))]
+        growths.append([Interval(*(1.0 + row)) for row in each])
+    texts = (" and ".join(each.change() for each in of_act) for of_act in growths)
+    within = [v for e in growths[0] for v in (e.below(1 + AGED), opposite(e.below(1 - AGED)))]
     return "{}; act (b): {}".format(*texts), all_of(within)
 
 
-def _any_length(results: Results) -> Judged:
-    period = float(results["paper"].attrs["encounter_period"])
-    length = float(results["paper"].tests["irregular"]["time"].values[-1])
+def _any_length(paper: Evidence, raw: Evidence) -> Judged:
+    period = float(paper.result.attrs["encounter_period"])
+    length = float(paper.result.tests["irregular"]["time"].values[-1])
     return f"{length / period:.0f} T̂ were forecast, as in the paper", None
 
 
-def _share(result: StudyResult, measure: str, channels: Sequence[str]) -> Interval:
+def _share(act: Evidence, measure: str, channels: Sequence[str]) -> Interval:
     """Fraction of the average error that some channels make."""
-    picked = _columns(result, channels)
+    picked = act.columns(channels)
 
     def statistic(drawn: FloatArray) -> FloatArray:
         means = average_of(drawn.reshape(len(drawn), -1, drawn.shape[-1]).swapaxes(1, 2))
         out: FloatArray = means[:, picked].sum(axis=1) / np.nansum(means, axis=1)
         return out
 
-    return _interval(result, SEA, statistic, _cells(result, SEA, measure=measure))
+    return act.interval(statistic, act.cells(measure=measure))
 
 
-def _who_errs(results: Results) -> Judged:
-    shares = {words: _share(results["paper"], key, LOADS) for key, words in MEASURES.items()}
-    raw = _share(results["raw"], "nrmse", SLOW)
+def _who_errs(paper: Evidence, raw: Evidence) -> Judged:
+    shares = {words: _share(paper, key, LOADS) for key, words in HEADING.items()}
     listed = ", ".join(f"{each.part()} of {words}" for words, each in shares.items())
-    holds = all_of(opposite(each.below(0.5)) for each in shares.values())
-    return f"loads make {listed}; act (b): surge and loads {raw.part()} of ANRMSE", holds
+    words = f"loads make {listed}; act (b): surge and loads {_share(raw, 'nrmse', SLOW).part()}"
+    return f"{words} of ANRMSE", all_of(opposite(each.below(0.5)) for each in shares.values())
 
 
-def _load_divergence(results: Results) -> Judged:
-    at = results["paper"].groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
-    loads, others = (
-        at.sel(channel=list(names)).mean("channel") for names in (LOADS, _motions(results["paper"]))
-    )
+def _load_divergence(paper: Evidence, raw: Evidence) -> Judged:
+    at = paper.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
+    loads, others = (at.sel(channel=[*k]).mean("channel") for k in (LOADS, paper.motions))
     pairs = (("mean", "mean"), ("lower", "upper"), ("upper", "lower"))
     ratio = Interval(*(float(loads[a] / others[b]) for a, b in pairs))
     words = (
@@ -236,116 +255,118 @@ def _load_divergence(results: Results) -> Judged:
     return words, opposite(ratio.below(10**0.5))
 
 
-def _densities(results: Results) -> Judged:
-    result = results["paper"]
-    at = result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
-    at = at.sel(channel=_motions(result))
-    within, count = int((at["mean"] <= at["noise_floor_upper"]).sum()), at.sizes["channel"]
-    share = Interval(within / count, *binomtest(within, count).proportion_ci())
-    words = f"{within} of {count} motions within the noise of the record: {share.part()}"
+def _densities(paper: Evidence, raw: Evidence) -> Judged:
+    at = paper.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
+    within = (at["mean"] <= at["noise_floor_upper"]).sel(channel=paper.motions).values
+    count, total = int(within.sum()), within.size
+    share = Interval(count / total, *binomtest(count, total).proportion_ci())
+    words = f"{count} of {total} motions within the noise of the record: {share.part()}"
     return words, opposite(share.below(ALMOST))
 
 
-def _against_single(
-    result: StudyResult, tests: Sequence[str], statistic: Statistic = _median
-) -> dict[str, Interval]:
-    """A statistic of the ensemble over that of the single model, in both measures."""
+def _ratio(statistic: Statistic) -> Statistic:
+    """A statistic of one model over that of another."""
 
     def ratio(drawn: FloatArray, other: FloatArray) -> FloatArray:
         with np.errstate(invalid="ignore", divide="ignore"):  # a redraw may hold one cell alone
             return statistic(drawn) / statistic(other)
 
+    return ratio
+
+
+def _against_single(
+    act: Evidence, tests: Sequence[str] = SEA, statistic: Statistic = _median
+) -> dict[str, Interval]:
+    """A statistic of the ensemble over that of the single model, in both measures."""
     both = {
-        key: [_cells(result, tests, (), key, m) for m in (ENSEMBLE, SINGLE)] for key in MEASURES
+        words: [act.cells(tests, (), key, m) for m in (ENSEMBLE, SINGLE)]
+        for key, words in HEADING.items()
     }
-    return {MEASURES[key]: _interval(result, tests, ratio, *each) for key, each in both.items()}
+    ratio = _ratio(statistic)
+    return {words: act.interval(ratio, *each, tests=tests) for words, each in both.items()}
 
 
-def _better(results: Results, statistic: Statistic) -> Judged:
-    differences = _against_single(results["paper"], SEA, statistic)
+def _changes(ratios: Mapping[str, Interval]) -> str:
+    """Text of the changes of both measures."""
+    return ", ".join(f"{words} {each.change()}" for words, each in ratios.items())
+
+
+def _better(paper: Evidence, raw: Evidence, statistic: Statistic = _median) -> Judged:
+    differences = _against_single(paper, statistic=statistic)
     return _changes(differences), all_of(each.below(1.0) for each in differences.values())
 
 
-def _always_better(results: Results) -> Judged:
-    result = results["paper"]
+def _always_better(paper: Evidence, raw: Evidence) -> Judged:
     differences = [
         each.below(1.0)
-        for test in result.tests
-        for each in _against_single(result, (test,)).values()
+        for test in paper.result.tests
+        for each in _against_single(paper, (test,)).values()
     ]
-    better, worse, unknown = (differences.count(each) for each in (True, False, None))
-    return (
-        f"better in {better}, worse in {worse}, undecided in {unknown} of {len(differences)}",
-        all_of(differences),
-    )
+    better, worse, unknown = map(differences.count, (True, False, None))
+    words = f"better in {better}, worse in {worse}, undecided in {unknown} of {len(differences)}"
+    return words, all_of(differences)
 
 
-def _band(result: StudyResult, channels: Sequence[str]) -> list[Interval]:
+def _band(act: Evidence, channels: Sequence[str]) -> list[Interval]:
     """Part of the instants inside the band of irregular waves, and its width in window SDs."""
-    test, picked = result.tests["irregular"], _columns(result, channels)
-    order, _ = training_order(result.groups["training"])
-    lower, upper = (bound[order][..., picked] for bound in band_of(test, ENSEMBLE, None))
+    test, picked = act.result.tests["irregular"], act.columns(channels)
+    lower, upper = (bound[act.order][..., picked] for bound in band_of(test, ENSEMBLE, None))
     measured = test["measured"].values[..., picked]
     inside = ((measured >= lower) & (measured <= upper)).mean(axis=2)
     width = (upper - lower).mean(axis=2) / measured.std(axis=1, ddof=1)
-    cells = (np.where(test["judged"].values[order][..., None], x, np.nan) for x in (inside, width))
-    return [_interval(result, SEA, lambda drawn: average_of(_flat(drawn)), each) for each in cells]
+    judged = test["judged"].values[act.order][..., None]
+    cells = (np.where(judged, values, np.nan) for values in (inside, width))
+    return [act.interval(lambda drawn: average_of(_flat(drawn)), each) for each in cells]
 
 
-def _narrow(results: Results) -> Judged:
-    inside, width = _band(results["paper"], _motions(results["paper"]))
-    error = error_of(results["paper"], SEA, _motions(results["paper"])).value
+def _narrow(paper: Evidence, raw: Evidence) -> Judged:
+    inside, width = _band(paper, paper.motions)
+    error = paper.error(SEA, paper.motions).value
     words = f"motions: {width.text()} SD wide, {inside.part()} of the instants inside 95 %"
     return f"{words}; median error {error:.2f} SD", width.below(USEFUL)
 
 
-def _load_band(results: Results) -> Judged:
-    inside, _ = _band(results["paper"], LOADS)
+def _load_band(paper: Evidence, raw: Evidence) -> Judged:
+    inside, _ = _band(paper, LOADS)
     return f"{inside.part()} of the instants of the loads inside 95 %", inside.below(0.9)
 
 
-def _slow_loads(results: Results) -> Judged:
-    result = results["raw"]
-    test, picked = result.tests["irregular"], _columns(result, LOADS)
-    split = float(result.settings["statistics"]["split_period"])
-    frequency = 1 / (split * float(result.attrs["encounter_period"]))
-    order, _ = training_order(result.groups["training"])
+def _slow_loads(paper: Evidence, raw: Evidence) -> Judged:
+    test, attrs = raw.result.tests["irregular"].sel(channel=list(LOADS)), raw.result.attrs
+    split = float(raw.result.settings["statistics"]["split_period"])
+    frequency = 1 / (split * float(attrs["encounter_period"]))
+    forecasts = test["mean"].sel(model=ENSEMBLE).values[raw.order]
     measured, forecast = (
-        split_bands(values[..., picked], float(result.attrs["dt"]), frequency)[0]
-        for values in (test["measured"].values, test["mean"].sel(model=ENSEMBLE).values[order])
+        split_bands(values, float(attrs["dt"]), frequency)[0]
+        for values in (test["measured"].values, forecasts)
     )
     errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
-    by_statistic = {
-        name.removeprefix("mooring_"): _interval(result, SEA, _median, errors[..., [k]])
-        for k, name in enumerate(LOADS)
-    }
-    words = ", ".join(f"{name} {each.text()}" for name, each in by_statistic.items())
-    return f"act (b): {words}", all_of(each.below(1.0) for each in by_statistic.values())
+    of_lines = [raw.interval(_median, errors[..., [k]]) for k in range(len(LOADS))]
+    words = ", ".join(
+        f"{name.removeprefix('mooring_')} {each.text()}"
+        for name, each in zip(LOADS, of_lines, strict=True)
+    )
+    return f"act (b): {words}", all_of(each.below(1.0) for each in of_lines)
 
 
-def _peaks(results: Results) -> Judged:
-    loads = error_of(results["paper"], SEA, LOADS, "nammae")
+def _peaks(paper: Evidence, raw: Evidence) -> Judged:
+    loads = paper.error(SEA, LOADS, "nammae")
     return f"median NAMMAE of the loads {loads.text()} SD", loads.below(1.0)
 
 
-def _regular(results: Results) -> Judged:
-    result = results["paper"]
-    motions, loads = (
-        [error_of(result, (test,), names) for test in REGULAR]
-        for names in (_motions(result), LOADS)
-    )
-    words = [", ".join(each.text() for each in group) for group in (motions, loads)]
-    better = [a.below_other(b) for a, b in zip(motions, loads, strict=True)]
-    holds = all_of([*(each.below(USEFUL) for each in motions), *better])
-    return f"λ/L 1.5, 2, 3: motions {words[0]}; loads {words[1]}", holds
+def _regular(paper: Evidence, raw: Evidence) -> Judged:
+    both = [[paper.error((test,), k) for test in REGULAR] for k in (paper.motions, LOADS)]
+    motions, loads = (", ".join(each.text() for each in group) for group in both)
+    better = [a.below_other(b) for a, b in zip(*both, strict=True)]
+    holds = all_of([*(each.below(USEFUL) for each in both[0]), *better])
+    return f"λ/L 1.5, 2, 3: motions {motions}; loads {loads}", holds
 
 
-def _against_irregular(results: Results) -> Judged:
-    result, tests = results["paper"], (*SEA, *REGULAR)
-    sizes = [result.tests[test].sizes["window"] for test in tests]
-    regular = np.repeat([False, *[True] * len(REGULAR)], sizes)
-    shape = (result.groups["training"].sizes["training"], regular.size)
-    labels = np.broadcast_to(regular, shape).astype(float)
+def _against_irregular(paper: Evidence, raw: Evidence) -> Judged:
+    tests = (*SEA, *REGULAR)
+    sizes = [paper.result.tests[test].sizes["window"] for test in tests]
+    regular = np.repeat([0.0, *[1.0] * len(REGULAR)], sizes)
+    labels = np.broadcast_to(regular, (paper.order.size, regular.size))
 
     def ratio(drawn: FloatArray, label: FloatArray) -> FloatArray:
         averages, kind = _flat(average_of(drawn)), _flat(label) > 0.5
@@ -353,29 +374,28 @@ def _against_irregular(results: Results) -> Judged:
         return ours / sea
 
     differences = {
-        words: _interval(result, tests, ratio, _cells(result, tests, measure=key), labels)
-        for key, words in MEASURES.items()
+        words: paper.interval(ratio, paper.cells(tests, (), key), labels, tests=tests)
+        for key, words in HEADING.items()
     }
     return _changes(differences), all_of(
         [opposite(differences["ANRMSE"].below(1.0)), differences["NAMMAE"].below(1.0)]
     )
 
 
-def _phase(results: Results) -> Judged:
-    result = results["paper"]
-    order, _ = training_order(result.groups["training"])
-    leads = [np.abs(phase_leads(result.groups, test, ENSEMBLE)[order]) for test in REGULAR]
-    cells = np.concatenate(leads, axis=1)
-    both = [cells[..., _columns(result, names)] for names in (LOADS, _motions(result))]
-    loads, motions = (_interval(result, REGULAR, _middle, each).text(0, "°") for each in both)
-    more = _interval(result, REGULAR, lambda a, b: _middle(a) - _middle(b), *both, signed=True)
+def _phase(paper: Evidence, raw: Evidence) -> Judged:
+    leads = [np.abs(phase_leads(paper.result.groups, test, ENSEMBLE)) for test in REGULAR]
+    cells = np.concatenate(leads, axis=1)[paper.order]
+    both = [cells[..., paper.columns(names)] for names in (LOADS, paper.motions)]
+    interval = partial(paper.interval, tests=REGULAR)
+    loads, motions = (interval(_middle, each).text(0, "°") for each in both)
+    more = interval(lambda a, b: _middle(a) - _middle(b), *both, signed=True)
     return f"median |phase|: loads {loads}, motions {motions}", opposite(more.below(0.0))
 
 
-def _stern(results: Results) -> Judged:
-    result, line = results["paper"], "mooring_stern"
-    errors = [error_of(result, (test,), (line,)) for test in REGULAR]
-    slack = [_slack(results["raw"], test, line) for test in REGULAR]
+def _stern(paper: Evidence, raw: Evidence) -> Judged:
+    line = "mooring_stern"
+    errors = [paper.error((test,), (line,)) for test in REGULAR]
+    slack = [_slack(raw, test, line) for test in REGULAR]
     falls = [
         errors[longer].below_other(errors[shorter])
         for shorter, longer in pairwise(range(len(REGULAR)))
@@ -387,54 +407,44 @@ def _stern(results: Results) -> Judged:
     return f"NRMSE {listed}; slack {parts} of the time", all_of(falls) if falls else None
 
 
-def _slack(result: StudyResult, test: str, line: str) -> Interval:
+def _slack(act: Evidence, test: str, line: str) -> Interval:
     """Part of the time at which a line is slack in the windows of a test set."""
-    data = result.tests[test].sel(channel=line)
+    data = act.result.tests[test].sel(channel=line)
     loads = zip(data["measured"].values, data["noise_std"].values, strict=True)
     shares = np.array([[slack_share(load, noise) for load, noise in loads]])
-    return _interval(result, (test,), lambda drawn: _flat(drawn).mean(axis=1), shares)
+    return act.interval(lambda drawn: _flat(drawn).mean(axis=1), shares, tests=(test,))
 
 
-def _variants(result: StudyResult, key: str) -> dict[str, FloatArray]:
-    """A number of the models with λ, without, and truncated, over (training, 1)."""
-    order, _ = training_order(result.groups["training"])
-    data = result.groups[f"regularisation/{SINGLE}"][key].isel(training=order)
-    return {str(name): data.sel(variant=name).values[:, None] for name in data["variant"].values}
-
-
-def _stable(results: Results) -> Judged:
-    radii = _variants(results["paper"], "radius")
-    ours, none = (_interval(results["paper"], SEA, _middle, radii[k]) for k in ("ridge", "none"))
+def _stable(paper: Evidence, raw: Evidence) -> Judged:
+    radii = paper.variants("radius")
+    ours, none = (paper.interval(_middle, radii[k]) for k in ("ridge", "none"))
     words = f"spectral radius {ours.text()} with λ, {none.text()} without"
     return words, all_of([ours.below(1.0), opposite(none.below(1.0))])
 
 
-def _cheaper(results: Results) -> Judged:
-    seconds = _variants(results["paper"], "seconds")
-    ratios = seconds["truncated"] / seconds["ridge"]
-    times = _interval(results["paper"], SEA, _middle, ratios)
+def _cheaper(paper: Evidence, raw: Evidence) -> Judged:
+    seconds = paper.variants("seconds")
+    times = paper.interval(_middle, seconds["truncated"] / seconds["ridge"])
     return f"the SVD takes {times.text(0)} times as long", opposite(times.below(1.0))
 
 
-def _robust_to_noise(results: Results) -> Judged:
-    result = results["paper"]
-    order, _ = training_order(result.groups["training"])
-    data = result.groups[f"regularisation/{SINGLE}"].isel(training=order)
-    truncated = data["truncated_nrmse"].transpose("training", "window", "channel").values
-    cells = _cells(result, SEA, model=SINGLE), truncated
-    ratio = _interval(result, SEA, lambda a, b: _median(a) / _median(b), *cells)
+def _robust_to_noise(paper: Evidence, raw: Evidence) -> Judged:
+    data = paper.result.groups[f"regularisation/{SINGLE}"]
+    truncated = data["truncated_nrmse"].transpose("training", "window", "channel")
+    cells = paper.cells(model=SINGLE), truncated.values[paper.order]
+    ratio = paper.interval(_ratio(_median), *cells)
     rank = int(data["rank"].median())
     return f"ANRMSE {ratio.change()} from {rank} singular values to λ", ratio.below(1.0)
 
 
-CLAIMS: dict[str, Callable[[Results], Judged]] = {
+CLAIMS: dict[str, Callable[[Evidence, Evidence], Judged]] = {
     "robust": _robust,
     "trend": _trend,
     "any_length": _any_length,
     "who_errs": _who_errs,
     "load_divergence": _load_divergence,
     "densities": _densities,
-    "better": partial(_better, statistic=_median),
+    "better": _better,
     "dispersion": partial(_better, statistic=_spread),
     "always_better": _always_better,
     "narrow": _narrow,
@@ -449,9 +459,4 @@ CLAIMS: dict[str, Callable[[Results], Judged]] = {
     "phase": _phase,
     "stern": _stern,
 }
-"""What judges each claim, in the order of the paper; ``words.toml`` has the words."""
-
-
-def _changes(ratios: Mapping[str, Interval]) -> str:
-    """Text of the changes of both measures."""
-    return ", ".join(f"{words} {each.change()}" for words, each in ratios.items())
+"""What judges each claim by the first act and the second; ``words.toml`` has the words."""

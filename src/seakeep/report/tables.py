@@ -5,8 +5,8 @@ from __future__ import annotations
 import csv
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
 from functools import cache, cached_property
 from importlib import resources
 from itertools import product
@@ -97,13 +97,7 @@ def words() -> dict[str, Any]:
     return tomllib.loads(file.read_text("utf-8"))
 
 
-def table(
-    key: str,
-    rows: Sequence[Sequence[str]],
-    values: Mapping[str, Any] | None = None,
-    more: str = "",
-    **options: Any,
-) -> Table:
+def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any) -> Table:
     """Return a table with the words of ``words.toml``.
 
     Parameters
@@ -112,22 +106,23 @@ def table(
         Its place there.
     rows : sequence of sequence of str
         Cells.
-    values : mapping, optional
-        What the words hold in braces.
     more : str, optional
         What follows the note.
-    **options
-        Other parts of a :class:`Table`, such as ``name``, if it is not the key.
+    **given
+        Other parts of a :class:`Table`, such as ``name``, if it is not the key, and what the
+        words hold in braces.
 
     Returns
     -------
     Table
     """
-    entry = {"name": key, "columns": (), "note": "", **words()["tables"][key], **options}
-    entry["columns"] = tuple(each.format(**values or {}) for each in entry["columns"])
-    entry["title"] = entry["title"].format(**values or {})
-    entry["note"] = entry["note"].format(**values or {}) + more
-    return Table(rows=rows, **entry)
+    entry = {"name": key, "columns": (), "note": "", **words()["tables"][key], **given}
+    entry["columns"] = tuple(each.format(**given) for each in entry["columns"])
+    for part in ("title", "note"):
+        entry[part] = entry[part].format(**given)
+    entry["note"] += more
+    parts = {each.name for each in fields(Table)} & entry.keys()
+    return Table(rows=rows, **{part: entry[part] for part in parts})
 
 
 SHADES = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
