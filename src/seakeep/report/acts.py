@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -61,13 +60,13 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
     }
     sections = [_summary(results)]
     if {"paper", "raw"} <= set(results):
-        sections.append(section("claims", tables=(claims_table(results),)))
+        sections.append(section("claims", claims_table(results)))
     divergence, beside = divergence_table(first, "bayesian", "paper"), ", beside the paper's"
     links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
     sections += [
-        section("channels", tables=[acts_table(results)]),
+        section("channels", acts_table(results)),
         Section("densities", f"Divergence of the densities{beside}", tables=(divergence,)),
-        section("waves", tables=wave_tables(first)),
+        section("waves", *wave_tables(first)),
         section("studies", links=links),
     ]
     return write_page(folder, "The paper's study on the virtual tank", stamp, sections, progress)
@@ -83,10 +82,10 @@ def _summary(results: Results) -> Section:
     repeats = [result.groups.get("repeats") for result in results.values()]
     return section(
         "summary",
+        drawing("acts", acts_figure, results),
+        replace(short, note=f"{short.note} {still_water(results)}"),
         more=(finding(results), against_filter(results), NOTE),
         points=[f"{act.title}. {act.sentence}" for act in _played(results)],
-        figures=(drawing("acts", partial(acts_figure, results)),),
-        tables=(replace(short, note=f"{short.note} {still_water(results)}"),),
         # Once what several studies warn of.
         notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each is not None)),
     )

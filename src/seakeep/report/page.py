@@ -88,6 +88,12 @@ class Section:
     figures: Sequence[Drawing] = ()
     tables: Sequence[Table] = ()
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether it shows nothing but its paragraphs."""
+        parts = (self.points, self.links, self.terms, self.histories, self.figures, self.tables)
+        return not any(parts)
+
 
 def drawing(
     key: str, draw: Callable[..., Figure], *given: Any, name: str = "", **values: Any

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -109,7 +108,7 @@ def write_quality_sheet(
     rows = [(*row, kinds or "nothing found") for *row, kinds in map(run_row, runs, runs.values())]
     rows += [(n, Number("not prepared"), MISSING, why) for n, why in (unread or {}).items()]
     marked = [k for k, row in enumerate(rows) if row[2] != "0"]
-    every = section("runs", tables=(table("runs", rows, marked=marked),))
+    every = section("runs", table("runs", rows, marked=marked))
     sections = [every, *map(_section, runs, runs.values())]
     drawn = {
         path.stem: inline_picture(path.read_bytes(), f"channels of {name}")
@@ -150,8 +149,8 @@ def _section(name: str, run: xr.Dataset) -> Section:
         for each in channels
     ]
     marked = [k for k, each in enumerate(channels) if each.findings]
-    shown = table("channels_of_run", rows, {"run": name}, name=f"channels_{name}", marked=marked)
-    figure = drawing("quality", partial(quality_figure, run, {}), {"run": name}, f"quality_{name}")
+    shown = table("channels_of_run", rows, name=f"channels_{name}", marked=marked, run=name)
+    figure = drawing("quality", quality_figure, run, {}, name=f"quality_{name}", run=name)
     points = [*clocks, *other_findings(run)]
     return Section(name, name, (steps_of(run),), points, figures=(figure,), tables=(shown,))
 

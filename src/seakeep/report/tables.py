@@ -245,9 +245,9 @@ def row(at: xr.Dataset, /, *words: str, **forms: int | Form) -> tuple[str, ...]:
     return (*texts, *numbers)
 
 
-def interval(at: xr.Dataset, key: str) -> Number:
+def interval(at: xr.Dataset, key: str, form: Form = number) -> Number:
     """Text of the bounds ``KEY_lower`` and ``KEY_upper``."""
-    return to([at[f"{key}_{bound}"] for bound in ("lower", "upper")])
+    return to([at[f"{key}_{bound}"] for bound in ("lower", "upper")], form)
 
 
 def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = number) -> Number:

@@ -337,7 +337,7 @@ def versions(result: StudyResult) -> Section:
 
 
 def chosen(result: StudyResult) -> Section:
-    """Return how settings were chosen: those that are not all stated, or whose model looks ahead."""
+    """Return how settings that are not stated were chosen, and look-aheads."""
     rows = []
     for at in entries(result.groups["chosen"].sel(model=result.models), "model", "training"):
         model, name, text = row(at, "model", "training", "words")

@@ -29,6 +29,7 @@ from seakeep.report.tables import (
     beside,
     entries,
     number,
+    numbers,
     percent,
     row,
     short,
@@ -53,17 +54,14 @@ def errors(result: StudyResult) -> Section:
     figures = []
     for group in filter(None, groups):
         words = {"tests": ", ".join(map(result.label_of, group)), "fewest": FEWEST}
-        name = f"errors_{group[0] if len(group) == 1 else 'others'}"
-        figures.append(drawing("errors", partial(average_boxes, result, group), words, name))
+        words["name"] = f"errors_{group[0] if len(group) == 1 else 'others'}"
+        figures.append(drawing("errors", average_boxes, result, group, **words))
     for test in tests:
-        words, name = (
-            {"tests": result.label_of(test), "fewest": FEWEST},
-            f"errors_{test}_by_channel",
-        )
-        draw = partial(channel_boxes, result, test)
-        figures.append(drawing("errors_by_channel", draw, words, name))
-    tables = [overview_table(result), *(error_table(result, test) for test in tests)]
-    return section("errors", figures=figures, tables=tables)
+        words = {"tests": result.label_of(test), "fewest": FEWEST}
+        words["name"] = f"errors_{test}_by_channel"
+        figures.append(drawing("errors_by_channel", channel_boxes, result, test, **words))
+    tables = (error_table(result, test) for test in tests)
+    return section("errors", *figures, overview_table(result), *tables)
 
 
 def error_table(result: StudyResult, test: str) -> Table:
@@ -86,21 +84,12 @@ def error_table(result: StudyResult, test: str) -> Table:
         )
     heads = [f"{key.upper()} {model_words(model)}: median [IQR]" for key, model in places]
     count = int(result.tests[test]["judged"].sum())
-    return by_channel(
-        result,
-        "errors",
-        cells,
-        {"test": result.label_of(test), "count": count},
-        columns=heads,
-        name=f"errors_{test}",
-        more=more + conditional(result),
-        folded=test != next(iter(result.tests)),
-    )
+    return by_channel(result, "errors", cells, heads, more, test=test, count=count)
 
 
 def scales(result: StudyResult) -> Section:
     """Return errors counted in both standard deviations."""
-    return section("scales", tables=[_scales_table(result, test) for test in result.tests])
+    return section("scales", *(_scales_table(result, test) for test in result.tests))
 
 
 def _scales_table(result: StudyResult, test: str) -> Table:
@@ -113,29 +102,19 @@ def _scales_table(result: StudyResult, test: str) -> Table:
         yield "" if name == "average" else number(size.sel(channel=name), 2)
         for model in result.models:
             at = median.sel(channel=name, model=model)
-            both = (number(at.sel(measure=key)) for key in ("nrmse", "training_nrmse"))
-            yield "{} ({})".format(*both)
+            yield "{} ({})".format(*numbers(at.sel(measure=["nrmse", "training_nrmse"])))
 
     heads = ("SD of the window [training SD]", *map(model_words, result.models))
-    return by_channel(
-        result,
-        "scales",
-        cells,
-        {"test": result.label_of(test)},
-        columns=heads,
-        name=f"scales_{test}",
-        more=conditional(result),
-        folded=test != next(iter(result.tests)),
-    )
+    return by_channel(result, "scales", cells, heads, test=test)
 
 
 def regular(result: StudyResult) -> Section | None:
     """Return the errors in regular waves, taken apart."""
-    if "statistics/response" not in result.groups:
+    if (response := result.groups.get("statistics/response")) is None:
         return None
-    tests = [str(test) for test in result.groups["statistics/response"]["test"].values]
-    words = [_slack_words(result, tests)]
-    return section("regular", more=words, tables=[_response_table(result, tests)])
+    tests = [str(test) for test in response["test"].values]
+    table = _response_table(result, tests)
+    return section("regular", table, more=[_slack_words(result, tests)])
 
 
 def _response_table(result: StudyResult, tests: list[str]) -> Table:
@@ -184,30 +163,25 @@ def _test_of(result: StudyResult, at: xr.Dataset) -> str:
     return result.label_of(str(at["test"].values))
 
 
-def bands(result: StudyResult) -> Section | None:
+def bands(result: StudyResult) -> Section:
     """Return coverage and scores of bands by wave height, horizon and channel."""
-    if "statistics/bands" not in result.groups:
-        return None
-    groups, tables = result.groups["statistics/bands"], []
+    groups, tables = result.groups.get("statistics/bands"), []
     level = short(100 * float(result.settings["statistics"]["level"]))
-    for model in filter(result.is_ensemble, result.models):
+    for model in filter(result.is_ensemble, result.models if groups else ()):
         for at in entries(groups.sel(model=model), "band"):
             at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
-            if at.sizes["test"]:
-                band = str(at["band"].values)
-                kind = "calibrated " * (band == "calibrated")
-                title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
-                name = f"bands_{band}_{model}"
-                tables += [_by_part(result, at, name, title), _of_all(result, at, name, title)]
-    return section("bands", tables=tables) if tables else None
+            band = str(at["band"].values)
+            kind = "calibrated " * (band == "calibrated")
+            title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
+            name = f"bands_{band}_{model}"
+            tables += [_by_part(result, at, name, title), _of_all(result, at, name, title)]
+    return section("bands", *tables)
 
 
 def _by_part(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table:
     """Averages over the channels, a row per test set and part."""
     scale = at["relative_width"] / at["width"]  # one over the measured SD
-    scores = at[["winkler", "crps"]] * scale
-    at = at.assign(scores)
-    rows = []
+    at, rows = at.assign(at[["winkler", "crps"]] * scale), []
     for one in entries(at, "test", "part"):
         inside = one["inside"]
         if inside.isnull().all():
@@ -218,7 +192,7 @@ def _by_part(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Tabl
         means = row(moving.mean("channel"), relative_width=2, winkler=2, crps=2)
         covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
         rows.append((_test_of(result, one), *row(one, "part"), *covered, *means))
-    return table("bands", rows, {"band": title}, conditional(result), name=name)
+    return table("bands", rows, conditional(result), name=name, band=title)
 
 
 def _of_all(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table:
@@ -233,14 +207,13 @@ def _of_all(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table
         for one in entries(at.sel(part="all"), "test", "channel")
         for channel in row(one, "channel")
     ]
-    words = {"band": title}
-    return table("bands_by_channel", rows, words, conditional(result), name=f"{name}_channels")
+    name = f"{name}_channels"
+    return table("bands_by_channel", rows, conditional(result), name=name, band=title)
 
 
 def age(result: StudyResult) -> Section:
     """Return the error over the age of a forecast."""
     split = float(result.settings["statistics"]["split_period"])
-    figure = drawing("error_over_time", partial(error_over_time_figure, result), {"split": split})
     trend = result.groups["statistics/trend"].sel(model=judged_models(result))
     rows = [
         (
@@ -252,18 +225,21 @@ def age(result: StudyResult) -> Section:
         )
         for at in entries(trend, "test", "band", "model")
     ]
-    words = {"split": split, "seconds": split * float(result.attrs["encounter_period"])}
+    seconds = split * float(result.attrs["encounter_period"])
     return section(
-        "time", figures=[figure], tables=[table("trend", rows, words, conditional(result))]
+        "time",
+        drawing("error_over_time", error_over_time_figure, result, split=split),
+        table("trend", rows, conditional(result), split=split, seconds=seconds),
     )
 
 
-def coverage(result: StudyResult) -> Section | None:
+def coverage(result: StudyResult) -> Section:
     """Return coverage and width of the bands of ensembles."""
     kinds = (False, True) if result.is_calibrated else (False,)
     ensembles = filter(result.is_ensemble, result.models)
-    tables = [coverage_table(result, model, kind) for model in ensembles for kind in kinds]
-    return section("coverage", tables=tables) if tables else None
+    return section(
+        "coverage", *(coverage_table(result, m, kind) for m in ensembles for kind in kinds)
+    )
 
 
 def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
@@ -289,15 +265,8 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
         )
     heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
     words = {"kind": prefix.replace("_", " "), "level": short(100 * level), "part": level}
-    return by_channel(
-        result,
-        "coverage",
-        cells,
-        {**words, "model": model_words(model)},
-        columns=heads,
-        name=f"coverage_{prefix}{model}",
-        more=more + conditional(result),
-    )
+    words |= {"name": f"coverage_{prefix}{model}", "model": model_words(model)}
+    return by_channel(result, "coverage", cells, heads, more, **words)
 
 
 def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
@@ -305,12 +274,9 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
     group = result.groups["calibration"].sel(ensemble=model)
     words = "these quantiles, moved outwards by a margin found"
     if "floor" in group:
-        learnt = "law" in group
-        scale = (
-            "a scale learnt from spread, horizon and waves"
-            if learnt
-            else "the spread of the members"
-        )
+        scale = "the spread of the members"
+        if "law" in group:
+            scale = "a scale learnt from spread, horizon and waves"
         words = (
             f"the mean, and a factor times {scale} (with a "
             "floor of a quarter of the root mean square error) to either side, found"
@@ -345,11 +311,11 @@ def densities(result: StudyResult) -> Section:
     ensembles = [model for model in result.models if result.is_ensemble(model)]
     figures = []
     for model in ensembles or result.models[:1]:
-        draw, words = partial(density_figure, result, model), {"model": model_words(model)}
-        figures.append(drawing("densities", draw, words, f"densities_{model}"))
+        words = {"name": f"densities_{model}", "model": model_words(model)}
+        figures.append(drawing("densities", density_figure, result, model, **words))
     order = sorted(judged_models(result), key=lambda model: model not in ensembles)
-    tables = [divergence_table(result, m, variant) for m in order for variant in VARIANTS]
-    return section("densities", figures=figures, tables=tables)
+    tables = (divergence_table(result, m, variant) for m in order for variant in VARIANTS)
+    return section("densities", *figures, *tables)
 
 
 def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
@@ -373,18 +339,19 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     how = "blocks may cross joins, block length and bandwidth as printed in the paper"
     if variant == "recommended":
         how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
-    more = " The paper's columns are of another vessel in another tank." * comparable
-    test = result.label_of(str(data.attrs["test"]))
     return by_channel(
         result,
         "jsd",
         cells,
-        {"model": model_words(model), "test": test, "variant": variant, "how": how},
-        columns=[*heads, *published],
+        [*heads, *published],
+        " The paper's columns are of another vessel in another tank." * comparable,
+        test=str(data.attrs["test"]),
         name=f"jsd_{model}_{variant}",
-        more=more + conditional(result),
         elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
         folded=not result.is_ensemble(model) and any(map(result.is_ensemble, result.models)),
+        model=model_words(model),
+        variant=variant,
+        how=how,
     )
 
 
@@ -392,5 +359,4 @@ def eigenvalues(result: StudyResult) -> Section | None:
     """Return the eigenvalues of the models of the first training set."""
     if not any(name.startswith("eigenvalues/") for name in result.groups):
         return None
-    figure = drawing("eigenvalues", partial(eigenvalue_figure, result), {"lowest": LOWEST})
-    return section("eigenvalues", figures=[figure])
+    return section("eigenvalues", drawing("eigenvalues", eigenvalue_figure, result, lowest=LOWEST))

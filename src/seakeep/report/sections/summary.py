@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import partial
-from itertools import chain
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -50,18 +48,19 @@ def summary(result: StudyResult) -> Section:
     figures = [
         drawing(
             "first_history",
-            partial(history_figure, result, *place, names=(name,)),
-            {"channel": result.words_of(name).capitalize(), "test": result.label_of(place[0])},
+            *(history_figure, result, *place, (name,)),
+            channel=result.words_of(name).capitalize(),
+            test=result.label_of(place[0]),
         )
         for place in shown_cells(result)[:1]
     ]
     return section(
         "summary",
+        *figures,
+        _heat(result),
         more=(_tested(result),),
         points=findings(result),
         notices=tuple(filter(None, notices)),
-        figures=figures,
-        tables=(_heat(result),),
     )
 
 
@@ -92,16 +91,22 @@ def by_channel(
     result: StudyResult,
     key: str,
     cells: Callable[[str], Iterable[str]],
-    values: Mapping[str, Any] | None = None,
-    *,
     columns: Iterable[str],
-    **options: Any,
+    more: str = "",
+    test: str = "",
+    **given: Any,
 ) -> Table:
-    """Table of numbers with a row per channel, and one of averages; `cells` takes a channel."""
+    """Table of numbers with a row per channel, and one of averages; `cells` takes a channel.
+
+    One of several test sets is named after it; that of the first is not folded away.
+    """
     rows = [(result.words_of(name), *map(Number, cells(name))) for name in result.channels]
     rows.append(("average", *map(Number, cells("average"))))
-    last = [len(rows) - 1]
-    return table(key, rows, values, columns=("channel", *columns), averages=last, **options)
+    if test:
+        of_test = {"name": f"{key}_{test}", "folded": test != next(iter(result.tests))}
+        given = {"test": result.label_of(test), **of_test, **given}
+    heads, last = ("channel", *columns), [len(rows) - 1]
+    return table(key, rows, more + conditional(result), columns=heads, averages=last, **given)
 
 
 def _heat(result: StudyResult) -> Table:
@@ -116,7 +121,7 @@ def _heat(result: StudyResult) -> Table:
     def cells(channel: str) -> Iterator[str]:
         return (number(median.sel({**at, "channel": channel}), 2) for at in places.values())
 
-    return by_channel(result, "heat", cells, columns=places, more=conditional(result))
+    return by_channel(result, "heat", cells, places)
 
 
 def overview_table(result: StudyResult) -> Table:
@@ -126,12 +131,11 @@ def overview_table(result: StudyResult) -> Table:
     boxes["spread"] = boxes["upper_quartile"] - boxes["lower_quartile"]
     for at in entries(boxes, "test", "model"):
         test, model = row(at, "test", "model")
-        measures = (row(at.sel(measure=key), median=3, spread=3) for key in HEADING)
-        scaled = row(at.sel(measure="training_nrmse"), median=3)
-        count = row(at.sel(measure="nrmse"), count=0)
-        errors = chain(*measures, scaled, count)
-        rows.append((result.label_of(test), model_words(model), *errors))
-    return table("overview", rows, more=conditional(result))
+        cells = [text for key in HEADING for text in row(at.sel(measure=key), median=3, spread=3)]
+        cells += row(at.sel(measure="training_nrmse"), median=3)
+        cells += row(at.sel(measure="nrmse"), count=0)
+        rows.append((result.label_of(test), model_words(model), *cells))
+    return table("overview", rows, conditional(result))
 
 
 def conditional(result: StudyResult) -> str:
