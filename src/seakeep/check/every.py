@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from inspect import signature
 from typing import Any
 
 import xarray as xr
@@ -41,15 +42,10 @@ CHECKS: dict[str, Check] = {
     "validity": validity,
     "drift": drift,
 }
-"""Checks by name: each takes a model and prepared runs by name."""
-SHARES = {
-    "worth": ("free", "baselines"),
-    "validation": ("measured",),
-    "coherence": ("free", "baselines"),
-    "residuals": ("free",),
-    "statistics": ("free",),
-}
-"""What checks take of the others: free runs of model and baselines, and results."""
+"""Checks by name: each takes a model and prepared runs by name, and what checks share.
+
+That are `free` runs of model and `baselines`, and the `measured` response.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +107,7 @@ def check_model(
     for number, (name, check) in enumerate(CHECKS.items()):
         if progress is not None:
             progress(number, len(CHECKS), name)
-        how = {key: shared[key] for key in SHARES.get(name, ())}
+        how = {key: shared[key] for key in signature(check).parameters if key in shared}
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:

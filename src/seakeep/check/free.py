@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 import xarray as xr
 
-from seakeep.check.parts import single_model
+from seakeep.check.parts import single_model, units_of
 from seakeep.conventions import MOTIONS, canonical_channel
 from seakeep.core.extremes import free_decay
 from seakeep.errors import DataError, RequestError
@@ -103,8 +103,7 @@ def decay(model: Model) -> xr.Dataset:
     still = np.zeros((before, len(single.inputs)))
     ahead = np.zeros((steps - 1 + single.lead_samples, len(single.inputs)))
     rest = single.forecast_arrays(history, still, ahead, steps)
-    units = {each.name: each.units for each in single.state_labels}
-    parts = []
+    rows = []
     for motion in motions:
         column = single.states.index(motion)
         offset = float(single.state_scale.spread[column])
@@ -114,20 +113,19 @@ def decay(model: Model) -> xr.Dataset:
         left = np.concatenate([[1.0], (run - rest)[:, column] / offset])
         released = free_decay(left[np.isfinite(left)], single.dt)
         linear = released.decrements.mean() if released.cycles else np.nan
-        parts.append(
-            xr.Dataset(
-                {
-                    "displacement": ("time", left),
-                    "offset": offset,
-                    "period": ((), released.period, {"units": "s"}),
-                    "damping_ratio": linear / np.hypot(2 * np.pi, linear),
-                    "p": linear,
-                },
-                {"units": units[motion]},
-            )
-        )
-    time = ("time", single.dt * np.arange(steps + 1), {"units": "s"})
-    return xr.concat(parts, xr.Variable("motion", motions)).assign_coords(time=time)
+        damping = linear / np.hypot(2 * np.pi, linear)
+        rows.append((left, offset, released.period, damping, linear))
+    left, *facts = map(np.array, zip(*rows, strict=True))
+    keys = ("offset", "period", "damping_ratio", "p")
+    return xr.Dataset(
+        {"displacement": (("motion", "time"), left)}
+        | {key: ("motion", fact) for key, fact in zip(keys, facts, strict=True)},
+        coords={
+            "motion": motions,
+            "units": ("motion", units_of(single, motions)),
+            "time": ("time", single.dt * np.arange(steps + 1), {"units": "s"}),
+        },
+    )
 
 
 def measured_decay(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
