@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
+from typer import Argument, Option
 
 from seakeep.cli.console import CampaignFile, progress_bar, results, say
 from seakeep.errors import RequestError, SeakeepError
@@ -22,21 +23,19 @@ SHOWN = 12
 
 
 def init(
-    files: Annotated[list[Path], typer.Argument(help="Files of measured runs.", metavar="FILE…")],
+    files: Annotated[list[Path], Argument(help="Files of measured runs.", metavar="FILE…")],
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="File to write; by default standard output."),
+        Option("-o", "--out", help="File to write; by default standard output."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier draft.")] = False,
-    skip_rows: Annotated[
-        int | None, typer.Option(min=0, help="Lines to skip above the header.")
-    ] = None,
+    force: Annotated[bool, Option("--force", help="Overwrite an earlier draft.")] = False,
+    skip_rows: Annotated[int | None, Option(min=0, help="Lines to skip above the header.")] = None,
     delimiter: Annotated[
         Literal[",", ";", "tab", "blank"] | None,
-        typer.Option(help="Mark between columns."),
+        Option(help="Mark between columns."),
     ] = None,
-    decimal: Annotated[Literal[".", ","] | None, typer.Option(help="Decimal mark.")] = None,
-    group: Annotated[str | None, typer.Option(help="Group of HDF5 or TDMS, topic of ROS.")] = None,
+    decimal: Annotated[Literal[".", ","] | None, Option(help="Decimal mark.")] = None,
+    group: Annotated[str | None, Option(help="Group of HDF5 or TDMS, topic of ROS.")] = None,
 ) -> None:
     """Draft a campaign file from measured files' headers.
 
@@ -67,7 +66,7 @@ def prepare(
     campaign: CampaignFile,
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "-o",
             "--out",
             help="Folder; by default 'prepared' beside the campaign, the only folder that fit, "
@@ -75,10 +74,10 @@ def prepare(
         ),
     ] = None,
     anew: Annotated[
-        bool, typer.Option("--anew", help="Prepare all runs again, up-to-date ones too.")
+        bool, Option("--anew", help="Prepare all runs again, up-to-date ones too.")
     ] = False,
     sheet: Annotated[
-        bool, typer.Option("--sheet/--no-sheet", help="Write the data-quality sheet.")
+        bool, Option("--sheet/--no-sheet", help="Write the data-quality sheet.")
     ] = True,
 ) -> None:
     """Prepare runs from raw files, with a data-quality sheet.
@@ -199,10 +198,10 @@ def _list(context: typer.Context) -> None:
 
 @datasets.command("fetch")
 def _fetch(
-    name: Annotated[str, typer.Argument(help="Name of the data set.")],
+    name: Annotated[str, Argument(help="Name of the data set.")],
     to: Annotated[
         Path | None,
-        typer.Option(help="Data folder; by default SEAKEEP_DATA_DIR."),
+        Option(help="Data folder; by default SEAKEEP_DATA_DIR."),
     ] = None,
 ) -> None:
     """Fetch a data set from its origin and check it; the one command that uses the network.

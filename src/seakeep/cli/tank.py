@@ -5,39 +5,33 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
+from typer import Option
 
 from seakeep.cli.console import progress_bar, say
 
 
 def tank(
-    out: Annotated[
-        Path, typer.Option("-o", "--out", help="Folder for raw files and campaign.toml.")
-    ],
+    out: Annotated[Path, Option("-o", "--out", help="Folder for raw files and campaign.toml.")],
     seed: Annotated[
-        int | None, typer.Option(min=0, max=2**64 - 1, help="Seed of waves and noise.")
+        int | None, Option(min=0, max=2**64 - 1, help="Seed of waves and noise.")
     ] = None,
     settings: Annotated[
         Path | None,
-        typer.Option(help="Tank settings (TOML); by default the CK-14e's."),
+        Option(help="Tank settings (TOML); by default the CK-14e's."),
     ] = None,
-    run: Annotated[
-        list[str] | None, typer.Option(help="Play this run only; may be repeated.")
-    ] = None,
+    run: Annotated[list[str] | None, Option(help="Play this run only; may be repeated.")] = None,
     kind: Annotated[
-        Literal["csv", "nc"], typer.Option("--raw-format", help="Format of the raw files.")
+        Literal["csv", "nc"], Option("--raw-format", help="Format of the raw files.")
     ] = "csv",
     one_logger: Annotated[
         bool,
-        typer.Option("--one-logger", help="One file and one clock per run, for all instruments."),
+        Option("--one-logger", help="One file and one clock per run, for all instruments."),
     ] = False,
     spacing: Annotated[
         Literal["equal", "jittered"] | None,
-        typer.Option(help="Frequencies of irregular seas; jittered never repeat."),
+        Option(help="Frequencies of irregular seas; jittered never repeat."),
     ] = None,
-    video: Annotated[
-        list[str] | None, typer.Option(help="Render this run's side view as MP4.")
-    ] = None,
+    video: Annotated[list[str] | None, Option(help="Render this run's side view as MP4.")] = None,
 ) -> None:
     """Play a virtual campaign: raw files and campaign.toml.
 
