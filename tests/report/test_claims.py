@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.report.claims import CLAIMS, LOADS, REGULAR, Evidence
+from seakeep.report.acts import CLAIMS, LOADS, REGULAR, Evidence
 from seakeep.study import StudyResult
 from seakeep.study.judge import MEASURES
 

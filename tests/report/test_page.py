@@ -12,12 +12,10 @@ import xarray as xr
 from tutorial_study import put_tutorial
 
 from seakeep.files import check_report
-from seakeep.report.sections.errors import (
+from seakeep.report.sections.results import (
     age,
     coverage_table,
     divergence_table,
-)
-from seakeep.report.sections.summary import (
     summary,
 )
 from seakeep.report.tables import probability, small_number

@@ -94,7 +94,7 @@ class TestShipSection:
 def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
     from seakeep.quality.faults import FLAGS
     from seakeep.quality.sensors import LATE, Agreement
-    from seakeep.report.figures.runs import quality_figure
+    from seakeep.report.figures.histories import quality_figure
     from seakeep.report.quality_sheet import channel_rows
 
     time = np.linspace(0.0, 10.0, 101)
@@ -109,9 +109,9 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
         },
         {"time": time, "heave_flags": ("time", flags)},
     )
-    rows = {row.channel: row for row in channel_rows(run)}
-    assert rows["pitch"].unit == "deg"
-    assert rows["pitch"].numbers[1] == pytest.approx(5.0, rel=2e-3)  # the nearest sample
+    rows = {name: cells for name, *cells in channel_rows(run)}
+    assert rows["pitch"][0] == "deg"
+    assert float(rows["pitch"][2]) == pytest.approx(5.0, rel=2e-3)  # the nearest sample
     # Windows stand 1 s apart, and two are missing.
     centre, lags = np.array([1.0, 2.0, 5.0, 6.0]), np.array([0.01, 0.02, 0.01, 0.02])
     found = Agreement(
@@ -134,7 +134,7 @@ def test_a_channel_with_findings_keeps_its_line_and_shows_its_marks():
     from matplotlib.colors import to_rgb
 
     from seakeep.quality.faults import FLAGS
-    from seakeep.report.figures.runs import quality_figure
+    from seakeep.report.figures.histories import quality_figure
 
     time = np.linspace(0.0, 10.0, 101)
     flags = np.zeros(time.size, dtype=np.int16)

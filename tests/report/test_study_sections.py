@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from seakeep.report.sections.data import chosen
-from seakeep.report.sections.errors import bands, regular, scales
+from seakeep.report.sections.results import bands, regular, scales
 from seakeep.study import StudyResult
 from seakeep.study.judge import MEASURES, band_tables, box_table
 

@@ -2,12 +2,11 @@
 
 from seakeep.check.coherence import coherence
 from seakeep.check.every import CHECKS, Checked, check_model
-from seakeep.check.free import decay, measured_decay, modes
+from seakeep.check.motion import decay, drift, measured_decay, modes
 from seakeep.check.peaks import statistics
 from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
 from seakeep.check.sea import validity
-from seakeep.check.second_order import drift
 from seakeep.check.worth import worth
 
 __all__ = [

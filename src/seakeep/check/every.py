@@ -13,13 +13,12 @@ import xarray as xr
 
 from seakeep.arrays import Progress
 from seakeep.check.coherence import coherence
-from seakeep.check.free import decay, measured_decay, modes
+from seakeep.check.motion import decay, drift, measured_decay, modes
 from seakeep.check.parts import Known, of_part
 from seakeep.check.peaks import statistics
 from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
 from seakeep.check.sea import validity
-from seakeep.check.second_order import drift
 from seakeep.check.worth import worth
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models import Model

@@ -44,7 +44,7 @@ def study(
     Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
     """
     from seakeep.models.executor import make_executor
-    from seakeep.report.sections.summary import findings, overview_table
+    from seakeep.report.sections.results import findings, overview_table
     from seakeep.study import read_study, run_study
 
     asked = read_study(study_file)

@@ -7,11 +7,11 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from importlib import resources
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, SupportsFloat
+from typing import TYPE_CHECKING, Any, NamedTuple, SupportsFloat
 
 import numpy as np
 import numpy.typing as npt
@@ -259,6 +259,44 @@ def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = number) ->
     ('0.481 [0.421, 0.549]', '-20 [-35, +5]')
     """
     return Number(f"{form(value)} [{', '.join(map(form, others))}]")
+
+
+class Interval(NamedTuple):
+    """A number with its 95 % interval; NaN where there is none."""
+
+    value: float
+    lower: float
+    upper: float
+
+    def below(self, bound: float) -> bool | None:
+        """Whether it lies below a bound; None where the interval holds the bound."""
+        return self.below_other(Interval(bound, bound, bound))
+
+    def below_other(self, other: Interval) -> bool | None:
+        """Whether it lies below another number; None where the intervals meet."""
+        if self.upper < other.lower:
+            return True
+        return False if self.lower > other.upper else None
+
+    def text(self, form: int | Form = 2, unit: str = "", factor: float = 1.0) -> Number:
+        """Text of the number times a factor, with its interval in brackets.
+
+        Examples
+        --------
+        >>> Interval(0.4, 0.2, 0.6).text(), Interval(0.4, np.nan, np.nan).text(0, " %", 100)
+        ('0.40 [0.20, 0.60]', '40 %')
+        """
+        each = partial(number, digits=form) if isinstance(form, int) else form
+        value, low, high = (each(factor * x) for x in self)
+        return Number(f"{value}{unit}" + f" [{low}, {high}]" * bool(np.isfinite(self.lower)))
+
+    def change(self) -> Number:
+        """Text of a ratio as a relative change."""
+        return Interval(*(x - 1 for x in self)).text(signed, " %", 100.0)
+
+    def part(self) -> Number:
+        """Text of a share."""
+        return self.text(0, " %", 100.0)
 
 
 def uncertain(value: SupportsFloat, uncertainty: SupportsFloat) -> Number:

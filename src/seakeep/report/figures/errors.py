@@ -27,7 +27,7 @@ from seakeep.report.style import (
     plain_text,
     short_label,
 )
-from seakeep.report.tables import signed
+from seakeep.report.tables import Interval, Number, signed
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
 
@@ -205,10 +205,10 @@ def error_over_time_figure(result: StudyResult) -> Figure:
     return figure
 
 
-def growth_text(at: xr.Dataset) -> str:
+def growth_text(at: xr.Dataset) -> Number:
     """Change of ε(t) over the window with its interval, where there is one, in percent."""
-    value, *bounds = (signed(100 * at[key]) for key in ("change", "lower", "upper"))
-    return f"{value} %" + f" [{', '.join(bounds)}]" * bool(np.isfinite(at["lower"]))
+    change = Interval(*(float(at[key]) for key in ("change", "lower", "upper")))
+    return change.text(signed, " %", 100.0)
 
 
 @figure_style()

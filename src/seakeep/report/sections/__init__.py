@@ -7,28 +7,28 @@ from pathlib import Path
 
 from seakeep.arrays import Progress
 from seakeep.report.page import Section, write_page
-from seakeep.report.sections import data, errors, histories, summary
+from seakeep.report.sections import data, histories, results
 from seakeep.study import StudyResult
 from seakeep.study.store import storing
 
 SECTIONS: list[Callable[[StudyResult], Section | None]] = [
-    summary.summary,
-    errors.errors,
-    errors.scales,
-    errors.regular,
+    results.summary,
+    results.errors,
+    results.scales,
+    results.regular,
     histories.explorer,
     histories.histories,
-    errors.age,
-    errors.coverage,
-    errors.bands,
-    errors.densities,
-    errors.eigenvalues,
+    results.age,
+    results.coverage,
+    results.bands,
+    results.densities,
+    results.eigenvalues,
     data.waves,
     data.data,
     data.chosen,
     data.settings,
     data.versions,
-    summary.glossary,
+    results.glossary,
 ]
 """A section is one function here; one that has nothing to show is left out."""
 
