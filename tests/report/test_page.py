@@ -13,12 +13,10 @@ from tutorial_study import put_tutorial
 
 from seakeep.files import check_report
 from seakeep.report.sections.results import (
-    age,
     coverage_table,
     divergence_table,
     summary,
 )
-from seakeep.report.tables import probability, small_number
 from seakeep.report.tables import words as known_words
 from seakeep.study import read_result, read_study, run_study
 
@@ -99,10 +97,8 @@ def test_the_page_holds_its_parts_and_names_nothing_outside_itself(page, result)
     wanted = ["summary", "errors", "explore", "densities", "settings", "versions", "words"]
     found = re.findall(r'<section id="(.*?)">', text)
     assert [each for each in found if each in wanted] == wanted
-    for part in ("a &amp; b &lt; c", "noise floor", "@media print", result.attrs["digest"]):
+    for part in ("a &amp; b &lt; c", "noise floor", result.attrs["digest"], "<dt>EV, U</dt>"):
         assert part in text
-    for term in ("cell", "T̂", "NAMMAE", "HDMDc, BHDMDc", "EV, U"):
-        assert f"<dt>{term}</dt>" in text
     assert "θ pitch; z\u0307 heave rate" in text
     (when,) = re.findall(r'finished\s<span class="whole">(.*?)</span>', text)
     assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", when)
@@ -183,17 +179,6 @@ def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(resul
     published = known_words()["published"]
     rows = [row[-4:] for row in table.rows if row[0] == "heave"]
     assert rows == [tuple(published["heave"])]
-    # U is the distance of the quantiles, to the rounding of the last digit.
-    for _, low, high, width in published.values():
-        assert float(high) - float(low) == pytest.approx(float(width), abs=1.01e-4)
-
-
-def test_small_numbers_keep_two_digits_and_probabilities_are_no_zero(result):
-    for table in (divergence_table(result, "bayesian", "recommended"), *age(result).tables):
-        cells = [cell for row in table.rows for k, cell in enumerate(row) if k in table.numbers]
-        assert not [cell for cell in cells if re.search(r"\b0\.0000\b", cell)]
-    assert (probability(0.0004), probability(0.0386)) == ("< 0.001", "0.039")
-    assert small_number(0.0) == "0"
 
 
 def test_a_report_that_was_interrupted_is_written_again(tmp_path):

@@ -180,6 +180,8 @@ def small_number(value: SupportsFloat) -> Number:
     --------
     >>> small_number(0.0186), small_number(0.00023), small_number(-1.4e-5), small_number(3e-9)
     ('0.0186', '0.00023', '-0.000014', '3.0e-09')
+    >>> small_number(0.0)
+    '0'
     """
     value = float(value)
     if not np.isfinite(value) or value == 0:
@@ -206,7 +208,13 @@ def percent(part: SupportsFloat, digits: int = 0) -> Number:
 
 
 def probability(value: SupportsFloat) -> Number:
-    """Text of a p-value."""
+    """Text of a p-value.
+
+    Examples
+    --------
+    >>> probability(0.0004), probability(0.0386)
+    ('< 0.001', '0.039')
+    """
     return Number("< 0.001") if float(value) < 0.001 else number(value)
 
 
