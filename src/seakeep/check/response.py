@@ -280,10 +280,10 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
     amplitude, half = np.abs(gain[at]), radius[at]
     with np.errstate(divide="ignore", invalid="ignore"):
         turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
-    of_points = {"run": name, "kind": "irregular", "frequency": spectra.frequency[at]}
+    names = {"run": name, "kind": "irregular"}
     return _points(
         model,
-        of_points | {"wave_amplitude": np.nan},
+        {**names, "frequency": spectra.frequency[at], "wave_amplitude": np.nan},
         *(gain[at], half, turn),
         coherence=spectra.ordinary()[at, 0],
     )
@@ -369,7 +369,8 @@ def validation(
             "both in [rig] of the campaign file."
         )
     own = result.sel(input=entry, frequency=measured["frequency"]).transpose("point", "state")
-    error, spread = own["amplitude"] - measured["amplitude"], 0.0
+    error = own["amplitude"] - measured["amplitude"]
+    spread = 0 * error
     if "amplitude_lower" in own:
         spread = 0.5 * (own["amplitude_upper"] - own["amplitude_lower"])
     uncertainty = np.hypot(spread, measured["amplitude_uncertainty"])

@@ -60,7 +60,7 @@ def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
         outside.append(_outside(model, part.run, np.isfinite(of_parts[1, 1])))
     if not parts:
         raise DataError("no run has all channels of the model: there are no waves to compare.")
-    columns = np.moveaxis(facts, -1, 0)
+    columns = np.moveaxis(np.array(facts), -1, 0)
     if np.isnan(columns[0]).all():
         raise no_energy(model.inputs[reference])
     keys = ("height", "period", "steepness", "drift")

@@ -434,9 +434,6 @@ CLAIMS: dict[str, Callable[[Evidence, Evidence], Judged]] = {
 """What judges each claim by the first act and the second; ``words.toml`` has the words."""
 
 
-Results = Mapping[str, StudyResult]
-
-
 def write_reproduction(folder: Path, results: Results, progress: Progress | None = None) -> Path:
     """Write the page over the acts; each act's own page is written by itself.
 

@@ -12,7 +12,7 @@ import xarray as xr
 from seakeep.check import Checked
 from seakeep.conventions import displayed
 from seakeep.report.figures import checks
-from seakeep.report.page import Section, drawing, section, write_page
+from seakeep.report.page import Drawing, Section, drawing, section, write_page
 from seakeep.report.style import shown_unit
 from seakeep.report.tables import (
     MISSING,
@@ -227,7 +227,7 @@ def _validation_table(result: xr.Dataset) -> Table:
                 continue
             error = at["error"]
             worst = at.isel(point=(abs(error) - at["uncertainty"]).argmax("point"))
-            counts = numbers([error.size, at["within"].sum()], 0)
+            counts = numbers([error.size, int(at["within"].sum())], 0)
             rms, place = short(np.sqrt(np.mean(error**2))), number(worst["frequency"])
             by = uncertain(worst["error"], worst["uncertainty"])
             rows.append((*row(own, "shown"), kind, *counts, rms, place, by))
@@ -299,7 +299,8 @@ def _advice(model: float, linear: float, more: float, ahead: bool) -> str:
 
 def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
     """Return free decay, beside measured ones, and the modes."""
-    parts, words, points = [], [], []
+    words, points = [], []
+    parts: list[Drawing | Table] = []
     if (result := checked.results.get("decay")) is not None:
         parts = [
             drawing("decay", checks.decay, result),

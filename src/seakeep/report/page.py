@@ -95,15 +95,13 @@ class Section:
         return not any(parts)
 
 
-def drawing(
-    key: str, draw: Callable[..., Figure], *given: Any, name: str = "", **values: Any
-) -> Drawing:
+def drawing(key: str, draw: Callable[..., Figure], *given: Any, **values: Any) -> Drawing:
     """Figure with the caption of ``words.toml``, and the values that it holds in braces.
 
-    `draw` takes what is `given`.
+    `draw` takes what is `given`; the value ``name`` is that of its files, by default the key.
     """
     caption = words()["figures"][key].format(**values)
-    return Drawing(name or key, caption, partial(draw, *given))
+    return Drawing(values.get("name", key), caption, partial(draw, *given))
 
 
 def section(

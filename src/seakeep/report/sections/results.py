@@ -420,7 +420,7 @@ def _test_of(result: StudyResult, at: xr.Dataset) -> str:
 
 def bands(result: StudyResult) -> Section:
     """Return coverage and scores of bands by wave height, horizon and channel."""
-    groups, tables = result.groups.get("statistics/bands"), []
+    groups, tables = result.groups.get("statistics/bands", xr.Dataset()), []
     level = short(100 * float(result.settings["statistics"]["level"]))
     for model in filter(result.is_ensemble, result.models if groups else ()):
         for at in entries(groups.sel(model=model), "band"):
@@ -519,9 +519,15 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
             "slap; rates are not filtered."
         )
     heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
-    words = {"kind": prefix.replace("_", " "), "level": short(100 * level), "part": level}
-    words |= {"name": f"coverage_{prefix}{model}", "model": model_words(model)}
-    return by_channel(result, "coverage", cells, heads, more, **words)
+    return by_channel(
+        result,
+        *("coverage", cells, heads, more),
+        name=f"coverage_{prefix}{model}",
+        kind=prefix.replace("_", " "),
+        level=short(100 * level),
+        part=level,
+        model=model_words(model),
+    )
 
 
 def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
