@@ -171,7 +171,7 @@ CHANGES = (
     ("models/live.py", "count.taken - count.since + since, since, blind=True", "count.taken, 0, blind=True", "models/test_live.py::test_a_state_without_measurements_is_small_and_goes_on_bit_for_bit"),
     ("models/live.py", "out += self._d @ direct", "out += 0.0", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
     ("models/live.py", "self._filter.limit(self.errors.at(since + 1) ** 2, exactly=blind)", "self._filter.limit(self.errors.at(since + 1) ** 2)", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
-    ("models/observables.py", "calm = u / np.sqrt(1.0 + u * u / limits", "calm = u / np.sqrt(1.0 + 0.0 * u / limits", "models/test_observables.py::test_powers_grow_like_the_input_far_out"),
+    ("models/terms.py", "calm = u / np.sqrt(1.0 + u * u / limits", "calm = u / np.sqrt(1.0 + 0.0 * u / limits", "models/test_observables.py::test_powers_grow_like_the_input_far_out"),
     ("models/observables.py", "reach = len(kernel) // 2 + (max(self.orders) > 0)", "reach = len(kernel) // 2", "models/test_observables.py::test_columns_are_named_with_units_and_stand_in_two_groups"),
     ("models/selection.py", "key.lead != lead, near[key]", "alike[key]", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),
     ("models/selection.py", "candidate.lead and not follows", "candidate.lead", "models/test_choice.py::test_the_look_ahead_of_carried_waves_is_no_part_of_its_own"),

@@ -276,12 +276,13 @@ class Model:
             As :meth:`forecast`, or if there is no start.
         """
         windows = self.read_windows(*one_run(run, starts), steps, ahead)
-        ((values,),) = engine.run_members(self, [windows], executor, progress)
+        with engine.member_series(self, [windows], executor, progress) as ((series, lost),):
+            values = np.array(series[0])
         signature = self.signature
         variables = label_channels(signature, values, ("window", "lead"))
         status = [
             status_text(outcome(windows, window, int(at)), signature.dt)
-            for window, at in enumerate(first_lost(values))
+            for window, at in enumerate(lost[0])
         ]
         variables["status"] = xr.Variable(("window",), status)
         return xr.Dataset(

@@ -22,7 +22,6 @@ from seakeep.models.forecasts import Spec
 from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel, LinearKind
-from seakeep.models.observables import Observable
 from seakeep.models.parametric import SMALLER, regress_varying, varying_then_pooled
 from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
 from seakeep.models.readouts import FittedReadOut
@@ -40,6 +39,7 @@ from seakeep.models.settings import (
     in_samples,
     periods_to_samples,
 )
+from seakeep.models.terms import Observable
 from seakeep.models.training import (
     TrainingArrays,
     check_names,

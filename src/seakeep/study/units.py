@@ -26,7 +26,7 @@ from seakeep.errors import DataError, SeakeepError
 from seakeep.formats.netcdf import opened_netcdf
 from seakeep.models import Spec
 from seakeep.models.calibration import Judged, envelope_of, held_out, learn_margin
-from seakeep.models.engine import group_series, read_groups
+from seakeep.models.engine import member_series, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import Selected
@@ -261,7 +261,7 @@ def _series(
         for steps, tests in batches.items()
     ]
     windows = read_groups(fitted.signature, runs, groups)
-    with group_series(fitted, windows) as series_of:
+    with member_series(fitted, windows) as series_of:
         for (series, lost), tests, each in zip(series_of, batches.values(), windows, strict=True):
             envelope = envelope_of(fitted.signature, each)
             first = 0
