@@ -154,16 +154,12 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
         dynamics.input_delays,
     )
     scale = np.concatenate([dynamics.input_scale.std, dynamics.direct_scale.std])
-    early = np.exp(2j * np.pi * frequency * model.dt * _lead(model))
+    input_map = model.signature.input_map
+    lead = (input_map.follows or input_map).lead  # of delayed columns, in samples
+    early = np.exp(2j * np.pi * frequency * model.dt * lead)
     early = np.where(np.arange(scale.size) < len(model.inputs), early[:, None], 1.0)
     result: ComplexArray = gain * dynamics.state_scale.std[:, None] / scale * early[:, None]
     return result
-
-
-def _lead(model: Model) -> int:
-    """Samples by which delayed columns lead."""
-    input_map = model.signature.input_map
-    return input_map.lead if input_map.follows is None else input_map.follows.lead
 
 
 def _matrices(model: Model) -> tuple[Coverage, list[Dynamics]]:
