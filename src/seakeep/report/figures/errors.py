@@ -305,7 +305,7 @@ def error_figure(table: xr.Dataset) -> Figure:
 
     The table is that of :func:`seakeep.study.difference_table`.
     """
-    table = table.isel(run=np.argsort(table["wave_period"].values, kind="stable"))
+    table = table.sortby("wave_period")
     labels = [
         plain_text(str(run)) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
         for run, period in zip(table["run"].values, table["wave_period"].values, strict=True)
