@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 from seakeep.campaign.pipeline import flag_samples
+from seakeep.campaign.settings import PreparationSettings
 from seakeep.quality import Record
 from seakeep.quality.faults import find_held, find_outliers, noise_share, saturated
 from seakeep.quality.samples import constant, flagged, level_drift, levels, noise
@@ -29,7 +30,7 @@ def noisy():
 def reported(x):
     """Kinds of findings about samples."""
     group = xr.Dataset({"x": ("time", x, {"units": "m"})}, {"time": T})
-    record = Record("r", group, {"": flag_samples(group, replaced=False)})
+    record = Record("r", group, {"": flag_samples(group, PreparationSettings())})
     return {found.kind.name for check in (flagged, constant, noise) for found in check(record)}
 
 
@@ -105,7 +106,8 @@ def test_a_probe_that_dies_has_no_drift_besides():
     x = waves()
     dead = 1500 + int(np.argmax(x[1500:1600]))
     x[dead:] = x[dead]
-    group = flag_samples(xr.Dataset({"eta": ("time", x, {"units": "m"})}, {"time": T}), False)
+    group = xr.Dataset({"eta": ("time", x, {"units": "m"})}, {"time": T})
+    group = flag_samples(group, PreparationSettings())
     assert list(levels(Record("r", group, {"": group}))) == []
     assert [each.kind.name for each in flagged(Record("r", group, {"": group}))] == ["STUCK"]
 

@@ -170,7 +170,7 @@ def test_the_recommended_model_is_tested_in_the_same_windows_and_learns_from_oth
 ):
     text = study_text(ACTS[2], SMALL, 0).replace("../campaign", str(played / "campaign"))
     (tmp_path / "study.toml").write_text(text, "utf-8")
-    plan, _ = make_plan(read_study(tmp_path / "study.toml"))
+    plan = make_plan(read_study(tmp_path / "study.toml"))
     for name, data in results["raw"].tests.items():
         windows = [(each.run, each.start) for each in plan.tests[name]]
         assert windows == list(zip(data["run"].values, data["start"].values, strict=True))

@@ -111,11 +111,11 @@ def test_cells_by_predicted_surge_are_what_the_models_say(folder):
     study = read_study(folder / "study.toml")
     found = run_study(study, folder / "out")
     assert found.attrs["conditional_on"] == ""
-    plan, runs = make_plan(study)
+    plan = make_plan(study)
     assert {test: len(each) for test, each in plan.tests.items()} == {"later": 2, "regular": 3}
     # The record is read up to the end of the last window of its run, and continued by prediction
     # from there: alone, a window ends with less of it.
-    assert_cells_are_what_the_models_say(found, plan, runs, rtol=0, atol=3e-6)
+    assert_cells_are_what_the_models_say(found, plan, rtol=0, atol=3e-6)
 
 
 def test_every_test_set_has_its_statistics_and_its_start_up_is_cut(folder):

@@ -203,15 +203,15 @@ def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure
 def _coverage_findings(result: StudyResult, model: str) -> list[str]:
     first = next(iter(result.tests))
     level = float(result.settings["statistics"]["level"])
-    table = result.groups["statistics/coverage"].sel(test=first, model=model, against="measured")
-    row = table.sel(channel="average")
-    inside = float(row["inside"])
+    at = {"test": first, "model": model, "against": "measured", "channel": "average"}
+    row = result.groups["statistics/coverage"].sel(at)
+    inside = float(row["inside"].sel(band="members"))
     words = band_verdict(inside, level)
     calibrated = ""
-    if "calibrated_inside" in row and np.isfinite(row["calibrated_inside"]):
-        wider, width = (row[f"{key}relative_width"] for key in ("calibrated_", ""))
+    if "calibrated" in row["band"] and np.isfinite(held := row["inside"].sel(band="calibrated")):
+        width, wider = row["relative_width"]
         calibrated = (
-            f" Calibrated on training data it holds {percent(row['calibrated_inside'])} %, "
+            f" Calibrated on training data it holds {percent(held)} %, "
             f"{short(wider, 2)} measured SD wide instead of {short(width, 2)}."
         )
     each = [test["lost"].sel(ensemble=model) for test in result.tests.values()]
@@ -499,17 +499,16 @@ def coverage(result: StudyResult) -> Section:
 
 def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
     """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
-    prefix = "calibrated_" * calibrated
-    shares = result.groups["statistics/coverage"].sel(model=model)
+    prefix, band = "calibrated_" * calibrated, "calibrated" if calibrated else "members"
+    shares = result.groups["statistics/coverage"].sel(model=model, band=band)
     true = "truth" in shares["against"].values
     kinds, two = ("inside" + " [of the truth]" * true, "width [SD]"), partial(number, digits=2)
 
     def cells(name: str) -> Iterator[str]:
         for test in result.tests:
             at = shares.sel(test=test, channel=name)
-            inside, width = (at[f"{prefix}{key}"] for key in ("inside", "relative_width"))
-            yield beside(*inside, form=two) if true else two(*inside)
-            yield two(width.sel(against="measured"))
+            yield beside(*at["inside"], form=two) if true else two(*at["inside"])
+            yield two(at["relative_width"].sel(against="measured"))
 
     level = float(result.settings["statistics"]["level"])
     more = _calibrated_words(result, model, level) if calibrated else ""
