@@ -164,7 +164,7 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
         rows.append(("mean", "", *numbers(table["all_anrmse"])))
         heads = ("run", "waves, s", *models)
         yield Table("by_run", f"{of} by wave period: ANRMSE", heads, rows, averages=[len(runs)])
-    changes = []
+    changes: list[tuple[str, ...]] = []
     for at in entries(table, "model"):
         value, low, high = (1 + float(at[f"all_{key}"]) for key in ("change", "lower", "upper"))
         cells: tuple[str, ...] = ("", "", "")
