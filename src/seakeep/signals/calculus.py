@@ -71,8 +71,7 @@ def continued(past: FloatArray, whitening: FloatArray, count: int) -> FloatArray
     order = len(whitening) - 1
     lags = scipy.linalg.toeplitz(past[: -order - 1 : -1], np.zeros(order))
     state = -whitening[1:] @ lags
-    result: FloatArray = scipy.signal.lfilter([1.0], whitening, np.zeros(count), zi=state)[0]
-    return result
+    return scipy.signal.lfilter([1.0], whitening, np.zeros(count), zi=state)[0]
 
 
 def predicted_extension(
