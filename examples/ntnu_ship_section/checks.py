@@ -176,7 +176,9 @@ def reach(campaign, runs):
         print(f"{ahead:5.2f}  {delays:6d}  {delays - ahead:12.2f}{words}")
 
 
-CHECKS = {each.__name__: each for each in (sway, springs, repeats, camera, means, ends, periods, reach)}
+CHECKS = {
+    each.__name__: each for each in (sway, springs, repeats, camera, means, ends, periods, reach)
+}
 
 
 def main(names):
