@@ -138,7 +138,7 @@ This part is generated from the settings themselves.
 """
 
 
-PARAMETER = re.compile(r"^    (\w[\w, ]*)(?: : (.*))?$", re.MULTILINE)
+PARAMETER = re.compile(r"^    (\w+(?:,\s+\w+)*)(?: : (.*))?$", re.MULTILINE)
 OF_MODELS = {
     HankelDMDc: "`kind = 'hankel_dmdc'`",
     BayesianHankelDMDc: "`kind = 'bayesian_hankel_dmdc'`",
@@ -176,19 +176,21 @@ def rows(table):
 
 
 def documented(spec):
-    """Rows of the arguments of a model, from its docstring."""
+    """Rows of the arguments of a model, from its docstring, which must describe all of them."""
     section = spec.__doc__.split("----------\n", 1)[1].split("\n    Raises\n")[0]
     parts = PARAMETER.split(section)[1:]
     defaults = {each.name: each.default for each in dataclasses.fields(spec) if each.init}
     for names, kind, text in zip(parts[::3], parts[1::3], parts[2::3], strict=True):
         words = re.sub(r":\w+:`~?([^`]*)`", r"`\1`", " ".join(text.split())).replace("``", "`")
         kinds = (kind or "").removesuffix(", optional")
-        for name in names.split(", "):
-            default = defaults[name]
+        for name in re.split(r",\s+", names):
+            default = defaults.pop(name)
             value = "–" if default in (None, ()) else f"`{default}`"
             value = "needed" if default is dataclasses.MISSING else value
             meaning = f"{kinds}: {words}" if kinds else words
             yield f"| `{name}` | {value} | {meaning} |".replace("||", "\\|\\|")
+    if defaults:
+        raise ValueError(f"the docstring of {spec.__name__} lacks {', '.join(defaults)}")
 
 
 def text_of(table):

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from seakeep.models.labelled import nearest_sample
-from seakeep.study.units import fit_training
 
 TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
 
@@ -19,10 +18,11 @@ def put_tutorial(folder: Path, study: str) -> None:
     (folder / "study.toml").write_text(study, encoding="utf-8")
 
 
-def assert_cells_are_what_the_models_say(found, plan, runs, **near) -> None:
+def assert_cells_are_what_the_models_say(found, plan, **near) -> None:
     """Compare the forecasts of every window of a study with those of its models alone."""
     for number, training in enumerate(plan.training):
-        single, ensemble = (fit_training(plan, runs, name, training) for name in plan.models)
+        taught, runs = plan.taught(training.spans), plan.runs
+        single, ensemble = (spec.fit(*taught) for spec in plan.specs.values())
         ((name, begin, stop),) = training.spans
         part = runs[name].sel(time=slice(begin - 1e-6, stop + 1e-6))
         for test, windows in plan.tests.items():

@@ -20,9 +20,10 @@ from seakeep.models import (
     outside_training,
 )
 from seakeep.models.draws import Draw
-from seakeep.models.engine import group_series, read_groups
+from seakeep.models.engine import member_series, read_groups
 from seakeep.models.labelled import ChannelLabel
-from seakeep.models.observables import OBSERVABLES, Bound
+from seakeep.models.observables import OBSERVABLES
+from seakeep.models.terms import Bound
 
 DT = 0.1
 PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
@@ -143,7 +144,7 @@ class TestObservableOfAnother:
         np.testing.assert_allclose(arrays[:, 0], forecast.heave, atol=1e-12)
         back = load_model(model.save(tmp_path / "m.nc"))
         xr.testing.assert_identical(back.forecast(run, start=20.0, steps=40), forecast)
-        assert "half" in back.summary()
+        assert "observable    half: 1 column at lags" in back.summary()
         many = ensemble(observables=(Half(),), n_members=2).fit(run, ["heave"], ["eta"])
         summary = many.forecast_summary(run, start=20.0, steps=40)
         again = load_model(many.save(tmp_path / "e.nc"))
@@ -173,7 +174,7 @@ class TestOneEngine:
         places = [("a", 20.0), ("b", 21.0), ("a", 30.0)]
         groups = [(places, 20), (places[:1], 30)]
         windows = read_groups(fitted.signature, {"a": test, "b": runs[0]}, groups)
-        with group_series(fitted, windows) as found:
+        with member_series(fitted, windows) as found:
             assert [series.shape for series, _ in found] == [(5, 3, 20, 2), (5, 1, 30, 2)]
         assert len(carries) == 2 * len(INPUTS)
 

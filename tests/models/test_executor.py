@@ -227,7 +227,7 @@ class TestCluster:
     def test_a_cluster_that_is_lost_is_not_waited_for(self, start, distributed, monkeypatch, lost):
         monkeypatch.setattr(executors, "PATIENCE", 1.0)
         cluster = start(1)
-        with distributed.Client(cluster.address, set_as_default=False, timeout=60) as client:
+        with distributed.Client(cluster.address, set_as_default=False, timeout=15) as client:
             executor = client.get_executor(pure=False)
             work = in_order(side_work.square, 1, range(4000), executor)
             next(work)

@@ -138,9 +138,9 @@ def test_figures_and_tables_are_files_too(page, result):
 
 def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result):
     average = result.groups["statistics/coverage"].sel(
-        test="unseen", model="bayesian", against="measured", channel="average"
+        test="unseen", model="bayesian", band="calibrated", against="measured", channel="average"
     )
-    expected = [average["calibrated_inside"], average["calibrated_relative_width"]]
+    expected = [average["inside"], average["relative_width"]]
     row = rows_of(page, "coverage_calibrated_bayesian")[-1]
     assert row == ["average", *(f"{float(value):.2f}" for value in expected)]
     windows = result.groups["calibration"]["windows"].sel(ensemble="bayesian").values

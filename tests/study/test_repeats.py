@@ -9,7 +9,7 @@ from seakeep.study.plan import make_plan
 
 def groups(folder):
     study = read_study(folder / "study.toml")
-    return describe_study(study, *make_plan(study))
+    return describe_study(study, make_plan(study))
 
 
 def test_a_run_that_was_learnt_from_is_found_and_named(study_folder):

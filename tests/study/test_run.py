@@ -55,9 +55,9 @@ def finished(study_folder, finished_once):
 
 
 def test_cells_are_what_the_models_say(study_folder, finished):
-    planned = make_plan(read_study(study_folder / "study.toml"))
+    plan = make_plan(read_study(study_folder / "study.toml"))
     # Windows side by side are one product: sums in another order, about 1e-13.
-    assert_cells_are_what_the_models_say(finished, *planned, rtol=1e-9, atol=1e-11)
+    assert_cells_are_what_the_models_say(finished, plan, rtol=1e-9, atol=1e-11)
 
 
 def test_the_error_over_time_is_kept_in_bands_and_its_growth_is_that_of_each_channel(finished):
@@ -147,7 +147,7 @@ def test_one_process_works_in_a_folder_and_who_waited_takes_its_result(
                 run_study(study, out)
             refused.append(what)
 
-    def overtaken(plan, runs):
+    def overtaken(plan):
         monkeypatch.setattr(run, "warn_of_slow_study", usual)
         same(finished, run_study(study, out, progress=third))
 
@@ -200,7 +200,7 @@ def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):
 def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folder):
     path = study_folder / "study.toml"
     path.write_text('[study]\ncampaign = "campaign.toml"\n', "utf-8")
-    plan, _ = make_plan(read_study(path))
+    plan = make_plan(read_study(path))
     assert {window.run for window in plan.tests["irregular"]} == {"unseen"}
     path.write_text(path.read_text("utf-8") + '[tests.regular]\nwaves = "regular"\n', "utf-8")
     with pytest.raises(RequestError, match=r"not stated: irregular.*State the waves of a run"):
@@ -244,13 +244,13 @@ length = 6
 def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(tmp_path):
     put_tutorial(tmp_path, OPEN)
     study = read_study(tmp_path / "study.toml")
-    plan, runs = make_plan(study)
-    facts = facts_of(study, plan, runs)
+    plan = make_plan(study)
+    facts = facts_of(study, plan)
     single, ensemble, mean = units_of(plan)
     assert tasks_of(plan, [single, ensemble, mean]) == [(single, ensemble), (mean,)]
-    both = compute_task(plan, runs, facts, (single, ensemble))
+    both = compute_task(plan, facts, (single, ensemble))
     for unit, found in zip((single, ensemble), both, strict=True):
-        alone = compute(plan, runs, facts, unit)
+        alone = compute(plan, facts, unit)
         assert found.keys() == alone.keys()
         for name, group in found.items():
             xr.testing.assert_identical(group, alone[name])

@@ -28,11 +28,11 @@ def drifting_folder(study_folder):
 
 def test_a_study_with_short_windows_is_told_once(drifting_folder, monkeypatch):
     study = read_study(drifting_folder / "study.toml")
-    plan, runs = make_plan(study)
+    plan = make_plan(study)
     with pytest.warns(SeakeepWarning, match=r"slow motion of heave \(period [56]\d") as caught:
-        warn_of_slow_study(plan, runs)
+        warn_of_slow_study(plan)
     assert len(caught) == 1
     assert "windows of 'bayesian' in" in str(caught[0].message)  # 20 T at most
-    monkeypatch.setattr("seakeep.study.run._compute_all", lambda *_: pytest.fail("told before"))
+    monkeypatch.setattr("seakeep.study.run._computed", lambda *_: pytest.fail("told before"))
     with pytest.warns(SeakeepWarning, match="slow motion"), pytest.raises(pytest.fail.Exception):
         run_study(study, drifting_folder / "out")

@@ -24,7 +24,6 @@ from seakeep.study.judge import (
     verdict,
 )
 from seakeep.study.plan import make_plan, random_stream
-from seakeep.study.units import training_parts
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +32,7 @@ def place(tmp_path_factory, put_study):
     folder = tmp_path_factory.mktemp("study")
     text = put_study(folder).replace("seed = 3", 'seed = 3\ntruth = "truth"')
     (folder / "study.toml").write_text(text, encoding="utf-8")
-    _, runs = make_plan(read_study(folder / "study.toml"))
+    runs = make_plan(read_study(folder / "study.toml")).runs
     (folder / "truth").mkdir()
     true = xr.Dataset({"heave": runs["unseen"]["heave"] + 0.005}).drop_vars(
         [name for name in runs["unseen"].coords if name != "time"]
@@ -83,7 +82,7 @@ def test_the_truth_is_read_at_the_instants_of_the_windows(found):
     heave = test.sel(channel="heave")
     np.testing.assert_allclose(heave["truth"], heave["measured"] + 0.005, rtol=0, atol=1e-9)
     assert np.isnan(test["truth"].sel(channel="pitch")).all()
-    table = found.groups["statistics/coverage"].sel(test="unseen", model="bayesian")
+    table = found.groups["statistics/coverage"].sel(test="unseen", model="bayesian", band="members")
     assert list(table["against"].values) == ["measured", "truth"]
     assert np.isnan(table["inside"].sel(against="truth", channel="pitch"))
     for side in ("measured", "truth"):
@@ -125,7 +124,9 @@ def cells(inside=0.5):
 
 
 def test_coverage_by_hand():
-    row = band_tables(cells(), None, 0.95)["coverage"].sel(model="m", against="measured")
+    row = band_tables(cells(), None, 0.95)["coverage"].sel(
+        model="m", band="members", against="measured"
+    )
     np.testing.assert_allclose(row["inside"], 0.5, rtol=1e-15)
     np.testing.assert_allclose(row["below"], 0.5, rtol=1e-15)
     # Widths of 60 and of 5 in turns, over SDs √(8/7) times amplitudes 1, 2, 1 (10, 20, 10).
@@ -162,7 +163,7 @@ ridge_scale = "absolute"
 """
 
 
-def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study, monkeypatch):
+def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study):
     text = put_study(tmp_path)
     path = tmp_path / "study.toml"
     path.write_text(text.replace("length = 6", "length = 20") + WILD, "utf-8")
@@ -176,16 +177,6 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study, monk
     assert boxes["count"].sel(model="wild") == 0
     assert boxes["count"].sel(model="deterministic") == 6
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
-    # The study ends in a report, whose figures are made here and not written.
-    pytest.importorskip("matplotlib", reason="the report draws figures")
-    from seakeep.report import page
-    from seakeep.report.sections import write_report
-
-    made = []
-    monkeypatch.setattr(page, "_drawn", lambda drawing, folder: made.append(drawing.draw()))
-    text = write_report(found).read_text("utf-8")
-    assert "6 forecast(s) diverged and are left out: model " in text
-    assert made
 
 
 def crossed(rng, levels, cells=10):
@@ -265,32 +256,6 @@ def test_medians_leave_out_what_is_not_judged():
     assert np.isnan(found[1]).all()
 
 
-BASELINES = """
-[models.still]
-kind = "hold_last"
-[models.average]
-kind = "mean"
-[models.filter]
-kind = "fir"
-[models.classic]
-kind = "arx"
-"""
-
-
-def test_any_registered_kind_runs_in_a_study(tmp_path, put_study):
-    text = put_study(tmp_path)
-    ensemble = text[text.index("[models.bayesian]") : text.index("[tests.unseen]")]
-    path = tmp_path / "study.toml"
-    path.write_text(text.replace(ensemble, "") + BASELINES, "utf-8")
-    found = run_study(read_study(path), tmp_path / "out")
-    test = found.tests["unseen"]
-    still = test["mean"].sel(model="still")
-    assert (still == still.isel(time=0)).all()
-    average = test["mean"].sel(model="average").isel(window=0, time=0)
-    np.testing.assert_allclose(average, test["training_mean"], rtol=1e-9, atol=1e-12)
-    assert found.model_settings["classic"]["preset"] == "recommended"
-
-
 REGULARISED = """
 [models.printed]
 preset = "paper"
@@ -312,9 +277,9 @@ def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path, put_stu
         "regularisation/printed"  # neither exact delay rows nor an ensemble
     ]
     at = found.groups["regularisation/printed"].isel(training=1)
-    plan, runs = make_plan(read_study(path))
-    parts = training_parts(runs, plan.training[1])
-    spec, channels = plan.specs["printed"], (plan.states, plan.inputs)
+    plan = make_plan(read_study(path))
+    parts, *channels = plan.taught(plan.training[1].spans)
+    spec = plan.specs["printed"]
     fitted = spec.fit(parts, *channels)
     size = fitted.coefficients.shape[1]
     # Degrees of freedom of a ridge regression: the trace of its hat matrix.
@@ -334,8 +299,8 @@ def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path, put_stu
         radius = at["radius"].sel(variant=name)
         assert float(radius) == pytest.approx(model.spectral_radius, rel=1e-12)
     window = plan.tests["unseen"][2]
-    forecast = truncated.forecast(runs[window.run], window.start, window.steps)
-    error = nrmse(predicted=forecast, measured=runs[window.run])
+    forecast = truncated.forecast(plan.runs[window.run], window.start, window.steps)
+    error = nrmse(predicted=forecast, measured=plan.runs[window.run])
     expected = [float(error[name]) for name in found.channels]
     np.testing.assert_allclose(at["truncated_nrmse"].isel(window=2), expected, rtol=1e-6)
     assert (at["seconds"] > 0).all()

@@ -312,12 +312,10 @@ def _recorded(time: FloatArray, run: Run, logger: Logger) -> slice | BoolArray:
     if run.own.record is None:
         return slice(None)
     start, end = (number(edge) for edge in run.own.record)
-    step, key = float(np.median(np.diff(time))), f"runs.{run.name}.record"
-    whole = float(time[0]), float(time[-1])
-    if logger.name == next(iter(run.loggers)):
-        _refuse_outside(key, (start, end), whole, step, step * (1 + 1e-6))
-    _refuse_empty(key, (start, end), time, step, whole)
-    return (time >= start) & (time <= end)
+    step, whole = float(np.median(np.diff(time))), (float(time[0]), float(time[-1]))
+    is_reference = logger.name == next(iter(run.loggers))
+    slack = step * (1 + 1e-6) if is_reference else np.inf
+    return _part(f"runs.{run.name}.record", (start, end), time, step, whole, slack)
 
 
 def _converted(
@@ -370,7 +368,7 @@ def cleaned(run: Run) -> Run:
         if preparation.gaps == "refuse":
             _refuse_gaps(data, run.name, logger.path)
         data = _regular(data, preparation, f"run '{run.name}' ({logger.path})")
-        data = flag_samples(_bridged(data, preparation), preparation.outliers == "replace")
+        groups[key] = data = flag_samples(data, preparation)
         if logger.options.sampling_rate is not None and logger.options.time is None:
             aside = time_column(logger.columns)
             step = None if aside is None else time_step_of(logger.columns, aside)
@@ -378,29 +376,28 @@ def cleaned(run: Run) -> Run:
                 data.attrs["time_column_step"] = step
         elif counts_samples(logger.columns, logger.options):
             data.attrs["time_counts"] = 1
-        groups[key] = data
     return replace(run, groups=groups)
 
 
 def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
-    gapped = [str(n) for n, each in data.items() if not np.isfinite(each.to_numpy()).all()]
+    missing = {str(n): ~np.isfinite(each.to_numpy()) for n, each in data.items()}
+    gapped = [name for name, each in missing.items() if each.any()]
     if not gapped:
         return
-    time = data["time"].to_numpy()
-    missing = ~np.isfinite(data[gapped[0]].to_numpy())
+    time, first = data["time"].to_numpy(), missing[gapped[0]]
     step = float(np.median(np.diff(time)))
-    gaps = stretches(missing)
 
     def said(gap: tuple[int, int]) -> str:
-        count = gap[1] - gap[0]
-        begin = instant_text(time[gap[0]], step)
+        count, begin = gap[1] - gap[0], instant_text(time[gap[0]], step)
         return f"t = {begin} s ({count} samples, {count * step:.4g} s)"
 
+    gaps = stretches(first)
+    longest = max(gaps, key=lambda gap: gap[1] - gap[0])
     others = f" (also in {', '.join(gapped[1:])})" if gapped[1:] else ""
     raise DataError(
-        f"run '{run}' ({path}): channel '{gapped[0]}' has {int(missing.sum())} missing values of "
-        f"{missing.size} in {len(gaps)} gap(s), the first at {said(gaps[0])}, the longest at "
-        f"{said(max(gaps, key=lambda gap: gap[1] - gap[0]))}{others}. Repair the file, leave the "
+        f"run '{run}' ({path}): channel '{gapped[0]}' has {int(first.sum())} missing values of "
+        f"{first.size} in {len(gaps)} gap(s), the first at {said(gaps[0])}, the longest at "
+        f"{said(longest)}{others}. Repair the file, leave the "
         f"channel out, or cut the gap off with record = [start, end] in [runs.{run}]; or state "
         "gaps = 'mask' or 'bridge' in [preparation]."
     )
@@ -433,44 +430,40 @@ def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> x
     return xr.Dataset(variables, {"time": ("time", new, data["time"].attrs)}, done)
 
 
-def _bridged(data: xr.Dataset, preparation: PreparationSettings) -> xr.Dataset:
-    """Fill gaps so that filters can run, and flag each sample that was filled."""
+def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Dataset:
+    """Fill gaps, so that filters can run, and flag what was filled and what looks wrong."""
     step = float(np.median(np.diff(data["time"].to_numpy())))
     longest = preparation.longest_gap if preparation.gaps == "bridge" else 0.0
     for name in list(data.data_vars):
-        values = data[name].to_numpy()
-        if np.isfinite(values).all():
-            continue
         try:
-            filled = bridge(values, step, longest)
+            values, flags, known = _flagged(
+                data[name].to_numpy(), step, longest, preparation.outliers == "replace"
+            )
         except DataError as error:
             raise DataError(f"channel '{name}': {error}") from None
-        flags = (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
-        data[name] = data[name].copy(data=filled.values)
-        data.coords[f"{name}_flags"] = ("time", flags, flag_attributes(str(name)))
-        if filled.short.any():
-            data[name].attrs["repaired"] = (
-                f"{int(filled.short.sum())} samples "
-                f"({filled.short.sum() * step:.3g} s of {filled.short.size * step:.4g} s) "
-                "bridged by monotone cubics"
-            )
+        data[name] = data[name].copy(data=values).assign_attrs(known)
+        if flags.any():
+            data.coords[f"{name}_flags"] = ("time", flags, flag_attributes(str(name)))
     return data
 
 
-def flag_samples(data: xr.Dataset, replaced: bool) -> xr.Dataset:
-    """Flag outliers, plateaus and stuck samples; outliers are replaced where that is asked for."""
-    time = data["time"].to_numpy()
-    dt = float(time[1] - time[0])
-    for name in list(data.data_vars):
-        x, key = data[name].to_numpy(), f"{name}_flags"
-        if x.size < 16 or not np.ptp(x):
-            continue
-        known = key in data.coords
-        flags = data[key].to_numpy().copy() if known else np.zeros(x.size, dtype=np.int16)
-        there = (flags & (MISSING | BRIDGED)) == 0
-        if np.isfinite(step := reading_step(x)):
-            data[name].attrs["reading_step"] = step
-        stuck = find_held(x, dt) & there
+def _flagged(
+    x: FloatArray, step: float, longest: float, replaced: bool
+) -> tuple[FloatArray, Any, dict[str, Any]]:
+    """Series without gaps, its flags, and the attributes that say what was done to it."""
+    flags, known, repaired = np.zeros(x.size, dtype=np.int16), dict[str, Any](), list[str]()
+    if not np.isfinite(x).all():
+        filled = bridge(x, step, longest)
+        x = filled.values
+        flags += (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
+        if count := int(filled.short.sum()):
+            seconds = f"{count * step:.3g} s of {x.size * step:.4g} s"
+            repaired.append(f"{count} samples ({seconds}) bridged by monotone cubics")
+    if x.size >= 16 and np.ptp(x):
+        if np.isfinite(reading := reading_step(x)):
+            known["reading_step"] = reading
+        there = flags == 0
+        stuck = find_held(x, step) & there
         for start, end in stretches(stuck):  # what stands before a gap that was filled
             stuck[start:end] = end - start > 2
         outlier, edge = find_outliers(x) & there & ~stuck, saturated(x, stuck)
@@ -478,15 +471,12 @@ def flag_samples(data: xr.Dataset, replaced: bool) -> xr.Dataset:
         flags[edge] |= SATURATED
         flags[stuck & ~edge] |= STUCK
         if replaced and outlier.any():
-            filled = bridge(np.where(outlier, np.nan, x), dt, np.inf).values
-            data[name] = data[name].copy(data=filled)
+            x = bridge(np.where(outlier, np.nan, x), step, np.inf).values
             flags[outlier] |= REPLACED
-            done = [data[name].attrs["repaired"]] if "repaired" in data[name].attrs else []
-            done.append(f"{int(outlier.sum())} outliers replaced by monotone cubics")
-            data[name].attrs["repaired"] = "; ".join(done)
-        if flags.any():
-            data.coords[key] = ("time", flags, flag_attributes(str(name)))
-    return data
+            repaired.append(f"{int(outlier.sum())} outliers replaced by monotone cubics")
+    if repaired:
+        known["repaired"] = "; ".join(repaired)
+    return x, flags, known
 
 
 def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
@@ -690,26 +680,24 @@ def used_span(settings: RunSettings) -> tuple[float, float]:
 def cropped(run: Run) -> Run:
     """Step 8: cut the run to its span; spans that lie outside the record are refused."""
     assert run.data is not None
-    time = run.data["time"].to_numpy()
-    dt = float(np.median(np.diff(time)))
-    reference = run.reference_time
+    data, reference = run.data, run.reference_time
+    dt = float(np.median(np.diff(data["time"].to_numpy())))
     record = float(reference[0]), float(reference[-1])
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
     slack = max(dt, (record[1] - record[0]) / (reference.size - 1)) * (1 + 1e-6)
-    spans = {
-        key: (number(span[0]), number(span[1]))
-        for key in ("span", "train", "test")
-        if (span := getattr(run.own, key)) is not None
-    }
-    for key, span in spans.items():
-        _refuse_outside(f"runs.{run.name}.{key}", span, record, dt, slack)
-        _refuse_empty(f"runs.{run.name}.{key}", span, time, dt, record)
-    if "span" not in spans:
-        return run
-    data = run.data.isel(time=inside(time, spans.pop("span"), dt))
-    time = data["time"].to_numpy()
-    for key, span in spans.items():
-        _refuse_empty(f"runs.{run.name}.{key}", span, time, dt, (float(time[0]), float(time[-1])))
+    stated = {key: getattr(run.own, key) for key in ("span", "train", "test")}
+    spans = {k: (number(each[0]), number(each[1])) for k, each in stated.items() if each}
+
+    def used(key: str, record: tuple[float, float], slack: float) -> BoolArray:
+        time = data["time"].to_numpy()
+        return _part(f"runs.{run.name}.{key}", spans[key], time, dt, record, slack)
+
+    parts = {key: used(key, record, slack) for key in spans}
+    if "span" in parts:
+        data = data.isel(time=parts.pop("span"))
+        time = data["time"].to_numpy()
+        for key in parts:
+            used(key, (float(time[0]), float(time[-1])), np.inf)
     return replace(run, data=data)
 
 
@@ -719,25 +707,29 @@ def inside(time: FloatArray, span: tuple[float, float], dt: float) -> BoolArray:
     return (time >= span[0] - slack) & (time <= span[1] + slack)
 
 
-def _refuse_outside(
-    key: str, span: tuple[float, float], record: tuple[float, float], dt: float, slack: float
-) -> None:
-    """Refuse a span that reaches beyond a record by more than its last sample's own step."""
+def _part(
+    key: str,
+    span: tuple[float, float],
+    time: FloatArray,
+    dt: float,
+    record: tuple[float, float],
+    slack: float,
+) -> BoolArray:
+    """Instants of a run in a span, which must hold two or more of them.
+
+    Refused is also a span that reaches beyond the reference's record by more than a slack.
+    """
+    shown = f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}] s"
     finite = [edge for edge in span if np.isfinite(edge)]
     if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):
         raise RequestError(
-            f"{key}: received {_shown(span, dt)} s, and the record runs from "
+            f"{key}: received {shown}, and the record runs from "
             f"{span_text(*record, dt)}. Correct the span; 'inf' stands for the end."
         )
-
-
-def _refuse_empty(
-    key: str, span: tuple[float, float], time: FloatArray, dt: float, record: tuple[float, float]
-) -> None:
-    """Refuse a span that holds too few of a run's instants, whose record is the reference's."""
-    if (count := int(inside(time, span, dt).sum())) > 1:
-        return
-    stated = f"{key}: {_shown(span, dt)} s holds {count} sample(s) at a step of {dt:.4g} s"
+    used = inside(time, span, dt)
+    if (count := int(used.sum())) > 1:
+        return used
+    stated = f"{key}: {shown} holds {count} sample(s) at a step of {dt:.4g} s"
     common = span_text(float(time[0]), float(time[-1]), dt)
     if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:
         raise DataError(
@@ -746,10 +738,6 @@ def _refuse_empty(
             "whole, or correct the span."
         )
     raise RequestError(f"{stated}. Lengthen the span, or move it into the run's {common}.")
-
-
-def _shown(span: tuple[float, float], dt: float) -> str:
-    return f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}]"
 
 
 def attributes_of(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 import xarray as xr
@@ -13,6 +13,7 @@ from seakeep.campaign.prepare import Campaign
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, warn
 from seakeep.files import check_output, load_sealed, make_folder, write_sealed
+from seakeep.quality import warn_of_runs
 
 PREPARED = "prepared run"
 """Kind of these files, which sets them apart from measurements."""
@@ -87,6 +88,8 @@ def load_prepared(
     out_dir: Path | str | None = None,
     names: Iterable[str] | None = None,
     progress: Progress | None = None,
+    *,
+    channels: Collection[str] = (),
 ) -> dict[str, xr.Dataset]:
     """Take prepared runs from their files where these are fresh, else prepare them in memory.
 
@@ -98,6 +101,8 @@ def load_prepared(
         Folder of the files; the default is ``prepared`` beside the campaign file.
     names, progress
         As in :meth:`Campaign.prepare`.
+    channels : collection of str, optional
+        Channels of a model; what the checks found in them is warned of.
 
     Returns
     -------
@@ -119,6 +124,7 @@ def load_prepared(
         runs |= campaign.prepare(missing, progress)
     if len({run.attrs["dt"] for run in runs.values()}) > 1:  # files of one rate beside others
         runs = campaign.prepare(wanted, progress)
+    warn_of_runs(runs.values(), channels)
     return {name: runs[name] for name in wanted}
 
 

@@ -53,7 +53,6 @@ def check(
     from seakeep.check import check_model
     from seakeep.models import load_model
     from seakeep.models.forecasts import counted
-    from seakeep.quality import warn_of_runs
     from seakeep.report.check_page import check_sections, write_check
     from seakeep.study import fit_baselines
     from seakeep.study.fit import repeats_of
@@ -63,11 +62,11 @@ def check(
     read = read_campaign(campaign)
     check_output(out / "report.html", "report", read_files(read, model))
     check_report(out)
+    channels = identified.states, identified.inputs
     with progress_bar("Preparing") as progress:
-        runs = load_prepared(read, names=run or None, progress=progress)
-    warn_of_runs(runs.values(), [*identified.states, *identified.inputs])
+        used = [*channels[0], *channels[1]]
+        runs = load_prepared(read, names=run or None, progress=progress, channels=used)
     try:
-        channels = (identified.states, identified.inputs)
         prepared = None if run else runs
         baselines = fit_baselines(read, *channels, prepared=prepared, beside=identified)
     except SeakeepError as error:
@@ -152,7 +151,6 @@ def calibrate(
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.models import is_ensemble, load_model
     from seakeep.models.forecasts import counted
-    from seakeep.quality import warn_of_runs
     from seakeep.report.comparison import margins_table
     from seakeep.signals.time_axis import span_text
     from seakeep.study.comparison import calibration_parts, samples_of
@@ -172,8 +170,8 @@ def calibrate(
             "same sea with --run."
         )
     with progress_bar("Preparing") as progress:
-        prepared = load_prepared(read, names=wanted, progress=progress)
-    warn_of_runs(prepared.values(), [*fitted.states, *fitted.inputs])
+        used = [*fitted.states, *fitted.inputs]
+        prepared = load_prepared(read, names=wanted, progress=progress, channels=used)
     parts = calibration_parts(read, prepared, fitted.dt, start, stop)
     count = samples_of(steps, read, prepared.values(), fitted.dt, "--steps")
     with member_executor(workers, scheduler) as executor, progress_bar("Calibrating") as progress:

@@ -137,7 +137,6 @@ def forecast(
     check_place(out)
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.models import is_ensemble, load_model
-    from seakeep.quality import warn_of_runs
     from seakeep.report.comparison import (
         forecast_header,
         forecast_words,
@@ -153,8 +152,8 @@ def forecast(
     read = read_campaign(campaign)
     check_output(out, "forecast", read_files(read, model), forecast_header(identified.states))
     band_options = _band({str(model): identified}, level, band, scheduler, members)
-    prepared = load_prepared(read, names=[run])[run]
-    warn_of_runs([prepared], [*identified.states, *identified.inputs])
+    channels = [*identified.states, *identified.inputs]
+    prepared = load_prepared(read, names=[run], channels=channels)[run]
     first = instant_of(start, read, [prepared], "--start")
     if not isfinite(first):
         raise RequestError(f"--start: received {start[:20]!r}. Give an instant within the run, s.")

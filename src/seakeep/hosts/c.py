@@ -18,7 +18,7 @@ from seakeep.files import MARK, check_output, make_folder, replacing
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
-from seakeep.models.observables import SlowSquare, Term
+from seakeep.models.terms import SlowSquare, Term
 from seakeep.signals.expressions import Text
 
 if TYPE_CHECKING:

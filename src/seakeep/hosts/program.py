@@ -34,7 +34,7 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
     ------
     RequestError
         If the model is an ensemble or another kind, is driven by waves that are carried to a
-        measured surge, or has an observable that was added from outside.
+        measured surge, or has an observable without terms.
     """
     if follows and (is_ensemble(model) or (is_linear(model) and model.errors is None)):
         raise RequestError(
@@ -71,8 +71,8 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
     for bound in () if observed is None else observed.bound:
         if not bound.terms:
             raise RequestError(
-                f"the observable '{bound.labels[0].name}' is Python code from outside seakeep, "
-                "which cannot be exported. Fit the model without it, or run it in Python."
+                f"the observable '{bound.labels[0].name}' states no terms, by which other "
+                "hosts could compute it. Fit the model without it, or run it in Python."
             )
     return model
 

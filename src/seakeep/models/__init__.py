@@ -9,7 +9,7 @@ from seakeep.models.interface import Needs, Signature
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live, load_live
-from seakeep.models.observables import OBSERVABLES, Bound, Expression, Powers, SlowSquares
+from seakeep.models.observables import OBSERVABLES, Expression, Powers, SlowSquares
 from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
 from seakeep.models.readouts import FittedReadOut
@@ -17,6 +17,7 @@ from seakeep.models.registry import KINDS, is_ensemble, load_model
 from seakeep.models.settings import Select
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
 from seakeep.models.summaries import summarize
+from seakeep.models.terms import Bound
 from seakeep.models.validity import outside_training
 
 __all__ = [

@@ -55,6 +55,8 @@ class Constant(LinearKind):
     role: ClassVar[Role] = "reference"
     is_ensemble: ClassVar[bool] = False
     n_members: ClassVar[int] = 1
+    standardize: ClassVar[bool] = False
+    alignment: ClassVar[None] = None
     window: int | None = None
 
     def __post_init__(self) -> None:

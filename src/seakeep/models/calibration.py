@@ -286,7 +286,7 @@ def held_out(
         time = np.asarray(run["time"].values, dtype=float)
         starts = tuple(float(time[at]) for at in places)
         windows = read_windows(signature, {name: run}, [(name, start) for start in starts], steps)
-        with member_series(ensemble, windows, executor, tell) as (series, lost):
+        with member_series(ensemble, [windows], executor, tell) as ((series, lost),):
             values = reduce_members(series, lost, level)
         states = labelled.channel_matrix(run, signature.states, name)
         measured = np.stack([states[at + 1 : at + 1 + steps] for at in places])

@@ -1,8 +1,8 @@
 """Free runs of many members over many windows: the one engine of models, ensembles and studies.
 
 :func:`read_windows` reads what forecasts from several starts in several runs need, the inputs of
-each run once. A model's ``free_runs(windows, members)`` gives arrays; :func:`run_members` hands
-members to an executor, and :func:`group_series` collects them, in a file where they are many.
+each run once. A model's ``free_runs(windows, members)`` gives arrays; :func:`member_series` hands
+members to an executor and collects them, in a file where they are many.
 """
 
 from __future__ import annotations
@@ -637,18 +637,7 @@ def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows)
     return values
 
 
-def run_members(
-    model: Runs,
-    groups: Sequence[Windows],
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-) -> Iterator[list[FloatArray]]:
-    """Free runs member by member, then those that they are centred on, where they are.
-
-    Of each group an array of shape (window, steps, N).
-    """
-    numbers = range(model.n_members + model.is_centred)
-    return in_order(_run_member, (model, groups), numbers, executor, progress)
+Series = tuple[FloatArray, npt.NDArray[np.int64]]
 
 
 def _run_member(data: tuple[Runs, Sequence[Windows]], member: int) -> list[FloatArray]:
@@ -656,51 +645,38 @@ def _run_member(data: tuple[Runs, Sequence[Windows]], member: int) -> list[Float
     return [each[0] for each in model.free_runs(groups, [member])]
 
 
-Series = tuple[FloatArray, npt.NDArray[np.int64]]
-
-
 @contextmanager
 def member_series(
     model: Runs,
-    windows: Windows,
+    groups: Sequence[Windows],
     executor: Executor | None = None,
     progress: Progress | None = None,
-) -> Iterator[Series]:
+) -> Iterator[list[Series]]:
     """Free runs of all members, in a temporary file where they take more than ``HELD`` bytes.
+
+    Each member is identified once.
 
     Parameters
     ----------
     model : Runs
         A model, an ensemble, or members that are held.
-    windows : Windows
-        From :func:`read_windows`.
+    groups : sequence of Windows
+        From :func:`read_groups`.
     executor, progress
         As in :meth:`HankelEnsemble.forecast`.
 
     Yields
     ------
-    series : ndarray, shape (member, window, steps, N)
-        States in physical units; NaN from where a window is lost on. Gone when the block is left.
-    lost : ndarray of int, shape (member, window)
-        First instant lost, or −1.
+    list of (series, lost), one of each group
+        States in physical units, shape (member, window, steps, N), NaN from where a window is lost
+        on and gone when the block is left; and the first instant lost, or −1, shape (member,
+        window).
 
     Raises
     ------
     RequestError
         If the temporary folder has no room.
     """
-    with group_series(model, [windows], executor, progress) as series:
-        yield series[0]
-
-
-@contextmanager
-def group_series(
-    model: Runs,
-    groups: Sequence[Windows],
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-) -> Iterator[list[Series]]:
-    """:func:`member_series` of several groups of windows; each member is identified once."""
     count, channels = model.n_members, len(model.signature.states)
     with ExitStack() as stack:
         runs: list[Series] = [
@@ -710,7 +686,10 @@ def group_series(
             )
             for each in groups
         ]
-        for number, values in enumerate(run_members(model, groups, executor, progress)):
+        # What members are centred on comes after them.
+        numbers = range(count + model.is_centred)
+        members = in_order(_run_member, (model, groups), numbers, executor, progress)
+        for number, values in enumerate(members):
             for (series, lost), each in zip(runs, values, strict=True):
                 if number == count:
                     _centre(series, lost, each)

@@ -391,7 +391,7 @@ class HankelEnsemble(Model):
             As :meth:`HankelDMDcModel.forecast`.
         """
         windows = self.read_windows(*one_run(run, [start]), steps, ahead)
-        with member_series(self, windows, executor, progress) as (series, lost):
+        with member_series(self, [windows], executor, progress) as ((series, lost),):
             return self._single(run, windows, np.array(series[:, 0]), lost, "member")
 
     def forecast_summary(
@@ -496,7 +496,7 @@ class HankelEnsemble(Model):
             As :meth:`forecast`.
         """
         windows = self.read_windows(*one_run(run, starts), steps, ahead)
-        with member_series(self, windows, executor, progress) as (series, lost):
+        with member_series(self, [windows], executor, progress) as ((series, lost),):
             values = np.array(series).swapaxes(0, 1)
         variables = label_channels(self.signature, values, ("window", "member", "lead"))
         status = [statuses(row, windows, window, self.dt) for window, row in enumerate(lost.T)]
@@ -558,7 +558,7 @@ class HankelEnsemble(Model):
         """Statistics (window, 4, steps, N) of all members, and where these were lost."""
         level = fraction(level, "level")
         check_band(self.calibration, level, band)
-        with member_series(self, windows, executor, progress) as (series, lost):
+        with member_series(self, [windows], executor, progress) as ((series, lost),):
             values = reduce_members(series, lost, level)
         return widened(self.calibration, values, band, self.signature, windows), lost
 

@@ -13,7 +13,7 @@ from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
 from seakeep.models.interface import Signature
-from seakeep.models.observables import SlowSquare
+from seakeep.models.terms import SlowSquare
 from seakeep.signals.expressions import Text
 
 if TYPE_CHECKING:

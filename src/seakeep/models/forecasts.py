@@ -15,6 +15,7 @@ from seakeep.arrays import FloatArray, IntArray, Progress, as_real, whole_number
 from seakeep.errors import RequestError, warn
 from seakeep.files import write_sealed
 from seakeep.models import engine, store
+from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.checks import Json, check_choice
 from seakeep.models.engine import Windows, first_lost
 from seakeep.models.html import text_html
@@ -286,12 +287,13 @@ class Model:
             As :meth:`forecast`, or if there is no start.
         """
         windows = self.read_windows(*one_run(run, starts), steps, ahead)
-        ((values,),) = engine.run_members(self, [windows], executor, progress)
+        with engine.member_series(self, [windows], executor, progress) as ((series, lost),):
+            values = np.array(series[0])
         signature = self.signature
         variables = label_channels(signature, values, ("window", "lead"))
         status = [
             status_text(outcome(windows, window, int(at)), signature.dt)
-            for window, at in enumerate(first_lost(values))
+            for window, at in enumerate(lost[0])
         ]
         variables["status"] = xr.Variable(("window",), status)
         return xr.Dataset(
@@ -317,6 +319,18 @@ class Spec(Protocol):
     kind: ClassVar[str]
     role: ClassVar[Role]
     is_ensemble: ClassVar[bool]
+
+    @property
+    def n_members(self) -> int:
+        """Number of members."""
+
+    @property
+    def standardize(self) -> bool:
+        """Whether channels are centred and scaled."""
+
+    @property
+    def alignment(self) -> ProbeAlignment | None:
+        """How measured waves are carried to the vessel."""
 
     def resolved(self, dt: float, encounter_period: float | None) -> Self:
         """Settings whose lengths are samples."""

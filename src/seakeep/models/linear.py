@@ -522,7 +522,7 @@ class HankelDMDcModel(Model):
         export.check_linear(self.signature)
         observed = self.signature.input_map.observed
         if is_file and observed is not None and not all(each.terms for each in observed.bound):
-            is_file = False  # Python code from outside
+            is_file = False  # only Python computes it
         if not is_file and (more := self.regressors[len(self.inputs) :]):
             raise RequestError(
                 f"the model is driven by observables too ({', '.join(more)}), which a state-space "

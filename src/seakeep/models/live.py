@@ -679,7 +679,7 @@ class Live:
             )
         futures, known = self._futures(count, future)
         windows = self._windows(count, futures)
-        with engine.member_series(self.model, windows) as (values, lost):
+        with engine.member_series(self.model, [windows]) as ((values, lost),):
             complete = values[lost.max(axis=1) < 0].reshape(-1, *values.shape[2:])
         conditions, (late, free) = self.conditions, self.consistency_by_state
         worst = np.fmax(np.fmax(late, free), 1.0)

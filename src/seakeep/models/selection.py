@@ -44,9 +44,10 @@ from seakeep.models.executor import in_order
 from seakeep.models.following import LEAD
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.loads import PERIODS, Held, fit_readouts
-from seakeep.models.observables import Observable, Powers, SlowSquares, named
+from seakeep.models.observables import Powers, SlowSquares, named
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
+from seakeep.models.terms import Observable
 from seakeep.models.training import TrainingData, gather, scales_of
 from seakeep.signals import encounter_period, repeated_waves
 from seakeep.signals.waves import is_regular

@@ -30,10 +30,11 @@ from seakeep.models.following import BACK, Following
 from seakeep.models.html import settings_html
 from seakeep.models.inputs import InputMap
 from seakeep.models.interface import Needs, Role
-from seakeep.models.observables import Observable, Observed, observables_of
+from seakeep.models.observables import Observed, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
 from seakeep.models.readouts import ReadOuts, readouts_json, readouts_of
+from seakeep.models.terms import Observable
 from seakeep.toml import Length, parse_length
 
 DelayRows = Literal["ridge", "exact"]

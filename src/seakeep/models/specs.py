@@ -25,7 +25,6 @@ from seakeep.models.forecasts import Spec
 from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel, LinearKind
-from seakeep.models.observables import Observable
 from seakeep.models.parametric import regress_varying
 from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
 from seakeep.models.readouts import FittedReadOut
@@ -45,6 +44,7 @@ from seakeep.models.settings import (
     in_samples,
     periods_to_samples,
 )
+from seakeep.models.terms import Observable
 from seakeep.models.training import (
     TrainingArrays,
     check_names,

@@ -162,8 +162,8 @@ def band_sentence(results: Results) -> str:
     """How much the calibrated band of the recommended ensemble holds; empty without one."""
     if (result := results.get("recommended")) is None:
         return ""
-    table = result.groups["statistics/coverage"]["calibrated_inside"]
-    at = table.sel(model=ENSEMBLE, against="measured", channel="average")
+    table = result.groups["statistics/coverage"]["inside"]
+    at = table.sel(model=ENSEMBLE, band="calibrated", against="measured", channel="average")
     seas = (f"{percent(at.sel(test=test))} % ({result.label_of(test)})" for test in result.tests)
     level = short(100 * float(result.settings["statistics"]["level"]))
     return f"Of the instants, the calibrated {level} % band of (c) holds {', '.join(seas)}."

@@ -23,15 +23,14 @@ from seakeep.campaign import Campaign, load_prepared
 from seakeep.check.parts import samples_in
 from seakeep.conventions import displayed, froude_factor, is_elevation
 from seakeep.core.bootstrap import FEWEST_SAMPLES
+from seakeep.core.metrics import root_mean_square
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_text
-from seakeep.quality import warn_of_runs
 from seakeep.signals import encounter_period
 from seakeep.signals.time_axis import instant_text, span_text
 from seakeep.study.fit import warn_of_repeats, warn_of_waves
-from seakeep.study.judge import MEASURES, window_errors
 from seakeep.study.plan import between, named
 from seakeep.toml import parse_length
 
@@ -150,13 +149,7 @@ def with_degrees(run: xr.Dataset) -> xr.Dataset:
     -------
     Dataset
     """
-    out = run.copy()
-    for name, variable in run.data_vars.items():
-        units = str(variable.attrs.get("units", ""))
-        factor, target = displayed(units)
-        if target != units:
-            out[name] = times(variable, factor).assign_attrs(units=target)
-    return out
+    return _scaled(run, displayed)
 
 
 def compare(model: Model, campaign: Campaign, *where: Any, **how: Any) -> list[Comparison]:
@@ -252,9 +245,8 @@ def compare_models(
             "role = 'test' or a span test = [start, end]."
         )
     check_alike(models)
-    prepared = load_prepared(campaign, names=wanted, progress=progress)
-    used = dict.fromkeys(c for model in models.values() for c in (*model.states, *model.inputs))
-    warn_of_runs(prepared.values(), list(used))
+    used = list(dict.fromkeys(c for m in models.values() for c in (*m.states, *m.inputs)))
+    prepared = load_prepared(campaign, names=wanted, progress=progress, channels=used)
     known_runs = list(prepared.values())
     first = None if start is None else instant_of(start, campaign, known_runs, "start")
     history = max(model.history_samples for model in models.values())
@@ -266,19 +258,25 @@ def compare_models(
         count = None if steps is None else samples_of(steps, campaign, known_runs, dt, "steps")
         compared[label] = []
         for name, run in prepared.items():
-            how: dict[str, Any] = {}
-            if is_ensemble(model):
-                tell = named(members, f"{name}, ")
-                how = {"level": level, "band": band, "executor": executor, "progress": tell}
             time = run["time"].values
             span = run.attrs.get("test_span", (time[0], time[-1]))
             at, last = samples_in(run, used, span, dt, history, lead, first)
-            begin = float(time[at]) if first is None else first
-            each = _compare_run(model, run, name, begin, count or max(last - at, 1), how)
+            window: Any = (
+                run,
+                float(time[at]) if first is None else first,
+                count or max(last - at, 1),
+            )
+            if is_ensemble(model):
+                tell = named(members, f"{name}, ")
+                how: Any = {"level": level, "band": band, "executor": executor, "progress": tell}
+                forecast = model.forecast_summary(*window, **how)
+            else:
+                forecast = model.forecast(*window)
+            each = _judged(model, run, name, forecast)
             compared[label].append(each)
             _warn_of_known(model, each)
             warn_of_waves(model, run, name, each.start, each.measured.sizes["time"])
-            if (until := float(each.forecast.attrs.get("reads_input_until", -1.0))) > 0.0:
+            if (until := float(forecast.attrs.get("reads_input_until", -1.0))) > 0.0:
                 warn(
                     f"the forecast of {name} reads the waves up to {until:.3g} s after the instant "
                     "that it forecasts: the model needs these waves ahead of time."
@@ -313,28 +311,25 @@ def _warn_of_known(model: Model, compared: Comparison) -> None:
             )
 
 
-def _compare_run(
-    model: Model, run: xr.Dataset, name: str, start: float, steps: int, how: Mapping[str, Any]
-) -> Comparison:
-    time = run["time"].values
-    forecast = model.forecast_summary if is_ensemble(model) else model.forecast
-    result = forecast(run, start, steps, **how)
+def _judged(model: Model, run: xr.Dataset, name: str, forecast: xr.Dataset) -> Comparison:
+    """Pair a forecast with what was measured at its instants."""
+    end = run["time"].values[-1]
     # The last instant may lie a step beyond the record: the input before it is known.
-    inside = result[model.states].sel(time=slice(None, time[-1])).assign_attrs(result.attrs)
+    inside = forecast[model.states].sel(time=slice(None, end)).assign_attrs(forecast.attrs)
     if (known := inside.sizes["time"]) < FEWEST_SAMPLES:
         raise RequestError(
-            f"the forecast of {name} from {start:g} s has {known} measured instant(s), and errors "
-            f"are judged over {FEWEST_SAMPLES} or more; the run ends at {time[-1]:g} s. Choose an "
-            "earlier start or more steps."
+            f"the forecast of {name} from {forecast.attrs['start']:g} s has {known} measured "
+            f"instant(s), and errors are judged over {FEWEST_SAMPLES} or more; the run ends at "
+            f"{end:g} s. Choose an earlier start or more steps."
         )
-    instants = {"time": inside["time"]}
+    there = run.sel({"time": inside["time"]})
     has_band = "statistic" in inside.dims
     return Comparison(
         run=name,
         sea_state=str(run.attrs.get("sea_state", "")),
         forecast=inside.sel(statistic="mean", drop=True) if has_band else inside,
-        measured=run[model.states].sel(instants),
-        inputs=run.sel(instants)[model.inputs],
+        measured=there[model.states],
+        inputs=there[model.inputs],
         band=inside.sel(statistic=["lower", "upper"]) if has_band else None,
     )
 
@@ -415,6 +410,12 @@ def _wave_period(inputs: xr.Dataset) -> float:
 
 INTERVAL = 0.95
 """Probability between the bounds of the measures."""
+WITH_BOUNDS = {
+    "nrmse": metrics.nrmse,
+    "nammae": metrics.normalised_extremes_error,
+    "anrmse": metrics.anrmse,
+    "mean_nammae": metrics.nammae,
+}
 UNITS = {"fit": "%", "coverage": "%", "look_ahead": "s"}
 """Of columns of the table that are neither pure numbers nor in the unit of the channel."""
 
@@ -431,22 +432,18 @@ def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
         "noise_std": [comparison.measured[n].attrs.get("noise_std", 0.0) for n in names],
     }
     slack = metrics.is_slack(**pair)
-    errors = dict(zip(MEASURES, window_errors(**pair), strict=True))
+    in_training_sd = root_mean_square(pair["predicted"] - pair["measured"]) / pair["training_std"]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = p.std("time", ddof=1, skipna=False) / m.std("time", ddof=1).where(~slack)
-    columns = {
-        **errors,
+    row: dict[str, Any] = {
+        "training_nrmse": in_training_sd,
+        "training_anrmse": in_training_sd.mean(),
         "fit": metrics.fit_percent(**pair),
         "sd_ratio": ratio.values,
         "measured_min": m.min("time").values,
         "measured_max": m.max("time").values,
         "predicted_min": p.min("time", skipna=False).values,
         "predicted_max": p.max("time", skipna=False).values,
-    }
-    row: dict[str, Any] = {
-        "anrmse": metrics.anrmse(**pair),
-        "training_anrmse": errors["training_nrmse"].mean(),
-        "mean_nammae": metrics.nammae(**pair),
         "slack_channels": int(slack.sum()),
         "status": comparison.status,
         "conditional_on": str(facts.get("conditional_on", "")),
@@ -455,22 +452,16 @@ def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
         "look_ahead": max(float(facts.get("reads_input_until", 0.0)), 0.0),
         "start": comparison.start,
     }
-    if intervals:
-        bounds = {
-            "nrmse": metrics.nrmse(**pair, interval=INTERVAL),
-            "nammae": metrics.normalised_extremes_error(**pair, interval=INTERVAL),
-            "anrmse": metrics.anrmse(**pair, interval=INTERVAL),
-            "mean_nammae": metrics.nammae(**pair, interval=INTERVAL),
-        }
-        for key, (lower, upper) in bounds.items():
-            into = columns if key in errors else row
-            into |= {f"{key}_lower": lower, f"{key}_upper": upper}
+    for key, measure in WITH_BOUNDS.items():
+        row[key] = measure(**pair)
+        if intervals:
+            row[f"{key}_lower"], row[f"{key}_upper"] = measure(**pair, interval=INTERVAL)
     if comparison.band is not None:
         lower, upper = (comparison.band.sel(statistic=key, drop=True) for key in metrics.BOUNDS)
         coverage = statistics.coverage(lower, upper, comparison.measured)
-        columns["coverage"] = inside = 100.0 * coverage["inside"].values
-        columns["band_width"] = coverage["width"].values
-        columns["relative_band_width"] = coverage["relative_width"].values
+        row["coverage"] = inside = 100.0 * coverage["inside"].values
+        row["band_width"] = coverage["width"].values
+        row["relative_band_width"] = coverage["relative_width"].values
         row |= {key: facts[key] for key in ("members", "diverged", "level")}
         row["mean_coverage"] = inside[~slack].mean() if not slack.all() else np.nan
         row["band"] = str(facts.get("band", "members"))
@@ -478,12 +469,8 @@ def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
         row |= {"scale": "full", "scale_factor": comparison.full_scale}
     units = [str(forecast[name].attrs.get("units", "")) for name in names]
     return xr.Dataset(
-        {key: ("channel", values) for key, values in columns.items()} | row,
-        coords={
-            "run": comparison.run,
-            "channel": names,
-            "channel_units": ("channel", units),
-        },
+        {key: ("channel", each) if np.ndim(each) else each for key, each in row.items()},
+        {"run": comparison.run, "channel": names, "channel_units": ("channel", units)},
     )
 
 
@@ -568,22 +555,38 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
     """
     if run.attrs.get("scale") == "full":
         raise RequestError("the run is at full scale already; convert it once.")
-    clock = froude_factor("s", scale)
-    out = run.assign_coords(time=run["time"] * clock)
+
+    def factor_of(unit: str) -> tuple[float, str]:
+        return froude_factor(unit or "1", scale, density_ratio), unit
+
+    clock, _ = factor_of("s")
+    out = _scaled(run, factor_of).assign_coords(time=run["time"] * clock)
     out["time"].attrs = dict(run["time"].attrs)
-    for name, variable in run.drop_vars("status", errors="ignore").data_vars.items():
-        factor = froude_factor(str(variable.attrs.get("units", "1")), scale, density_ratio)
-        out[name] = times(variable.assign_coords(time=out["time"]), factor)
+    for variable in out.data_vars.values():
         if "x_position" in variable.attrs:
-            out[name].attrs["x_position"] = scale * float(variable.attrs["x_position"])
+            variable.attrs["x_position"] = scale * float(variable.attrs["x_position"])
     out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}
     for key in ATTRIBUTES.keys() & run.attrs:
-        by = clock if ATTRIBUTES[key] == "s" else scale
-        value = run.attrs[key]
+        by, value = clock if ATTRIBUTES[key] == "s" else scale, run.attrs[key]
         pair = isinstance(value, tuple | list)
         out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
     if "status" in run.attrs:
         _state_again(out)
+    return out
+
+
+def _scaled(run: xr.Dataset, factor_of: Callable[[str], tuple[float, str]]) -> xr.Dataset:
+    """Multiply channels, and the standard deviations among their attributes, by their factors."""
+    out = run.copy()
+    for name, channel in run.data_vars.items():
+        unit = str(channel.attrs.get("units", ""))
+        if (factor := factor_of(unit)[0]) == 1.0 or channel.dtype.kind not in "fiu":
+            continue
+        known = {"training_std", "noise_std"} & set(channel.attrs)
+        spreads = {key: factor * float(channel.attrs[key]) for key in known}
+        out[name] = (channel * factor).assign_attrs(
+            channel.attrs | spreads | ({"units": factor_of(unit)[1]} if unit else {})
+        )
     return out
 
 
@@ -598,13 +601,6 @@ def _state_again(forecast: xr.Dataset) -> None:
             for at in forecast["diverged_at"].values
         ]
         forecast["status"] = forecast["status"].copy(data=words)
-
-
-def times(channel: xr.DataArray, factor: float) -> xr.DataArray:
-    """Multiply a channel, and the standard deviations among its attributes, by a factor."""
-    known = {"training_std", "noise_std"} & set(channel.attrs)
-    spreads = {key: factor * float(channel.attrs[key]) for key in known}
-    return (channel * factor).assign_attrs(channel.attrs | spreads)
 
 
 def calibration_parts(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -21,7 +21,6 @@ from seakeep.models.settings import Select
 from seakeep.models.specs import left_open
 from seakeep.models.training import until
 from seakeep.models.validity import warn_of_slow_motions
-from seakeep.quality import warn_of_runs
 from seakeep.signals import find_leakage
 from seakeep.study.plan import between
 from seakeep.study.resolve import can_align, counts_in_periods, mistakes_of, resolve_model
@@ -29,10 +28,6 @@ from seakeep.toml import Length, refusal
 
 MAPS = {"alignment", "lead", "observables"}
 """Settings that say how measured inputs drive a model."""
-NOTHING_TRAINS = (
-    "no run of the campaign trains a model. Give one role = 'train', or a span "
-    "train = [start, end]."
-)
 
 
 def training_runs(
@@ -61,14 +56,16 @@ def training_runs(
     """
     runs = {}
     for name, run in prepared.items():
-        if "train_span" not in run.attrs:
+        if (span := run.attrs.get("train_span")) is None:
             continue
-        runs[name] = between(run, run.attrs["train_span"])
+        runs[name] = between(run, span)
         if window is not None and runs[name].sizes["time"] >= window:
-            begin = float(run["time"][0])
-            runs[name] = between(run, (begin, run.attrs["train_span"][1]))
+            runs[name] = between(run, (float(run["time"][0]), span[1]))
     if not runs:
-        raise RequestError(NOTHING_TRAINS)
+        raise RequestError(
+            "no run of the campaign trains a model. Give one role = 'train', or a span "
+            "train = [start, end]."
+        )
     return runs
 
 
@@ -122,7 +119,10 @@ def fit_campaign(
     identified: Model = spec.fit(runs, *channels, stop=stop, **how)
     both = {name: run for name, run in prepared.items() if "test_span" in run.attrs}
     warn_of_repeats(identified, campaign, both)
-    for name, run in (both | _prepared_tests(campaign, both)).items():
+    # Other tests are not prepared for a warning.
+    folder = prepared_folder(campaign)
+    others = [n for n in campaign.test_runs if n not in both and (folder / f"{n}.nc").exists()]
+    for name, run in (both | load_prepared(campaign, names=others)).items():
         begin, end = run.attrs.get("test_span", (run["time"].values[0], run["time"].values[-1]))
         warn_of_waves(identified, run, name, float(begin), round((end - begin) / dt))
     look_ahead = identified.signature.input_map.look_ahead
@@ -132,7 +132,7 @@ def fit_campaign(
             f"forecasts of this model read the waves up to {latest:.3g} s after the instant that "
             "they forecast: it needs these waves ahead of time."
         )
-    if getattr(spec, "standardize", False):
+    if spec.standardize:
         _warn_of_slow_model(identified, runs)
     single: Any = identified.centre if is_ensemble(identified) else identified
     if single is not None and single.settings.role == "model":
@@ -161,10 +161,13 @@ def read_training(
     place = ("model",) if model is None else ("models", model)
     if mistakes := mistakes_of(settings, place):
         raise refusal(campaign.path, "campaign", mistakes)
-    prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
-    if not prepared:
-        raise RequestError(NOTHING_TRAINS)
-    warn_of_runs(prepared.values(), [*settings.states, *settings.inputs])
+    prepared = load_prepared(
+        campaign,
+        names=campaign.training_runs,
+        progress=progress,
+        channels=[*settings.states, *settings.inputs],
+    )
+    runs = training_runs(prepared)
     dt = float(next(iter(prepared.values())).attrs["dt"])
     period = campaign.encounter_period() if counts_in_periods(settings) else None
     aligned = can_align(campaign.settings, settings.inputs)
@@ -176,8 +179,9 @@ def read_training(
     if isinstance(stop, Length):
         stop = None if period is None else stop.at(period)
     needs = spec.needs(dt, period)
-    whole = needs.inside or needs.snapshots == 1 or getattr(spec, "train_on", "") == "windows"
-    return spec, prepared, training_runs(prepared, None if whole else needs.snapshots), stop
+    if not needs.inside and needs.snapshots > 1 and getattr(spec, "train_on", "") != "windows":
+        runs = training_runs(prepared, needs.snapshots)
+    return spec, prepared, runs, stop
 
 
 def fit_baselines(
@@ -249,14 +253,6 @@ def _input_map(spec: Any, settings: Any) -> dict[str, Any]:
     return {name: getattr(settings, name) for name in MAPS & own & others}
 
 
-def _prepared_tests(campaign: Campaign, known: Collection[str]) -> dict[str, xr.Dataset]:
-    """Test runs that `seakeep prepare` has written; the others are not prepared for a warning."""
-    folder = prepared_folder(campaign)
-    names = [name for name in campaign.test_runs if name not in known]
-    names = [name for name in names if (folder / f"{name}.nc").exists()]
-    return load_prepared(campaign, names=names) if names else {}
-
-
 def warn_of_waves(model: Model, run: xr.Dataset, name: str, start: float, steps: int) -> None:
     """Warn of each respect in which a test lies outside what trained the model."""
     for text in outside_training(model, run, start, steps):
@@ -276,24 +272,21 @@ def _warn_of_slow_model(model: Model, runs: Mapping[str, xr.Dataset]) -> None:
 
 
 def repeats_of(
-    model: Model, campaign: Campaign, tested: Mapping[str, xr.Dataset]
+    model: Model, campaign: Campaign, tested: dict[str, xr.Dataset]
 ) -> dict[str, Repeat]:
     """Tests whose input repeats the model's training input, up to a constant phase, by run.
 
     Training runs that the campaign marks as regular waves are left out: regular waves repeat by
     their nature. So are runs that the campaign does not have.
     """
-    if not model.inputs:
-        return {}
     known = campaign.settings.runs
     spans = {
         name: span
         for name, span in model.training_spans.items()
-        if name in known and known[name].waves != "regular"
+        if name in known and known[name].waves != "regular" and model.inputs
     }
-    missing = [name for name in spans if name not in tested]
-    prepared = dict(tested) | (load_prepared(campaign, names=missing) if missing else {})
-    pieces = {name: between(prepared[name], span) for name, span in spans.items()}
+    prepared = load_prepared(campaign, names=[name for name in spans if name not in tested])
+    pieces = {name: between((tested | prepared)[name], span) for name, span in spans.items()}
     repeats: dict[str, Repeat] = {}
     for name, run in tested.items():
         part = run
@@ -309,7 +302,7 @@ def repeats_of(
     return repeats
 
 
-def warn_of_repeats(model: Model, campaign: Campaign, tested: Mapping[str, xr.Dataset]) -> None:
+def warn_of_repeats(model: Model, campaign: Campaign, tested: dict[str, xr.Dataset]) -> None:
     """Warn where a test run's input repeats the model's training input."""
     for repeat in repeats_of(model, campaign, tested).values():
         warn(f"{repeat} This test shows memory, not skill: test on another run.")

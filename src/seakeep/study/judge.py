@@ -141,7 +141,21 @@ def lost_forecasts(groups: Mapping[str, xr.Dataset], tests: Iterable[str]) -> xr
             at = test.isel(model=model, training=training, window=window)
             cell = {key: at[key].item() for key in ("model", "training", "window", "run", "start")}
             rows.append(cell | {"test": name})
-    return xr.Dataset({key: ("cell", [r[key] for r in rows]) for key in rows[0]}) if rows else None
+    return along("cell", rows) if rows else None
+
+
+def along(dim: str, rows: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+    """Rows of the same keys as variables along a dimension, which may be one of them."""
+    return xr.Dataset({key: (dim, [row[key] for row in rows]) for key in rows[0]})
+
+
+def side_by_side(
+    grid: Sequence[Sequence[xr.Dataset]], names: Mapping[str, Any], fill: Any = np.nan
+) -> xr.Dataset:
+    """Datasets over two new dimensions, first that of the rows."""
+    how: Any = {"join": "outer", "combine_attrs": "override", "fill_value": fill}
+    out = xr.combine_nested(grid, list(names), **how).assign_coords(names)
+    return out.transpose(*names, ...)
 
 
 def words_of_lost(lost: xr.Dataset) -> str:
@@ -159,7 +173,7 @@ def words_of_lost(lost: xr.Dataset) -> str:
     )
 
 
-def _table(
+def numbered(
     values: npt.ArrayLike, dims: tuple[str, ...], numbers: Sequence[str], coords: Mapping[str, Any]
 ) -> xr.Dataset:
     """An array as a Dataset, one variable per entry of its dimension ``number``."""
@@ -196,7 +210,7 @@ def difference_table(
         "channel": _names(test),
     }
     values = np.stack([ratio(cells[None])[0], *bounds]) - 1.0
-    return _table(values, ("number", *coords), ("change", "lower", "upper"), coords)
+    return numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
 
 
 def _names(test: xr.Dataset) -> list[str]:
@@ -237,14 +251,11 @@ def training_order(training: xr.Dataset) -> tuple[npt.NDArray[np.intp], int]:
 
 def median_of(cells: FloatArray) -> FloatArray:
     """Median along the second axis, NaN left out: a tenth of the time of ``nanmedian``."""
-    ordered = np.sort(cells, axis=1)  # NaN last
+    ordered = np.sort(cells, axis=1)  # NaN last, and first where there is nothing else
     count = np.isfinite(ordered).sum(axis=1, keepdims=True)
     low, high = np.maximum(count - 1, 0) // 2, count // 2
-    both = [
-        np.take_along_axis(ordered, np.minimum(at, cells.shape[1] - 1), axis=1)
-        for at in (low, high)
-    ]
-    out: FloatArray = np.where(count > 0, 0.5 * (both[0] + both[1]), np.nan)[:, 0]
+    pair = np.take_along_axis(ordered, np.concatenate([low, high], axis=1), axis=1)
+    out: FloatArray = pair.mean(axis=1)
     return out
 
 
@@ -285,7 +296,7 @@ def box_table(test: xr.Dataset) -> xr.Dataset:
     cells = with_average(test["error"].values[:, :, test["judged"].values])
     coords = {"model": test["model"], "measure": test["measure"], "channel": _names(test)}
     values = np.apply_along_axis(box, 2, cells)  # (model, measure, number, channel)
-    return _table(values, ("model", "measure", "number", "channel"), BOX, coords)
+    return numbered(values, ("model", "measure", "number", "channel"), BOX, coords)
 
 
 COVERAGE = ("inside", "below", "above", "relative_width")
@@ -297,9 +308,9 @@ def band_tables(
 ) -> dict[str, xr.Dataset]:
     """How bands hold the measurement; empty without ensembles.
 
-    ``coverage`` over (model, against, channel) is the fraction of the instants at which a band
-    holds the measurement, and the truth where it is known, averages over all cells; with a
-    calibration the same of the calibrated band as ``calibrated_inside`` and so on. ``bands`` over
+    ``coverage`` over (model, band, against, channel) is the fraction of the instants at which a
+    band holds the measurement, and the truth where it is known, averages over all cells; the band
+    is that of the members or, with a calibration, the calibrated one too. ``bands`` over
     (model, band, part, channel) has coverage, width, Winkler score and CRPS of all instants, of
     thirds by wave height, and of thirds of the horizon; it is left out where no band can be judged.
     """
@@ -316,42 +327,39 @@ def band_tables(
     known = "wave_height" in test and np.isfinite(test["wave_height"]).all()
     waves = cells("wave_height") if known else None
     bands = {"members": None} | ({} if calibration is None else {"calibrated": calibration})
-    shares: dict[str, list[Any]] = defaultdict(list)
-    parts = {}
+    shares, parts = [], {}
     for model, band in product(ensembles, bands):
         lower, upper = (bound[judged] for bound in band_of(test, model, bands[band]))
-        rows = [_coverage_row(lower, upper, each) for each in against.values()]
-        prefix = "" if band == "members" else f"{band}_"
-        for key, values in zip(COVERAGE, zip(*rows, strict=True), strict=True):
-            shares[prefix + key].append(values)
+        shares += [_coverage_row(lower, upper, each) for each in against.values()]
         if not np.isnan(lower).any(axis=(1, 2)).all():  # lost, or nothing to calibrate on
             parts[model, band] = statistics.coverage_table(
                 lower, upper, against["measured"], level, waves
             )
-    over = {"model": ensembles, "against": list(against), "channel": _names(test)}
-    out = {"coverage": xr.Dataset({key: (tuple(over), each) for key, each in shares.items()}, over)}
+    over = {"model": ensembles, "band": list(bands)}
+    shape = len(ensembles), len(bands)
+    grid = np.reshape(shares, (*shape, len(against), len(COVERAGE), -1))
+    coords = {**over, "against": list(against), "channel": _names(test)}
+    out = {"coverage": numbered(grid, (*over, "against", "number", "channel"), COVERAGE, coords)}
     if parts:
-        names = list(next(iter(parts.values())).parts)
-        nothing = dict.fromkeys(PARTS, np.full((len(names), test.sizes["channel"]), np.nan))
-        grid = [
-            [[vars(parts[at])[key] if at in parts else nothing[key] for key in PARTS] for at in row]
-            for row in ([(model, band) for band in bands] for model in ensembles)
+        first = next(iter(parts.values()))
+        nothing = np.full((len(PARTS), len(first.parts), test.sizes["channel"]), np.nan)
+        scores = [
+            [getattr(parts[at], key) for key in PARTS] if at in parts else nothing
+            for at in product(ensembles, bands)
         ]
-        over = {"model": ensembles, "band": list(bands), "part": names, "channel": test["channel"]}
-        out["bands"] = _table(grid, ("model", "band", "number", "part", "channel"), PARTS, over)
+        grid = np.reshape(scores, (*shape, *nothing.shape))
+        coords = {**over, "part": list(first.parts), "channel": test["channel"]}
+        out["bands"] = numbered(grid, (*over, "number", "part", "channel"), PARTS, coords)
     return out
 
 
-def _coverage_row(lower: FloatArray, upper: FloatArray, against: FloatArray) -> list[list[float]]:
+def _coverage_row(lower: FloatArray, upper: FloatArray, against: FloatArray) -> FloatArray:
     """Coverage over the judged cells, shape (number, 1 + channel): the average first."""
     known = np.isfinite(against).all(axis=(0, 1))
     band = statistics.coverage(lower, upper, np.where(known, against, 0.0))
-    rows = []
-    for number in COVERAGE:
-        each = getattr(band, number)
-        each = np.where(known & np.isfinite(each), each, np.nan)
-        rows.append([float(average_of(average_of(each))), *average_of(each.T)])
-    return rows
+    each = np.stack([getattr(band, number) for number in COVERAGE])  # (number, cell, channel)
+    each[~(known & np.isfinite(each))] = np.nan
+    return average_of(with_average(each).swapaxes(1, 2))
 
 
 def band_of(
@@ -407,8 +415,8 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
         change, level, growth, rng=rng, blocks=blocks, n_series=DIFFERENCES, signed=True
     )
     values = np.stack([change(level.values[None], growth.values[None])[0], *bounds])
-    growths = _table(values, ("number", *coords), ("change", "lower", "upper"), coords)
-    lines = _table(series, (*coords, "number", "time"), TREND_LINES, {**coords, "time": time})
+    growths = numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
+    lines = numbered(series, (*coords, "number", "time"), TREND_LINES, {**coords, "time": time})
     return xr.merge([growths, lines])
 
 
@@ -476,9 +484,9 @@ def density_tables(
         else:
             table[m, c], curves[m, c] = each
     both = {**coords, "variant": list(VARIANTS)}
-    divergence = _table(table, (*both, "number"), DIVERGENCE, both)
+    divergence = numbered(table, (*both, "number"), DIVERGENCE, both)
     divergence["diverged_series"] = ("model", diverged)
-    densities = _table(curves, (*coords, "number", "grid"), CURVES, coords)
+    densities = numbered(curves, (*coords, "number", "grid"), CURVES, coords)
     return {
         "divergence": divergence.assign_attrs(test=name),
         "densities": densities.assign_attrs(test=name),
@@ -547,7 +555,7 @@ def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
         phase = np.degrees(np.angle(np.nanmean(answer / np.abs(answer), axis=1)))
         ratio = np.nanmedian(np.abs(answer), axis=1)
     coords = {"model": data["model"], "channel": data["channel"]}
-    return _table([*errors, ratio, phase], ("number", "model", "channel"), RESPONSE, coords)
+    return numbered([*errors, ratio, phase], ("number", "model", "channel"), RESPONSE, coords)
 
 
 def _responses(groups: Mapping[str, xr.Dataset], test: str) -> tuple[FloatArray, ComplexArray]:

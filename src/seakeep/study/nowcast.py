@@ -15,7 +15,6 @@ from seakeep.models import Model, is_ensemble
 from seakeep.models.labelled import channel_matrix
 from seakeep.models.live import Servable, held_samples
 from seakeep.models.registry import is_linear
-from seakeep.quality import warn_of_runs
 from seakeep.study.comparison import samples_of
 
 STARTS = 24
@@ -70,8 +69,8 @@ def nowcasts(
                 "delayed states to estimate. Name a Hankel or ARX model."
             )
         every[name] = follows
-    prepared = load_prepared(campaign, names=list(runs) or campaign.test_runs)
-    warn_of_runs(prepared.values(), {c for m in models.values() for c in (*m.states, *m.inputs)})
+    channels = {c for m in models.values() for c in (*m.states, *m.inputs)}
+    prepared = load_prepared(campaign, names=list(runs) or campaign.test_runs, channels=channels)
     longest = steps or f"{PERIODS} T"
     out: dict[str, list[xr.Dataset]] = {name: [] for name in models}
     for done, (name, key) in enumerate(product(every, prepared), 1):

@@ -24,6 +24,8 @@ from seakeep.study.resolve import ResolvedModel, can_align, resolve_model
 from seakeep.study.settings import Study, StudySettings, TestSetSettings, TrainingSettings
 
 Runs = Mapping[str, xr.Dataset]
+Span = tuple[str, float, float]
+"""Run, first and last instant, s."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class TrainingSet:
     """
 
     name: str
-    spans: tuple[tuple[str, float, float], ...]
+    spans: tuple[Span, ...]
     left_out: tuple[str, ...] = ()
 
     def may_test(self, run: str) -> bool:
@@ -102,13 +104,12 @@ def _samples(run: xr.Dataset, span: tuple[float, float]) -> tuple[int, int]:
     return first, last
 
 
-def trained_parts(sets: Iterable[TrainingSet], runs: Runs) -> dict[str, xr.Dataset]:
-    """Part of each run from the first to the last instant that some training sets may read."""
-    spans: dict[str, list[float]] = {}
-    for each in sets:
-        for name, begin, stop in each.spans:
-            spans.setdefault(name, []).extend((begin, stop))
-    return {name: between(runs[name], (min(ends), max(ends))) for name, ends in spans.items()}
+def parts_of(runs: Runs, spans: Iterable[Span]) -> dict[str, xr.Dataset]:
+    """Part of each run from the start of its first to the end of its last span."""
+    edges: dict[str, list[float]] = {}
+    for name, *ends in spans:
+        edges.setdefault(name, []).extend(ends)
+    return {name: between(runs[name], (min(ends), max(ends))) for name, ends in edges.items()}
 
 
 def choose_training(
@@ -136,8 +137,10 @@ def choose_training(
             f"training: the run '{missing[0]}' has no training span in the campaign. Give it "
             "role = 'train' or a span train = [start, end], or use scheme = 'leave_out'."
         )
-    times = {n: whole_span(runs[n]) if groups else runs[n].attrs["train_span"] for n in names}
-    spans = {name: _samples(runs[name], span) for name, span in times.items()}
+    spans = {
+        name: _samples(run, whole_span(run) if groups else run.attrs["train_span"])
+        for name, run in ((name, runs[name]) for name in names)
+    }
     longest = max(spans, key=lambda name: spans[name][1] - spans[name][0])
     needed = training_samples(needs)
     for name in [longest] if training.scheme == "halves" else names:
@@ -149,27 +152,27 @@ def choose_training(
                 f"({needs.snapshots} snapshots and {needs.history} of delay history, "
                 f"{needed * dt:g} s). Shorten window or the delays, or give longer runs."
             )
+
+    def part(name: str, last: int) -> Span:
+        time = runs[name]["time"].values
+        return name, float(time[spans[name][0]]), float(time[last])
+
+    whole = {name: part(name, last) for name, (_, last) in spans.items()}
     if groups:
         return tuple(
             TrainingSet(
                 f"without {group[0]}" + (f" (+{len(group) - 1})" if len(group) > 1 else ""),
-                tuple((name, *times[name]) for name in names if name not in group),
+                tuple(whole[name] for name in names if name not in group),
                 tuple(group),
             )
             for group in groups.values()
         )
-
-    def part(name: str, first: int, last: int) -> tuple[str, float, float]:
-        time = runs[name]["time"].values
-        return name, float(time[first]), float(time[last])
-
     if training.scheme == "pooled":
-        return (TrainingSet("pooled", tuple(part(name, *span) for name, span in spans.items())),)
+        return (TrainingSet("pooled", tuple(whole.values())),)
     rng, remedy = random_stream(settings.study.seed, "training"), "shorten the training length"
     places = _places("training", training, spans, needed, needs.snapshots, rng, remedy)
     return tuple(
-        TrainingSet(f"t{number:02d}", (part(name, spans[name][0], stop),))
-        for number, (name, stop) in enumerate(places)
+        TrainingSet(f"t{number:02d}", (part(*place),)) for number, place in enumerate(places)
     )
 
 
@@ -299,6 +302,8 @@ class Plan:
         Training data of the members.
     tests : dict of str to tuple of TestWindow
         What they are judged on.
+    runs : dict of str to Dataset
+        Prepared runs.
     calibrated_on : tuple of str
         Runs that train, if bands are to be calibrated on them.
     """
@@ -312,6 +317,7 @@ class Plan:
     needs: Needs
     training: tuple[TrainingSet, ...]
     tests: dict[str, tuple[TestWindow, ...]]
+    runs: dict[str, xr.Dataset]
     calibrated_on: tuple[str, ...] = ()
 
     @property
@@ -324,8 +330,17 @@ class Plan:
         """Names of the models that have members."""
         return [name for name, each in self.models.items() if each.spec.is_ensemble]
 
+    @property
+    def windows(self) -> list[TestWindow]:
+        """Windows of all test sets."""
+        return [each for windows in self.tests.values() for each in windows]
 
-def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dict[str, xr.Dataset]]:
+    def taught(self, spans: Iterable[Span]) -> tuple[dict[str, xr.Dataset], list[str], list[str]]:
+        """What a spec is fitted to: parts of runs, states, inputs."""
+        return parts_of(self.runs, spans), list(self.states), list(self.inputs)
+
+
+def make_plan(study: Study, progress: Progress | None = None) -> Plan:
     """Prepare the runs of a study and choose its windows."""
     settings, campaign = study.settings, study.campaign
     general = settings.study
@@ -375,7 +390,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
                     f"tests.{name}: no model may be tested on the run '{window.run}', because all "
                     "learn from it. Leave it out of training.runs, or name other runs."
                 )
-    plan = Plan(
+    return Plan(
         settings,
         study.states,
         study.inputs,
@@ -385,9 +400,9 @@ def make_plan(study: Study, progress: Progress | None = None) -> tuple[Plan, dic
         needs,
         training,
         tests,
+        runs,
         tuple(training_names) if settings.calibrates else (),
     )
-    return plan, runs
 
 
 def _test_runs(study: Study, name: str) -> list[str]:
@@ -433,16 +448,16 @@ def _check_channels(name: str, run: xr.Dataset, channels: list[str]) -> None:
             )
 
 
-def warn_of_slow_study(plan: Plan, runs: Mapping[str, xr.Dataset]) -> None:
+def warn_of_slow_study(plan: Plan) -> None:
     """Warn once for a study, of the model and training set that hold the fewest slow periods."""
     trained = {}
     for model, spec in plan.specs.items():
-        snapshots = needs_of([spec], plan.dt, plan.encounter_period).snapshots
-        longest = (snapshots - 1) * plan.dt if snapshots > 1 else float("inf")
-        for each in plan.training if getattr(spec, "standardize", False) else ():
+        snapshots = spec.needs(plan.dt, plan.encounter_period).snapshots
+        longest = (snapshots - 1) * plan.dt if snapshots > 1 else np.inf
+        for each in plan.training if spec.standardize else ():
             seconds = sum(min(stop - begin, longest) for _, begin, stop in each.spans)
             trained[f"the training windows of '{model}' in '{each.name}'"] = seconds
     if trained:
         where = min(trained, key=trained.__getitem__)
-        parts, states = trained_parts(plan.training, runs), list(plan.states)
+        parts, states, _ = plan.taught(span for each in plan.training for span in each.spans)
         warn_of_slow_motions(parts, states, trained[where], plan.encounter_period, where)

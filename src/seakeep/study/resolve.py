@@ -55,11 +55,6 @@ class ResolvedModel:
     spec: Spec
     sources: Mapping[str, Source]
 
-    @property
-    def n_members(self) -> int:
-        """Number of members, 1 of a single model."""
-        return int(getattr(self.spec, "n_members", 1))
-
     def to_json(self) -> dict[str, Any]:
         """Kind, preset, number of members, and value and source of each key, as JSON values."""
         values = _values(self.spec)
@@ -68,7 +63,7 @@ class ResolvedModel:
             "preset": self.preset,
             "role": self.spec.role,
             "ensemble": self.spec.is_ensemble,
-            "n_members": self.n_members,
+            "n_members": self.spec.n_members,
             "settings": {
                 key: {"value": value, "source": self.sources[key]} for key, value in values.items()
             },

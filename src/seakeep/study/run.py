@@ -11,7 +11,7 @@ from pathlib import Path
 import xarray as xr
 
 from seakeep.arrays import Progress
-from seakeep.errors import SeakeepError, warn
+from seakeep.errors import warn
 from seakeep.models.executor import WorkerLostError, as_finished
 from seakeep.study.describe import describe_study, words_of_repeats
 from seakeep.study.judge import judge, words_of_lost
@@ -27,9 +27,6 @@ from seakeep.study.store import (
     write_result,
 )
 from seakeep.study.units import Unit, collect, compute_task, facts_of, tasks_of, units_of
-
-Data = tuple[Plan, dict[str, xr.Dataset], Groups]
-"""What workers read: the plan, the runs, and facts of the windows."""
 
 
 def run_study(
@@ -97,21 +94,19 @@ def run_study(
             return write_result(out, {**result.attrs, **labels}, result.groups, hand_on)
         hand_on(result)
         return result
-    plan, runs = make_plan(study, named(report, "preparing "))
-    warn_of_slow_study(plan, runs)
-    taken = _taken(plan)
+    plan = make_plan(study, named(report, "preparing "))
+    warn_of_slow_study(plan)
     folder.open(study.name)
     with folder.alone():
         result = _finished(study, out, report)  # by another process, meanwhile
         if result is None:
-            units = units_of(plan)
-            facts = facts_of(study, plan, runs)
-            _compute_all((plan, runs, facts), folder, units, executor, report, taken)
-            report(len(units), len(units), "statistics and densities")
-            groups = describe_study(study, plan, runs)
+            facts = facts_of(study, plan)
+            computed = _computed(plan, facts, folder, executor, report)
+            report(len(computed), len(computed), "statistics and densities")
+            groups = describe_study(study, plan)
             if "repeats" in groups:
                 warn(words_of_repeats(groups["repeats"]))
-            groups |= collect(plan, facts, lambda unit: _groups(folder, unit))
+            groups |= collect(plan, facts, computed)
             groups |= judge(groups, study.settings, list(plan.states), executor)
             if "statistics/lost" in groups:
                 warn(words_of_lost(groups["statistics/lost"]))
@@ -122,16 +117,6 @@ def run_study(
             hand_on(result)
         folder.clear()
     return result
-
-
-def _groups(folder: UnitFolder, unit: Unit) -> Groups:
-    groups = folder.read(unit.name)
-    if groups is None:
-        raise SeakeepError(
-            f"the file {unit.name}.nc in {folder.folder} is missing or damaged. Run the study "
-            "again."
-        )
-    return groups
 
 
 def _finished(study: Study, out: Path, report: Progress) -> StudyResult | None:
@@ -157,7 +142,7 @@ def _labels(study: Study) -> dict[str, str]:
 
 def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
     general = study.settings.study
-    alignments = [getattr(spec, "alignment", None) for spec in plan.specs.values()]
+    alignments = [each.spec.alignment for each in plan.models.values()]
     # Measured output that a forecast reads after its start.
     read = [each.surge_channel for each in alignments if each and each.surge == "measured"]
     return {
@@ -176,40 +161,33 @@ def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
     }
 
 
-def _taken(plan: Plan) -> str:
-    """Say how much will be forecast."""
-    members = sum(each.n_members for each in plan.models.values())
-    windows = [each for test in plan.tests.values() for each in test]
-    judged = [each.steps for t in plan.training for each in windows if t.may_test(each.run)]
-    mebibytes = 8 * members * sum(judged) * len(plan.states) / 2**20
-    return f"{members * len(judged)} forecasts of {mebibytes:.3g} MiB"
-
-
-def _compute_all(
-    data: Data,
-    folder: UnitFolder,
-    units: list[Unit],
-    executor: Executor | None,
-    report: Progress,
-    taken: str,
-) -> None:
-    plan, *_ = data
-    left = [unit for unit in units if folder.read(unit.name) is None]
-    done, items = len(units) - len(left), deque(tasks_of(plan, left))
-    report(done, len(units), f"fitting and forecasting, {taken}")
+def _computed(
+    plan: Plan, facts: Groups, folder: UnitFolder, executor: Executor | None, report: Progress
+) -> dict[Unit, Groups]:
+    """Groups of all units: those that the folder holds, and others once they are written there."""
+    units = units_of(plan)
+    known = {unit: folder.read(unit.name) for unit in units}
+    done = {unit: groups for unit, groups in known.items() if groups is not None}
+    items = deque(tasks_of(plan, [unit for unit in units if unit not in done]))
+    members = sum(each.spec.n_members for each in plan.models.values())
+    steps = [w.steps for each in plan.training for w in plan.windows if each.may_test(w.run)]
+    mebibytes = 8 * members * sum(steps) * len(plan.states) / 2**20
+    taken = f"{members * len(steps)} forecasts of {mebibytes:.3g} MiB"
+    report(len(done), len(units), f"fitting and forecasting, {taken}")
     try:
-        for task, computed in as_finished(_work, data, items, executor):
+        for task, computed in as_finished(_work, (plan, facts), items, executor):
             for unit, groups in zip(task, computed, strict=True):
                 folder.write(unit.name, groups)
-                done += 1
+                done[unit] = groups
                 name = plan.training[unit.training].name
-                report(done, len(units), f"{unit.model}, training set {name}")
+                report(len(done), len(units), f"{unit.model}, training set {name}")
     except WorkerLostError as error:
         raise WorkerLostError(
             f"{error} What was finished is kept: the same command continues where it stopped."
         ) from None
+    return {unit: done[unit] for unit in units}
 
 
-def _work(data: Data, task: tuple[Unit, ...]) -> list[Groups]:
+def _work(data: tuple[Plan, Groups], task: tuple[Unit, ...]) -> list[Groups]:
     """Groups of some units, which come back to be written: a worker may have another disk."""
     return compute_task(*data, task)

@@ -21,9 +21,19 @@ from seakeep.campaign.settings import ModelSettings
 from seakeep.errors import did_you_mean
 from seakeep.files import expanded, is_there, sha256_of
 from seakeep.study.resolve import mistakes_of
-from seakeep.toml import Count, Mistake, Names, Positive, Table, read_toml, refusal, validated
+from seakeep.toml import (
+    Count,
+    Mistake,
+    Names,
+    Positive,
+    Table,
+    optional,
+    read_toml,
+    refusal,
+    validated,
+)
 
-FORMAT = 9
+FORMAT = 10
 """Goes into digest and result: raise it when the same settings give other arrays than before."""
 
 Preset = Literal["paper", "recommended"]
@@ -34,55 +44,49 @@ class GeneralStudySettings(Table):
     """``[study]``: which campaign, which channels, which preset, which seed."""
 
     campaign: str = Field(description="the campaign file, relative to the study file")
-    name: str = Field(default="", description="a name for titles and tables")
-    description: str = Field(default="", description="free text")
-    model: str | None = Field(
-        default=None, description="key of the campaign's [models.NAME] whose channels are used"
+    name: str = optional("a name for titles and tables", "")
+    description: str = optional("free text", "")
+    model: str | None = optional("key of the campaign's [models.NAME] whose channels are used")
+    states: Names = optional("list of channels that the models forecast", ())
+    inputs: Names = optional("list of channels that drive the models", ())
+    preset: Preset = optional("'paper' or 'recommended', for models that state no other", "paper")
+    seed: Annotated[int, Field(ge=0, lt=2**64)] = optional(
+        "an integer, 0 or more and below 2^64", 0
     )
-    states: Names = Field(default=(), description="list of channels that the models forecast")
-    inputs: Names = Field(default=(), description="list of channels that drive the models")
-    preset: Preset = Field(
-        default="paper", description="'paper' or 'recommended', for models that state no other"
+    encounter_period: Positive | None = optional(
+        "seconds, that lengths are multiples of; left out, the campaign's"
     )
-    seed: Annotated[int, Field(ge=0, lt=2**64)] = Field(
-        default=0, description="an integer, 0 or more and below 2^64"
-    )
-    encounter_period: Positive | None = Field(
-        default=None, description="seconds, that lengths are multiples of; left out, the campaign's"
-    )
-    truth: str | None = Field(
-        default=None, description="folder of RUN.nc with the true channels (the virtual tank's)"
-    )
+    truth: str | None = optional("folder of RUN.nc with the true channels (the virtual tank's)")
 
 
 class StudyModelSettings(ModelSettings):
     """``[models.NAME]`` of a study: as in a campaign, with the study's channels and preset."""
 
-    states: Names = Field(default=(), description="left out: the study's")
-    inputs: Names = Field(default=(), description="left out: the study's")
+    states: Names = optional("left out: the study's", ())
+    inputs: Names = optional("left out: the study's", ())
 
 
 class TrainingSettings(Table):
     """``[training]``: what the models learn from."""
 
-    scheme: Literal["halves", "pooled", "leave_out"] = Field(
-        default="halves",
-        description="'halves' (windows of the training spans), 'pooled' (all training spans at "
+    scheme: Literal["halves", "pooled", "leave_out"] = optional(
+        "'halves' (windows of the training spans), 'pooled' (all training spans at "
         "once) or 'leave_out' (all runs but those that test)",
+        "halves",
     )
-    runs: Names = Field(default=(), description="list of runs; left out, the training runs")
-    leave_out: Literal["auto", "run", "sea_state"] = Field(
-        default="auto",
-        description="'auto', a run and those that repeat its waves; 'run', a run alone; "
+    runs: Names = optional("list of runs; left out, the training runs", ())
+    leave_out: Literal["auto", "run", "sea_state"] = optional(
+        "'auto', a run and those that repeat its waves; 'run', a run alone; "
         "'sea_state', all runs of one sea state at once",
+        "auto",
     )
-    windows: Count | None = Field(
-        default=10,
-        description="a number of training windows, with placement = 'apart' at most; belongs to "
+    windows: Count | None = optional(
+        "a number of training windows, with placement = 'apart' at most; belongs to "
         "scheme = 'halves'",
+        10,
     )
-    placement: Placement = Field(
-        default="random", description="'random' as in the paper, or 'apart': without overlap"
+    placement: Placement = optional(
+        "'random' as in the paper, or 'apart': without overlap", "random"
     )
 
     @model_validator(mode="after")
@@ -103,76 +107,69 @@ class TestSetSettings(Table):
 
     __test__ = False  # not a test class, although pytest would collect it by its name
 
-    runs: Names = Field(default=(), description="list of runs; left out, the test runs")
-    waves: Literal["regular", "irregular"] | None = Field(
-        default=None,
-        description="'regular' or 'irregular': only such runs; a run whose waves are not stated "
-        "counts as irregular",
+    runs: Names = optional("list of runs; left out, the test runs", ())
+    waves: Literal["regular", "irregular"] | None = optional(
+        "'regular' or 'irregular': only such runs; a run whose waves are not stated "
+        "counts as irregular"
     )
-    windows: Count | None = Field(
-        default=10, description="number of test windows; with placement = 'apart' at most"
+    windows: Count | None = optional("number of test windows; with placement = 'apart' at most", 10)
+    length: Positive = optional("length of a window in encounter periods", 15.0)
+    placement: Placement = optional(
+        "'random' as in the paper, or 'apart': without overlap", "random"
     )
-    length: Positive = Field(default=15.0, description="length of a window in encounter periods")
-    placement: Placement = Field(
-        default="random", description="'random' as in the paper, or 'apart': without overlap"
+    part: Literal["test", "whole"] | None = optional(
+        "where windows are placed: in the 'test' spans, or in 'whole' runs; left out, "
+        "in whole runs with scheme = 'leave_out' alone"
     )
-    part: Literal["test", "whole"] | None = Field(
-        default=None,
-        description="where windows are placed: in the 'test' spans, or in 'whole' runs; left out, "
-        "in whole runs with scheme = 'leave_out' alone",
+    startup: Annotated[float, Field(ge=0, allow_inf_nan=False)] = optional(
+        "seconds cut off the start of each test span", 0.0
     )
-    startup: Annotated[float, Field(ge=0, allow_inf_nan=False)] = Field(
-        default=0.0, description="seconds cut off the start of each test span"
-    )
-    label: str = Field(default="", description="words for titles")
+    label: str = optional("words for titles", "")
 
 
 class StatisticsSettings(Table):
     """``[statistics]``: bootstrap and bands."""
 
-    n_series: Annotated[int, Field(ge=2)] = Field(
-        default=100, description="number of bootstrapped series, 2 or more"
+    n_series: Annotated[int, Field(ge=2)] = optional(
+        "number of bootstrapped series, 2 or more", 100
     )
-    level: Annotated[float, Field(gt=0, lt=1)] = Field(
-        default=0.95, description="probability of the band, such as 0.95"
+    level: Annotated[float, Field(gt=0, lt=1)] = optional(
+        "probability of the band, such as 0.95", 0.95
     )
-    split_period: Positive = Field(
-        default=3.0,
-        description="period between the low-frequency and the wave-frequency band of ε(t), in "
+    split_period: Positive = optional(
+        "period between the low-frequency and the wave-frequency band of ε(t), in "
         "encounter periods",
+        3.0,
     )
-    calibrate: bool | None = Field(
-        default=None,
-        description="whether the bands of ensembles are calibrated too, on training data that "
-        "members have not read; left out, with preset = 'recommended' alone",
+    calibrate: bool | None = optional(
+        "whether the bands of ensembles are calibrated too, on training data that "
+        "members have not read; left out, with preset = 'recommended' alone"
     )
-    scale: Literal["spread", "constant", "learnt"] = Field(
-        default="spread",
-        description="what the half-width of a calibrated band follows: 'spread', that of the "
+    scale: Literal["spread", "constant", "learnt"] = optional(
+        "what the half-width of a calibrated band follows: 'spread', that of the "
         "members with a floor, 'constant', the members' band moved by as much everywhere, or "
         "'learnt' from spread, horizon and waves",
+        "spread",
     )
-    densities_of: str | None = Field(
-        default=None, description="the test set whose densities are compared; left out, the first"
+    densities_of: str | None = optional(
+        "the test set whose densities are compared; left out, the first"
     )
 
 
 class OutputSettings(Table):
     """``[output]``: what is kept beside the arrays that are judged, and what a report shows."""
 
-    shown_windows: Annotated[int, Field(ge=0)] = Field(
-        default=2, description="windows of the first test set that figures show; of the others one"
+    shown_windows: Annotated[int, Field(ge=0)] = optional(
+        "windows of the first test set that figures show; of the others one", 2
     )
-    eigenvalues: bool = Field(default=True, description="true or false")
-    regularisation: bool = Field(
-        default=False,
-        description="whether single models with delay_rows = 'ridge' are identified without λ and "
+    eigenvalues: bool = optional("true or false", True)
+    regularisation: bool = optional(
+        "whether single models with delay_rows = 'ridge' are identified without λ and "
         "by truncated singular values too, to compare stability, time and error",
+        False,
     )
-    paper: bool = Field(
-        default=False,
-        description="whether the report puts the paper's published divergences beside those of "
-        "the study",
+    paper: bool = optional(
+        "whether the report puts the paper's published divergences beside those of the study", False
     )
 
 

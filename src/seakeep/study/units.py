@@ -7,10 +7,8 @@ by name; :func:`collect` puts those of all units side by side, along models and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -24,9 +22,8 @@ from seakeep.conventions import is_elevation
 from seakeep.core import embed, metrics
 from seakeep.errors import DataError, SeakeepError
 from seakeep.formats.netcdf import opened_netcdf
-from seakeep.models import Spec
-from seakeep.models.calibration import Judged, envelope_of, held_out, learn_margin
-from seakeep.models.engine import group_series, read_groups
+from seakeep.models.calibration import envelope_of, held_out, learn_margin
+from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import Selected
@@ -34,12 +31,10 @@ from seakeep.models.specs import HankelDMDc, left_open
 from seakeep.models.summaries import STATISTICS, reduce_members
 from seakeep.models.training import gather
 from seakeep.signals import envelope_squared
-from seakeep.study.judge import BANDS, MEASURES, judge_windows
-from seakeep.study.plan import Plan, TestWindow, TrainingSet, between
+from seakeep.study.judge import BANDS, MEASURES, judge_windows, numbered, side_by_side
+from seakeep.study.plan import Plan, TestWindow, parts_of
 from seakeep.study.settings import Study
 from seakeep.study.store import Groups
-
-Runs = Mapping[str, xr.Dataset]
 
 FILL = {"lost": -2, "windows": 0}
 """What stands for a training set that tests no window, where it is not NaN."""
@@ -88,37 +83,23 @@ def tested_windows(plan: Plan, training: int) -> dict[str, list[int]]:
     return {test: numbers for test, numbers in every.items() if numbers}
 
 
-@contextmanager
-def _named_after(plan: Plan, unit: Unit) -> Iterator[None]:
-    """Name training set and model in errors."""
-    try:
-        yield
-    except SeakeepError as error:
-        name = plan.training[unit.training].name
-        raise DataError(f"training set '{name}', model '{unit.model}': {error}") from error
-
-
-def compute_task(plan: Plan, runs: Runs, facts: Groups, units: Sequence[Unit]) -> list[Groups]:
-    """Compute units of :func:`tasks_of`, in their order."""
+def compute_task(plan: Plan, facts: Groups, units: Sequence[Unit]) -> list[Groups]:
+    """Compute units of :func:`tasks_of`, in their order; errors name training set and model."""
     selected, out = None, []
     for unit in units:
-        spec = left_open(plan.specs[unit.model])
-        if selected is None and spec is not None:
-            parts = training_parts(runs, plan.training[unit.training])
-            with _named_after(plan, unit):
-                selected = spec.central(plan.dt).settled(
-                    parts, list(plan.states), list(plan.inputs)
-                )
-        out.append(compute(plan, runs, facts, unit, selected))
+        training, spec = plan.training[unit.training], left_open(plan.specs[unit.model])
+        try:
+            if selected is None and spec is not None:
+                selected = spec.central(plan.dt).settled(*plan.taught(training.spans))
+            out.append(compute(plan, facts, unit, selected))
+        except SeakeepError as error:
+            place = f"training set '{training.name}', model '{unit.model}'"
+            raise DataError(f"{place}: {error}") from error
     return out
 
 
 def compute(
-    plan: Plan,
-    runs: Runs,
-    facts: Groups,
-    unit: Unit,
-    selected: Selected[HankelDMDc] | None = None,
+    plan: Plan, facts: Groups, unit: Unit, selected: Selected[HankelDMDc] | None = None
 ) -> Groups:
     """Fit a model, with the settings that were chosen, and forecast all windows.
 
@@ -131,52 +112,62 @@ def compute(
         ``draws``.
     """
     training, settings = plan.training[unit.training], plan.settings
-    with _named_after(plan, unit):
-        fitted = fit_training(plan, runs, unit.model, training, selected=selected)
+    spec: Any = plan.specs[unit.model]
+    how = {} if selected is None else {"selected": selected}
+    fitted = spec.fit(*plan.taught(training.spans), **how)
     ahead = (max(fitted.signature.lead_samples, 1) - 1) * plan.dt
     words = {"units": "s", "long_name": "waves read after the instant that is forecast"}
     chosen = {"words": getattr(fitted, "selection", ""), "look_ahead": ((), ahead, words)}
     out = {"chosen": xr.Dataset(chosen)}
-    is_ensemble = plan.specs[unit.model].is_ensemble
     frequency = 1.0 / (settings.statistics.split_period * plan.encounter_period)
     tested = tested_windows(plan, unit.training)
-    for test, series, lost, envelope in _series(plan, runs, fitted, tested):
+    for test, series, lost, windows in _free_runs(plan, fitted, tested):
         at = {"window": tested[test]}
-        known = facts[test].isel(at | {"training": unit.training})
-        pair = {key: known[key].values for key in ("measured", "training_std", "noise_std")}
         mean = np.array(series[0])
-        if is_ensemble:
+        if spec.is_ensemble:
             reduced = reduce_members(series, lost, settings.statistics.level)
-            mean = reduced[:, 0]
-            bands: dict[str, Any] = {
-                key: (("window", "time", "channel"), reduced[:, row])
-                for row, key in enumerate(STATISTICS)
-                if key != "mean"
-            }
-            bands["lost"] = (("window", "member"), lost.T)
+            bands = numbered(reduced, ("window", "number", "time", "channel"), STATISTICS, at)
+            mean = bands["mean"].values
+            bands = bands.drop_vars("mean").assign(lost=(("window", "member"), lost.T))
             if settings.statistics.scale == "learnt":
+                envelope = envelope_of(fitted.signature, windows)
                 bands["envelope"] = (("window", "time"), envelope)
-            out[f"bands/{test}"] = xr.Dataset(bands, {**at, "member": np.arange(len(series))})
-        judged = judge_windows(predicted=mean, **pair, dt=plan.dt, frequency=frequency)
+            out[f"bands/{test}"] = bands.assign_coords(member=np.arange(len(series)))
+        known = _known(facts[test], unit, tested[test])
+        judged = judge_windows(predicted=mean, **known, dt=plan.dt, frequency=frequency)
         out[f"tests/{test}"] = judged.assign_coords(at)
-    if is_ensemble and plan.calibrated_on:
-        out["calibration"] = band_margins(plan, runs, unit, fitted)
-    form = getattr(plan.specs[unit.model], "delay_rows", "")
-    if settings.output.regularisation and form == "ridge" and not is_ensemble:
-        out["regularisation"] = regularisation(plan, runs, fitted, training, facts, tested)
+    if spec.is_ensemble and plan.calibrated_on:
+        out["calibration"] = band_margins(plan, unit, fitted)
+    ridged = getattr(spec, "delay_rows", "") == "ridge" and not spec.is_ensemble
+    if settings.output.regularisation and ridged:
+        out["regularisation"] = regularisation(plan, facts, unit, fitted)
     if unit.training == units_of(plan)[0].training:
-        out |= _of_first(plan, unit, fitted)
+        if spec.is_ensemble:
+            out["draws"] = fitted.draws
+        if settings.output.eigenvalues:
+            out["eigenvalues"] = _eigenvalues(fitted).assign_attrs(
+                training=training.name, dt=plan.dt
+            )
     return out
 
 
-def regularisation(
-    plan: Plan,
-    runs: Runs,
-    fitted: HankelDMDcModel,
-    training: TrainingSet,
-    facts: Groups,
-    tested: Mapping[str, Sequence[int]],
-) -> xr.Dataset:
+def _known(facts: xr.Dataset, unit: Unit, windows: Sequence[int]) -> dict[str, FloatArray]:
+    """What windows are judged by."""
+    known = facts.isel(window=windows, training=unit.training)
+    return {key: known[key].values for key in ("measured", "training_std", "noise_std")}
+
+
+def _eigenvalues(fitted: Any) -> xr.Dataset:
+    """Eigenvalues of all members, in descending order of modulus."""
+    values = [np.linalg.eigvals(matrix) for matrix in fitted.system_matrices()]
+    padded = np.full((len(values), max(each.size for each in values)), complex(np.nan, np.nan))
+    for row, each in zip(padded, values, strict=True):
+        row[: each.size] = each[np.argsort(-np.abs(each), kind="stable")]
+    parts = {key: (("member", "mode"), getattr(padded, key)) for key in ("real", "imag")}
+    return xr.Dataset(parts)
+
+
+def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcModel) -> xr.Dataset:
     r"""Identify a model of the paper's form with λ, without it, and by truncated singular values.
 
     As many singular values are kept as the regression with λ has degrees of freedom,
@@ -189,8 +180,8 @@ def regularisation(
         the matrices; ``truncated_nrmse`` over (window, channel) of the first test set; ``rank``.
     """
     spec: Any = fitted.settings
-    parts = training_parts(runs, training)
-    data = gather(parts, plan.states, plan.inputs, None, spec)
+    parts, states, inputs = plan.taught(plan.training[unit.training].spans)
+    data = gather(parts, states, inputs, None, spec)
     groups = (data.states, spec.state_delays), (data.delayed, spec.input_delays)
     regressors = [
         np.concatenate([embed(x[k], lags, at.first_column, at.columns) for x, lags in groups])
@@ -198,11 +189,8 @@ def regularisation(
     ]
     squares = np.linalg.svd(np.concatenate(regressors, axis=1), compute_uv=False) ** 2
     rank = round(float(np.sum(squares / (squares + fitted.training.ridge))))
-    variants = {
-        "none": replace(spec, ridge=0.0),
-        "truncated": replace(spec, ridge=0.0, rank=rank),
-        "ridge": spec,
-    }
+    truncated = replace(spec, ridge=0.0, rank=rank)
+    variants = {"none": replace(spec, ridge=0.0), "truncated": truncated, "ridge": spec}
     radius, seconds, models = [], [], {}
     for name, each in variants.items():
         begin = process_time()
@@ -210,92 +198,36 @@ def regularisation(
         seconds.append(process_time() - begin)
         models[name] = HankelDMDcModel.fitted(each, data, solution, parts)
         radius.append(spectral_radius(models[name].dynamics))
-    test, numbers = next(iter(tested.items()))
-    known = facts[test].isel(window=numbers, training=list(plan.training).index(training))
-    pair = {key: known[key].values for key in ("measured", "training_std", "noise_std")}
-    ((_, series, *_),) = _series(plan, runs, models["truncated"], {test: numbers})
+    test, numbers = next(iter(tested_windows(plan, unit.training).items()))
+    ((_, series, *_),) = _free_runs(plan, models["truncated"], {test: numbers})
+    error = metrics.nrmse(predicted=np.array(series[0]), **_known(facts[test], unit, numbers))
     return xr.Dataset(
         {
             "radius": ("variant", radius),
             "seconds": ("variant", seconds, {"units": "s"}),
-            "truncated_nrmse": (
-                ("window", "channel"),
-                metrics.nrmse(predicted=np.array(series[0]), **pair),
-            ),
+            "truncated_nrmse": (("window", "channel"), error),
             "rank": rank,
         },
         {"variant": list(variants), "window": numbers},
     )
 
 
-def _of_first(plan: Plan, unit: Unit, fitted: Any) -> Groups:
-    """What is kept of a model of the first training set alone."""
-    out = {}
-    if plan.specs[unit.model].is_ensemble:
-        out["draws"] = fitted.draws
-    if plan.settings.output.eigenvalues:
-        values = [np.linalg.eigvals(matrix) for matrix in fitted.system_matrices()]
-        padded = np.full((len(values), max(each.size for each in values)), complex(np.nan, np.nan))
-        for row, each in enumerate(values):  # in descending order of modulus
-            padded[row, : each.size] = each[np.argsort(-np.abs(each), kind="stable")]
-        out["eigenvalues"] = xr.Dataset(
-            {key: (("member", "mode"), getattr(padded, key)) for key in ("real", "imag")},
-            attrs={"training": plan.training[unit.training].name, "dt": plan.dt},
-        )
-    return out
-
-
-def _series(
-    plan: Plan, runs: Runs, fitted: Any, tested: Mapping[str, Sequence[int]]
-) -> Iterator[tuple[str, FloatArray, npt.NDArray[np.int64], FloatArray]]:
-    """Free runs of all members over each test set, (member, window, steps, N), where lost, waves.
-
-    Test sets of one length run side by side: what a free run prepares serves all of them.
-    """
-    batches: dict[int, list[str]] = {}
-    for test in tested:
-        batches.setdefault(plan.tests[test][0].steps, []).append(test)
+def _free_runs(
+    plan: Plan, fitted: Any, tested: Mapping[str, Sequence[int]]
+) -> Iterator[tuple[str, FloatArray, npt.NDArray[np.int64], Windows]]:
+    """Free runs of all members over each test set, (member, window, steps, N), and where lost."""
     chosen = {test: [plan.tests[test][k] for k in numbers] for test, numbers in tested.items()}
-    groups = [
-        ([(window.run, window.start) for test in tests for window in chosen[test]], steps)
-        for steps, tests in batches.items()
+    places = [
+        ([(each.run, each.start) for each in windows], windows[0].steps)
+        for windows in chosen.values()
     ]
-    windows = read_groups(fitted.signature, runs, groups)
-    with group_series(fitted, windows) as series_of:
-        for (series, lost), tests, each in zip(series_of, batches.values(), windows, strict=True):
-            envelope = envelope_of(fitted.signature, each)
-            first = 0
-            for test in tests:
-                mine = slice(first, first + len(tested[test]))
-                yield test, series[:, mine], lost[:, mine], envelope[mine]
-                first = mine.stop
+    groups = read_groups(fitted.signature, plan.runs, places)
+    with member_series(fitted, groups) as every:
+        for test, (series, lost), windows in zip(tested, every, groups, strict=True):
+            yield test, series, lost, windows
 
 
-def training_parts(runs: Runs, training: TrainingSet) -> dict[str, xr.Dataset]:
-    """The runs of a training set, cut to what may be read."""
-    return {name: between(runs[name], (begin, stop)) for name, begin, stop in training.spans}
-
-
-def fit_training(
-    plan: Plan,
-    runs: Runs,
-    model: str,
-    training: TrainingSet,
-    spec: Spec | None = None,
-    selected: Selected[HankelDMDc] | None = None,
-) -> Any:
-    """Fit a model of the study to a training set.
-
-    Its settings may be others, `spec`, and what they leave open may be chosen already, `selected`.
-    """
-    spec = spec or plan.specs[model]
-    parts, states, inputs = training_parts(runs, training), list(plan.states), list(plan.inputs)
-    if selected is not None and (open_spec := left_open(spec)) is not None:
-        return open_spec.fit(parts, states, inputs, selected=selected)
-    return spec.fit(parts, states, inputs)
-
-
-def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
+def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
     """Find the band of an ensemble on windows as long as those of the first test set.
 
     The windows lie in the training spans, clear of what the members have read. Where these read
@@ -304,24 +236,27 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
     """
     training, statistics = plan.training[unit.training], plan.settings.statistics
     steps = next(iter(plan.tests.values()))[0].steps
-    judged: list[Judged] = []
     if training.left_out or len(training.runs) > 1:
+        spec: Any = plan.specs[unit.model].from_json(fitted.origin)
         groups = [each.left_out for each in plan.training if each is not training and each.left_out]
-        spec = plan.specs[unit.model].from_json(fitted.origin)
+        cases = []
         for group in groups or [(run,) for run in training.runs]:
-            rest = tuple(span for span in training.spans if span[0] not in group)
-            tests = {n: between(runs[n], (b, e)) for n, b, e in training.spans if n in group}
+            rest = [span for span in training.spans if span[0] not in group]
+            tests = parts_of(plan.runs, [span for span in training.spans if span[0] in group])
             if rest and tests:
-                others = TrainingSet(f"{training.name}, calibration", rest)
-                ensemble = fit_training(plan, runs, unit.model, others, spec)
-                judged += held_out(
-                    dict.fromkeys(tests, ensemble), tests, steps, statistics.level
-                ).values()
+                cases.append((spec.fit(*plan.taught(rest)), tests))
     else:
-        parts = {n: between(runs[n], runs[n].attrs["train_span"]) for n in plan.calibrated_on}
-        judged += held_out(dict.fromkeys(parts, fitted), parts, steps, statistics.level).values()
-    keys = ("margin", "blocks", "warranted")
+        spans = [(name, *plan.runs[name].attrs["train_span"]) for name in plan.calibrated_on]
+        cases = [(fitted, parts_of(plan.runs, spans))]
+    judged = [
+        each
+        for ensemble, tests in cases
+        for each in held_out(
+            dict.fromkeys(tests, ensemble), tests, steps, statistics.level
+        ).values()
+    ]
     nothing = np.full(len(plan.states), np.nan)
+    keys = ("margin", "blocks", "warranted")
     out: dict[str, Any] = dict.fromkeys(keys, ("channel", nothing))
     floor: FloatArray | None = nothing
     law: FloatArray | None = np.tile(nothing, (4, 1))
@@ -336,52 +271,43 @@ def band_margins(plan: Plan, runs: Runs, unit: Unit, fitted: Any) -> xr.Dataset:
     return xr.Dataset(out, attrs={"level": statistics.level})
 
 
-def collect(plan: Plan, facts: Groups, read: Callable[[Unit], Groups]) -> Groups:
+def collect(plan: Plan, facts: Groups, computed: Mapping[Unit, Groups]) -> Groups:
     """Put all units together, with the facts of their windows."""
-    units = units_of(plan)
-    computed = {unit: read(unit) for unit in units}
     sets = [each.name for each in plan.training]
 
-    def of(model: str, group: str) -> dict[str, xr.Dataset]:
-        """A group of a model, by training set."""
-        mine = {sets[u.training]: computed[u] for u in units if u.model == model}
-        return {name: each[group] for name, each in mine.items() if group in each}
-
-    def stacked(models: Sequence[str], group: str, dim: str) -> xr.Dataset:
+    def stacked(group: str, models: Iterable[str], dim: str) -> xr.Dataset:
         """A group of several models, over (`dim`, training)."""
-        each = [_along("training", of(model, group)) for model in models]
-        return _along(dim, dict(zip(models, each, strict=True)))
+        mine = [unit for unit in computed if group in computed[unit] and unit.model in models]
+        numbers = list(dict.fromkeys(unit.training for unit in mine))
+        names = {dim: list(models), "training": [sets[k] for k in numbers]}
+        grid = [[computed[Unit(model, k)][group] for k in numbers] for model in models]
+        return side_by_side(grid, names, FILL)
 
     out: Groups = {}
     for test, windows in plan.tests.items():
         every = {"training": sets, "window": range(len(windows))}
-        means = stacked(list(plan.models), f"tests/{test}", "model").reindex(every)
+        means = stacked(f"tests/{test}", plan.models, "model").reindex(every)
         parts = [means.transpose("model", "measure", "band", "training", ...)]
         if plan.ensembles:
-            bands = stacked(plan.ensembles, f"bands/{test}", "ensemble")
+            bands = stacked(f"bands/{test}", plan.ensembles, "ensemble")
             parts.append(bands.reindex(every, fill_value=FILL))
         data = xr.merge([*parts, facts[test]], join="outer")
         out[f"tests/{test}"] = data.drop_vars("member", errors="ignore")
-    out["chosen"] = stacked(list(plan.models), "chosen", "model")
+    out["chosen"] = stacked("chosen", plan.models, "model")
     if plan.calibrated_on and plan.ensembles:
-        margins = stacked(plan.ensembles, "calibration", "ensemble")
+        margins = stacked("calibration", plan.ensembles, "ensemble")
         margins = margins.reindex(training=sets, fill_value=FILL)
         out["calibration"] = margins.assign_coords(channel=list(plan.states))
-    for model, key in product(plan.models, ("eigenvalues", "draws", "regularisation")):
-        if each := of(model, key):
-            several = key == "regularisation"  # of the others there is the first alone
-            group = _along("training", each) if several else next(iter(each.values()))
-            out[f"{key}/{model}"] = group
+    for model in plan.models:
+        first = next(groups for unit, groups in computed.items() if unit.model == model)
+        # There is one of the first training set alone, but for what regularisation changes.
+        out |= {f"{key}/{model}": first[key] for key in ("eigenvalues", "draws") if key in first}
+        if (key := "regularisation") in first:
+            out[f"{key}/{model}"] = stacked(key, [model], "model").squeeze("model", drop=True)
     return out
 
 
-def _along(dim: str, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Datasets one after the other along a new dimension, by name."""
-    names = xr.Variable(dim, list(parts))
-    return xr.concat(list(parts.values()), names, join="outer", fill_value=FILL)
-
-
-def facts_of(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
+def facts_of(study: Study, plan: Plan) -> Groups:
     """What is known of the windows of each test set without any model.
 
     Returns
@@ -391,40 +317,34 @@ def facts_of(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
         channel), ``judged``, ``start``, ``run``, moments of the training, ``noise_std`` and, with
         an elevation among the inputs, ``wave_height``.
     """
-    measured = {name: _columns(plan, run) for name, run in runs.items()}
-    waves = next(filter(is_elevation, plan.inputs), None)
-    heights = {} if waves is None else {n: _heights(r[waves], plan.dt) for n, r in runs.items()}
-    means, spreads = [], []
-    for training in plan.training:
-        parts = training_parts(runs, training).values()
-        pooled = np.concatenate([_columns(plan, part) for part in parts]).T.copy()
-        means.append(pooled.mean(axis=1))
-        spreads.append(pooled.std(axis=1, ddof=1))
+    tested = {window.run: plan.runs[window.run] for window in plan.windows}
+    known = {"measured": {name: _columns(plan, run) for name, run in tested.items()}}
+    if (waves := next(filter(is_elevation, plan.inputs), None)) is not None:
+        known["wave_height"] = {n: _heights(run[waves], plan.dt) for n, run in tested.items()}
+    if (folder := study.truth_folder) is not None:
+        known["truth"] = {name: _truth(folder, plan, name) for name in tested}
+    taught = [parts_of(plan.runs, each.spans).values() for each in plan.training]
+    pooled = [np.concatenate([_columns(plan, each) for each in of]).T.copy() for of in taught]
     out, dims = {}, ("window", "time", "channel")
     for test, windows in plan.tests.items():
+        series = {key: _cut(plan, each, windows) for key, each in known.items()}
         noise = [
-            [runs[each.run][name].attrs.get("noise_std", 0.0) for name in plan.states]
+            [tested[each.run][name].attrs.get("noise_std", 0.0) for name in plan.states]
             for each in windows
         ]
-        variables: dict[str, Any] = {
-            "measured": (dims, _cut(runs, measured, windows)),
-            "judged": (
-                ("training", "window"),
-                [[each.may_test(w.run) for w in windows] for each in plan.training],
-            ),
-            "start": ("window", [each.start for each in windows]),
-            "run": ("window", [each.run for each in windows]),
-            "training_mean": (("training", "channel"), means),
-            "training_std": (("training", "channel"), spreads),
-            "noise_std": (("window", "channel"), noise),
-        }
-        if heights:
-            variables["wave_height"] = (dims[:2], _cut(runs, heights, windows))
-        if (folder := study.truth_folder) is not None:
-            variables["truth"] = (dims, _true_windows(folder, plan, windows))
-        time = plan.dt * np.arange(1, windows[0].steps + 1)
         out[test] = xr.Dataset(
-            variables,
+            {
+                **{key: (dims[: each.ndim], each) for key, each in series.items()},
+                "judged": (
+                    ("training", "window"),
+                    [[each.may_test(w.run) for w in windows] for each in plan.training],
+                ),
+                "start": ("window", [each.start for each in windows]),
+                "run": ("window", [each.run for each in windows]),
+                "training_mean": (("training", "channel"), [x.mean(axis=1) for x in pooled]),
+                "training_std": (("training", "channel"), [x.std(axis=1, ddof=1) for x in pooled]),
+                "noise_std": (("window", "channel"), noise),
+            },
             coords={
                 "model": list(plan.models),
                 "ensemble": plan.ensembles,
@@ -432,25 +352,27 @@ def facts_of(study: Study, plan: Plan, runs: Runs) -> dict[str, xr.Dataset]:
                 "band": list(BANDS),
                 "training": [each.name for each in plan.training],
                 "window": range(len(windows)),
-                "time": ("time", time, {"units": "s"}),
+                "time": ("time", plan.dt * np.arange(1, windows[0].steps + 1), {"units": "s"}),
                 "channel": list(plan.states),
             },
         )
     return out
 
 
-def _cut(runs: Runs, whole: Mapping[str, FloatArray], windows: Sequence[TestWindow]) -> FloatArray:
+def _cut(plan: Plan, whole: Mapping[str, FloatArray], windows: Sequence[TestWindow]) -> FloatArray:
     """Samples of arrays over the time of runs that windows forecast."""
     parts = []
     for each in windows:
-        at = int(np.argmin(np.abs(runs[each.run]["time"].values - each.start))) + 1
+        at = int(np.argmin(np.abs(plan.runs[each.run]["time"].values - each.start))) + 1
         parts.append(whole[each.run][at : at + each.steps])
     return np.stack(parts)
 
 
 def _columns(plan: Plan, run: xr.Dataset) -> FloatArray:
-    """States of a run, (time, channel)."""
-    return np.stack([run[name].values for name in plan.states], axis=-1).astype(float)
+    """States of a run, (time, channel); NaN of one that it lacks."""
+    nothing = np.full(run.sizes["time"], np.nan)
+    columns = [run[name].values if name in run else nothing for name in plan.states]
+    return np.stack(columns, axis=-1).astype(float)
 
 
 def _heights(elevation: xr.DataArray, dt: float) -> FloatArray:
@@ -462,22 +384,14 @@ def _heights(elevation: xr.DataArray, dt: float) -> FloatArray:
     return heights
 
 
-def _true_windows(folder: Path, plan: Plan, windows: Sequence[TestWindow]) -> FloatArray:
-    """True states at the instants of windows; NaN of a channel that has no truth."""
-    truth = {}
-    for name in dict.fromkeys(window.run for window in windows):
-        path = folder / f"{name}.nc"
-        if not path.exists():
-            raise DataError(
-                f"the study names the folder {folder} of true channels, and {path.name} is not in "
-                "it. Play the tank again, or leave study.truth out."
-            )
-        truth[name] = opened_netcdf(path)
-    values = np.full((len(windows), windows[0].steps, len(plan.states)), np.nan)
-    for row, window in zip(values, windows, strict=True):
-        time = window.start + plan.dt * np.arange(1, window.steps + 1)
-        true = truth[window.run]
-        for k, name in enumerate(plan.states):
-            if name in true:
-                row[:, k] = np.interp(time, true["time"].values, true[name].values)
-    return values
+def _truth(folder: Path, plan: Plan, run: str) -> FloatArray:
+    """True states at the instants of a run; NaN of a channel that has no truth."""
+    path = folder / f"{run}.nc"
+    if not path.exists():
+        raise DataError(
+            f"the study names the folder {folder} of true channels, and {path.name} is not in "
+            "it. Play the tank again, or leave study.truth out."
+        )
+    true, time = opened_netcdf(path), plan.runs[run]["time"].values
+    values, known = _columns(plan, true), true["time"].values
+    return np.stack([np.interp(time, known, each) for each in values.T], axis=-1)

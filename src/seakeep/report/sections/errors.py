@@ -268,17 +268,16 @@ def coverage(result: StudyResult) -> Section | None:
 
 def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
     """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
-    prefix = "calibrated_" * calibrated
-    shares = result.groups["statistics/coverage"].sel(model=model)
+    prefix, band = "calibrated_" * calibrated, "calibrated" if calibrated else "members"
+    shares = result.groups["statistics/coverage"].sel(model=model, band=band)
     true = "truth" in shares["against"].values
     kinds, two = ("inside" + " [of the truth]" * true, "width [SD]"), partial(number, digits=2)
 
     def cells(name: str) -> Iterator[str]:
         for test in result.tests:
             at = shares.sel(test=test, channel=name)
-            inside, width = (at[f"{prefix}{key}"] for key in ("inside", "relative_width"))
-            yield beside(*inside, form=two) if true else two(*inside)
-            yield two(width.sel(against="measured"))
+            yield beside(*at["inside"], form=two) if true else two(*at["inside"])
+            yield two(at["relative_width"].sel(against="measured"))
 
     level = float(result.settings["statistics"]["level"])
     more = _calibrated_words(result, model, level) if calibrated else ""

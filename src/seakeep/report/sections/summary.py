@@ -183,15 +183,15 @@ def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure
 def _coverage_findings(result: StudyResult, model: str) -> list[str]:
     first = next(iter(result.tests))
     level = float(result.settings["statistics"]["level"])
-    table = result.groups["statistics/coverage"].sel(test=first, model=model, against="measured")
-    row = table.sel(channel="average")
-    inside = float(row["inside"])
+    at = {"test": first, "model": model, "against": "measured", "channel": "average"}
+    row = result.groups["statistics/coverage"].sel(at)
+    inside = float(row["inside"].sel(band="members"))
     words = band_verdict(inside, level)
     calibrated = ""
-    if "calibrated_inside" in row and np.isfinite(row["calibrated_inside"]):
-        wider, width = (row[f"{key}relative_width"] for key in ("calibrated_", ""))
+    if "calibrated" in row["band"] and np.isfinite(held := row["inside"].sel(band="calibrated")):
+        width, wider = row["relative_width"]
         calibrated = (
-            f" Calibrated on training data it holds {percent(row['calibrated_inside'])} %, "
+            f" Calibrated on training data it holds {percent(held)} %, "
             f"{short(wider, 2)} measured SD wide instead of {short(width, 2)}."
         )
     each = [test["lost"].sel(ensemble=model) for test in result.tests.values()]
