@@ -123,19 +123,3 @@ def test_the_papers_column_is_taken_in_every_row(tank, door):
     assert ensemble.state_delays == Uniform("0.5 T", "1.5 T")  # row 11
     assert taken.campaign.settings.celerity_channels == ("eta_fwd", "eta_cog")  # row 4
     assert taken.campaign.settings.rig.positions["eta_fwd"] == 48.42  # row 27
-
-
-@pytest.mark.parametrize("door", ["fit", "study"])
-def test_the_recommended_column_is_another_wherever_it_says_so(tank, door):
-    taken = found(tank, "recommended", door)
-    single, ensemble = taken.specs
-    preparation = taken.campaign.settings.preparation
-    assert (preparation.low_pass, preparation.anti_alias) == (None, True)  # row 24
-    assert single.delay_rows == ensemble.delay_rows == "exact"  # row 15
-    assert single.ridge_scale == ensemble.ridge_scale == "per_snapshot"  # row 12
-    assert not isinstance(ensemble.ridge, Uniform)
-    assert single.window is None  # row 23: all of the runs
-    assert ensemble.window is None
-    for each in taken.specs:
-        assert each.alignment is None or each.alignment.surge != "measured"  # row 6
-    assert taken.study is None or taken.study.calibrates  # row 14

@@ -1,6 +1,5 @@
 """The three acts of ``seakeep reproduce``: one tank, the same windows, and a page over them."""
 
-import re
 import warnings
 
 import numpy as np
@@ -153,34 +152,12 @@ def test_the_table_of_the_acts_is_made_of_their_cells(results):
 
 
 def test_every_claim_has_a_figure_and_a_verdict(results):
-    from seakeep.report.claims import CLAIMS, claims_table
+    from seakeep.report.acts import CLAIMS, claims_table
 
     table = claims_table(results)
     assert len({row[0] for row in table.rows}) == len(CLAIMS) == 20
     assert {row[2] for row in table.rows} <= {"holds", "does not", "cannot tell"}
     assert not [row for row in table.rows if "nan" in row[1] or MISSING in row[1]]
-
-
-def test_pages_take_the_numbers_of_a_folder(results, tmp_path):
-    from acts_in_docs import ROOT, write
-
-    from seakeep.report.acts import acts_table
-
-    pages = ("README.md", "docs/study.md")
-    (tmp_path / "docs").mkdir()
-    before = {page: (ROOT / page).read_text("utf-8") for page in pages}
-    for page, text in before.items():
-        (tmp_path / page).write_text(text, "utf-8")
-    write(results, tmp_path)
-    mark = re.compile(r"(<!-- (\w+): .*? -->\n\n).*?(\n\n<!-- end of \2 -->)", re.S)
-    for page, text in before.items():
-        after = (tmp_path / page).read_text("utf-8")
-        assert after != text
-        assert mark.sub(r"\1\3", after) == mark.sub(r"\1\3", text)
-    row = acts_table(results).rows[-1]
-    assert f"| {' | '.join(row)} |" in after
-    write(results, tmp_path)
-    assert (tmp_path / page).read_text("utf-8") == after
 
 
 def test_the_edge_of_the_drift_lies_between_drift_and_waves():
