@@ -145,12 +145,6 @@ def test_boxes_are_matplotlibs_for_any_numbers(values):
     compare_with_matplotlib(values)
 
 
-def test_a_whisker_does_not_end_inside_the_box():
-    # No value lies between the upper fence and the box.
-    compare_with_matplotlib([0.0, 0.0, 0.0, 10.0])
-    compare_with_matplotlib([1.0, 1.0, 1.0, 1.0, 9.0])
-
-
 def test_diverged_values_are_left_out_and_counted():
     box = box_statistics([[1.0, np.nan, 2.0], [np.inf, 3.0, 4.0]])
     assert (box.count, box.left_out, box.median) == (4, 2, 2.5)

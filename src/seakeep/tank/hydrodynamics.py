@@ -20,6 +20,7 @@ import xarray as xr
 from seakeep.arrays import ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import reading
+from seakeep.signals.calculus import rising
 
 CONVENTIONS = {
     "format": "seakeep-hydrodynamics 2",
@@ -180,8 +181,7 @@ def passive_damping(hydro: Hydrodynamics) -> tuple[FloatArray, FloatArray]:
     weight = np.ones((omega.size, len(hydro.names)))
     if hydro.pool is not None:
         low, high = POOL_TAPER
-        part = np.clip((omega - low) / (high - low), 0.0, 1.0)
-        weight[:, 3:] = 0.5 * (1.0 + np.cos(np.pi * part))[:, None]
+        weight[:, 3:] -= rising((omega - low) / (high - low))[:, None]
     # A congruence keeps the matrices passive.
     tapered = weight[:, :, None] * inside * tail[:, None, None] * weight[:, None, :]
     return omega, _passive(tapered)

@@ -16,6 +16,7 @@ import scipy
 import xarray as xr
 
 from seakeep.arrays import FloatArray
+from seakeep.signals.calculus import rising
 from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
 from seakeep.tank.settings import ClockSettings, Logger, SlapSettings, TankSettings
@@ -53,8 +54,7 @@ class Played:
 
     def ramp(self, time: FloatArray) -> FloatArray:
         """Part of their height to which the waves have grown, shape (time,)."""
-        elapsed = np.clip((time - self.motion.time[0]) / self.rig.ramp, 0.0, 1.0)
-        return 0.5 * (1.0 - np.cos(np.pi * elapsed))
+        return rising((time - self.motion.time[0]) / self.rig.ramp)
 
     def elevation(self, place: npt.ArrayLike, time: FloatArray) -> FloatArray:
         """Linear elevation at a place in the tank (m from the wave maker), m."""
@@ -89,7 +89,7 @@ def clock_instants(clock: ClockSettings, length: float) -> tuple[FloatArray, Flo
 def trigger(time: FloatArray, period: float, width: float) -> FloatArray:
     """Trigger that every logger records: raised-cosine pulses of height one, the first at 10 s."""
     phase = (time - FIRST_PULSE + 0.5 * period) % period - 0.5 * period
-    return np.where(np.abs(phase) < 0.5 * width, 0.5 + 0.5 * np.cos(2 * np.pi * phase / width), 0.0)
+    return 1.0 - rising(np.abs(phase) / (0.5 * width))
 
 
 def slap_pulses(
