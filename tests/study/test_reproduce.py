@@ -152,7 +152,7 @@ def test_the_table_of_the_acts_is_made_of_their_cells(results):
 
 
 def test_every_claim_has_a_figure_and_a_verdict(results):
-    from seakeep.report.claims import CLAIMS, claims_table
+    from seakeep.report.acts import CLAIMS, claims_table
 
     table = claims_table(results)
     assert len({row[0] for row in table.rows}) == len(CLAIMS) == 20
