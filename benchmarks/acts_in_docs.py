@@ -15,14 +15,15 @@ from pathlib import Path
 
 from seakeep.cli.console import print_table
 from seakeep.report.acts import (
+    ENSEMBLE,
     acts_table,
     against_filter,
-    band_sentence,
+    claims_table,
     finding,
     short_table,
     still_water,
 )
-from seakeep.report.claims import claims_table
+from seakeep.report.tables import percent, short
 from seakeep.study.reproduce import read_reproduction
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -36,6 +37,17 @@ def main():
     folder = parser.parse_args().folder
     write(read_reproduction(folder), ROOT)
     shutil.copy(folder / "figures" / "acts.png", ROOT / "docs" / "figures")
+
+
+def band_sentence(results):
+    """How much the calibrated band of the recommended ensemble holds; empty without one."""
+    if (result := results.get("recommended")) is None:
+        return ""
+    table = result.groups["statistics/coverage"]["inside"]
+    at = table.sel(model=ENSEMBLE, band="calibrated", against="measured", channel="average")
+    seas = (f"{percent(at.sel(test=test))} % ({result.label_of(test)})" for test in result.tests)
+    level = short(100 * float(result.settings["statistics"]["level"]))
+    return f"Of the instants, the calibrated {level} % band of (c) holds {', '.join(seas)}."
 
 
 def write(results, root):

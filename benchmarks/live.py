@@ -19,7 +19,7 @@ import xarray as xr
 import seakeep
 from seakeep.campaign import load_prepared
 from seakeep.formats import read_columns
-from seakeep.signals.prediction import draw_sea, predict_waves
+from seakeep.signals.prediction import foresee, predict_waves
 
 TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial" / "campaign.toml"
 LEADS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
@@ -195,9 +195,7 @@ def lost(campaign, gaps=100):
     rig["positions"] = [run[each].attrs["x_position"] for each in names]
     fills = {
         "own record": lambda record, count: predict_waves(record, count),
-        "up-wave": lambda record, count: draw_sea(
-            record, count, 1, np.random.default_rng(0), **rig
-        ).mean(axis=0),
+        "up-wave": lambda record, count: foresee(record, count, **rig).expected,
     }
     for words, fill in fills.items():
         begun, apart = time.process_time(), []

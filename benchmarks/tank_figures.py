@@ -23,7 +23,7 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.cli.console import print_table
 from seakeep.errors import RequestError
-from seakeep.report.figures.runs import draw_spectra, quality_figure
+from seakeep.report.figures.histories import draw_spectra, quality_figure
 from seakeep.report.style import COLOURS, PALETTE, SERIES, figure_style, new_figure, save_figure
 from seakeep.report.tables import Table, write_csv
 from seakeep.signals import (

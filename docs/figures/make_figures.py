@@ -354,7 +354,7 @@ def chain():
     """A part of the data-quality sheet, by the example of the measurement chain's page."""
     from seakeep.campaign.pipeline import redundant_pairs
     from seakeep.quality import compared
-    from seakeep.report.figures.runs import quality_figure
+    from seakeep.report.figures.histories import quality_figure
     from seakeep.tank.play import play
     from seakeep.tank.settings import default_settings
 

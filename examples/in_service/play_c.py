@@ -61,7 +61,7 @@ def play(model, run, folder, seed=0):
         of_c = np.array(library.rom_estimated(vessel)[: y.shape[1]])
         estimates.append((of_c, live.step(row, states)))
     ahead = np.empty((STEPS, y.shape[1]))
-    library.rom_forecast(vessel, STEPS, None, pointer(ahead))
+    library.rom_forecast(vessel, STEPS, None, pointer(ahead), None)
     outside = library.rom_validity(vessel)
     return np.array(estimates), ahead, outside, lost
 

@@ -536,13 +536,13 @@ def check_output(
     with path.open("rb") as file:
         start = file.read(HEAD)
         file.seek(-min(HEAD, path.stat().st_size), os.SEEK_END)
-        both = (start + file.read()).decode("utf-8", "replace")  # PDF keeps its mark at the end
+        both = start + file.read()  # PDF keeps its mark at the end
     if path.suffix == ".nc" or start.startswith(HDF5):
         ours = _mark_of_netcdf(path) == kind
     elif path.suffix == ".csv":
-        ours = header is not None and re.match(header, both) is not None
+        ours = header is not None and re.match(header, both.decode("utf-8", "replace")) is not None
     else:
-        ours = f"{MARK}: {kind}" in both
+        ours = f"{MARK}: {kind}".encode() in both
     if not ours:
         raise RequestError(
             f"{path} exists and is not a {kind} that seakeep wrote; it may be a measurement. "

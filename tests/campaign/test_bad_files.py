@@ -202,13 +202,6 @@ class TestBagFolder:
         self.refused(folder)
         self.refused(database, *filter(None, [words]))
 
-    @pytest.mark.parametrize("content", [b"", b"- 1\n- 2\n", "é: [".encode("latin-1"), None])
-    def test_metadata(self, folder, content):
-        metadata = folder / "metadata.yaml"
-        whole = metadata.read_bytes()
-        metadata.write_bytes(whole[: len(whole) // 2] if content is None else content)
-        self.refused(folder)
-
     def test_missing_parts(self, folder):
         database = next(folder.glob("*.db3"))
         moved = database.rename(folder.with_name("alone.db3"))
@@ -257,11 +250,3 @@ class TestUnits:
         with pytest.warns(SeakeepWarning, match=r"heave leaves its mean by .* Check unit"):
             runs = self.prepared(tank, "deg", mended)  # millimetres, now said to be metres
         assert float(runs["second"]["heave"].std()) > 1.0
-
-    def test_one_unit_in_other_words(self, tank):
-        text = CAMPAIGN.replace('column = "Pitch"', 'column = "Pitch"\nunit = "°"')
-        assert "second" in self.prepared(tank, "mm", text)
-
-    def test_a_unit_in_one_run_alone(self, tank):
-        with pytest.raises(RequestError, match=r"column 'Heave' of .*second\.csv states no unit"):
-            self.prepared(tank, "")

@@ -61,29 +61,6 @@ def test_all_lengths_of_a_campaign(tank):
     assert periods.seconds(2.5) == 2.5
 
 
-def test_clocks_in_periods(tank):
-    """Windows and lags of a correlation."""
-    columns = tank_columns(0, seconds=60.0)
-    write_csv(tank / "one.csv", {k: columns[k] for k in ("Time [s]", "WP fwd [mm]", "acc [g]")})
-    late = {"Time [s]": columns["Time [s]"] + 0.3} | {
-        k: columns[k] for k in ("Heave [mm]", "Pitch (deg)", "WP fwd [mm]")
-    }
-    late["copy [mm]"] = late.pop("WP fwd [mm]")
-    write_csv(tank / "two.csv", late)
-    text = CAMPAIGN.replace(*STATED)
-    text = text[: text.index("[runs.first]")] + text[text.index("[preparation]") :]
-    clocks = []
-    for window, lag in (("16.0", "1.6"), ("'10 T'", "'1 T'")):
-        (tank / "campaign.toml").write_text(
-            text + f"[instruments.two]\nshared = ['copy', 'WP fwd']\nwindow = {window}\n"
-            f"largest_lag = {lag}\n[instruments.one]\n[instruments]\nreference = 'one'\n"
-            "[runs.r.files]\none = 'one.csv'\ntwo = 'two.csv'\n"
-        )
-        clocks.append(read_campaign(tank / "campaign.toml").clocks()["r"]["two"])
-    assert clocks[0] == clocks[1]
-    assert clocks[0].offset == pytest.approx(0.3, abs=1e-6)  # the same samples, noise-free
-
-
 def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(edited):
     path = edited(
         ("train = [0, 10]", 'waves = "irregular"\ntrain = [0, 10]'),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy
-import xarray as xr
+from records import record
 
 from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, LogUniform, check
 from seakeep.check.parts import free_windows, samples_in
@@ -22,13 +22,8 @@ def oscillator_run(seed=0, samples=2000, ratio=RATIO):
     state = np.zeros((samples, 2))
     for k in range(samples - 1):
         state[k + 1] = step @ state[k] + drive[:, 0] * force[k]
-    channels = {"heave": state[:, 0], "heave_rate": state[:, 1], "eta": force}
-    units = {"heave": "m", "heave_rate": "m/s", "eta": "m"}
-    return xr.Dataset(
-        {key: ("time", value, {"units": units[key]}) for key, value in channels.items()},
-        coords={"time": DT * np.arange(samples)},
-        attrs={"encounter_period": 3.0},
-    )
+    attrs = {"encounter_period": 3.0}
+    return record(DT, attrs, heave=state[:, 0], heave_rate=state[:, 1], eta=force)
 
 
 def measured_decay_run(linear, quadratic):
@@ -39,8 +34,7 @@ def measured_decay_run(linear, quadratic):
 
     time = DT * np.arange(900)
     found = scipy.integrate.solve_ivp(rate, (0, time[-1]), [1.0, 0.0], t_eval=time, rtol=1e-8)
-    heave = ("time", found.y[0], {"units": "m"})
-    return xr.Dataset({"heave": heave}, coords={"time": time}, attrs={"waves": "still"})
+    return record(DT, {"waves": "still"}, heave=found.y[0])
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +103,7 @@ def test_a_forecast_starts_where_the_waves_have_come():
     time = np.arange(0, 200, 0.1)
     wave = np.where(time < 40, 0.0, np.sin(np.pi * time))
     heave = np.where(time < 50, 0.0, np.sin(np.pi * time + 1))
-    run = xr.Dataset({"eta": ("time", wave), "heave": ("time", heave)}, {"time": time})
+    run = record(0.1, eta=wave, heave=heave)
 
     def start(names, span=(0.0, 199.9), history=11, stated=None):
         first, last = samples_in(run, names, span, 0.1, history, 3, stated)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy
-import xarray as xr
+from records import record
 
 from seakeep import HankelDMDc, check
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
@@ -17,11 +17,8 @@ def sea_run(height=0.04, period=2.0, seed=0, samples=3000, **attrs):
     waves = np.cos(2 * np.pi * np.outer(time, f) + rng.uniform(0, 2 * np.pi, 60)).sum(axis=1)
     wave = height / 4 * waves / waves.std()
     heave = 0.8 * np.roll(wave, 1) + 1e-5 * rng.standard_normal(samples)
-    return xr.Dataset(
-        {"eta": ("time", wave, {"units": "m"}), "heave": ("time", heave, {"units": "m"})},
-        coords={"time": time},
-        attrs={"encounter_period": period, "waves": "irregular", "water_depth": np.inf, **attrs},
-    )
+    attrs = {"encounter_period": period, "waves": "irregular", "water_depth": np.inf, **attrs}
+    return record(0.1, attrs, eta=wave, heave=heave)
 
 
 @pytest.fixture(scope="module")

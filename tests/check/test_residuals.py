@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy
-import xarray as xr
+from records import record
 
 from seakeep import HankelDMDc, check
 from seakeep.check.parts import free_windows
@@ -16,11 +16,8 @@ def noisy_run(seed=0, samples=3000):
     wave = scipy.signal.lfilter([1.0], [1.0, -0.8], rng.standard_normal(samples))
     driven = 0.5 * np.roll(wave, 1) + 0.3 * np.roll(wave, 2) + 0.2 * rng.standard_normal(samples)
     heave = scipy.signal.lfilter([1.0], [1.0, -0.6], driven)
-    return xr.Dataset(
-        {"eta": ("time", wave, {"units": "m"}), "heave": ("time", heave, {"units": "m"})},
-        coords={"time": 0.1 * np.arange(samples)},
-        attrs={"encounter_period": 2.0, "test_span": (150.0, 299.9)},
-    )
+    attrs = {"encounter_period": 2.0, "test_span": (150.0, 299.9)}
+    return record(0.1, attrs, eta=wave, heave=heave)
 
 
 @pytest.fixture(scope="module")
@@ -34,18 +31,12 @@ def fitted(run, input_delays):
 
 
 def test_a_right_model_leaves_white_errors(run):
-    found = check.residuals(fitted(run, 1), {"run": run})
-    assert float(found.probability[0]) > 0.01
-    beyond = np.abs(found.input_correlation) > found.input_limit
-    assert float(beyond.mean()) < 0.15
-    assert found.attrs["instants"] == 1499
-
-
-def test_a_model_without_a_delay_is_found_out_by_past_inputs(run):
-    found = check.residuals(fitted(run, 0), {"run": run})
-    assert float(found.probability[0]) < 1e-3
-    worst = np.abs(found.input_correlation[0, 0]) / found.input_limit[0, 0]
+    right, poor = (check.residuals(fitted(run, delays), {"run": run}) for delays in (1, 0))
+    assert float(right.probability[0]) > 0.01 > 10 * float(poor.probability[0])
+    beyond, worst = (np.abs(each.input_correlation) / each.input_limit for each in (right, poor))
+    assert float((beyond > 1).mean()) < 0.15
     assert float(worst.max()) > 3
+    assert right.attrs["instants"] == 1499
 
 
 def test_bands_and_ages_add_up(run):

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 from moored import moored_run
+from records import record
 
 from seakeep import HankelDMDc, check
 from seakeep.check.parts import reference_probe
@@ -31,12 +31,8 @@ def vessel_run(frequencies, seed=0, samples=3000, noise=1e-5, **attrs):
         for name, x in PLACES.items()
     }
     heave = 0.02 * (answer(f) * np.exp(1j * turn)).real.sum(axis=1)
-    channels = {**waves, "heave": heave + noise * rng.standard_normal(samples)}
-    run = xr.Dataset(
-        {name: ("time", values, {"units": "m"}) for name, values in channels.items()},
-        coords={"time": ("time", time, {"units": "s"})},
-        attrs={"water_depth": DEPTH, "encounter_period": 1.6, **attrs},
-    )
+    attrs = {"water_depth": DEPTH, "encounter_period": 1.6, **attrs}
+    run = record(DT, attrs, **waves, heave=heave + noise * rng.standard_normal(samples))
     for name, x in PLACES.items():
         run[name].attrs["x_position"] = x
     return run

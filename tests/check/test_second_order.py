@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import xarray as xr
+from records import record
 
 from seakeep import Expression, HankelDMDc, SlowSquares, check
 from seakeep.core.observables import slow_kernel
@@ -23,11 +23,7 @@ def drifting_run(seed=0, samples=2000, waves=None, **attrs):
     surge = np.zeros(samples)
     for k in range(samples - 1):
         surge[k + 1] = MEMORY * surge[k] + GAIN * wave[k] ** 2
-    return xr.Dataset(
-        {"eta": ("time", wave, {"units": "m"}), "surge": ("time", surge, {"units": "m"})},
-        coords={"time": time},
-        attrs={"encounter_period": PERIOD, **attrs},
-    )
+    return record(DT, {"encounter_period": PERIOD, **attrs}, eta=wave, surge=surge)
 
 
 @pytest.fixture(scope="module")

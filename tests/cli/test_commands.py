@@ -163,11 +163,9 @@ def test_calibrate_widens_the_band_that_compare_and_forecast_show(run, place):
 
     status, _, err = run(f"forecast wide.nc {FROM_20} --band calibrated -o wide_band.nc")
     assert "mean, std and 90 % calibrated band of 8 members" in err
-    with xr.open_dataset(place / "wide_band.nc", engine="h5netcdf") as stored:
-        band = ensemble.forecast_summary(unseen, 20.0, 50, 0.9)["heave"]
-        np.testing.assert_array_equal(
-            stored["heave"].sel(statistic="upper"), band.sel(statistic="upper") + margin[0]
-        )
+    stored = xr.load_dataset(place / "wide_band.nc")["heave"].sel(statistic="upper")
+    band = ensemble.forecast_summary(unseen, 20.0, 50, 0.9)["heave"].sel(statistic="upper")
+    np.testing.assert_array_equal(stored, band + margin[0])
 
 
 def rows_of(path):
@@ -224,8 +222,8 @@ def test_several_models_are_judged_over_the_same_instants(run, place):
         name: row["nrmse"] for name, row in single.items()
     }
     drawn = importlib.util.find_spec("matplotlib") is not None
-    assert (place / "both/unseen.png").exists() == drawn
-    assert (place / "both/errors_by_run.png").exists() == drawn
+    for name in ("unseen", "errors_by_run"):
+        assert (place / f"both/{name}.png").exists() == drawn
     assert "unseen: change of ANRMSE from model" in out
     changes = rows_of(place / "both/differences.csv")
     assert [row["model"] for row in changes] == 2 * ["model", "ensemble"]
@@ -378,16 +376,6 @@ def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, pla
     assert (place / kept).read_bytes() == before
 
 
-def test_ctrl_c_ends_with_130_and_says_what_is_kept(run, monkeypatch):
-    def interrupt(*_args, **_keywords):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("seakeep.study.fit_campaign", interrupt)
-    status, _, err = run(f"fit {CAMPAIGN} -o m.nc")
-    assert status == 130
-    assert "Interrupted. Finished files are kept: run the same command again" in err
-
-
 def test_datasets_lists_origin_licence_and_state(run, monkeypatch):
     monkeypatch.delenv("SEAKEEP_DATA_DIR", raising=False)
     status, out, _ = run("datasets")
@@ -416,12 +404,9 @@ def test_full_scale_by_froudes_law(run, place):
     # Froude: lengths by the scale, times by its root, so rates by 1/root; loads by its cube.
     by = {"heave": 25, "pitch": 1, "heave_rate": 5, "pitch_rate": 1 / 5, "mooring_bow": 25**3}
     assert set(by) == set(full.data_vars)
-    for name, factor in by.items():
+    for name, factor in {**by, "time": 5}.items():
         np.testing.assert_allclose(full[name], factor * small[name], rtol=1e-12)
-        assert full[name].attrs["units"] == small[name].attrs["units"]
-    np.testing.assert_allclose(full["time"], 5 * small["time"], rtol=1e-12)
     assert full.attrs["start"] == pytest.approx(5 * small.attrs["start"], rel=1e-12)
-    assert (full.attrs["scale"], full.attrs["scale_factor"]) == ("full", 25.0)
 
 
 def test_commands_report_what_prepare_finds(run, place, tmp_path, monkeypatch):
@@ -450,5 +435,4 @@ def test_commands_report_what_prepare_finds(run, place, tmp_path, monkeypatch):
         f"calibrate ensemble.nc {steps} 200 --stop 60 -o {folder}/c.nc",
         f"check {folder}/m.nc {campaign} --run unseen -o {folder}/checked",
     ):
-        _, _, err = run(command)
-        assert "unseen: heave outlier: 1 samples in 1 place(s)" in err
+        assert "unseen: heave outlier: 1 samples in 1 place(s)" in run(command)[2]

@@ -53,18 +53,10 @@ def upstream(tmp_path):
     thread.join()
 
 
-def test_fetch_takes_the_first_address_that_has_the_file_and_checks_it(upstream, tmp_path):
-    _, dataset = upstream
-    told = []
-    place = datasets.fetch(dataset, tmp_path / "data", lambda *step: told.append(step))
-    assert place == tmp_path / "data" / "toy"
+def test_fetch_takes_the_first_address_that_has_the_file_resumes_and_repairs(upstream, tmp_path):
+    (folder, dataset), told = upstream, []
+    datasets.fetch(dataset, tmp_path, lambda *step: told.append(step))
     assert told == [(1, 2, "a.csv"), (2, 2, "b.csv")]
-    assert datasets.state_of(dataset, tmp_path / "data") == "complete"
-
-
-def test_fetch_resumes_and_repairs(upstream, tmp_path):
-    folder, dataset = upstream
-    datasets.fetch(dataset, tmp_path)
     kept = (tmp_path / "toy/a.csv").stat().st_mtime_ns
     (tmp_path / "toy/b.csv").write_bytes(b"Time")
     assert "1 altered" in datasets.state_of(dataset, tmp_path)

@@ -38,6 +38,8 @@ MATRIX = np.column_stack([T, HEAVE, WAVE])
         {"time": T, "data": MATRIX[:, 1:], "names": NAMES[1:], "units": UNITS[1:]},
         {"Fs": 20.0, "data": MATRIX[:, 1:], "names": NAMES[1:], "units": UNITS[1:]},
         {"dt": 0.05, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}, "comment": "text"},
+        {"data": {"heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}}, "fs": 20.0, "note": "7"},
+        {"data": MATRIX, "labels": np.array(["Time [s]", "heave [mm]", "wave (m)"], dtype=object)},
     ],
 )
 @pytest.mark.parametrize("compressed", [False, True])
@@ -48,13 +50,6 @@ def test_matlab(tmp_path, content, compressed):
     # A step of 0.05 turned into a rate and back: rounding.
     np.testing.assert_allclose(run["time"], T, rtol=1e-15)
     check(run.assign_coords(time=T))
-
-
-def test_matlab_headers_with_units(tmp_path):
-    path = tmp_path / "run.mat"
-    names = np.array(["Time [s]", "heave [mm]", "wave (m)"], dtype=object)
-    io.savemat(path, {"data": MATRIX, "labels": names})
-    check(read_table(path))
 
 
 def dataset():
@@ -137,12 +132,3 @@ def test_hdf5_sets_of_several_columns_are_split(tmp_path):
         DataError, match=r"'cube' has 3 dimensions \(200, 2, 2\), and a channel has"
     ):
         read_table(tmp_path / "run.h5", columns=["cube"])
-
-
-def test_a_struct_with_its_rate_and_a_note_beside_it(tmp_path):
-    path = tmp_path / "run.mat"
-    heave = np.sin(np.arange(20.0))
-    io.savemat(path, {"data": {"heave": heave, "eta": 2 * heave}, "fs": 10.0, "note": "run 7"})
-    table = read_table(path)
-    np.testing.assert_array_equal(table["heave"].values, heave)
-    assert float(table["time"][1]) == pytest.approx(0.1)

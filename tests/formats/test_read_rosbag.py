@@ -109,12 +109,6 @@ def test_a_message_of_ones_own(tmp_path):
     assert "remark" not in run
 
 
-def test_a_message_without_header_has_times_of_reception(tmp_path):
-    run = read_table(save(tmp_path / "bag", load=number))
-    np.testing.assert_allclose(run["time"], T, atol=1e-12)
-    assert list(run.data_vars) == ["data"]
-
-
 def test_topics(tmp_path):
     path = save(tmp_path / "bag", mru=imu, load=number, note=text)
     with pytest.raises(

@@ -74,11 +74,6 @@ def test_options(tmp_path):
     np.testing.assert_allclose(run["time"], [0, 0.05], rtol=1e-15)
 
 
-def test_time_in_the_unit_of_its_header(tmp_path):
-    run = read_table(write(tmp_path, "time (ms),heave\n0,1\n20,2\n"))
-    np.testing.assert_allclose(run["time"], [0, 0.02], rtol=1e-15)
-
-
 @pytest.mark.parametrize("name", ["time_ms", "Tid_ms", "t ms"])
 @pytest.mark.parametrize("stated", [None, "stated"])
 def test_time_in_the_unit_that_its_name_ends_on(tmp_path, name, stated):
@@ -101,12 +96,6 @@ def test_a_unit_of_time_stated_against_the_header(tmp_path):
         read_table(path, FileSettings(time="Zeit", time_unit="ms"))
     rated = read_table(path, FileSettings(sampling_rate=10))  # what the message proposes
     np.testing.assert_array_equal(rated["time"], [0, 0.1])
-
-
-def test_no_time_column_but_a_rate(tmp_path):
-    run = read_table(write(tmp_path, "heave,pitch\n1,1\n2,2\n"), FileSettings(sampling_rate=50))
-    np.testing.assert_array_equal(run["time"], [0, 0.02])
-    assert set(run.data_vars) == {"heave", "pitch"}
 
 
 def test_latin_1_is_read_and_said(tmp_path):

@@ -9,11 +9,14 @@ import pytest
 
 from seakeep import HankelDMDc
 from seakeep.hosts import write_estimator
-from seakeep.signals.prediction import predict_waves
+from seakeep.models.live import Live
+from seakeep.models.validity import Validity
+from seakeep.signals.prediction import foresee
 
 STATES, INPUTS = ["heave", "pitch"], ["eta_fwd", "eta_cog"]
 COUNT = 700
 FLAGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"]
+ROLES = {"eta_cog": "constant"}
 NOISES = {"exact": {}, "noisy": {"heave": 0.02}}
 
 
@@ -37,6 +40,21 @@ def library(sources):
     files = sorted(path.name for path in sources.glob("*.c"))
     subprocess.run(["cc", *FLAGS, "-o", "all.so", *files, "-lm"], cwd=sources, check=True)
     return ctypes.CDLL(str(sources / "all.so"))
+
+
+@pytest.fixture
+def errors_of_training(monkeypatch):
+    """The band of Python is not widened outside the training, as that of C is not."""
+    monkeypatch.setattr(Live, "conditions", None)
+    monkeypatch.setattr(Live, "consistency_by_state", np.ones((2, 1)))
+
+
+def built(model, folder, **settings):
+    """Library of an estimator named rom."""
+    files = [str(each) for each in write_estimator(model, folder, "rom", **settings)]
+    written = [each for each in files if each.endswith(".c")]
+    subprocess.run(["cc", *FLAGS, "-o", folder / "rom.so", *written, "-lm"], check=True)
+    return ctypes.CDLL(str(folder / "rom.so"))
 
 
 def pointer(values):
@@ -68,9 +86,14 @@ class Estimator:
         return np.array([self.calls["deviation"](self.memory, each) for each in (0, 1)])
 
     def forecast(self, steps, future=None):
-        out = np.empty((steps, self.count))
+        mean, std = out = np.empty((2, steps, self.count))
         known = None if future is None else pointer(future)
-        return self.calls["forecast"](self.memory, steps, known, pointer(out)), out
+        return self.calls["forecast"](self.memory, steps, known, pointer(mean), pointer(std)), out
+
+
+def moments(forecast, states):
+    """Mean and standard deviation of a forecast in Python, shape (2, steps, N)."""
+    return np.stack([forecast[each].values[:2] for each in states], axis=-1)
 
 
 def samples(make_run, lost_inputs):
@@ -86,6 +109,7 @@ def samples(make_run, lost_inputs):
     return u, y
 
 
+@pytest.mark.usefixtures("errors_of_training")
 @pytest.mark.parametrize("name", NOISES)
 @pytest.mark.parametrize("lost_inputs", [False, True])
 def test_each_estimate_and_forecast_is_that_of_the_live_model(
@@ -105,38 +129,49 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
             status, forecast = found.forecast(30, u[at + 1 : at + 30])
             assert status == (1 if at == 5 else 0)
             if status == 0:
-                steps = live.forecast(30, u[at + 1 : at + 30]).sel(statistic="mean")
-                expected = np.stack([steps[each] for each in STATES], axis=1)
-                np.testing.assert_allclose(forecast, expected, **close)
-    waves = predict_waves(live._known_inputs(), 29)  # the mean does not tend to that of training
-    expected = live.forecast(30, waves).sel(statistic="mean")
-    status, forecast = found.forecast(30)
-    assert status == 0
-    expected = np.stack([expected[each] for each in STATES], axis=1)
-    np.testing.assert_allclose(forecast, expected, **close)
+                expected = moments(live.forecast(30, u[at + 1 : at + 30]), STATES)
+                np.testing.assert_allclose(forecast, expected, rtol=1e-9, atol=1e-12)
+    # Waves that are not known, or of one probe for a while: the mean tends to that of training.
+    part = np.full((199, 2), np.nan)
+    part[:20, 0] = u[COUNT - 30 : COUNT - 10, 0]
+    for known in (None, part):
+        status, forecast = found.forecast(200, known)
+        assert status == 0
+        # The departures are small differences of runs.
+        expected = moments(live.forecast(200, known), STATES)
+        np.testing.assert_allclose(forecast, expected, rtol=1e-7, atol=1e-9)
+        share = expected[1] / live.signature.state_scale.spread
+        assert np.all((share[20] < 0.6) & (share[-1] > 0.9))  # all weight, and then less
 
 
+@pytest.mark.usefixtures("errors_of_training")
 def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
     model, make_run, tmp_path
 ):
-    roles = {"eta_cog": "constant"}
-    write_estimator(model, tmp_path, "rom", roles=roles)
-    subprocess.run(
-        ["cc", *FLAGS, "-o", "rom.so", "rom.c", "rom_estimator.c", "-lm"], cwd=tmp_path, check=True
-    )
-    found, live = Estimator(ctypes.CDLL(str(tmp_path / "rom.so")), "rom"), model.live(roles=roles)
+    found, live = Estimator(built(model, tmp_path, roles=ROLES), "rom"), model.live(roles=ROLES)
     u, y = samples(make_run, True)
     for at in range(460):  # u[450] is lost
         found.step(u[at], y[at])
         live.step(u[at], y[at])
     plan = np.full((29, 2), np.nan)
     plan[3:, 1] = np.linspace(0, 1, 26)
-    plan[:, 0] = predict_waves(live._known_inputs()[:, 0], 29)
-    plan[:3, 1] = u[459, 1]  # it stays there
-    expected = live.forecast(30, plan).sel(statistic="mean")
     plan[:, 0] = plan[:3, 1] = np.nan
-    expected = np.stack([expected[each] for each in STATES], axis=1)
-    np.testing.assert_allclose(found.forecast(30, plan)[1], expected, rtol=0, atol=1e-12)
+    expected = moments(live.forecast(30, {"eta_cog": plan[:, 1]}), STATES)
+    np.testing.assert_allclose(found.forecast(30, plan)[1], expected, rtol=1e-7, atol=1e-9)
+
+
+def test_an_input_that_is_no_wave_is_not_judged(library, model, make_run, tmp_path):
+    wave = (Estimator(library, "exact"), model.live())
+    constant = (Estimator(built(model, tmp_path, roles=ROLES), "rom"), model.live(roles=ROLES))
+    u, y = samples(make_run, False)
+    for at in range(300):
+        for found, live in (wave, constant):
+            found.step(u[at] * [1, 3], y[at])
+            live.step(u[at] * [1, 3], y[at])
+    outside = [found.calls["validity"](found.memory) for found, _ in (wave, constant)]
+    assert outside == [live.conditions.validity for _, live in (wave, constant)]
+    assert outside[0] & Validity.HEIGHT
+    assert outside[1] == 0
 
 
 def test_a_probe_that_stands_still_is_predicted_to(library, model):
@@ -174,12 +209,12 @@ def test_it_runs_clean_under_sanitizers_without_a_heap(sources, model, make_run)
     int main(void)
     {
         static exact_estimator e;
-        static double x[40 * 2];
+        static double x[40 * 2], std[40 * 2];
         double row[4];
         while (fread(row, sizeof row, 1, stdin) == 1)
             if (exact_estimate(&e, row, row + 2))
                 return 3;
-        if (exact_forecast(&e, 40, NULL, x))
+        if (exact_forecast(&e, 40, NULL, x, std))
             return 4;
         printf("%.12g", x[0]);
         return 0;
@@ -216,11 +251,7 @@ def test_what_lies_outside_the_training_is_that_of_the_live_model(
     cases, name, factor, slow, away, tmp_path
 ):
     model = cases[name].model
-    write_estimator(model, tmp_path, "rom")
-    subprocess.run(
-        ["cc", *FLAGS, "-o", "rom.so", "rom.c", "rom_estimator.c", "-lm"], cwd=tmp_path, check=True
-    )
-    found, live = Estimator(ctypes.CDLL(str(tmp_path / "rom.so")), "rom"), model.live()
+    found, live = Estimator(built(model, tmp_path), "rom"), model.live()
     every = cases[name].run.to_dataframe()
     u, y = (every[names].to_numpy(copy=True) for names in (model.inputs, model.states))
     if slow:  # a swell of 0.24 Hz; noise trained one of these models at all periods
@@ -234,18 +265,23 @@ def test_what_lies_outside_the_training_is_that_of_the_live_model(
     assert bool(validity) == ((factor, slow, away) != (1, False, 0))
 
 
+@pytest.mark.usefixtures("errors_of_training")
 @pytest.mark.parametrize("name", ["full", "short", "autonomous", "following", "following_now"])
 @pytest.mark.parametrize("noise", [0.0, 1e-4])
 def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
     """Look-ahead, observables, carried waves and read-outs, with samples lost."""
     model = cases[name].model
     noises = {model.states[-1]: noise} if noise else {}
-    write_estimator(model, tmp_path, "rom", noises)
-    subprocess.run(
-        ["cc", *FLAGS, "-o", "rom.so", "rom.c", "rom_estimator.c", "-lm"], cwd=tmp_path, check=True
-    )
-    compiled = ctypes.CDLL(str(tmp_path / "rom.so"))
+    compiled = built(model, tmp_path, noise=noises)
     found, live = Estimator(compiled, "rom", len(model.states)), model.live(noise=noises)
+    if "following" in name:  # from probe to probe for the look-ahead, and on from each record
+
+        def foreseen(known, count):
+            first = live._expected(known, max(model.lead_samples, 1))
+            more = foresee(np.concatenate([known, first]), count, dt=1, positions=nowhere, depth=1)
+            return more._replace(expected=np.concatenate([first, more.expected])[:count])
+
+        nowhere, live._foreseen = [np.nan] * len(model.inputs), foreseen
     u, y = measured(cases[name].run, model)
     # The same sums in another order, through gains of the order of ten.
     close = {"rtol": 0, "atol": (1e-10 if "following" in name else 1e-12) * np.nanmax(np.abs(y))}
@@ -253,17 +289,10 @@ def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
         assert found.step(u[at], y[at]) == 0
         np.testing.assert_allclose(found.state, live.step(u[at], y[at]), **close, err_msg=str(at))
         if at in (148, 190, 240, 299):
-            known = live._known_inputs()
-            future = known[:0]
-            if model.inputs:  # from probe to probe for the look-ahead, and on from each record
-                future = live._expected(known, max(model.lead_samples, 1))
-                follows = "following" in name
-                known = np.concatenate([known, future]) if follows else known
-                rest = predict_waves(known, 19 + model.lead_samples)
-                future = np.concatenate([future, rest])[: len(rest)] if follows else rest
-            expected = live.forecast(20, future).sel(statistic="mean")
-            expected = np.stack([expected[each] for each in model.states], axis=1)
-            for given in (None, future):
-                status, forecast = found.forecast(20, given)
+            given = live._known_inputs()[-40:]  # of 40 samples before
+            for known in (None, given) if model.inputs else (None,):
+                status, forecast = found.forecast(20, known)
                 assert status == 0
-                np.testing.assert_allclose(forecast, expected, **close, err_msg=str(at))
+                expected = moments(live.forecast(20, known), model.states)
+                near = {"rtol": 1e-6, "atol": 100 * close["atol"]}  # small differences of runs
+                np.testing.assert_allclose(forecast, expected, **near, err_msg=str(at))

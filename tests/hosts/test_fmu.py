@@ -176,7 +176,9 @@ def test_a_compiler_that_fails_is_quoted(cases, tmp_path, monkeypatch):
     assert not (tmp_path / "arx.fmu").exists()
 
 
-def test_a_unit_that_follows_estimates_as_the_live_model_with_samples_lost(cases, tmp_path):
+def test_a_unit_that_follows_estimates_and_forecasts_as_the_live_model_with_samples_lost(
+    cases, tmp_path, monkeypatch
+):
     model = cases["full"].model
     unit = write_fmu(model, tmp_path / "follow.fmu", ahead=3)
     assert validate_fmu(str(unit)) == []
@@ -186,13 +188,19 @@ def test_a_unit_that_follows_estimates_as_the_live_model_with_samples_lost(cases
         each[rng.random(each.shape) < 0.1] = np.nan
     names = ["eta", "'wave probe'", *(f"measured.{state}" for state in model.states)]
     rows = [(at * dt, *u[at], *y[at]) for at in range(count)]
+    coming = [f"{k}.{x}[{n}]" for k in ("ahead", "std") for n in (1, 2, 3) for x in model.states]
     result = fmpy.simulate_fmu(
         str(unit),
         stop_time=count * dt,
         input=np.array(rows, dtype=[("time", float), *((name, float) for name in names)]),
-        output=list(model.states),
+        output=[*model.states, *coming],
     )
     live = model.live()
     expected = [live.step(*row) for row in zip(u, y, strict=True)]
     found = np.stack([result[name] for name in model.states], axis=1)
     np.testing.assert_allclose(found[1:], expected, rtol=1e-10, atol=1e-10)
+    monkeypatch.setattr(type(live), "conditions", None)  # C does not widen outside the training
+    monkeypatch.setattr(type(live), "consistency_by_state", np.ones((2, 1)))
+    ahead = live.forecast(3)
+    expected = [ahead[x].values[row, n] for row in (0, 1) for n in range(3) for x in model.states]
+    np.testing.assert_allclose([result[name][-1] for name in coming], expected, rtol=1e-6)

@@ -309,7 +309,6 @@ def test_waves_that_are_not_known_widen_the_band(models, run):
     for name in STATES:
         deviations = [each[name].sel(statistic="std").values for each in (known, part, unknown)]
         np.testing.assert_allclose(deviations[1][:14], deviations[0][:14], rtol=1e-6)
-        # Waves drawn over fewer rows differ less while part of them is known, at the end by chance.
         assert np.all(deviations[2][6:20] > deviations[1][6:20])
         assert np.all(deviations[1][-20:] > deviations[0][-20:])
         assert np.all(deviations[2][-20:] > deviations[0][-20:])
@@ -319,13 +318,22 @@ def test_waves_that_are_not_known_widen_the_band(models, run):
         np.testing.assert_allclose(width, 2 * stats.t.ppf(0.975, 48) * deviations[0], rtol=1e-6)
 
 
+def test_a_band_that_is_widened_does_not_move_a_mean_that_is_not_known(models, run, monkeypatch):
+    live = started(models["lead"], run)
+    calm = live.forecast(STEPS)
+    monkeypatch.setattr(type(live), "consistency_by_state", np.full((2, len(STATES)), 30.0))
+    widened = live.forecast(STEPS)
+    np.testing.assert_array_equal(mean(widened), mean(calm))
+    assert np.all(widened.heave.sel(statistic="std") > calm.heave.sel(statistic="std"))
+
+
 def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, run):
     model = models["lead"]
     cut = run.isel(time=slice(0, START))
     expected = model.forecast(cut, float(cut.time[-1]), STEPS, ahead="predict")
     live = model.live()  # of another rig: each probe from its own record
     play(live, cut, 0, START)
-    # Futures lie in pairs about the predicted one, and the model is linear in them.
+    # The model is linear in the waves, so that none of their errors moves its mean.
     made = live.forecast(STEPS)
     error = np.stack([made[name].sel(statistic="std") for name in STATES], axis=1)
     scale = model.state_scale

@@ -55,10 +55,6 @@ class TestRedundantSensors:
         assert found.kind.name == "LAG_GROWS"
         assert found.value == pytest.approx(-0.27 * PERIOD, rel=0.15)  # windows at the ends
 
-    def test_a_phase_that_wanders_and_returns(self):
-        wandering = np.interp(T + 0.2 * PERIOD * np.sin(2 * np.pi * T / T[-1]), T, waves())
-        assert kinds(wandering) == ["LAG_GROWS"] or kinds(wandering) == ["DIFFERENCE"]
-
     def test_noise_of_another_size_than_a_model_s_error(self):
         noise = np.random.default_rng(0).normal(0, waves().std(), T.size)
         assert kinds(waves() + 0.1 * noise) == []
@@ -93,14 +89,11 @@ class TestRedundantSensors:
 
 
 class TestLags:
-    def test_lag_that_runs_away_beyond_half_a_period(self):
-        stretched = np.interp(T * (1 - 1.2 / T[-1]), T, waves())
-        found = compare_sensors(stretched, waves(), DT)
-        assert 0.9 < found.growth < 1.2  # the middles of the first and last windows
-
     def test_what_stands_still_has_no_lag(self):
         """A sensor that runs away and then freezes: the windows that it froze in say nothing."""
         stretched = np.interp(T * (1 - 1.2 / T[-1]), T, waves())
+        # The middles of the first and last windows.
+        assert 0.9 < compare_sensors(stretched, waves(), DT).growth < 1.2
         frozen = np.where(np.arange(T.size) < 2600, stretched, stretched[2600])
         held = np.arange(T.size) >= 2600
         found = compare_sensors(frozen, waves(), DT, stuck_samples=held)

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from seakeep.report.sections.data import chosen
-from seakeep.report.sections.errors import bands, regular, scales
+from seakeep.report.sections.results import bands, regular, scales
 from seakeep.study import StudyResult
 from seakeep.study.judge import MEASURES, band_tables, box_table
 
@@ -79,7 +79,7 @@ def test_bands_stand_by_horizon_and_channel(result):
     # 2/0.05 times the distance to the bound at -9, of crests and troughs in turn, in a third.
     assert float(heave[4]) == pytest.approx(width + 40 * 9 / 3, rel=4e-3)  # three digits
     single = {**result.attrs, "models": json.dumps({"m": {"ensemble": False}})}
-    assert bands(replace(result, attrs=single)) is None
+    assert bands(replace(result, attrs=single)).is_empty
 
 
 @pytest.mark.parametrize(("size", "share"), [(1.0, "62 %"), (0.0, "–")])
@@ -110,4 +110,4 @@ def test_choices_stand_with_the_look_ahead(result):
     (table,) = chosen(with_group(result, chosen=group)).tables
     words = "ridge 0.001: the best; 0.3 ridge 0.001, observables none"
     assert table.rows == [("m", "a", "1.50", words)]
-    assert chosen(with_group(result, chosen=group.isel(training=[1]))) is None
+    assert chosen(with_group(result, chosen=group.isel(training=[1]))).is_empty

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from seakeep.signals import predict_waves
-from seakeep.signals.prediction import draw_sea, draw_waves, predictable_time
+from seakeep.signals.prediction import foresee, predictable_time
 from seakeep.waves import wavenumber
 
 
@@ -45,46 +46,58 @@ def sea():
     return waves + 0.02 * waves.std() * rng.standard_normal(waves.shape)
 
 
-def drawn(sea, positions, pairs=8, seed=0):
-    rng = np.random.default_rng(seed)
-    return draw_sea(sea[:900], 60, pairs, rng, dt=0.1, positions=positions, depth=3.6)
+def foreseen(sea, positions, count=60):
+    return foresee(sea[:900], count, dt=0.1, positions=positions, depth=3.6)
 
 
 def test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it(sea):
-    found, alone = drawn(sea, [0.0, 2.0, 4.0]), drawn(sea, [np.nan] * 3)
+    found, alone = foreseen(sea, [0.0, 2.0, 4.0]), foreseen(sea, [np.nan] * 3)
     spread = sea.std(axis=0)
-    errors = [(each.mean(axis=0) - sea[900:]) / spread for each in (found, alone)]
+    errors = [(each.expected - sea[900:]) / spread for each in (found, alone)]
     np.testing.assert_array_equal(errors[0][:, 0], errors[1][:, 0])
-    middle = found.reshape(2, -1, *found.shape[1:]).mean(axis=0)  # of each pair
-    np.testing.assert_allclose(middle, middle[:1] + np.zeros(middle.shape), atol=1e-9)
+    claimed = np.sqrt(np.cumsum((found.departures**2).sum(axis=0), axis=0)) / spread
     for column, x in ((1, 2.0), (2, 4.0)):
         known = int(predictable_time(sea[:900, 0], 0.1, x, 3.6) / 0.1)
         error, own = (np.sqrt(np.mean(each[:known, column] ** 2)) for each in errors)
         # Noise of two probes, 0.03, and the twentieth of the variance that is faster.
         assert error < 0.05
         assert error < 0.6 * own
-        assert found.std(axis=0)[:known, column].mean() < 0.1 * spread[column]
+        assert claimed[:known, column].mean() < 0.1
+    # Of the first probe, an innovation arrives at the last one after those in between.
+    arrival = np.abs(found.departures[0]).argmax(axis=0)
+    assert arrival[0] < arrival[1] < arrival[2]
 
 
-def test_futures_of_a_sea_spread_as_the_errors_of_its_prediction():
-    rng, trials, pairs = np.random.default_rng(0), 300, 10
+def test_departures_of_a_sea_are_the_errors_of_its_prediction():
+    rng, trials = np.random.default_rng(0), 300
     omega = 2 * np.pi * rng.uniform(0.4, 0.9, (trials, 60, 1))
     phase = rng.uniform(0, 2 * np.pi, omega.shape)
     seas = np.cos(omega * 0.1 * np.arange(460) + phase).sum(axis=1).T
     seas += 0.05 * seas.std() * rng.standard_normal(seas.shape)
-    found = draw_waves(seas[:400], 60, pairs, rng)[:, 10:]
-    expected = found.mean(axis=0)
-    ratio = (seas[410:] - expected) / np.sqrt(np.mean((found - expected) ** 2, axis=0))
-    # The mean of a square over a variance of n pairs is n/(n − 2) (F distribution). These seas
-    # tell its root to 2 %, and errors of coefficients are drawn to first order of their 62 in 400
-    # samples; without them the root is 10 % larger.
-    assert np.sqrt(np.mean(ratio**2)) == pytest.approx(np.sqrt(pairs / (pairs - 2)), rel=0.08)
+    found = foresee(seas[:400], 60, dt=0.1, positions=[np.nan] * trials, depth=3.6)
+    own = found.departures[np.arange(trials), :, np.arange(trials)]
+    others = found.departures.sum(axis=0) - own.T
+    assert not others.any()
+    ratio = (seas[400:] - found.expected).T / np.sqrt(np.cumsum(own**2, axis=1))
+    # These seas tell the root to 2 %. Errors of 62 coefficients in 400 samples count as those of
+    # one step do, to first order; without them the root is 15 % larger.
+    assert np.sqrt(np.mean(ratio**2)) == pytest.approx(1.0, rel=0.1)
+    assert 4 < found.freedom < 400 / 62  # of the largest order
 
 
-def test_probes_that_do_not_see_the_same_waves_are_drawn_alone(sea):
-    turned = sea[:900, [2, 1, 0]]  # the waves run the other way
-    expected = draw_waves(turned, 60, 8, np.random.default_rng(0))
-    np.testing.assert_array_equal(drawn(turned, [0.0, 2.0, 4.0]), expected)
-    still = np.stack([np.zeros(900), sea[:900, 0]], axis=1)
-    expected = draw_waves(still, 60, 8, np.random.default_rng(0))
-    np.testing.assert_array_equal(drawn(still, [0.0, 1.0]), expected)
+def test_the_power_of_innovations_is_that_of_a_known_process():
+    series = np.random.default_rng(1).standard_normal((6000, 1))
+    found = foresee(1.0 + 2.0 * lfilter([1.0], [1.0, -0.8], series, axis=0), 30, dt=0.1,
+                    positions=[np.nan], depth=3.6)  # fmt: skip
+    # 6000 samples tell an SD to a hundredth.
+    assert found.departures[0, :3, 0] == pytest.approx([2.0, 1.6, 1.28], rel=0.05)
+
+
+def test_probes_that_do_not_see_the_same_waves_are_continued_alone(sea):
+    turned = sea[:, [2, 1, 0]]  # the waves run the other way
+    still = np.stack([np.zeros(960), sea[:, 0]], axis=1)
+    for record, positions in ((turned, [0.0, 2.0, 4.0]), (still, [0.0, 1.0])):
+        apart, alone = foreseen(record, positions), foreseen(record, [np.nan] * len(positions))
+        np.testing.assert_array_equal(apart.expected, alone.expected)
+        np.testing.assert_array_equal(apart.departures, alone.departures)
+        np.testing.assert_array_equal(alone.expected, predict_waves(record[:900], 60))

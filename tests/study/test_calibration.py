@@ -7,7 +7,7 @@ import pytest
 
 from seakeep.study import read_study, run_study
 from seakeep.study.plan import make_plan
-from seakeep.study.units import Unit, compute, facts_of
+from seakeep.study.run import Unit, compute, facts_of
 
 
 def edited(folder, *changes):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from seakeep import Uniform
-from seakeep.campaign import ModelSettings, read_campaign
+from seakeep.campaign import read_campaign
 from seakeep.campaign.settings import is_elevation
 from seakeep.signals.waves import paper_welch
 from seakeep.study import judge, read_study
@@ -16,7 +16,7 @@ from seakeep.study.resolve import can_align, resolve_model
 
 pytest.importorskip("numba", reason="the campaign is the virtual tank's")
 
-PERIOD, DT = 1.64, 1.64 / 32
+PERIOD, DT, ENSEMBLE = 1.64, 1.64 / 32, "bayesian_hankel_dmdc"
 MAP = (Path(__file__).parents[2] / "docs/paper_map.md").read_text(encoding="utf-8")
 ROWS = {
     int(cells[1]): (cells[3].strip(), cells[4].strip())
@@ -43,55 +43,29 @@ def tank(tmp_path):
     return tmp_path
 
 
-def with_preset(folder, preset):
-    """The campaign with that preset of the model, and none of the preparation."""
+def found(folder, preset, door):
+    """Specs of the single model and the ensemble, by the preset of [model] or of a study."""
     path = folder / "campaign/campaign.toml"
     text = path.read_text(encoding="utf-8")
-    model = re.sub(r'(\[model\][^[]*?)preset = "\w+"', rf'\1preset = "{preset}"', text)
+    of_model = preset if door == "fit" else {"paper": "recommended", "recommended": "paper"}[preset]
+    model = re.sub(r'(\[model\][^[]*?)preset = "\w+"', rf'\1preset = "{of_model}"', text)
     path.write_text(re.sub(r'(\[preparation\]\n)preset = "\w+"\n', r"\1", model), encoding="utf-8")
-    return path
-
-
-def through_fit(folder, preset):
-    campaign = read_campaign(with_preset(folder, preset))
-    single = campaign.model()
-    several = ModelSettings(
-        kind="bayesian_hankel_dmdc", preset=preset, states=single.states, inputs=single.inputs
-    )
-    aligned = can_align(campaign.settings, single.inputs)
-    specs = [resolve_model(each, PERIOD, DT, aligned=aligned).spec for each in (single, several)]
-    return SimpleNamespace(campaign=campaign, specs=specs, study=None)
-
-
-def of_study(path):
-    study = read_study(path)
-    settings = study.settings
-    aligned = can_align(study.campaign.settings, study.inputs)
-    specs = [
-        resolve_model(each, PERIOD, DT, preset=settings.study.preset, aligned=aligned).spec
-        for each in list(settings.models.values())[:2]
-    ]
-    return SimpleNamespace(campaign=study.campaign, specs=specs, study=settings)
-
-
-def through_study(folder, preset):
-    with_preset(folder, {"paper": "recommended", "recommended": "paper"}[preset])
-    path = folder / "study.toml"
-    path.write_text(
-        f'[study]\ncampaign = "campaign/campaign.toml"\npreset = "{preset}"\n', encoding="utf-8"
-    )
-    return of_study(path)
-
-
-def through_reproduce(folder, preset):
-    act = next(act for act in ACTS if act.preset == preset and not act.without_drift)
-    path = folder / act.name / "study.toml"
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(study_text(act, Size(), 0), encoding="utf-8")
-    return of_study(path)
-
-
-DOORS = {"fit": through_fit, "study": through_study, "reproduce": through_reproduce}
+    if door == "fit":
+        campaign, study = read_campaign(path), None
+        tables = [campaign.model(), campaign.model().model_copy(update={"kind": ENSEMBLE})]
+    else:
+        act = next(act for act in ACTS if act.preset == preset and not act.without_drift)
+        says = f'[study]\ncampaign = "../campaign/campaign.toml"\npreset = "{preset}"\n'
+        file = folder / act.name / "study.toml"
+        file.parent.mkdir()
+        file.write_text(says if door == "study" else study_text(act, Size(), 0), encoding="utf-8")
+        read = read_study(file)
+        campaign, study = read.campaign, read.settings
+        tables = list(study.models.values())[:2]
+    aligned = can_align(campaign.settings, campaign.model().inputs)
+    above = None if study is None else preset
+    specs = [resolve_model(each, PERIOD, DT, preset=above, aligned=aligned).spec for each in tables]
+    return SimpleNamespace(campaign=campaign, specs=specs, study=study)
 
 
 def paper(found):
@@ -129,43 +103,23 @@ def same_in_both(row):
     return second.startswith(("the same", first))
 
 
-@pytest.mark.parametrize("door", DOORS)
+@pytest.mark.parametrize("door", ["fit", "study", "reproduce"])
 def test_the_papers_column_is_taken_in_every_row(tank, door):
-    found = DOORS[door](tank, "paper")
+    taken = found(tank, "paper", door)
     assert sorted(ROWS) == list(range(1, 32))
-    checked = paper(found)
+    checked = paper(taken)
     assert checked == dict.fromkeys(checked, True)
     left = set(ROWS) - set(checked) - {row for row in ROWS if same_in_both(row)}
     elsewhere = OF_TRAINING | OF_JUDGEMENT if door == "fit" else set()
     assert left <= elsewhere
     assert not elsewhere & set(checked)
     if door == "reproduce":
-        regular = [each for name, each in found.study.tests.items() if name.startswith("regular")]
+        regular = [each for name, each in taken.study.tests.items() if name.startswith("regular")]
         assert {(each.windows, each.startup) for each in regular} == {(10, 20.0)}  # rows 30, 31
     # Rows that both columns decide alike and a setting could change all the same.
-    single, ensemble = found.specs
-    names = found.campaign.settings.channel_names
-    inputs = found.campaign.model().inputs
-    assert len(inputs) == 2  # row 7
-    assert all(map(is_elevation, inputs))
-    assert set(inputs) <= set(names)
+    single, ensemble = taken.specs
+    assert list(map(is_elevation, taken.campaign.model().inputs)) == [True, True]  # row 7
     assert single.state_delays == 32  # rows 8 and 10: one period of 1.64 s, to the nearest
     assert ensemble.state_delays == Uniform("0.5 T", "1.5 T")  # row 11
-    assert found.campaign.settings.celerity_channels == ("eta_fwd", "eta_cog")  # row 4
-    assert found.campaign.settings.rig.positions["eta_fwd"] == 48.42  # row 27
-
-
-@pytest.mark.parametrize("door", ["fit", "study"])
-def test_the_recommended_column_is_another_wherever_it_says_so(tank, door):
-    found = DOORS[door](tank, "recommended")
-    single, ensemble = found.specs
-    preparation = found.campaign.settings.preparation
-    assert (preparation.low_pass, preparation.anti_alias) == (None, True)  # row 24
-    assert single.delay_rows == ensemble.delay_rows == "exact"  # row 15
-    assert single.ridge_scale == ensemble.ridge_scale == "per_snapshot"  # row 12
-    assert not isinstance(ensemble.ridge, Uniform)
-    assert single.window is None  # row 23: all of the runs
-    assert ensemble.window is None
-    for each in found.specs:
-        assert each.alignment is None or each.alignment.surge != "measured"  # row 6
-    assert found.study is None or found.study.calibrates  # row 14
+    assert taken.campaign.settings.celerity_channels == ("eta_fwd", "eta_cog")  # row 4
+    assert taken.campaign.settings.rig.positions["eta_fwd"] == 48.42  # row 27

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.core.harmonics import dominant_frequency
 from seakeep.study.judge import is_regular, regular_response
 
 DT, FREQUENCY = 0.05, 0.86
@@ -61,9 +60,3 @@ def test_a_set_in_an_irregular_sea_is_not_taken_apart():
     assert is_regular(made, "t")
     made["tests/t"]["run"] = ("window", np.array(["wave", "sea", "wave"], dtype=object))
     assert not is_regular(made, "t")
-
-
-def test_the_frequency_of_a_noisy_wave():
-    noise = 0.1 * np.random.default_rng(1).standard_normal(1200)
-    found = dominant_frequency(np.sin(2 * np.pi * 0.86 * np.arange(1200) * DT) + noise, DT)
-    assert found == pytest.approx(0.86, abs=1e-3)  # 6 % of the resolution of 60 s

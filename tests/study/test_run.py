@@ -2,25 +2,21 @@
 
 import json
 import shutil
-import signal
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
-from started import started
 from tutorial_study import assert_cells_are_what_the_models_say, put_tutorial
 
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models.executor import processes
 from seakeep.statistics import band_error_over_time
 from seakeep.study import read_study, run, run_study, store
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
+from seakeep.study.run import compute, compute_task, facts_of, tasks_of, units_of
 from seakeep.study.store import LOCK, UNITS, UnitFolder
-from seakeep.study.units import compute, compute_task, facts_of, tasks_of, units_of
 
 CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
 
@@ -89,48 +85,21 @@ def test_arrays_do_not_depend_on_workers(study_folder, finished):
     same(finished, run_study(study, study_folder / "alone"))
 
 
-WHOLE = 3  # both models of one training set, and one of the next
-HALF_A_UNIT = f"""
-import sys, time
-from seakeep.study import read_study, run_study
-from pathlib import Path
+def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, finished):
+    study, out, told = read_study(study_folder / "study.toml"), study_folder / "stopped", []
 
-whole, left = Path.write_bytes, iter(range({WHOLE}))
+    def stop(done, total, what):
+        if done == 3 and "training set" in what:  # both models of one, and one of the next
+            raise KeyboardInterrupt
 
-def write_bytes(path, content):
-    if path.parent.name != "units" or next(left, None) is not None:
-        return whole(path, content)
-    whole(path, content[:2])
-    print("half a unit", flush=True)
-    time.sleep(3600)
-
-if __name__ == "__main__":
-    Path.write_bytes = write_bytes
-    run_study(read_study(sys.argv[1]), sys.argv[2])
-"""
-
-
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
-@pytest.mark.filterwarnings("ignore:.*unfinished file")
-def test_a_study_that_is_killed_goes_on_and_ends_the_same(study_folder, finished):
-    out = study_folder / "killed"
-    (study_folder / "go.py").write_text(HALF_A_UNIT, "utf-8")
-    command = [sys.executable, "go.py", "study.toml", str(out)]
-    with started(command, study_folder, stdout=subprocess.PIPE) as process:
-        assert process.stdout.readline() == "half a unit\n", "the study ended before it was killed"
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-    assert len(list((out / "units").glob("*.nc"))) == WHOLE
-    assert len(list((out / "units").iterdir())) == WHOLE + 1
+    with pytest.raises(KeyboardInterrupt):
+        run_study(study, out, progress=stop)
+    assert len(list((out / UNITS).iterdir())) == 3
     assert not (out / "study.nc").exists()
-    told = []
-    again = run_study(
-        read_study(study_folder / "study.toml"),
-        out,
-        progress=lambda done, total, what: told.append((done, total, what)),
-    )
-    first = next(entry for entry in told if entry[2].startswith("fitting and forecasting, "))
-    assert first[0] >= 1, "no finished unit was taken over"
+    (out / UNITS / ".half.nc.tmp").write_bytes(b"\x89H")
+    with pytest.warns(SeakeepWarning, match=r"removed 1 unfinished file\(s\) of a killed run"):
+        again = run_study(study, out, progress=lambda *each: told.append(each))
+    assert next(each[0] for each in told if each[2].startswith("fitting and forecasting, ")) == 3
     same(finished, again)
 
 
@@ -248,7 +217,7 @@ def test_a_single_model_and_an_ensemble_share_what_is_chosen_on_a_training_set(t
     facts = facts_of(study, plan)
     single, ensemble, mean = units_of(plan)
     assert tasks_of(plan, [single, ensemble, mean]) == [(single, ensemble), (mean,)]
-    both = compute_task(plan, facts, (single, ensemble))
+    both = compute_task((plan, facts), (single, ensemble))
     for unit, found in zip((single, ensemble), both, strict=True):
         alone = compute(plan, facts, unit)
         assert found.keys() == alone.keys()

@@ -163,7 +163,7 @@ ridge_scale = "absolute"
 """
 
 
-def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study, monkeypatch):
+def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study):
     text = put_study(tmp_path)
     path = tmp_path / "study.toml"
     path.write_text(text.replace("length = 6", "length = 20") + WILD, "utf-8")
@@ -177,16 +177,6 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study, monk
     assert boxes["count"].sel(model="wild") == 0
     assert boxes["count"].sel(model="deterministic") == 6
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
-    # The study ends in a report, whose figures are made here and not written.
-    pytest.importorskip("matplotlib", reason="the report draws figures")
-    from seakeep.report import page
-    from seakeep.report.sections import write_report
-
-    made = []
-    monkeypatch.setattr(page, "_drawn", lambda drawing, folder: made.append(drawing.draw()))
-    text = write_report(found).read_text("utf-8")
-    assert "6 forecast(s) diverged and are left out: model " in text
-    assert made
 
 
 def crossed(rng, levels, cells=10):
@@ -264,32 +254,6 @@ def test_medians_leave_out_what_is_not_judged():
     found = median_of(cells)
     np.testing.assert_allclose(found[[0, 2]], np.nanmedian(cells[[0, 2]], axis=1))
     assert np.isnan(found[1]).all()
-
-
-BASELINES = """
-[models.still]
-kind = "hold_last"
-[models.average]
-kind = "mean"
-[models.filter]
-kind = "fir"
-[models.classic]
-kind = "arx"
-"""
-
-
-def test_any_registered_kind_runs_in_a_study(tmp_path, put_study):
-    text = put_study(tmp_path)
-    ensemble = text[text.index("[models.bayesian]") : text.index("[tests.unseen]")]
-    path = tmp_path / "study.toml"
-    path.write_text(text.replace(ensemble, "") + BASELINES, "utf-8")
-    found = run_study(read_study(path), tmp_path / "out")
-    test = found.tests["unseen"]
-    still = test["mean"].sel(model="still")
-    assert (still == still.isel(time=0)).all()
-    average = test["mean"].sel(model="average").isel(window=0, time=0)
-    np.testing.assert_allclose(average, test["training_mean"], rtol=1e-9, atol=1e-12)
-    assert found.model_settings["classic"]["preset"] == "recommended"
 
 
 REGULARISED = """

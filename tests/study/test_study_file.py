@@ -43,23 +43,20 @@ def test_what_no_study_file_may_say(tables, words):
         validated(StudySettings, content, "study.toml", "study")
 
 
-def test_the_digest_follows_settings_and_not_words(study_folder):
+def test_the_digest_follows_settings_and_raw_files_and_no_words(study_folder):
     path = study_folder / "study.toml"
     text = path.read_text("utf-8")
-    before = read_study(path).digest
-    path.write_text(text.replace("seed = 3", 'seed = 3\nname = "other"'), "utf-8")
-    assert read_study(path).digest == before
-    path.write_text(f"{text}\n[output]\npaper = true\n", "utf-8")
-    assert read_study(path).digest == before
-    path.write_text(text.replace("seed = 3", "seed = 4"), "utf-8")
-    assert read_study(path).digest != before
 
+    def digest(seed="seed = 3", more=""):
+        path.write_text(text.replace("seed = 3", seed) + more, "utf-8")
+        return read_study(path).digest
 
-def test_the_digest_follows_the_raw_files(study_folder):
-    before = read_study(study_folder / "study.toml").digest
+    before = digest()
+    assert digest('seed = 3\nname = "other"', "\n[output]\npaper = true\n") == before
+    assert digest("seed = 4") != before
     with (study_folder / "run2.csv").open("a", encoding="utf-8") as file:
         file.write("\n")
-    assert read_study(study_folder / "study.toml").digest != before
+    assert digest() != before
 
 
 def test_overlap_of_windows_by_hand():

@@ -132,12 +132,3 @@ def test_every_test_set_has_its_statistics_and_its_start_up_is_cut(folder):
     # The error in regular waves alone is taken apart.
     assert list(found.groups["statistics/response"]["test"].values) == ["regular"]
     assert found.groups["runs"].sel(run="wave")["wave_frequency"] == pytest.approx(0.6, abs=0.005)
-
-
-def test_what_a_study_by_measured_surge_is_conditional_on_is_kept_by_its_name(folder):
-    text = (folder / "campaign.toml").read_text("utf-8").replace("surge", "x_tracked")
-    (folder / "campaign.toml").write_text(text, "utf-8")
-    read = STUDY.replace('"predicted"', '"measured", surge_channel = "x_tracked"')
-    (folder / "study.toml").write_text(read, "utf-8")
-    found = run_study(read_study(folder / "study.toml"), folder / "out")
-    assert found.attrs["conditional_on"] == "x_tracked"

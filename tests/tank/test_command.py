@@ -4,7 +4,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from seakeep.cli.tank import tank
+from seakeep.cli.campaigns import tank
 
 pytest.importorskip("numba", reason="needs the extra tank")
 

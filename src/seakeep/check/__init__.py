@@ -1,14 +1,31 @@
-"""Checks of a model: worth, response, coherence, modes, residuals, statistics and validity."""
+"""Checks of a model: worth, response, coherence, modes, residuals, statistics and validity.
 
+:func:`check_model` makes all of them on the runs of a campaign.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from inspect import signature
+from typing import Any
+
+import xarray as xr
+
+from seakeep.arrays import Progress
 from seakeep.check.coherence import coherence
-from seakeep.check.every import CHECKS, Checked, check_model
-from seakeep.check.free import decay, measured_decay, modes
+from seakeep.check.motion import decay, drift, measured_decay, modes
+from seakeep.check.parts import Known, of_part
 from seakeep.check.peaks import statistics
 from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
 from seakeep.check.sea import validity
-from seakeep.check.second_order import drift
 from seakeep.check.worth import worth
+from seakeep.errors import SeakeepError, SeakeepWarning
+from seakeep.models import Model
+from seakeep.models.labelled import check_channels
 
 __all__ = [
     "CHECKS",
@@ -27,3 +44,105 @@ __all__ = [
     "validity",
     "worth",
 ]
+
+Check = Callable[..., xr.Dataset]
+
+
+CHECKS: dict[str, Check] = {
+    "worth": worth,
+    "response": lambda model, runs: response(model, None, runs),
+    "measured_response": measured_response,
+    "validation": validation,
+    "coherence": coherence,
+    "decay": lambda model, _: decay(model),
+    "measured_decay": measured_decay,
+    "modes": lambda model, _: modes(model),
+    "residuals": residuals,
+    "statistics": statistics,
+    "validity": validity,
+    "drift": drift,
+}
+"""Checks by name: each takes a model and prepared runs by name, and what checks share.
+
+That are `free` runs of model and `baselines`, and the `measured` response.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """Results of the checks.
+
+    Parameters
+    ----------
+    results : dict of str to Dataset
+        Result of each check that could judge; where runs test, also ``training_coherence`` and
+        ``training_residuals``, the same of what trains.
+    refused : dict of str to str
+        Why each other one could not.
+    notes : dict of str to tuple of str
+        Warnings of each.
+    repeats : dict of str to str, optional
+        Tests whose input repeats training input, in words.
+    """
+
+    results: dict[str, xr.Dataset]
+    refused: dict[str, str]
+    notes: dict[str, tuple[str, ...]]
+    repeats: dict[str, str] = field(default_factory=dict)
+
+
+def check_model(
+    model: Model,
+    runs: Mapping[str, xr.Dataset],
+    progress: Progress | None = None,
+    baselines: Mapping[str, Model] | None = None,
+) -> Checked:
+    """Check a model on prepared runs.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    runs : mapping of str to Dataset
+        Prepared runs by name, as ``campaign.prepare()`` gives them.
+    progress : callable, optional
+        Called as ``progress(done, total, check)``.
+    baselines : mapping of str to Model, optional
+        Linear models of the same states, from :func:`seakeep.study.fit_baselines`, to compare with.
+
+    Returns
+    -------
+    Checked
+
+    Raises
+    ------
+    RequestError
+        If a run lacks a channel of the model.
+    """
+    for name, run in runs.items():
+        check_channels(run, [*model.states, *model.inputs], name)
+    results: dict[str, xr.Dataset] = {}
+    refused, notes = {}, {}
+    shared: dict[str, Any] = {"free": {}, "baselines": baselines}
+    for number, (name, check) in enumerate(CHECKS.items()):
+        if progress is not None:
+            progress(number, len(CHECKS), name)
+        how = {key: shared[key] for key in signature(check).parameters if key in shared}
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                results[name] = check(model, runs, **how)
+            except SeakeepError as error:
+                refused[name] = str(error)
+        if name == "measured_response":
+            shared["measured"] = results.get(name)
+        ours = [str(each.message) for each in caught if issubclass(each.category, SeakeepWarning)]
+        notes[name] = tuple(dict.fromkeys(ours))
+    trained = of_part(runs, "train")
+    if trained and of_part(runs, "test"):
+        free: Known = {}
+        for name in ("coherence", "residuals"):
+            with warnings.catch_warnings(), suppress(SeakeepError):
+                warnings.simplefilter("ignore", SeakeepWarning)
+                results[f"training_{name}"] = CHECKS[name](model, trained, free=free)
+    return Checked(results, refused, notes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
@@ -109,10 +110,8 @@ def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
         time = np.asarray(run["time"].values, dtype=float)
         states = channel_matrix(run, model.states, name)
         try:
-            inputs = channel_matrix(run, model.inputs, name)
-            if is_linear(model):
-                aligned = model.aligned_inputs(run)
-                inputs = channel_matrix(aligned, model.inputs, name)
+            aligned = model.aligned_inputs(run) if is_linear(model) else run
+            inputs = channel_matrix(aligned, model.inputs, name)
         except DataError as error:
             warn(f"{name} is left out: {error}")
             continue
@@ -218,12 +217,9 @@ def beside(
     """Free runs of baselines over those of a model; one that lacks a run is left out."""
     others = {}
     for label, each in (baselines or {}).items():
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), suppress(DataError):
             warnings.simplefilter("ignore", SeakeepWarning)
-            try:
-                others[label] = free_runs(each, runs, free, label, own)
-            except DataError:
-                continue
+            others[label] = free_runs(each, runs, free, label, own)
     return {label: of for label, of in others.items() if of.keys() == own.keys()}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.check.parts import FreeRun, Known, free_runs, irregular, judged
+from seakeep.check.parts import Known, free_runs, irregular, judged, units_of
 from seakeep.core.density import jensen_shannon, kernel_density
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
 from seakeep.errors import SeakeepError
@@ -65,51 +65,45 @@ def statistics(
     if duration is None:
         scale = float(next(iter(waves.values())).attrs.get("scale_factor", 1.0))
         duration = 3600 * HOURS / np.sqrt(scale)
+    moved = {
+        kind: [x - x.mean(axis=0) for x in (getattr(run, kind) for run in known.values())]
+        for kind in KINDS
+    }
     parts = []
     for column in range(len(model.states)):
-        series = {kind: [getattr(r, kind)[:, column] for r in known.values()] for kind in KINDS}
-        laws = [_law(each, model.dt, duration) for each in series.values()]
-        parts.append(xr.concat(laws, xr.Variable("kind", list(series)), join="outer"))
+        laws = [_law([x[:, column] for x in of], model.dt, duration) for of in moved.values()]
+        parts.append(xr.concat(laws, xr.Variable("kind", list(moved)), join="outer"))
     names = xr.Variable("state", model.states)
     out = xr.concat(parts, names, join="outer").drop_vars("rank").transpose("state", ...)
-    deviation, density = _densities(list(known.values()), len(model.states))
+    deviation, density = _densities(np.array([np.concatenate(each) for each in moved.values()]))
     out["deviation"] = (("state", "place"), deviation)
     out["density"] = (("state", "kind", "place"), density)
-    out["divergence"] = ("state", [_divergence(*each) for each in density])
-    units = [label.units for label in model.signature.state_labels]
+    divergence = [jensen_shannon(*x) if np.isfinite(x).all() else np.nan for x in density]
+    out["divergence"] = ("state", divergence)
+    units = units_of(model, model.states)
     return out.assign_coords(units=("state", units)).assign_attrs(duration=duration, of=of)
 
 
-def _densities(free: list[FreeRun], states: int) -> tuple[FloatArray, FloatArray]:
-    """Densities of the deviations from the mean of each run, on a grid for each state."""
-    grids = np.empty((states, PLACES))
-    densities = np.full((states, len(KINDS), PLACES), np.nan)
-    both = np.concatenate(
-        [np.stack([(x := getattr(e, kind)) - x.mean(axis=0) for kind in KINDS]) for e in free],
-        axis=1,
-    )
+def _densities(both: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Densities of deviations (kind, time, state) on a grid for each state."""
     both = both[:, np.isfinite(both).all(axis=(0, 2))]  # a free run that was lost
-    for state in range(states):
-        reach = 1.1 * np.abs(both[:, :, state]).max(initial=0.0) or 1.0
-        grids[state] = np.linspace(-reach, reach, PLACES)
-        for side, values in enumerate(both[:, :, state]):
-            if values.size and np.ptp(values) > 0:
-                density = kernel_density(values, grids[state])
-                if density.sum() * 2 * reach / PLACES > 0.5:  # else the grid is too coarse for it
-                    densities[state, side] = density
+    reach = 1.1 * np.abs(both).max(axis=(0, 1), initial=0.0)
+    reach[reach == 0] = 1.0
+    grids = np.linspace(-reach, reach, PLACES, axis=-1)
+    densities = np.full((len(grids), len(KINDS), PLACES), np.nan)
+    for state, side in np.ndindex(densities.shape[:2]):
+        values = both[side, :, state]
+        if values.size and np.ptp(values) > 0:
+            density = kernel_density(values, grids[state])
+            if density.sum() * 2 * reach[state] / PLACES > 0.5:  # else the grid is too coarse
+                densities[state, side] = density
     return grids, densities
 
 
-def _divergence(measured: FloatArray, forecast: FloatArray) -> float:
-    known = np.isfinite(measured).all() and np.isfinite(forecast).all()
-    return float(jensen_shannon(measured, forecast)) if known else np.nan
-
-
-def _peaks(series: list[FloatArray], dt: float) -> tuple[FloatArray, FloatArray]:
-    """Peaks and zero-crossing periods of several records."""
+def _peaks(moved: list[FloatArray], dt: float) -> tuple[FloatArray, FloatArray]:
+    """Peaks and zero-crossing periods of the deviations of several records."""
     peaks, periods = [np.empty(0)], [np.empty(0)]
-    for each in series:
-        x = each - each.mean()
+    for x in moved:
         if not np.all(np.isfinite(x)):
             continue  # a free run that was lost
         try:
@@ -122,12 +116,11 @@ def _peaks(series: list[FloatArray], dt: float) -> tuple[FloatArray, FloatArray]
     return np.concatenate(peaks), np.concatenate(periods)
 
 
-def _law(series: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
-    """Statistics of several records of a state, and their peaks, largest first."""
-    peaks, periods = _peaks(series, dt)
-    ranked = -np.sort(-peaks)
+def _law(moved: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
+    """Statistics of the deviations of several records of a state; peaks largest first."""
+    peaks, periods = _peaks(moved, dt)
     rank = np.arange(1, peaks.size + 1)
-    spread = float(np.sqrt(np.mean(np.concatenate([x - x.mean() for x in series]) ** 2)))
+    spread = float(np.sqrt(np.mean(np.concatenate(moved) ** 2)))
     period = float(periods.mean()) if periods.size else np.nan
     law = fit_weibull(peaks)
     extreme, lower, upper = most_probable_extreme(law, duration / period if period else np.nan)
@@ -142,7 +135,7 @@ def _law(series: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
             "extreme": extreme,
             "extreme_lower": lower,
             "extreme_upper": upper,
-            "peak": ("rank", ranked),
+            "peak": ("rank", -np.sort(-peaks)),
             "exceedance": ("rank", rank / (peaks.size + 1)),
         },
         {"rank": rank},

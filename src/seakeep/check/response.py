@@ -30,6 +30,7 @@ from seakeep.models import Model, is_ensemble
 from seakeep.models.engine import Dynamics
 from seakeep.models.labelled import mean_period
 from seakeep.models.registry import is_linear
+from seakeep.models.validity import Coverage
 
 WAVE = "wave"
 """Name of the input that is a wave which passes all probes."""
@@ -93,7 +94,8 @@ def response(
     """
     if not model.inputs:
         raise RequestError("the model has no input: it answers no wave. Check its modes instead.")
-    wanted = _default_frequencies(model) if frequencies is None else frequencies
+    coverage, dynamics = _matrices(model)
+    wanted = _default_frequencies(coverage, model.dt) if frequencies is None else frequencies
     frequency = np.atleast_1d(as_real(wanted, "frequencies"))
     if frequency.size == 0:
         raise RequestError("frequencies is empty. Give at least one, in Hz, or leave it out.")
@@ -102,14 +104,42 @@ def response(
             f"frequencies must lie above 0 and up to half the sampling rate ({0.5 / model.dt:.4g} "
             f"Hz); received {frequency.min():.4g} to {frequency.max():.4g} Hz."
         )
-    size = len(model.inputs)
-    each = np.stack([transfer(model, one, frequency)[:, :, :size] for one in _dynamics(model)])
-    names, reference = list(model.inputs), ""
+    names = list(model.inputs)
+    waves, size, turns = names, len(names), None
+    each = np.stack([transfer(model, one, frequency)[:, :, :size] for one in dynamics])
     if runs is not None and size > 1:
-        each, reference = _with_wave(model, runs, frequency, each)
-        names = names if not reference else [*names, WAVE]
+        probe = reference_probe(model, runs)
+        turns = wave_turns(model, runs, frequency, probe)
+    if turns is not None:
+        phasors = np.nan_to_num(np.exp(-1j * turns))  # other inputs are still
+        passing = np.einsum("mfnq,fq->mfn", each, phasors)[..., None]
+        each = np.concatenate([each, passing], axis=-1)
+        waves, names = [*names, names[probe]], [*names, WAVE]
     each[:, :, read_off(model)] = np.nan
-    return _labelled(model, frequency, names, each, reference)
+    each, dims = np.moveaxis(each, 1, -1), ("state", "input", "frequency")
+    mean = each.mean(axis=0)
+    values = {"amplitude": np.abs(mean), "phase": np.degrees(np.angle(mean))}
+    if len(each) > 1:
+        ends = np.quantile(np.abs(each), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)
+        turned = np.abs(np.angle(each * np.conj(mean)))
+        values |= dict(zip(("amplitude_lower", "amplitude_upper"), ends, strict=True))
+        values["phase_spread"] = np.degrees(np.quantile(turned, LEVEL, axis=0))
+    known = coverage.is_trained(frequency)[[coverage.channels.index(name) for name in waves]]
+    of = units_of(model, waves)
+    units = [[_ratio(x, u) for u in of] for x in units_of(model, model.states)]
+    out = xr.Dataset(
+        {key: (dims, value) for key, value in values.items()}
+        | {"trained": (("input", "frequency"), known)},
+        coords={
+            "state": model.states,
+            "input": names,
+            "frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"}),
+            "units": (("state", "input"), units),
+        },
+        attrs={"reference": waves[-1]},
+    )
+    out["phase"].attrs = {"units": "deg", "long_name": "phase before the wave"}
+    return out
 
 
 def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> ComplexArray:
@@ -124,96 +154,33 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
         dynamics.input_delays,
     )
     scale = np.concatenate([dynamics.input_scale.std, dynamics.direct_scale.std])
-    early = np.exp(2j * np.pi * frequency * model.dt * _lead(model))
+    input_map = model.signature.input_map
+    lead = (input_map.follows or input_map).lead  # of delayed columns, in samples
+    early = np.exp(2j * np.pi * frequency * model.dt * lead)
     early = np.where(np.arange(scale.size) < len(model.inputs), early[:, None], 1.0)
     result: ComplexArray = gain * dynamics.state_scale.std[:, None] / scale * early[:, None]
     return result
 
 
-def _lead(model: Model) -> int:
-    """Samples by which delayed columns lead."""
-    input_map = model.signature.input_map
-    return input_map.lead if input_map.follows is None else input_map.follows.lead
-
-
-def _dynamics(model: Model) -> list[Dynamics]:
+def _matrices(model: Model) -> tuple[Coverage, list[Dynamics]]:
     if is_linear(model):
-        return [model.dynamics]
+        return model.coverage, [model.dynamics]
     if is_ensemble(model):
-        return [model.dynamics(member) for member in range(model.n_members)]
+        return model.coverage, [model.dynamics(member) for member in range(model.n_members)]
     raise RequestError(
         f"a model of kind '{model.kind}' has no matrices of delayed states and inputs, from which "
         "a response is read. Check a Hankel model, an ARX or a FIR model."
     )
 
 
-def _default_frequencies(model: Model) -> FloatArray:
-    highest = 0.5 / model.dt
+def _default_frequencies(coverage: Coverage, dt: float) -> FloatArray:
+    highest = 0.5 / dt
     low = highest / 200
-    coverage = getattr(model, "coverage", None)
-    if coverage is not None:
-        grid = np.geomspace(low, highest, 400)
-        known = grid[coverage.is_trained(grid).any(axis=0)]
-        if known.size:
-            low, highest = 0.5 * known[0], min(highest, 1.3 * known[-1])
+    grid = np.geomspace(low, highest, 400)
+    known = grid[coverage.is_trained(grid).any(axis=0)]
+    if known.size:
+        low, highest = 0.5 * known[0], min(highest, 1.3 * known[-1])
     return np.geomspace(low, highest, FREQUENCIES)
-
-
-def _with_wave(
-    model: Model, runs: Mapping[str, xr.Dataset], frequency: FloatArray, each: ComplexArray
-) -> tuple[ComplexArray, str]:
-    """Responses with that to a passing wave, and its probe; without, where it is not known."""
-    reference = reference_probe(model, runs)
-    turns = wave_turns(model, runs, frequency, reference)
-    if turns is None:
-        return each, ""
-    waves = np.nan_to_num(np.exp(-1j * turns))  # other inputs are still
-    passing = np.einsum("mfnq,fq->mfn", each, waves)[..., None]
-    return np.concatenate([each, passing], axis=-1), model.inputs[reference]
-
-
-def _labelled(
-    model: Model, frequency: FloatArray, names: list[str], each: ComplexArray, reference: str
-) -> xr.Dataset:
-    each = np.moveaxis(each, 1, -1)
-    mean = each.mean(axis=0)
-    dims = ("state", "input", "frequency")
-    quantiles = {}
-    if len(each) > 1:
-        bounds = np.quantile(np.abs(each), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)
-        turned = np.abs(np.angle(each * np.conj(mean)))
-        quantiles = {
-            "amplitude_lower": (dims, bounds[0]),
-            "amplitude_upper": (dims, bounds[1]),
-            "phase_spread": (dims, np.degrees(np.quantile(turned, LEVEL, 0))),
-        }
-    waves = [reference if name == WAVE else name for name in names]
-    of = units_of(model, waves)
-    units = [[_ratio(x, u) for u in of] for x in units_of(model, model.states)]
-    coverage = getattr(model, "coverage", None)
-    known = np.ones((len(names), frequency.size), dtype=bool)
-    if coverage is not None:
-        rows = coverage.is_trained(frequency)
-        known = rows[[coverage.channels.index(name) for name in waves]]
-    return xr.Dataset(
-        {
-            "amplitude": (dims, np.abs(mean), {"long_name": "amplitude"}),
-            "phase": (
-                dims,
-                np.degrees(np.angle(mean)),
-                {"units": "deg", "long_name": "phase before the wave"},
-            ),
-            **quantiles,
-            "trained": (("input", "frequency"), known),
-        },
-        coords={
-            "state": model.states,
-            "input": names,
-            "frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"}),
-            "units": (("state", "input"), units),
-        },
-        attrs={"reference": reference or waves[-1]},
-    )
 
 
 def _ratio(units: str, per: str) -> str:
@@ -277,27 +244,24 @@ def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Datase
 
 
 def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Dataset:
-    wave = part.inputs[:, reference]
-    frequency = dominant_frequency(wave, model.dt)
-    both = np.concatenate([wave[:, None], part.states], axis=1)
+    names = [model.inputs[reference], *model.states]
+    both = np.concatenate([part.inputs[:, [reference]], part.states], axis=1)
+    frequency = dominant_frequency(both[:, 0], model.dt)
     harmonics, means = harmonic_fits(both, model.dt, frequency)
-    amplitude, answer = np.abs(harmonics[:, 0]).mean(), np.abs(harmonics[:, 1:]).mean(axis=0)
-    accuracy = [_accuracy(part.run, each) for each in [model.inputs[reference], *model.states]]
-    ratio = answer / amplitude
+    amplitude, *answer = np.abs(harmonics).mean(axis=0)
+    accuracy = np.array([float(part.run[each].attrs.get("accuracy", 0.0)) for each in names])
+    ratio = np.array(answer) / amplitude
     type_b = np.hypot(accuracy[1:], ratio * accuracy[0]) / amplitude
     estimated = estimate(harmonics[:, 1:] / harmonics[:, :1], type_b)
     offset = means[:, 1:] - model.signature.state_scale.centre
-    mean = estimate(offset.astype(complex), np.array(accuracy[1:]))
+    mean = estimate(offset.astype(complex), accuracy[1:])
     return _points(
         model,
         {"run": name, "kind": "regular", "frequency": frequency, "wave_amplitude": amplitude},
         *(estimated.ratio, estimated.amplitude, estimated.phase),
-        {"offset": mean.ratio.real, "offset_uncertainty": mean.amplitude},
+        offset=mean.ratio.real,
+        offset_uncertainty=mean.amplitude,
     )
-
-
-def _accuracy(run: xr.Dataset, channel: str) -> float:
-    return float(run[channel].attrs.get("accuracy", 0.0))
 
 
 def _irregular_points(model: Model, parts: list[Part], reference: int, period: float) -> xr.Dataset:
@@ -312,16 +276,12 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
     amplitude, half = np.abs(gain[at]), radius[at]
     with np.errstate(divide="ignore", invalid="ignore"):
         turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
+    names = {"run": name, "kind": "irregular"}
     return _points(
         model,
-        {
-            "run": [name] * at.size,
-            "kind": ["irregular"] * at.size,
-            "frequency": spectra.frequency[at],
-            "wave_amplitude": [np.nan] * at.size,
-        },
+        {**names, "frequency": spectra.frequency[at], "wave_amplitude": np.nan},
         *(gain[at], half, turn),
-        {"coherence": spectra.ordinary()[at, 0]},
+        coherence=spectra.ordinary()[at, 0],
     )
 
 
@@ -346,22 +306,22 @@ def _points(
     ratio: ComplexArray,
     radius: FloatArray,
     turn: FloatArray,
-    others: Mapping[str, FloatArray],
+    **others: FloatArray,
 ) -> xr.Dataset:
     """Points from ratios with their uncertainty and that of the phase (rad); others are NaN."""
-    nothing = np.full(ratio.shape, np.nan)
     values = {
         "amplitude": np.abs(ratio),
         "phase": np.degrees(np.angle(ratio)),
         "amplitude_uncertainty": radius,
         "phase_uncertainty": np.degrees(turn),
-        **dict.fromkeys(("coherence", "offset", "offset_uncertainty"), nothing),
+        **dict.fromkeys(("coherence", "offset", "offset_uncertainty"), np.nan + radius),
         **others,
     }
+    count = np.size(of_points["frequency"])
     return xr.Dataset(
         {key: (("point", "state"), np.atleast_2d(value)) for key, value in values.items()},
         coords={"state": model.states}
-        | {key: ("point", np.atleast_1d(value)) for key, value in of_points.items()},
+        | {key: ("point", np.resize(value, count)) for key, value in of_points.items()},
     )
 
 
@@ -396,31 +356,20 @@ def validation(
         If the model reads several probes and no run states where they stand.
     """
     measured = measured_response(model, runs) if measured is None else measured
-    frequency, place = np.unique(measured["frequency"].values, return_inverse=True)
-    result = response(model, frequency, runs)
-    if WAVE not in result["input"] and elevations(model).sum() > 1:
+    result = response(model, np.unique(measured["frequency"]), runs)
+    entry = WAVE if WAVE in result["input"] else result.attrs["reference"]
+    if entry != WAVE and elevations(model).sum() > 1:
         raise DataError(
             "the model answers several probes, of which no run states the positions and the water "
             "depth: its answer to one of them is not its answer to a wave that passes all. State "
             "both in [rig] of the campaign file."
         )
-    own = result.sel(input=WAVE if WAVE in result["input"] else result.attrs["reference"])
-    amplitude = own["amplitude"].values[:, place].T
-    spread = np.zeros_like(amplitude)
+    own = result.sel(input=entry, frequency=measured["frequency"]).transpose("point", "state")
+    error = own["amplitude"] - measured["amplitude"]
+    spread = 0 * error
     if "amplitude_lower" in own:
-        width = own["amplitude_upper"] - own["amplitude_lower"]
-        spread = 0.5 * width.values[:, place].T
-    error = amplitude - measured["amplitude"].values
-    uncertainty = np.hypot(spread, measured["amplitude_uncertainty"].values)
-    dims = ("point", "state")
-    return xr.Dataset(
-        {
-            "model": (dims, amplitude),
-            "measured": (dims, measured["amplitude"].values),
-            "error": (dims, error),
-            "uncertainty": (dims, uncertainty),
-            "within": (dims, np.abs(error) < uncertainty),
-        },
-        coords={name: measured[name] for name in ("run", "kind", "frequency", "state")}
-        | {"units": ("state", own["units"].values)},
-    )
+        spread = 0.5 * (own["amplitude_upper"] - own["amplitude_lower"])
+    uncertainty = np.hypot(spread, measured["amplitude_uncertainty"])
+    out = xr.Dataset({"model": own["amplitude"], "measured": measured["amplitude"]})
+    out = out.assign(error=error, uncertainty=uncertainty, within=abs(error) < uncertainty)
+    return out.drop_vars(["input", "wave_amplitude"])

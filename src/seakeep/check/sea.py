@@ -43,35 +43,34 @@ def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """
     reference = reference_probe(model, runs)
     surge = model.states.index("surge") if "surge" in model.states else None
-    rows = {}
-    for name, part in used_parts(model, runs).items():
+    parts, facts, outside = used_parts(model, runs), [], []
+    for name, part in parts.items():
         trained = model.training_spans.get(name)
         tested = part.run.attrs.get("test_span")
         if tested is None and trained is None:
             tested = (part.time[0], part.time[-1])
-        facts = np.full((2, 4), np.nan)
-        for row, span in zip(facts, (trained, tested), strict=True):
-            inside = np.zeros(len(part.time), dtype=bool)
-            if span is not None:
-                inside = (part.time >= span[0] - 1e-6) & (part.time <= span[1] + 1e-6)
+        of_parts = np.full((2, 4), np.nan)
+        for row, span in zip(of_parts, (trained, tested), strict=True):
+            begin, end = (np.inf, -np.inf) if span is None else span
+            inside = (part.time >= begin - 1e-6) & (part.time <= end + 1e-6)
             if inside.sum() >= 16:
                 row[:3] = _sea(part.inputs[inside, reference], model.dt, part.run)
                 row[3] = np.nan if surge is None else part.states[inside, surge].mean()
-        keys = ("height", "period", "steepness", "drift")
-        rows[name] = xr.Dataset(
-            {key: ("part", column) for key, column in zip(keys, facts.T, strict=True)}
-            | {
-                "waves": str(part.run.attrs.get("waves") or ""),
-                "outside": _outside(model, part.run, np.isfinite(facts[1, 1])),
-            }
-        )
-    if not rows:
+        facts.append(of_parts)
+        outside.append(_outside(model, part.run, np.isfinite(of_parts[1, 1])))
+    if not parts:
         raise DataError("no run has all channels of the model: there are no waves to compare.")
-    out = xr.concat(list(rows.values()), xr.Variable("run", list(rows)))
-    if out["height"].isnull().all():
+    columns = np.moveaxis(np.array(facts), -1, 0)
+    if np.isnan(columns[0]).all():
         raise no_energy(model.inputs[reference])
-    out = out.assign_coords(part=["train", "test"])
-    return out.assign_attrs(reference=model.inputs[reference])
+    keys = ("height", "period", "steepness", "drift")
+    waves = [str(part.run.attrs.get("waves") or "") for part in parts.values()]
+    return xr.Dataset(
+        {key: (("run", "part"), column) for key, column in zip(keys, columns, strict=True)}
+        | {"waves": ("run", waves), "outside": ("run", outside)},
+        coords={"run": list(parts), "part": ["train", "test"]},
+        attrs={"reference": model.inputs[reference]},
+    )
 
 
 def _sea(wave: np.ndarray, dt: float, run: xr.Dataset) -> tuple[float, float, float]:

@@ -65,68 +65,63 @@ def worth(
     every = {"model": own, **beside(baselines, runs, own, free)}
     spread = dict(zip(model.states, model.signature.state_scale.spread, strict=True))
 
-    def labelled(values: FloatArray, run: xr.Dataset) -> xr.Dataset:
+    def labelled(values: FloatArray, run: xr.Dataset, states: list[str]) -> xr.Dataset:
         return xr.Dataset({
             s: ("time", values[:, k], {**run[s].attrs, "training_std": spread[s]})
             for k, s in enumerate(model.states)
-        })  # fmt: skip
+        })[states]  # fmt: skip
 
     def differences(names: list[str], states: list[str]) -> xr.Dataset:
         return anrmse_differences(
-            [[labelled(of[r].forecast, runs[r])[states] for r in names] for of in every.values()],
-            [labelled(own[r].measured, runs[r])[states] for r in names],
+            [[labelled(of[r].forecast, runs[r], states) for r in names] for of in every.values()],
+            [labelled(own[r].measured, runs[r], states) for r in names],
         )
 
     waves = {r: "regular" if is_regular(runs[r]) else "irregular" for r in own}
-    of_kind: dict[str, list[str]] = {}
-    for r in sorted(own, key=lambda r: waves[r] == "regular"):
-        of_kind.setdefault(waves[r], []).append(r)
-    names = [r for of in of_kind.values() for r in of]
+    of_kind = {kind: [r for r in own if waves[r] == kind] for kind in sorted({*waves.values()})}
     groups = {"all": list(model.states), **{state: [state] for state in model.states}}
     tables = [
-        [differences(of_waves, states) for states in groups.values()]
-        for of_waves in of_kind.values()
+        xr.concat([differences(names, states) for states in groups.values()], "state")
+        for names in of_kind.values()
     ]
-    both = xr.concat(
-        [xr.concat([each.drop_dims("run") for each in row], "state") for row in tables], "waves"
-    )
+    both = xr.concat([table.drop_dims("run") for table in tables], "waves")
     ends = ("", "_lower", "_upper")
-    out = xr.Dataset({f"nrmse{end}": both[f"all_anrmse{end}"] for end in ends})
+    out = both.rename({f"all_anrmse{end}": f"nrmse{end}" for end in ends})
     # Of the model from a baseline: the other way round, so that the bounds change places.
     for key, other in {"": "change", "_lower": "upper", "_upper": "lower"}.items():
         out[f"change{key}"] = 1 / (1 + both[f"all_{other}"]) - 1
+    out = out.drop_vars([f"all_{key}" for key in ("change", "lower", "upper")])
     out = out.assign_coords(model=list(every), state=list(groups), waves=list(of_kind))
-    upper, baseline = out["nrmse_upper"], out.isel(model=slice(1, None))
+    upper = out["nrmse_upper"]
     most = upper.where(np.isfinite(upper), out["nrmse"]).sel(model="model", drop=True)
     limits = [most < each for each in LIMITS]
-    known = baseline["nrmse"].notnull()  # a baseline that is lost does not count
+    out["limit"] = most.dims, np.select([~np.isfinite(most), *limits], [np.nan, *LIMITS], np.inf)
     whole = [
         [True, *np.all([np.isfinite(own[r].forecast).all(axis=0) for r in of], axis=0)]
         for of in of_kind.values()
     ]
-    out["limit"] = most.dims, np.select([~np.isfinite(most), *limits], [np.nan, *LIMITS], np.inf)
     out["still"] = np.isnan(out["limit"]) & whole
-    ranks = {"best": -baseline["nrmse"], "rival": baseline["change_upper"].fillna(np.inf)}
+    # A baseline that is lost does not count; the model stands for none.
+    known = out["nrmse"].notnull() & (out["model"] != "model")
+    names = xr.DataArray(["", *list(every)[1:]], dims="model")
+    ranks = {"best": -out["nrmse"], "rival": out["change_upper"].fillna(np.inf)}
     for key, rank in ranks.items():
-        none = xr.full_like(most, "", dtype=object)
-        label = rank.where(known, -np.inf).idxmax("model") if known.size else none
-        out[key] = label.where(known.any("model"), "")
-    is_better = (baseline["change_upper"] < 0) | ~known
-    out["better"] = known.any("model") & is_better.all("model")
-    of_runs = xr.concat([row[0][[f"anrmse{end}" for end in ends]] for row in tables], "run")
-    out = out.assign({key: (each.dims, each.values) for key, each in of_runs.items()})
-    out["run_nrmse"] = (
-        ("channel", "run"),
-        np.hstack([[table["anrmse"].values[0] for table in row[1:]] for row in tables]),
-    )
-    signature = model.signature
-    ahead = [signature.input_map.look_ahead(runs[r], model.dt) - model.dt for r in names]
-    reads = [signature.input_map.notes(runs[r]).get("conditional_on", "") for r in names]
+        out[key] = names[rank.where(known, -np.inf).argmax("model")]
+    out["better"] = known.any("model") & ((out["change_upper"] < 0) | ~known).all("model")
+    of_runs = xr.concat([table.drop_vars(both) for table in tables], "run")
+    for end in ends:
+        out[f"anrmse{end}"] = of_runs[f"anrmse{end}"].isel(state=0)
+    errors = of_runs["anrmse"].isel(model=0, state=slice(1, None))
+    out["run_nrmse"] = errors.rename(state="channel")
+    order = [r for names in of_kind.values() for r in names]
+    input_map = model.signature.input_map
+    ahead = [input_map.look_ahead(runs[r], model.dt) - model.dt for r in order]
+    reads = [input_map.notes(runs[r]).get("conditional_on", "") for r in order]
     return out.assign_coords(
-        run=names,
+        run=order,
         channel=list(model.states),
-        kind=("run", [waves[r] for r in names]),
-        sea_state=("run", [str(runs[r].attrs.get("sea_state", "")) for r in names]),
+        kind=("run", [waves[r] for r in order]),
+        sea_state=("run", [str(runs[r].attrs.get("sea_state", "")) for r in order]),
         look_ahead=("run", np.maximum(ahead, 0.0), {"units": "s"}),
     ).assign_attrs(
         of=of,
@@ -140,7 +135,8 @@ def _lost(every: Mapping[str, Mapping[str, FreeRun]], baselines: Mapping[str, Mo
     reasons = [
         f"{label}: not all runs can be forecast" for label in baselines if label not in every
     ]
-    for label, free in list(every.items())[1:]:
-        if bad := [r for r, each in free.items() if not np.isfinite(each.forecast).all()]:
+    for label, free in every.items():
+        bad = [r for r, each in free.items() if not np.isfinite(each.forecast).all()]
+        if bad and label != "model":
             reasons.append(f"{label}: its forecast of {', '.join(bad)} diverges")
     return reasons

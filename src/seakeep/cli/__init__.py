@@ -16,7 +16,6 @@ from seakeep.cli import (
     checking,
     exporting,
     modelling,
-    tank,
     tracking,
     tuning,
 )
@@ -64,7 +63,7 @@ def _options(
 
 
 for _verb in (
-    tank.tank,
+    campaigns.tank,
     campaigns.init,
     campaigns.prepare,
     tuning.tune,

@@ -1,4 +1,4 @@
-"""``seakeep init``, ``prepare`` and ``datasets``."""
+"""``seakeep tank``, ``init``, ``prepare`` and ``datasets``."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
+from typer import Argument, Option
 
 from seakeep.cli.console import CampaignFile, progress_bar, results, say
 from seakeep.errors import RequestError, SeakeepError
@@ -17,26 +18,69 @@ if TYPE_CHECKING:
 
     from seakeep.campaign import Campaign
 
+
+def tank(
+    out: Annotated[Path, Option("-o", "--out", help="Folder for raw files and campaign.toml.")],
+    seed: Annotated[
+        int | None, Option(min=0, max=2**64 - 1, help="Seed of waves and noise.")
+    ] = None,
+    settings: Annotated[
+        Path | None,
+        Option(help="Tank settings (TOML); by default the CK-14e's."),
+    ] = None,
+    run: Annotated[list[str] | None, Option(help="Play this run only; may be repeated.")] = None,
+    kind: Annotated[
+        Literal["csv", "nc"], Option("--raw-format", help="Format of the raw files.")
+    ] = "csv",
+    one_logger: Annotated[
+        bool,
+        Option("--one-logger", help="One file and one clock per run, for all instruments."),
+    ] = False,
+    spacing: Annotated[
+        Literal["equal", "jittered"] | None,
+        Option(help="Frequencies of irregular seas; jittered never repeat."),
+    ] = None,
+    video: Annotated[list[str] | None, Option(help="Render this run's side view as MP4.")] = None,
+) -> None:
+    """Play a virtual campaign: raw files and campaign.toml.
+
+    Raw files are like those of a towing tank. The folder truth holds the true motions; no command
+    reads it to identify a model.
+
+    Example: seakeep tank --out virtual --seed 0
+    """
+    from seakeep.tank.play import play
+    from seakeep.tank.settings import default_settings, read_tank, with_waves
+
+    chosen = default_settings() if settings is None else read_tank(settings)
+    chosen = with_waves(chosen, seed, spacing)
+    with progress_bar("Playing") as progress:
+        files = play(
+            chosen, out, kind=kind, one_logger=one_logger, names=run or None, videos=video or (),
+            progress=progress,
+        )  # fmt: skip
+    count = sum(map(len, files.values()))
+    say(f"Wrote {count} raw files and {out / 'campaign.toml'} (truth apart).")
+
+
 SHOWN = 12
 """Findings that prepare prints at most: what fits a screen beside the files' names."""
 
 
 def init(
-    files: Annotated[list[Path], typer.Argument(help="Files of measured runs.", metavar="FILE…")],
+    files: Annotated[list[Path], Argument(help="Files of measured runs.", metavar="FILE…")],
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="File to write; by default standard output."),
+        Option("-o", "--out", help="File to write; by default standard output."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier draft.")] = False,
-    skip_rows: Annotated[
-        int | None, typer.Option(min=0, help="Lines to skip above the header.")
-    ] = None,
+    force: Annotated[bool, Option("--force", help="Overwrite an earlier draft.")] = False,
+    skip_rows: Annotated[int | None, Option(min=0, help="Lines to skip above the header.")] = None,
     delimiter: Annotated[
         Literal[",", ";", "tab", "blank"] | None,
-        typer.Option(help="Mark between columns."),
+        Option(help="Mark between columns."),
     ] = None,
-    decimal: Annotated[Literal[".", ","] | None, typer.Option(help="Decimal mark.")] = None,
-    group: Annotated[str | None, typer.Option(help="Group of HDF5 or TDMS, topic of ROS.")] = None,
+    decimal: Annotated[Literal[".", ","] | None, Option(help="Decimal mark.")] = None,
+    group: Annotated[str | None, Option(help="Group of HDF5 or TDMS, topic of ROS.")] = None,
 ) -> None:
     """Draft a campaign file from measured files' headers.
 
@@ -67,7 +111,7 @@ def prepare(
     campaign: CampaignFile,
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "-o",
             "--out",
             help="Folder; by default 'prepared' beside the campaign, the only folder that fit, "
@@ -75,10 +119,10 @@ def prepare(
         ),
     ] = None,
     anew: Annotated[
-        bool, typer.Option("--anew", help="Prepare all runs again, up-to-date ones too.")
+        bool, Option("--anew", help="Prepare all runs again, up-to-date ones too.")
     ] = False,
     sheet: Annotated[
-        bool, typer.Option("--sheet/--no-sheet", help="Write the data-quality sheet.")
+        bool, Option("--sheet/--no-sheet", help="Write the data-quality sheet.")
     ] = True,
 ) -> None:
     """Prepare runs from raw files, with a data-quality sheet.
@@ -199,10 +243,10 @@ def _list(context: typer.Context) -> None:
 
 @datasets.command("fetch")
 def _fetch(
-    name: Annotated[str, typer.Argument(help="Name of the data set.")],
+    name: Annotated[str, Argument(help="Name of the data set.")],
     to: Annotated[
         Path | None,
-        typer.Option(help="Data folder; by default SEAKEEP_DATA_DIR."),
+        Option(help="Data folder; by default SEAKEEP_DATA_DIR."),
     ] = None,
 ) -> None:
     """Fetch a data set from its origin and check it; the one command that uses the network.

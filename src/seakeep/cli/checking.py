@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
+from typer import Argument, Option
 
 from seakeep.cli.console import (
     DEFAULT_LEVEL,
@@ -34,10 +34,10 @@ def check(
     campaign: CampaignFile,
     run: Annotated[
         list[str] | None,
-        typer.Option(help="Name of a run (repeatable); by default all that a check can use."),
+        Option(help="Name of a run (repeatable); by default all that a check can use."),
     ] = None,
     out: Annotated[
-        Path, typer.Option("-o", "--out", help="Folder for the page, its figures and tables.")
+        Path, Option("-o", "--out", help="Folder for the page, its figures and tables.")
     ] = Path("check"),
 ) -> None:
     """Compare a model with the measured vessel, on one page.
@@ -90,31 +90,31 @@ def check(
 
 def calibrate(
     ensemble: Annotated[
-        Path, typer.Argument(help="Ensemble file written by seakeep fit.", metavar="ENSEMBLE.nc")
+        Path, Argument(help="Ensemble file written by seakeep fit.", metavar="ENSEMBLE.nc")
     ],
     campaign: CampaignFile,
     steps: Annotated[
         str,
-        typer.Option(
+        Option(
             help="Length of a window, as long as forecasts will be: a number of instants, or "
             "encounter periods such as '15 T'.",
         ),
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Ensemble file to write (NetCDF).")],
+    out: Annotated[Path, Option("-o", "--out", help="Ensemble file to write (NetCDF).")],
     run: Annotated[
         list[str] | None,
-        typer.Option(help="Name of a run (repeatable); by default those that train."),
+        Option(help="Name of a run (repeatable); by default those that train."),
     ] = None,
     start: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="First instant used of each run, s or encounter periods such as '20 T'; by "
             "default the start of its training span, or of the run.",
         ),
     ] = None,
     stop: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Last instant used of each run, s or encounter periods such as '40 T'; by default "
             "the end of its training span, or of the run.",
         ),
@@ -122,7 +122,7 @@ def calibrate(
     level: Level = None,
     scale: Annotated[
         Literal["constant", "spread", "learnt"],
-        typer.Option(
+        Option(
             help="Half-width of the band: 'spread', a factor times that of the members with a "
             "floor, 'constant', the members' band moved outwards by the same amount everywhere, or "
             "'learnt' from spread, horizon and waves.",
@@ -130,7 +130,7 @@ def calibrate(
     ] = "spread",
     folds: Annotated[
         Literal["run"] | None,
-        typer.Option(
+        Option(
             help="'run': members trained on the other runs forecast each training run; by default "
             "only windows that no member has read count.",
         ),

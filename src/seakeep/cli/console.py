@@ -10,14 +10,14 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
 from rich.console import Console
+from typer import Argument, Option
 
 from seakeep.errors import RequestError, SeakeepWarning
 
@@ -139,10 +139,10 @@ def tell_warnings() -> Iterator[None]:
 
 DEFAULT_LEVEL = 0.95
 
-CampaignFile = Annotated[Path, typer.Argument(help="Campaign file.", metavar="CAMPAIGN.toml")]
+CampaignFile = Annotated[Path, Argument(help="Campaign file.", metavar="CAMPAIGN.toml")]
 FullScale = Annotated[
     bool,
-    typer.Option(
+    Option(
         "--full-scale",
         help="Convert results by Froude's law with the campaign's scale factor; START and STEPS "
         "stay at model scale.",
@@ -150,47 +150,45 @@ FullScale = Annotated[
 ]
 Level = Annotated[
     float | None,
-    typer.Option(
+    Option(
         help="For an ensemble: probability between the bounds of the band; by default 0.95, or "
         "what a calibrated band was made for.",
     ),
 ]
 Steps = Annotated[
     str | None,
-    typer.Option(
+    Option(
         help="Number of instants, or encounter periods such as '15 T'; by default to the end.",
     ),
 ]
 Workers = Annotated[
     int | None,
-    typer.Option(
+    Option(
         help="Processes for the members of a large ensemble; by default this process alone.",
         min=1,
     ),
 ]
-ModelFile = Annotated[
-    Path, typer.Argument(help="Model file written by seakeep fit.", metavar="MODEL.nc")
-]
+ModelFile = Annotated[Path, Argument(help="Model file written by seakeep fit.", metavar="MODEL.nc")]
 ModelKey = Annotated[
     str | None,
-    typer.Option("--model", help="Key in [models.NAME]; by default the table [model]."),
+    Option("--model", help="Key in [models.NAME]; by default the table [model]."),
 ]
 Scheduler = Annotated[
     str | None,
-    typer.Option(
+    Option(
         help="Scheduler of a running Dask cluster to use instead: tcp://HOST:8786.",
         metavar="ADDRESS",
     ),
 ]
 BandKind = Annotated[
     Literal["members", "calibrated"] | None,
-    typer.Option(
+    Option(
         "--band",
         help="For an ensemble: 'members', the quantiles of its members, or 'calibrated', which "
         "seakeep calibrate made; by default members.",
     ),
 ]
-Degrees = Annotated[bool, typer.Option("--degrees/--radians", help="Unit of angles.")]
+Degrees = Annotated[bool, Option("--degrees/--radians", help="Unit of angles.")]
 
 
 def read_files(campaign: Campaign, *others: Path) -> list[Path]:
@@ -213,6 +211,12 @@ def member_executor(
 
     given = workers is not None or scheduler is not None
     return make_executor(checked_count(workers, scheduler) if given else 1, scheduler)
+
+
+def refuse(given: Mapping[str, bool], words: str) -> None:
+    """Refuse the first option that is given."""
+    for option in (each for each, is_given in given.items() if is_given):
+        raise RequestError(f"{option} {words}")
 
 
 def checked_count(workers: int | None, scheduler: str | None) -> int:

@@ -11,7 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option, echo
 
 from seakeep.cli.console import ModelFile, say
 from seakeep.errors import RequestError
@@ -25,38 +25,38 @@ def export(
     model: ModelFile,
     c: Annotated[
         Path | None,
-        typer.Option(help="Folder for C99 sources: a library of two files.", metavar="DIR"),
+        Option(help="Folder for C99 sources: a library of two files.", metavar="DIR"),
     ] = None,
     estimator: Annotated[
         bool,
-        typer.Option("--estimator", help="Of C99 sources and FMU: an estimator beside a vessel."),
+        Option("--estimator", help="Of C99 sources and FMU: an estimator beside a vessel."),
     ] = False,
     fmu: Annotated[
         Path | None,
-        typer.Option(help="FMU 2.0 for co-simulation to write.", metavar="FILE.fmu"),
+        Option(help="FMU 2.0 for co-simulation to write.", metavar="FILE.fmu"),
     ] = None,
     onnx: Annotated[
         Path | None,
-        typer.Option(help="ONNX graph to write.", metavar="FILE.onnx"),
+        Option(help="ONNX graph to write.", metavar="FILE.onnx"),
     ] = None,
     mat: Annotated[
         Path | None,
-        typer.Option(help="State-space system for MATLAB.", metavar="FILE.mat"),
+        Option(help="State-space system for MATLAB.", metavar="FILE.mat"),
     ] = None,
     order: Annotated[
         int | None,
-        typer.Option(help="Order of the MATLAB system, by balanced truncation.", min=1),
+        Option(help="Order of the MATLAB system, by balanced truncation.", min=1),
     ] = None,
     steps: Annotated[
         int | None,
-        typer.Option(
+        Option(
             help="Instants that an ONNX graph, or an estimator's FMU, forecasts; by default 1.",
             min=1,
         ),
     ] = None,
     member: Annotated[
         int | None,
-        typer.Option(help="For an ensemble: the member to export, from 0.", min=0),
+        Option(help="For an ensemble: the member to export, from 0.", min=0),
     ] = None,
 ) -> None:
     """Write a model for another host: C, FMU, ONNX, MATLAB.
@@ -70,10 +70,16 @@ def export(
         raise RequestError("nothing to write. Give --c DIR, --fmu, --onnx or --mat FILE.")
     follows = fmu if estimator else None
     _check_beside(
-        steps is not None, onnx or follows, "--steps belongs to --onnx FILE, or --fmu --estimator"
+        (steps, onnx or follows, "--steps belongs to --onnx FILE, or --fmu --estimator"),
+        (order, mat, "--order belongs to --mat FILE"),
+        (estimator, c or fmu, "--estimator belongs to --c DIR or --fmu FILE"),
     )
-    _check_order(order, estimator, mat)
-    _check_beside(estimator, c or fmu, "--estimator belongs to --c DIR or --fmu FILE")
+    if estimator and order is not None:
+        raise RequestError(
+            "--order reduces the linear system of --mat; an estimator corrects measured states and "
+            "their delays, which a reduced system no longer holds. Leave out --order, or "
+            "--estimator."
+        )
     for path, suffix in ((fmu, ".fmu"), (onnx, ".onnx"), (mat, ".mat")):
         if path is not None:
             check_place(path, suffix)
@@ -82,6 +88,7 @@ def export(
 
     linear = exportable(_single(model, member), estimator)
     written: list[Path] = []
+    bound = ""
     if c is not None:
         written += (write_estimator if estimator else write_c)(linear, c, model.stem)
     if fmu is not None:
@@ -90,38 +97,18 @@ def export(
         written.append(write_onnx(linear, onnx, steps or 1))
     if mat is not None:
         written.append(linear.to_mat(mat, order))
-    say(f"Wrote {', '.join(map(str, written))}.{_bound(mat, order)}")
+        bound = _bound(mat) if order else ""
+    say(f"Wrote {', '.join(map(str, written))}.{bound}")
     if fmu is not None:
         say(_binary(fmu))
     say(timing(linear, estimator and not onnx and not mat))
 
 
-def _check_beside(is_given: bool, target: Path | None, option: str) -> None:
-    if is_given and target is None:
-        raise RequestError(f"{option}. Leave it out, or give both.")
-
-
-def _check_order(order: int | None, estimator: bool, mat: Path | None) -> None:
-    _check_beside(order is not None, mat, "--order belongs to --mat FILE")
-    if estimator and order is not None:
-        raise RequestError(
-            "--order reduces the linear system of --mat; an estimator corrects measured states and "
-            "their delays, which a reduced system no longer holds. Leave out --order, or "
-            "--estimator."
-        )
-
-
-def _bound(mat: Path | None, order: int | None) -> str:
-    """How far a reduced system errs, as a sentence after another one."""
-    if mat is None or order is None:
-        return ""
-    from scipy.io import loadmat
-
-    bound = loadmat(mat, variable_names="ErrorBound")["ErrorBound"].item()
-    return (
-        f" The system of order {order} errs by {bound:.3g} SD of its outputs per SD of its inputs, "
-        "at most, at any frequency."
-    )
+def _check_beside(*rules: tuple[object, Path | None, str]) -> None:
+    """Refuse an option that is given without the target that it belongs to."""
+    for given, target, words in rules:
+        if given and target is None:
+            raise RequestError(f"{words}. Leave it out, or give both.")
 
 
 def _single(file: Path, member: int | None) -> Model:
@@ -149,6 +136,17 @@ def _binary(fmu: Path) -> str:
     )
 
 
+def _bound(mat: Path) -> str:
+    """How far the reduced system of a file errs, as a sentence after another one."""
+    from scipy.io import loadmat
+
+    content = loadmat(mat, variable_names=["ErrorBound", "A"])
+    return (
+        f" The system of order {len(content['A'])} errs by {content['ErrorBound'].item():.3g} SD "
+        "of its outputs per SD of its inputs, at most, at any frequency."
+    )
+
+
 _PACKAGES = ("numpy", "scipy", "xarray", "h5netcdf", "h5py", "pandas", "pydantic", "typer", "pint")
 _EXTRAS = ("matplotlib", "control", "numba")
 
@@ -158,15 +156,13 @@ def info() -> None:
 
     Example: seakeep info
     """
-    typer.echo(f"seakeep {metadata.version('seakeep')}")
-    typer.echo(f"Python {platform.python_version()} on {platform.platform()}")
-    typer.echo(f"cores {os.cpu_count()}")
-    for name in _PACKAGES:
-        typer.echo(f"{name} {metadata.version(name)}")
-    for name in _EXTRAS:
+    echo(f"seakeep {metadata.version('seakeep')}")
+    echo(f"Python {platform.python_version()} on {platform.platform()}")
+    echo(f"cores {os.cpu_count()}")
+    for name in (*_PACKAGES, *_EXTRAS):
         try:
-            typer.echo(f"{name} {metadata.version(name)}")
+            echo(f"{name} {metadata.version(name)}")
         except metadata.PackageNotFoundError:
-            typer.echo(f"{name} not installed")
+            echo(f"{name} not installed")
     for name in ("SEAKEEP_DATA_DIR", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        typer.echo(f"{name}={os.environ.get(name, '')}")
+        echo(f"{name}={os.environ.get(name, '')}")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+from typer import Argument, Exit, Option
 
 from seakeep.cli.console import (
     DEFAULT_LEVEL,
@@ -26,6 +27,7 @@ from seakeep.cli.console import (
     print_table,
     progress_bar,
     read_files,
+    refuse,
     say,
     show,
 )
@@ -55,7 +57,7 @@ NO_NOWCAST = (
 
 def fit(
     campaign: CampaignFile,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Model file to write (NetCDF).")],
+    out: Annotated[Path, Option("-o", "--out", help="Model file to write (NetCDF).")],
     model: ModelKey = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -91,20 +93,20 @@ def fit(
 def forecast(
     model: ModelFile,
     campaign: CampaignFile,
-    run: Annotated[str, typer.Option(help="Name of the run.")],
+    run: Annotated[str, Option(help="Name of the run.")],
     start: Annotated[
         str,
-        typer.Option(
+        Option(
             help="Instant of the last measured state, s or encounter periods such as '20 T'.",
         ),
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Result: .nc or .csv.")],
+    out: Annotated[Path, Option("-o", "--out", help="Result: .nc or .csv.")],
     steps: Steps = None,
     level: Level = None,
     band: BandKind = None,
     members: Annotated[
         bool,
-        typer.Option("--members", help="For an ensemble: write each member, and no statistics."),
+        Option("--members", help="For an ensemble: write each member, and no statistics."),
     ] = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -112,7 +114,7 @@ def forecast(
     degrees: Degrees = False,
     ahead: Annotated[
         Literal["refuse", "predict"],
-        typer.Option(
+        Option(
             help="If the waves end before the model's look-ahead: 'refuse', or 'predict' them "
             "from their record.",
         ),
@@ -195,32 +197,32 @@ def forecast(
     members_left = result.sizes.get("member", 0) - int(result.attrs.get("diverged", 0))
     usable = members_left > 0 if "member" in result.dims else "diverged_at" not in result.attrs
     if not usable:
-        raise typer.Exit(1)
+        raise Exit(1)
 
 
 def compare(
     model: Annotated[
         list[Path],
-        typer.Argument(help="Model files written by seakeep fit.", metavar="MODEL.nc..."),
+        Argument(help="Model files written by seakeep fit.", metavar="MODEL.nc..."),
     ],
     campaign: CampaignFile,
     run: Annotated[
         list[str] | None,
-        typer.Option(help="Name of a run (repeatable); by default the test runs."),
+        Option(help="Name of a run (repeatable); by default the test runs."),
     ] = None,
     start: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="Instant of the last measured state, s or encounter periods such as '20 T'; by "
             "default the first possible one in waves.",
         ),
     ] = None,
     steps: Steps = None,
     out: Annotated[
-        Path, typer.Option("-o", "--out", help="Folder for the table and the figures.")
+        Path, Option("-o", "--out", help="Folder for the table and the figures.")
     ] = Path("comparison"),
     format_: Annotated[
-        Literal["png", "svg", "pdf"], typer.Option("--format", help="Format of the figures.")
+        Literal["png", "svg", "pdf"], Option("--format", help="Format of the figures.")
     ] = "png",
     degrees: Degrees = True,
     level: Level = None,
@@ -230,7 +232,7 @@ def compare(
     full_scale: FullScale = False,
     baselines: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--baselines",
             help="Fit hold-last, mean, FIR, ARX and a subspace model to the training runs and "
             "compare with them.",
@@ -238,7 +240,7 @@ def compare(
     ] = False,
     nowcast: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--nowcast",
             help="Follow the runs sample by sample, without future waves, and judge the error "
             "against lead time (--steps: the longest).",
@@ -287,7 +289,7 @@ def compare(
     if nowcast:
         given = {"--start": start, "--band": band, "--workers": workers, "--scheduler": scheduler}
         stated = {option: value is not None for option, value in given.items()}
-        _refuse(stated | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
+        refuse(stated | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
         serving = {n: each for n, each in fitted.items() if n in names or served(each)}
         _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
         return
@@ -320,7 +322,7 @@ def compare(
     written += _draw({name: comparisons[name] for name in names}, figures, differences)
     say("Wrote " + ", ".join(map(str, written)))
     if not all(each.complete for name in names for each in comparisons[name]):
-        raise typer.Exit(1)
+        raise Exit(1)
 
 
 def _displayed(each: Comparison, scale: float | None, degrees: bool) -> Comparison:
@@ -432,12 +434,6 @@ def _scale(campaign: Campaign) -> float:
     return general.scale_factor
 
 
-def _refuse(given: Mapping[str, bool], words: str) -> None:
-    """Refuse the first option that is given."""
-    for option in (each for each, is_given in given.items() if is_given):
-        raise RequestError(f"{option} {words}")
-
-
 def _band(
     models: Mapping[str, Model],
     level: float | None,
@@ -452,10 +448,10 @@ def _band(
     given = {"--level": level is not None, "--band": band is not None, "--members": members}
     if not ensembles:
         alone = FOR_ENSEMBLES.format(", ".join(models))
-        _refuse(given | {"--scheduler": scheduler is not None}, alone)
+        refuse(given | {"--scheduler": scheduler is not None}, alone)
     if members:
         del given["--members"]
-        _refuse(given, NO_BAND)
+        refuse(given, NO_BAND)
     calibrations = [each.calibration for each in ensembles if each.calibration is not None]
     if calibrations and band is None and not members:
         say(

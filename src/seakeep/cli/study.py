@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
+from typer import Argument, Option
 
 from seakeep.cli.console import Scheduler, checked_count, print_table, progress_bar, show
 
@@ -18,7 +19,7 @@ Preset = Literal["paper", "recommended"]
 
 Workers = Annotated[
     int | None,
-    typer.Option(
+    Option(
         help="Processes on this machine, each on one core; by default one per core.",
         min=1,
         metavar="N",
@@ -27,10 +28,10 @@ Workers = Annotated[
 
 
 def study(
-    study_file: Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml")],
+    study_file: Annotated[Path, Argument(help="Study file.", metavar="STUDY.toml")],
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="Folder; by default named after the study file."),
+        Option("-o", "--out", help="Folder; by default named after the study file."),
     ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -43,7 +44,7 @@ def study(
     Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
     """
     from seakeep.models.executor import make_executor
-    from seakeep.report.sections.summary import findings, overview_table
+    from seakeep.report.sections.results import findings, overview_table
     from seakeep.study import read_study, run_study
 
     asked = read_study(study_file)
@@ -66,17 +67,17 @@ def _write_study(result: StudyResult) -> Path:
 
 
 def reproduce(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("reproduction"),
+    out: Annotated[Path, Option("--out", "-o", help="Output folder.")] = Path("reproduction"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="All stages with small counts, in half of the time.")
+        bool, Option("--quick", help="All stages with small counts, in half of the time.")
     ] = False,
     preset: Annotated[
         Preset | None,
-        typer.Option(help="The acts of this preset alone."),
+        Option(help="The acts of this preset alone."),
     ] = None,
     seed: Annotated[
         int,
-        typer.Option(help="Seed of waves, noise, windows, draws.", min=0, max=2**64 - 1),
+        Option(help="Seed of waves, noise, windows, draws.", min=0, max=2**64 - 1),
     ] = 0,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -118,7 +119,7 @@ def reproduce(
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(help="Folder of a study's results.", metavar="DIR")],
+    folder: Annotated[Path, Argument(help="Folder of a study's results.", metavar="DIR")],
 ) -> None:
     """Write the report of a finished study.
 

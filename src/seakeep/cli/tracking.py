@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+from typer import Argument, Option
 
 from seakeep.cli.console import progress_bar, say
 from seakeep.errors import RequestError
@@ -14,43 +15,43 @@ from seakeep.files import check_output
 
 
 def track(
-    video: Annotated[Path, typer.Argument(help="Video of the vessel.", metavar="VIDEO.mp4")],
+    video: Annotated[Path, Argument(help="Video of the vessel.", metavar="VIDEO.mp4")],
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="Result, .csv or .nc; by default CSV on standard output."),
+        Option("-o", "--out", help="Result, .csv or .nc; by default CSV on standard output."),
     ] = None,
     sheet: Annotated[
         Path | None,
-        typer.Option("--contact-sheet", help="PNG of tracked frames, including the worst."),
+        Option("--contact-sheet", help="PNG of tracked frames, including the worst."),
     ] = None,
     metres_per_pixel: Annotated[
         float | None,
-        typer.Option(help="Calibration; by default from the panel's size as seen."),
+        Option(help="Calibration; by default from the panel's size as seen."),
     ] = None,
     panel: Annotated[
         tuple[float, float],
-        typer.Option(
+        Option(
             metavar="LENGTH HEIGHT",
             help="Length and height of the panel, m: two numbers separated by a space.",
         ),
     ] = (0.30, 0.10),
     panel_place: Annotated[
         tuple[float, float],
-        typer.Option(
+        Option(
             metavar="X Z",
             help="Panel's centre from the centre of gravity, downstream and up, m: two numbers "
             "separated by a space.",
         ),
     ] = (0.0, 0.25),
     downstream: Annotated[
-        Literal["right", "left"], typer.Option(help="Side of the picture to which waves run.")
+        Literal["right", "left"], Option(help="Side of the picture to which waves run.")
     ] = "right",
     camera_pitch: Annotated[
-        float, typer.Option(help="Pitch that the picture shows of a level vessel, deg.")
+        float, Option(help="Pitch that the picture shows of a level vessel, deg.")
     ] = 0.0,
     origin: Annotated[
         tuple[float, float] | None,
-        typer.Option(
+        Option(
             metavar="X Y",
             help="Pixel of the panel's centre at rest, two numbers separated by a space; by "
             "default from the first second.",
@@ -58,7 +59,7 @@ def track(
     ] = None,
     threshold: Annotated[
         tuple[int, int, int],
-        typer.Option(
+        Option(
             metavar="RED GREEN BLUE",
             help="Smallest red, green and blue of the panel, each 0 to 255: three numbers "
             "separated by spaces.",
@@ -66,35 +67,33 @@ def track(
     ] = (150, 150, 150),
     region: Annotated[
         tuple[int, int, int, int] | None,
-        typer.Option(
+        Option(
             metavar="LEFT TOP WIDTH HEIGHT",
             help="Part of the picture searched, pixels: four numbers separated by spaces.",
         ),
     ] = None,
     lamp: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(
+        Option(
             metavar="X Y RADIUS",
             help="Lamp that shows the trigger, pixels from the upper left corner: three numbers "
             "separated by spaces, such as 40 40 12.",
         ),
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(help="Fraction by which the panel's length may differ.")
+        float, Option(help="Fraction by which the panel's length may differ.")
     ] = 0.02,
-    bridge: Annotated[
-        float, typer.Option(help="Bridge gaps up to this long, s; by default none.")
-    ] = 0.0,
+    bridge: Annotated[float, Option(help="Bridge gaps up to this long, s; by default none.")] = 0.0,
     passband: Annotated[
-        float, typer.Option(help="Edge of the low-pass filter, Hz; 0 filters nothing.")
+        float, Option(help="Edge of the low-pass filter, Hz; 0 filters nothing.")
     ] = 4.0,
     mru: Annotated[
         Path | None,
-        typer.Option(help="Record with heave and pitch to compare with."),
+        Option(help="Record with heave and pitch to compare with."),
     ] = None,
     max_lag: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="Longest lag searched against --mru, s; by default 10, or a quarter of the "
             "record.",
         ),

@@ -1,7 +1,8 @@
-"""C99 sources of a model: a step function and its header, without any dependency."""
+"""C99 sources of a model and of its estimator, without any dependency."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from functools import cache
@@ -13,13 +14,19 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
+from seakeep.conventions import is_elevation
+from seakeep.core.bands import PER_OCTAVE
 from seakeep.core.readouts import SOFT
 from seakeep.files import MARK, check_output, make_folder, replacing
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
+from seakeep.models.live import DOUBTED, Live
 from seakeep.models.terms import SlowSquare, Term
+from seakeep.models.validity import CYCLES, TRAINED
 from seakeep.signals.expressions import Text
+from seakeep.signals.prediction import MEMORY, NOISE
+from seakeep.waves import GRAVITY
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -54,11 +61,43 @@ def write_c(model: Model, folder: str | Path, name: str = "rom") -> list[Path]:
     Numbers are written in hexadecimal, so that none is rounded. ``cc -std=c99 -Wall -Werror``
     compiles the code without a warning.
     """
-    return write_sources(sources(exportable(model), identifier(name)), folder)
+    return _written(sources(exportable(model), identifier(name)), folder)
 
 
-def write_sources(texts: Mapping[str, str], folder: str | Path) -> list[Path]:
-    """Write C files; raises as :func:`write_c`."""
+def write_estimator(
+    model: Model,
+    folder: str | Path,
+    name: str = "rom",
+    noise: Mapping[str, float] | None = None,
+    roles: Mapping[str, str] | None = None,
+) -> list[Path]:
+    """Write a model and its estimator as C99: the files of ``write_c``, and ``NAME_estimator.…``.
+
+    Parameters
+    ----------
+    model : Model
+        As for :func:`seakeep.hosts.write_c`.
+    folder, name
+        As for :func:`seakeep.hosts.write_c`.
+    noise, roles : mapping, optional
+        As for ``model.live``; a known input stays at its last value where no plan is given.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    RequestError
+        If the model cannot be exported, or a file is there that seakeep did not write.
+    """
+    linear = exportable(model, follows=True)
+    live = linear.live(noise=noise, roles=roles)
+    return _written(sources(linear, identifier(name), live), folder)
+
+
+def _written(texts: Mapping[str, str], folder: str | Path) -> list[Path]:
     targets = {make_folder(Path(folder)) / file: text for file, text in texts.items()}
     for target in targets:
         check_output(target, KIND)
@@ -74,14 +113,8 @@ def identifier(name: str) -> str:
     return text if text[:1].isalpha() else f"m_{text}"
 
 
-def sources(model: HankelDMDcModel, name: str) -> dict[str, str]:
-    """Text of the C files by their names."""
-    content = content_of(model, name)
-    return {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
-
-
-def content_of(model: HankelDMDcModel, name: str) -> dict[str, Any]:
-    """What the templates of C show of a model."""
+def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict[str, str]:
+    """Text of the C files of a model by their names, and of its estimator where it is live."""
     signature, input_map = model.signature, model.signature.input_map
     follows, observed = input_map.follows, input_map.observed
     back = 0 if follows is None else follows.back
@@ -97,7 +130,7 @@ def content_of(model: HankelDMDcModel, name: str) -> dict[str, Any]:
                 group += _columns(term, u, observed.limits, kernels)
         limited = zip(direct, observed.tops, observed.slopes, strict=True)
         direct = [f"rising({text}, {_number(top)}, {_number(by)})" for text, top, by in limited]
-    return {
+    content = {
         "name": name,
         "mark": f"{MARK}: {KIND}, written by seakeep {metadata.version('seakeep')}:",
         "model": model,
@@ -117,6 +150,16 @@ def content_of(model: HankelDMDcModel, name: str) -> dict[str, Any]:
             if each.load is not None
         ],
     }
+    files = {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
+    if live is not None:
+        content |= live.equations
+        content |= {"begins": model.history_samples, "memory": MEMORY, "pi": math.pi}
+        content |= {"coverage": model.coverage, "trained": TRAINED, "cycles": CYCLES}
+        content |= {"gravity": GRAVITY, "per_octave": PER_OCTAVE, "is_elevation": is_elevation}
+        content |= {"noise_part": NOISE, "doubted": DOUBTED}
+        for end in ("h", "c"):
+            files[f"{name}_estimator.{end}"] = rendered(f"estimator.{end}", **content)
+    return files
 
 
 def rendered(template: str, **content: Any) -> str:

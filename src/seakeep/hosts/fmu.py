@@ -18,7 +18,6 @@ from typing import Any
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
 from seakeep.hosts.c import identifier, rendered, sources
-from seakeep.hosts.estimator import followed
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
 
@@ -48,7 +47,8 @@ def write_fmu(model: Model, path: str | Path, ahead: int | None = None) -> Path:
     ahead : int, optional
         Instants that an estimator forecasts. With it the unit follows a vessel, as
         :func:`seakeep.hosts.write_estimator` says: inputs ``measured.NAME`` are the states, NaN
-        where they were not measured, and outputs their estimates and ``ahead.NAME[1]`` …
+        where they were not measured, and outputs their estimates, ``ahead.NAME[1]`` …, and the
+        standard deviations ``std.NAME[1]`` …
 
     Returns
     -------
@@ -64,7 +64,7 @@ def write_fmu(model: Model, path: str | Path, ahead: int | None = None) -> Path:
     target = Path(path)
     check_output(target, KIND)
     linear, name = exportable(model, ahead is not None), identifier(target.stem)
-    files = sources(linear, name) if ahead is None else followed(linear, name)
+    files = sources(linear, name, None if ahead is None else linear.live())
     digest = hashlib.sha256("".join(files.values()).encode()).digest()
     content: dict[str, Any] = {
         "name": name,
@@ -154,9 +154,10 @@ def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
             each | {"name": f"measured.{each['name']}", "is_output": False} for each in answered
         ]
         coming = [
-            each | {"name": f"ahead.{each['name']}[{step}]"}
+            each | {"name": f"{kind}.{each['name']}[{step}]", "start": start}
+            for kind, starts in (("ahead", means[1]), ("std", signature.state_scale.spread))
             for step in range(1, ahead + 1)
-            for each in answered
+            for each, start in zip(answered, starts.tolist(), strict=True)
         ]
         channels, groups = [*given, *measured, *answered, *coming], []
     return {

@@ -128,15 +128,23 @@ def as_finished(
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Limit BLAS to one thread: small products side by side beat products spread over cores."""
-    with _blas().limit(limits=1, user_api="blas"):
+    libraries = _blas()
+    before = [each.get_num_threads() for each in libraries]
+    for each in libraries:
+        each.set_num_threads(1)
+    try:
         yield
+    finally:
+        for each, number in zip(libraries, before, strict=True):
+            each.set_num_threads(number)
 
 
 @functools.cache
-def _blas() -> threadpoolctl.ThreadpoolController:
+def _blas() -> list[threadpoolctl.LibController]:
     import scipy.linalg  # noqa: F401  (its BLAS must be loaded to be found)
 
-    return threadpoolctl.ThreadpoolController()
+    found = threadpoolctl.ThreadpoolController().lib_controllers
+    return [each for each in found if each.user_api == "blas"]
 
 
 @contextmanager

@@ -38,7 +38,7 @@ from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.checks import check_choice
-from seakeep.models.engine import Dynamics, Runs, Windows
+from seakeep.models.engine import Dynamics, Runs
 from seakeep.models.executor import one_blas_thread
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors
@@ -47,12 +47,10 @@ from seakeep.models.interface import Signature
 from seakeep.models.labelled import Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.models.validity import Conditions, Coverage, Validity
-from seakeep.signals.prediction import draw_sea, predict_waves, predictable_time
+from seakeep.signals.prediction import Foreseen, foresee, predict_waves, predictable_time
 
 STATE = "live state"
 """Kind of the files of :meth:`Live.save`."""
-PAIRS = 8
-"""Pairs of futures of the waves that are drawn where they are not known."""
 RECORD = 16
 """Record that is kept, in longest delays: what waves are predicted from."""
 LEAST_RECORD = 512
@@ -64,6 +62,9 @@ SPIKE = 100.0
 """What a single sample adds to the consistency at most: a spike tells of a sensor, for a while."""
 ALARM = 2.0
 """Consistency of a state above which errors of late are no longer those of training."""
+DOUBTED = 0.7, 1.2
+"""Squares of errors, claimed, over the variance of training between which a forecast from waves
+that are predicted passes over to the mean: an autoregressive model errs more than it claims."""
 SMALL = 0.5
 """Part of the training SD below which an error stays over the lead time."""
 RIG = ("water_depth", "celerity", "probe_offset")
@@ -213,7 +214,8 @@ class Live:
             self._foresight = self._follows.foresight(self._rig, max(self._ahead, 1))
         # Rows of samples, `_first` the number of the first; half of the room is always there.
         longest = max(s, signature.input_delays) + 1
-        needed = 2 * (signature.history_samples + self._ahead + 1)
+        self._begins = signature.history_samples
+        needed = 2 * (self._begins + self._ahead + 1)
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
         delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
         widths = {"u": len(signature.inputs), "x": count, "y": count}
@@ -244,7 +246,7 @@ class Live:
     @property
     def ready(self) -> bool:
         """Whether there is enough history to forecast: ``history_samples`` of the model."""
-        return self._count.taken >= self.signature.history_samples
+        return self._count.taken >= self._begins
 
     @property
     def state(self) -> FloatArray:
@@ -440,9 +442,11 @@ class Live:
             )
         known = self._known_inputs()
         if self._follows is None and self.ready and np.isfinite(self._places).sum() >= 2:
-            drawn = self._drawn(known, 1, 1, 0)
-            return np.where(lost, drawn.mean(axis=0)[0], inputs)  # the draws lie about it
-        return np.where(lost, self._expected(known, 1)[0], inputs)
+            expected = known[-1].copy()
+            expected[self._waves] = self._foreseen(known, 1).expected[0]
+        else:
+            expected = self._expected(known, 1)[0]
+        return np.where(lost, expected, inputs)
 
     def _expected(self, known: FloatArray, count: int) -> FloatArray:
         """Inputs of the next samples: in waves as those of training, or from each record."""
@@ -457,16 +461,10 @@ class Live:
             out[:, waves] = predict_waves(known[:, waves], count)
         return out
 
-    def _drawn(self, known: FloatArray, count: int, pairs: int, seed: int) -> FloatArray:
-        """Futures of the inputs, shape (2 pairs, count, Q)."""
-        out = np.tile(known[-1:], (2 * pairs, count, 1))
-        if self._waves:
-            rng, places = np.random.default_rng(seed), self._places[self._waves]
-            series, dt = known[:, self._waves], self.signature.dt
-            out[..., self._waves] = draw_sea(
-                series, count, pairs, rng, dt=dt, positions=places, depth=self._depth
-            )
-        return out
+    def _foreseen(self, known: FloatArray, count: int) -> Foreseen:
+        """Waves to come after samples of the inputs, and how they may depart from it."""
+        places, dt = self._places[self._waves], self.signature.dt
+        return foresee(known[:, self._waves], count, dt=dt, positions=places, depth=self._depth)
 
     def _known_inputs(self) -> FloatArray:
         """Inputs that waves are predicted from: the last ones, always as many once there are."""
@@ -476,7 +474,7 @@ class Live:
         """Covariance and gain of a sample."""
         count = self._count
         is_exact = bool(seen.all()) and not self._noise.any()
-        if is_exact and count.since == 0 and at >= self.signature.history_samples:
+        if is_exact and count.since == 0 and at >= self._begins:
             update = self._as_it_is
         else:
             self._predict_covariance(at, count.since, blind=not (count.partly or seen.any()))
@@ -485,8 +483,9 @@ class Live:
         self._updates.append(update)
         count.complete = count.complete + 1 if is_exact else 0
         if count.complete > self.signature.state_delays:
+            if count.since:  # or it is zero already
+                self._filter.covariance.fill(0.0)
             count.since, count.partly = 0, False
-            self._filter.covariance.fill(0.0)
         elif update is not self._as_it_is:
             count.since += 1
             count.partly = count.partly or bool(seen.any())
@@ -499,7 +498,7 @@ class Live:
         """
         if blind and since >= len(self.errors.rms) + self.signature.state_delays:
             return
-        if at < self.signature.history_samples:
+        if at < self._begins:
             self._filter.shift(np.diag(self.signature.state_scale.spread**2))
             return
         self._filter.shift()
@@ -508,7 +507,7 @@ class Live:
     def _settle(self, at: int) -> None:
         """Bring estimates up to the sample `at`: final ones, then those that waves to come move."""
         count = self._count
-        if at < self.signature.history_samples:
+        if at < self._begins:
             self._advance(self._history, at, at)
             count.final = at
             return
@@ -538,7 +537,7 @@ class Live:
         for at in range(first, last + 1):
             update, measured = self._update_of(at), self._rows("y", at, at + 1)[0]
             predicted = self.signature.state_scale.centre
-            if at >= self.signature.history_samples:
+            if at >= self._begins:
                 self._place(at - 1)
                 predicted = self._predicted(history, at - 1)
             innovation = measured - predicted
@@ -589,9 +588,10 @@ class Live:
                 predicted = self._predicted(self._free, at - 1)
                 self._free[:-1], self._free[-1] = self._free[1:], predicted
                 squares[1] = ((measured - predicted) / self.errors.at(lead)) ** 2
-        self._squares *= np.where(np.isnan(squares), 1.0, self._fade)
-        self._squares[0] += np.fmin(np.nan_to_num(squares, posinf=SPIKE), SPIKE)
-        self._squares[1] += ~np.isnan(squares)
+        known = ~np.isnan(squares)
+        self._squares *= np.where(known, self._fade, 1.0)
+        self._squares[0] += np.where(known, np.minimum(squares, SPIKE), 0.0)
+        self._squares[1] += known
         lead = (lead + 1) % (len(self.errors.rms) + 1) if lead else 0
         if not lead and (update is self._as_it_is or self._noise.any()):
             self._free[:], lead = self._history, 1
@@ -599,7 +599,7 @@ class Live:
 
     def _find_rows(self, stop: int, known: FloatArray) -> None:
         """Regressors of the samples up to before `stop`; `known` ends with inputs to come."""
-        signature, begins = self.signature, self.signature.history_samples
+        signature, begins = self.signature, self._begins
         first = self._count.final
         if first < begins:  # no row was wanted yet
             first = begins - 1 - signature.input_delays
@@ -672,15 +672,23 @@ class Live:
         scale = signature.state_scale
         level = fraction(level, "level")
         if not self.ready:
-            needed = signature.history_samples
             raise RequestError(
-                f"there are {self._count.taken} samples of history and the model needs {needed}. "
-                f"Call step {needed - self._count.taken} more times first."
+                f"there are {self._count.taken} samples of history and the model needs "
+                f"{self._begins}. Call step {self._begins - self._count.taken} more times first."
             )
-        futures, known = self._futures(count, future)
-        windows = self._windows(count, futures)
+        futures, freedom, known = self._futures(count, future)
+        taken = self._count.taken
+        history = self._rows("x", taken - signature.state_samples, taken)
+        back = signature.input_map.history(signature.input_delays) + 1
+        windows = engine.array_windows(
+            signature,
+            np.broadcast_to(history, (len(futures), *history.shape)),
+            futures[:, min(taken, self._record) - back :],
+            count,
+            None if self._follows is None else self._rig,
+        )
         with engine.member_series(self.model, [windows]) as ((values, lost),):
-            complete = values[lost.max(axis=1) < 0].reshape(-1, *values.shape[2:])
+            complete = values[lost.max(axis=1) < 0]
         conditions, (late, free) = self.conditions, self.consistency_by_state
         worst = np.fmax(np.fmax(late, free), 1.0)
         wider = np.where(worst > ALARM, worst, 1.0)
@@ -688,16 +696,21 @@ class Live:
             wider = np.fmax(np.fmax(wider, free), conditions.beyond**2)
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(complete):
-            spread = (
-                complete.var(axis=0, ddof=1) if len(complete) > 1 else np.zeros(table.shape[1:])
-            )
-            table[0] = complete.mean(axis=0) if len(complete) > 1 else complete[0]
-            table[1] = np.sqrt(spread + wider * self._error_variances(count))
+            table[0], spread = _moments(complete)
+            # Errors of the model and of the estimate, never above those of the open loop.
+            errors = self.errors.of_forecast(count, self._count.since)
+            if self._count.partly:
+                own = self.errors.of_forecast(count)
+                errors = np.minimum(own + self._filter.ahead(count), errors)
             if len(futures) > 1:
                 foreseen = np.arange(count) <= known - self._ahead  # their waves are known
-                weight = np.where(foreseen[:, None], 1.0, _trust(table[1] / scale.spread))
+                low, high = DOUBTED
+                trust = (high - (spread + errors) / scale.spread**2) / (high - low)
+                lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0))
+                weight = np.where(foreseen[:, None], 1.0, lasting)
                 table[0] = scale.centre + weight * (table[0] - scale.centre)
-            half = _quantile(level, spread, table[1] ** 2, len(futures) > 1) * table[1]
+            table[1] = np.sqrt(spread + wider * errors)
+            half = _quantile(level, spread, table[1] ** 2, freedom) * table[1]
             table[2:] = table[0] - half, table[0] + half
         variables = label_channels(signature, table, ("statistic", "time"))
         inside = table[1] <= SMALL * scale.spread
@@ -706,7 +719,7 @@ class Live:
         words = "the mean minus and plus a quantile times std"
         time = self._time + signature.dt * np.arange(1, count + 1)
         attrs: dict[str, Any] = {"start": self._time, "level": level, "known_input": known}
-        attrs |= {"diverged": len(values) - len(complete) // values.shape[1]}
+        attrs |= {"diverged": len(values) - len(complete)}
         attrs |= {"predictable": self._predictable()}
         if conditions is not None:
             attrs |= conditions.attrs()
@@ -722,19 +735,25 @@ class Live:
 
     def _predictable(self) -> float:
         """Time for which the waves at the last probe are known from the first one, s."""
-        order = [place for place in np.argsort(self._places) if np.isfinite(self._places[place])]
-        if not order or not np.ptp(record := self._known_inputs()[:, order[0]]) > 0:
+        placed = np.flatnonzero(np.isfinite(self._places))
+        if not placed.size:
             return 0.0
-        apart = float(np.ptp(self._places[order]))
+        record = self._known_inputs()[:, placed[self._places[placed].argmin()]]
+        if not np.ptp(record) > 0:
+            return 0.0
+        apart = float(np.ptp(self._places[placed]))
         return predictable_time(record, self.signature.dt, apart, self._depth)
 
-    def _futures(self, steps: int, future: Any) -> tuple[list[FloatArray], int]:
-        """Inputs of the record and after it, of each future, and how many rows were given."""
-        names, record = self.signature.inputs, self._known_inputs()
-        if not names:
-            return [record], 0
+    def _futures(self, steps: int, future: Any) -> tuple[FloatArray, float, int]:
+        """Inputs of the record and after it, shape (1 + 2 departures, time, Q).
+
+        First those that are expected, then departures from them and their opposites, of each wave
+        by an innovation where it is first not known; the degrees of freedom of these, and how many
+        rows were given.
+        """
+        names, record, waves = self.signature.inputs, self._known_inputs(), self._waves
         given = _plan(future, names, steps - 1 + self._ahead)
-        for column in sorted(set(range(len(names))) - set(self._waves)):
+        for column in sorted(set(range(len(names))) - set(waves)):
             lost = np.isnan(given[:, column])
             if self._roles[names[column]] == "known" and lost.any():
                 raise RequestError(
@@ -745,37 +764,22 @@ class Live:
             whole = np.append(record[-1, column], given[:, column])
             at = np.where(np.isfinite(whole), np.arange(whole.size), 0)
             given[:, column] = whole[np.maximum.accumulate(at)][1:]
-        gaps = np.isnan(given).any(axis=1)
-        count = int(gaps.argmax()) if gaps.any() else len(given)
-        known, rest = np.concatenate([record, given[:count]]), given[count:]
-        if not len(rest):
-            return [known], count
-        drawn = self._drawn(known, len(rest), PAIRS, self._count.taken)
-        drawn = np.where(np.isnan(rest), drawn, rest)
-        return [np.concatenate([known, each]) for each in drawn], count
-
-    def _windows(self, steps: int, futures: Sequence[FloatArray]) -> Windows:
-        """What a forecast reads, for each future."""
-        signature, taken = self.signature, self._count.taken
-        history = self._rows("x", taken - signature.state_samples, taken)
-        back = signature.input_map.history(signature.input_delays) + 1
-        inputs = np.stack([each[min(taken, self._record) - back :] for each in futures])
-        if not signature.inputs:
-            inputs = np.zeros((1, signature.input_delays + steps, 0))
-        histories = np.broadcast_to(history, (len(inputs), *history.shape))
-        rig = None if self._follows is None else self._rig
-        return engine.array_windows(signature, histories, inputs, steps, rig)
-
-    def _error_variances(self, steps: int) -> FloatArray:
-        """Variances of the model's errors and the estimate's, never above the open loop's."""
-        own = self.errors.of_forecast(steps)
-        if not self._filter.covariance.any():
-            return own
-        bound = self.errors.of_forecast(steps, self._count.since)
-        if not self._count.partly:
-            return bound
-        result: FloatArray = np.minimum(own + self._filter.ahead(steps), bound)
-        return result
+        gaps, inputs = np.isnan(given), np.concatenate([record, given])
+        if not gaps.any():
+            return inputs[None], math.inf, len(given)
+        count = int(gaps.any(axis=1).argmax())
+        begin, missing = len(record) + count, gaps[count:, waves]
+        rest, foreseen = inputs[begin:], self._foreseen(inputs[:begin], len(missing))
+        rest[:, waves] = np.where(missing, foreseen.expected, rest[:, waves])
+        departures = np.zeros((len(waves), *inputs.shape))
+        for each, late, of_one in zip(
+            departures, missing.argmax(axis=0), foreseen.departures, strict=True
+        ):
+            each[begin + late :, waves] = of_one[: len(rest) - late]
+        departures[:, begin:, waves] *= missing
+        departures *= missing.max(axis=0)[:, None, None]
+        futures = np.concatenate([inputs[None], inputs + departures, inputs - departures])
+        return futures, foreseen.freedom, count
 
     def save(self, path: str | Path) -> Path:
         """Write all that the object needs to go on (NetCDF), to a temporary name first.
@@ -906,25 +910,31 @@ def held_samples(inside: BoolArray) -> npt.NDArray[np.intp]:
     return samples
 
 
-def _trust(error: FloatArray) -> FloatArray:
-    """Weight of a forecast against the mean of training, by its error in training SDs.
+def _moments(runs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean and variance over members and waves of runs (member, 1 + 2 departures, steps, N).
 
-    What an autoregressive model continues errs more than the mean where its error, claimed, comes
-    near the SD: all weight up to seven tenths of its square, and none from 1.2 of it on, or after.
+    First come runs of the inputs that are expected, then of departures from them and of their
+    opposites. Innovations of later samples do the same later, so that effects add up over the
+    leads: what squares of waves move the mean by, and the variance. Inputs may depart by the same
+    waves, so that effects of one innovation of each count with one sign.
     """
-    weight = np.clip((1.2 - error**2) / 0.5, 0.0, 1.0)
-    lasting: FloatArray = np.minimum.accumulate(weight)
-    return lasting
+    middle, (plus, minus) = runs[:, 0], np.split(runs[:, 1:], 2, axis=1)
+    apart = 0.5 * np.abs(plus - minus).sum(axis=1)
+    moved = (0.5 * (plus + minus) - middle[:, None]).sum(axis=1)
+    spread: FloatArray = np.cumsum(np.mean(apart**2, axis=0), axis=0)
+    if len(middle) > 1:
+        spread += middle.var(axis=0, ddof=1)
+    return middle.mean(axis=0) + np.cumsum(moved.mean(axis=0), axis=0), spread
 
 
-def _quantile(level: float, spread: FloatArray, variance: FloatArray, drawn: bool) -> FloatArray:
+def _quantile(level: float, spread: FloatArray, variance: FloatArray, freedom: float) -> FloatArray:
     """Half-width of the band in standard deviations: Student's quantile.
 
-    Part of the variance is the `spread` of few futures, where they were `drawn`, and the rest is
-    known from free runs; the degrees of freedom are those of Satterthwaite (1946).
+    Part of the variance is the `spread`, which is known with some degrees of `freedom`, and the
+    rest is known from free runs; those of the sum are Satterthwaite's (1946).
     """
     share = spread / np.maximum(variance, np.finfo(float).tiny)
-    doubt = (1.0 - share) ** 2 / WINDOWS + (share**2 / PAIRS if drawn else 0.0)
+    doubt = (1.0 - share) ** 2 / WINDOWS + share**2 / freedom
     quantile: FloatArray = special.stdtrit(1.0 / np.maximum(doubt, 1e-6), 0.5 + 0.5 * level)
     return quantile
 
@@ -936,28 +946,26 @@ def _mean_predictor(
 
     Physical units; blocks of a and b are oldest first.
     """
-    count, s, z = len(signature.states), signature.state_delays, signature.input_delays
+    scales = signature.state_scale, signature.input_scale, signature.direct_scale
+    count, blocks = len(signature.states), (signature.state_delays, signature.input_delays, 0)
+    out = [
+        np.zeros((count, each + 1, of.mean.size)) for each, of in zip(blocks, scales, strict=True)
+    ]
     offset = np.zeros(count)
-    a = np.zeros((count, s + 1, count))
-    b = np.zeros((count, z + 1, signature.input_scale.mean.size))
-    d = np.zeros((count, signature.direct_scale.mean.size))
     for member in members:
-        scale, (on_states, on_inputs) = member.state_scale, member.matrices
-        split = (member.input_delays + 1) * b.shape[2]
-        parts = (
-            (a, on_states[:count], scale),
-            (b, on_inputs[:count, :split], member.input_scale),
-            (d[:, None], on_inputs[:count, split:], member.direct_scale),
-        )
-        offset += scale.mean
-        for out, coefficients, own in parts:
-            blocks = coefficients.reshape(count, -1, out.shape[2]) if out.shape[2] else out[:, :0]
-            physical = blocks * scale.std[:, None, None] / own.std
-            offset -= np.einsum("nlc,c->n", physical, own.mean)
-            out[:, out.shape[1] - physical.shape[1] :] += physical[:, ::-1]
-    number = len(members)
-    flat = a.reshape(count, -1) / number, b.reshape(count, -1) / number
-    return offset / number, *flat, d / number
+        own, first = (member.state_scale, member.input_scale, member.direct_scale), 0
+        offset += own[0].mean
+        for whole, of, delays in zip(
+            out, own, (member.state_delays, member.input_delays, 0), strict=True
+        ):
+            shape = delays + 1, of.mean.size
+            columns = member.coefficients[:count, first : first + math.prod(shape)]
+            physical = columns.reshape(count, *shape) * own[0].std[:, None, None] / of.std
+            offset -= np.einsum("nlc,c->n", physical, of.mean)
+            whole[:, whole.shape[1] - shape[0] :] += physical[:, ::-1]
+            first += math.prod(shape)
+    a, b, d = (each.reshape(count, -1) / len(members) for each in out)
+    return offset / len(members), a, b, d
 
 
 def _rig(signature: Signature, like: xr.Dataset | None) -> xr.Dataset:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ import xarray as xr
 from seakeep.check import Checked
 from seakeep.conventions import displayed
 from seakeep.report.figures import checks
-from seakeep.report.page import Section, drawing, section, write_page
+from seakeep.report.page import Drawing, Section, drawing, section, write_page
 from seakeep.report.style import shown_unit
 from seakeep.report.tables import (
     MISSING,
@@ -29,7 +28,6 @@ from seakeep.report.tables import (
     row,
     short,
     table,
-    to,
     uncertain,
     words,
 )
@@ -66,9 +64,17 @@ def worth_section(result: xr.Dataset, checked: Checked) -> Section:
         points += [
             f"{run}: outside what trained the model ({why})." for run, why in _outside(validity)
         ]
-    one = str(result.attrs["of"]).removesuffix("s")
-    tables = [_by_run(result, one), _by_state(result), _of_runs(result)]
-    return section("worth", {"one": one, "runs": result.sizes["run"]}, points=points, tables=tables)
+    one, runs = str(result.attrs["of"]).removesuffix("s"), result["run"].values
+    errors = [(str(each["channel"].values), *numbers(each)) for each in result["run_nrmse"]]
+    return section(
+        "worth",
+        _by_run(result, one),
+        _by_state(result),
+        table("worth_of_runs", errors, columns=("state", *map(str, runs))),
+        one=one,
+        runs=runs.size,
+        points=points,
+    )
 
 
 def _verdicts(result: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
@@ -154,14 +160,6 @@ def _by_state(result: xr.Dataset) -> Table:
     return table("verdicts", rows)
 
 
-def _of_runs(result: xr.Dataset) -> Table:
-    """Error of each state in each run, which no mean hides."""
-    errors = result["run_nrmse"]
-    heads = ("state", *map(str, errors["run"].values))
-    rows = [(str(row["channel"].values), *numbers(row)) for row in errors]
-    return table("worth_of_runs", rows, columns=heads)
-
-
 def _outside(validity: xr.Dataset) -> list[tuple[str, str]]:
     """Tests outside the training, and why."""
     pairs = zip(validity["run"].values, validity["outside"].values, strict=True)
@@ -173,44 +171,24 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
     measured, reference = checked.results.get("measured_response"), result.attrs["reference"]
     if "validation" in checked.refused:  # points beside the answer to something else
         measured = None
-    per = reference
+    per, words, kinds, tables = reference, [], set(), []
     if "wave" in result["input"]:
         per = f"a wave that passes all probes, counted from {reference}"
-    words = []
-    unknown = (
-        result["amplitude"].isnull().all([d for d in result["amplitude"].dims if d != "state"])
-    )
+    unknown = result["amplitude"].isnull().all(["input", "frequency"])
     if read := ", ".join(map(str, result["state"].values[unknown])):
         words.append(f"{read}: read off other states, so that no linear response stands for it.")
-    kinds = set() if measured is None else set(measured["kind"].values)
+    if measured is not None:
+        kinds = {*measured["kind"].values}
+        tables.append(table("measured_response", _points(measured, result)))
     if "irregular" in kinds:
         words.append(
             "Points of irregular waves are of all runs, training included. Their bars hold chance, "
             "and the change from segments half as long, by which leakage is judged."
         )
-    figure = drawing("response", partial(checks.response, result, measured))
-    tables = []
-    if measured is not None and "regular" in kinds:
-        tables.append(_points_table(measured, result))
     if "validation" in checked.results:
         tables.append(_validation_table(checked.results["validation"]))
-    return section("response", {"per": per}, words, figures=[figure], tables=tables)
-
-
-def _points_table(measured: xr.Dataset, result: xr.Dataset) -> Table:
-    """Measured response in regular waves; irregular ones stand in the figure."""
-    at = measured.sel(point=measured["kind"] == "regular")
-    at = at.assign_coords(units=("state", result["units"].isel(input=-1).values))
-    rows = [
-        (
-            *row(own, "run", frequency=3, wave_amplitude=4),
-            *row(own, "shown"),
-            uncertain(own["amplitude"], own["amplitude_uncertainty"]),
-            uncertain(own["phase"], own["phase_uncertainty"]),
-        )
-        for own in entries(_as_shown(at, "amplitude", "amplitude_uncertainty"), "point", "state")
-    ]
-    return table("measured_response", rows)
+    figure = drawing("response", checks.response, result, measured)
+    return section("response", figure, *tables, per=per, more=words)
 
 
 def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
@@ -225,6 +203,20 @@ def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
     return result.assign(scaled).assign_coords(shown=("state", names))
 
 
+def _points(measured: xr.Dataset, result: xr.Dataset) -> list[tuple[str, ...]]:
+    """Measured response in regular waves; irregular ones stand in the figure."""
+    at = measured.sel(point=measured["kind"] == "regular")
+    at = at.assign_coords(units=("state", result["units"].isel(input=-1).values))
+    return [
+        (
+            *row(own, "run", frequency=3, wave_amplitude=4),
+            *row(own, "shown"),
+            *(uncertain(own[key], own[f"{key}_uncertainty"]) for key in ("amplitude", "phase")),
+        )
+        for own in entries(_as_shown(at, "amplitude", "amplitude_uncertainty"), "point", "state")
+    ]
+
+
 def _validation_table(result: xr.Dataset) -> Table:
     """E and u_val of each state: over the regular runs one by one, irregular points together."""
     rows = []
@@ -235,17 +227,10 @@ def _validation_table(result: xr.Dataset) -> Table:
                 continue
             error = at["error"]
             worst = at.isel(point=(abs(error) - at["uncertainty"]).argmax("point"))
-            rows.append(
-                (
-                    *row(own, "shown"),
-                    kind,
-                    number(error.size, 0),
-                    number(at["within"].sum(), 0),
-                    short(np.sqrt(np.mean(error**2))),
-                    number(worst["frequency"]),
-                    uncertain(worst["error"], worst["uncertainty"]),
-                )
-            )
+            counts = numbers([error.size, int(at["within"].sum())], 0)
+            rms, place = short(np.sqrt(np.mean(error**2))), number(worst["frequency"])
+            by = uncertain(worst["error"], worst["uncertainty"])
+            rows.append((*row(own, "shown"), kind, *counts, rms, place, by))
     return table("validation", rows)
 
 
@@ -280,13 +265,8 @@ def possible_section(result: xr.Dataset, checked: Checked) -> Section:
             f"The inputs are carried by measured {state} and so hold part of it: with waves alone "
             f"the bounds of {state}, and of what follows it, are higher."
         )
-    return section(
-        "coherence",
-        result.attrs,
-        points=points,
-        figures=[drawing("coherence", partial(checks.coherence, result))],
-        tables=[table("possible", rows)],
-    )
+    figure = drawing("coherence", checks.coherence, result)
+    return section("coherence", figure, table("possible", rows), points=points, **result.attrs)
 
 
 def _bounds(own: xr.Dataset) -> tuple[str, ...]:
@@ -319,10 +299,13 @@ def _advice(model: float, linear: float, more: float, ahead: bool) -> str:
 
 def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
     """Return free decay, beside measured ones, and the modes."""
-    figures, tables, words, points = [], [], [], []
+    words, points = [], []
+    parts: list[Drawing | Table] = []
     if (result := checked.results.get("decay")) is not None:
-        tables.append(_decay_table(result, checked.results.get("measured_decay")))
-        figures.append(drawing("decay", partial(checks.decay, result)))
+        parts = [
+            drawing("decay", checks.decay, result),
+            _decay_table(result, checked.results.get("measured_decay")),
+        ]
         most = np.abs(result["displacement"].values).max(axis=1)
         # None swings farther than it was moved in still water.
         points = [
@@ -338,10 +321,8 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
             "with fewer than three extremes has neither period nor damping: it creeps back, or its "
             "forecast leans on the waves and forgets the state."
         )
-    if modes.sizes["state"] > 1:
-        figures.append(drawing("modes", partial(checks.modes, modes)))
-    tables.append(_modes_table(modes))
-    return section("modes", more=words, points=points, figures=figures, tables=tables)
+    figure = drawing("modes", checks.modes, modes) if modes.sizes["state"] > 1 else None
+    return section("modes", *parts, figure, _modes_table(modes), more=words, points=points)
 
 
 def _decay_table(result: xr.Dataset, measured: xr.Dataset | None) -> Table:
@@ -362,7 +343,7 @@ def _modes_table(result: xr.Dataset) -> Table:
         parts = own["participation"].to_series().sort_values(ascending=False, kind="stable")[:2]
         taking = ", ".join(f"{state} {part:.2f}" for state, part in parts.items())
         rows.append((*row(own, period=4, damping_ratio=4, decay_time=4, modulus=4), taking))
-    return table("modes", rows, {"modes": result.sizes["mode"]})
+    return table("modes", rows, modes=len(rows))
 
 
 def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -387,10 +368,8 @@ def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
         "instants": result.attrs["instants"],
         "period": period,
     }
-    figure = drawing("residuals", partial(checks.residuals, result))
-    return section(
-        "residuals", result.attrs, figures=[figure], tables=[table("residuals", rows, words)]
-    )
+    figure = drawing("residuals", checks.residuals, result)
+    return section("residuals", figure, table("residuals", rows, **words), **result.attrs)
 
 
 def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -399,7 +378,7 @@ def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
     scaled = _as_shown(result, "significant_double_amplitude", *extreme)
     rows = []
     for own in entries(scaled, "state", "kind"):
-        bounds = to([own[key] for key in extreme[1:]], short)
+        bounds = interval(own, "extreme", short)
         rows.append(
             (
                 *row(own, "shown", "kind", significant_double_amplitude=short),
@@ -409,12 +388,12 @@ def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
                 number(own["divergence"], 4) if own["kind"] == "forecast" else MISSING,
             )
         )
-    hours = float(result.attrs["duration"]) / 3600
-    figures = [
-        drawing(key, partial(getattr(checks, key), result)) for key in ("exceedance", "density")
-    ]
-    tables = [table("statistics", rows, {"of": result.attrs["of"], "hours": hours})]
-    return section("statistics", figures=figures, tables=tables)
+    return section(
+        "statistics",
+        drawing("exceedance", checks.exceedance, result),
+        drawing("density", checks.density, result),
+        table("statistics", rows, of=result.attrs["of"], hours=result.attrs["duration"] / 3600),
+    )
 
 
 def validity_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -432,8 +411,8 @@ def validity_section(result: xr.Dataset, checked: Checked) -> Section:
         f"{text[0].upper()}{text[1:]} This test shows memory, not skill."
         for text in checked.repeats.values()
     ]
-    figure = drawing("validity", partial(checks.validity, result))
-    return section("validity", points=points, figures=[figure], tables=[table("validity", rows)])
+    figure = drawing("validity", checks.validity, result)
+    return section("validity", figure, table("validity", rows), points=points)
 
 
 def drift_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -450,9 +429,8 @@ def drift_section(result: xr.Dataset, checked: Checked) -> Section:
                 offset = uncertain(at["offset"], at["offset_uncertainty"])
                 place = row(at, "shown", "run", point_frequency=3)
                 rows.append((*place, number(value, 4), offset))
-    figure = drawing("drift", partial(checks.drift, result))
-    tables = [table("drift", rows)] if rows else []
-    return section("drift", result.attrs, figures=[figure], tables=tables)
+    figure = drawing("drift", checks.drift, result)
+    return section("drift", figure, table("drift", rows), **result.attrs)
 
 
 CHECK_SECTIONS: dict[Callable[[xr.Dataset, Checked], Section], Sequence[str]] = {

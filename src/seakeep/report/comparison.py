@@ -153,31 +153,26 @@ def model_blocks(tables: Mapping[str, xr.Dataset]) -> Iterator[Table]:
 
 def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Errors of several models run by run, and over all runs their change from the first one."""
-    models, runs = ([str(each) for each in table[key].values] for key in ("model", "run"))
+    models, runs = (table[key].values.tolist() for key in ("model", "run"))
     of = runs[0]
     if len(runs) > 1:
         of = f"{len(runs)} runs"
-        ordered = table.isel(run=np.argsort(table["wave_period"].values, kind="stable"))
         rows = [
-            (str(run), short(period, 3), *numbers(errors))
-            for run, period, errors in zip(
-                *(ordered[key].values for key in ("run", "wave_period")),
-                ordered["anrmse"].values.T,
-                strict=True,
-            )
+            (*row(at, "run", wave_period=partial(short, digits=3)), *numbers(at["anrmse"]))
+            for at in entries(table.sortby("wave_period"), "run")
         ]
         rows.append(("mean", "", *numbers(table["all_anrmse"])))
         heads = ("run", "waves, s", *models)
         yield Table("by_run", f"{of} by wave period: ANRMSE", heads, rows, averages=[len(runs)])
-    changes = []
-    for k, name in enumerate(models):
-        error, *ratios = (
-            float(table[f"all_{key}"][k]) for key in ("anrmse", "change", "lower", "upper")
-        )
-        value, low, high = (1 + each for each in ratios)
-        known = k > 0 and bool(np.isfinite([low, high]).all())
-        bounds = (change(low, high), verdict(low - 1, high - 1)) if known else ("", "")
-        changes.append((name, number(error), change(value) if k else "", *bounds))
+    changes: list[tuple[str, ...]] = []
+    for at in entries(table, "model"):
+        value, low, high = (1 + float(at[f"all_{key}"]) for key in ("change", "lower", "upper"))
+        cells: tuple[str, ...] = ("", "", "")
+        if changes:
+            known = bool(np.isfinite([low, high]).all())
+            bounds = (change(low, high), verdict(low - 1, high - 1)) if known else ("", "")
+            cells = (change(value), *bounds)
+        changes.append((*row(at, "model", all_anrmse=3), *cells))
     note = "Paired intervals over redrawn blocks of the forecast; they hold for these runs."
     heads = ("model", "ANRMSE", "change", "95 %", "verdict")
     yield Table("differences", f"{of}: change of ANRMSE from {models[0]}", heads, changes, note)
@@ -209,9 +204,7 @@ def write_differences(table: xr.Dataset, path: Path) -> Path:
     """Write errors of several models as CSV, a row per run and model, and per model for all."""
     of_all = {name: str(name)[4:] for name in table.data_vars if str(name).startswith("all_")}
     every = table[[*of_all]].rename(of_all).expand_dims(run=[""])
-    each = table[
-        ["anrmse", "anrmse_lower", "anrmse_upper", "change", "lower", "upper", "wave_period"]
-    ]
+    each = table[[*of_all.values(), "wave_period"]]
     both = [part.to_dataframe().reset_index() for part in (each, every)]
     return _write(pd.concat(both), ["run", "wave_period", "model"], path)
 
@@ -332,15 +325,17 @@ def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
 
 
 def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
-    columns = {}
-    for name, variable in forecast.data_vars.items():
-        if "time" in variable.dims:
-            of = [dim for dim in ("statistic", "member") if dim in variable.dims]
-            for place in variable[of[0]].values if of else [None]:
-                one = variable.sel({of[0]: place}) if of else variable
-                kind = "member " * ("member" in of)
-                words = f"{name} {kind}{place}" if place not in (None, "mean") else name
-                columns[plain_cell(f"{words} [{variable.attrs.get('units', '')}]")] = one.values
+    dim = next((each for each in ("statistic", "member") if each in forecast.dims), None)
+    parts, kind = {"": forecast}, "member " * (dim == "member")
+    if dim is not None:
+        places = forecast[dim].values
+        parts = {f" {kind}{p}".removesuffix(" mean"): forecast.sel({dim: p}) for p in places}
+    columns = {
+        plain_cell(f"{name}{words} [{variable.attrs.get('units', '')}]"): part[name].values
+        for name, variable in forecast.data_vars.items()
+        if "time" in variable.dims
+        for words, part in parts.items()
+    }
     if (ahead := float(forecast.attrs.get("reads_input_until", 0.0))) > 0.0:
         columns[UNTIL] = (forecast["time"].values + ahead).round(9)
     if forecast.attrs.get("scale") == "full":

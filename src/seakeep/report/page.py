@@ -6,8 +6,8 @@ import base64
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, fields
+from functools import cache, partial
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -88,24 +88,40 @@ class Section:
     figures: Sequence[Drawing] = ()
     tables: Sequence[Table] = ()
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether it shows nothing but its paragraphs."""
+        parts = (self.points, self.links, self.terms, self.histories, self.figures, self.tables)
+        return not any(parts)
 
-def drawing(
-    key: str, draw: Callable[[], Figure], values: Mapping[str, Any] | None = None, name: str = ""
-) -> Drawing:
-    """Figure with the caption of ``words.toml``, and the values that it holds in braces."""
-    return Drawing(name or key, words()["figures"][key].format(**values or {}), draw)
+
+def drawing(key: str, draw: Callable[..., Figure], *given: Any, **values: Any) -> Drawing:
+    """Figure with the caption of ``words.toml``, and the values that it holds in braces.
+
+    `draw` takes what is `given`; the value ``name`` is that of its files, by default the key.
+    """
+    caption = words()["figures"][key].format(**values)
+    return Drawing(values.get("name", key), caption, partial(draw, *given))
 
 
 def section(
-    key: str, values: Mapping[str, Any] | None = None, more: Sequence[str] = (), **parts: Any
+    key: str, *parts: Drawing | Table | None, more: Sequence[str] = (), **given: Any
 ) -> Section:
     """Section with the title and paragraphs of ``words.toml``, and `more` paragraphs.
 
-    `values` are what the paragraphs hold in braces, `parts` the other parts of a :class:`Section`.
+    `parts` are its figures and tables; a table without rows is left out. Of what is `given`, parts
+    of a :class:`Section` are its own, and the rest is what the paragraphs hold in braces.
     """
     entry = words()["sections"][key]
-    paragraphs = [each.format(**values or {}) for each in entry.get("words", ())]
-    return Section(key, entry["title"], [*paragraphs, *filter(None, more)], **parts)
+    paragraphs = [each.format(**given) for each in entry.get("words", ())]
+    return Section(
+        key,
+        entry["title"],
+        [*paragraphs, *filter(None, more)],
+        figures=[each for each in parts if isinstance(each, Drawing)],
+        tables=[each for each in parts if isinstance(each, Table) and each.rows],
+        **{name: given[name] for name in given.keys() & {each.name for each in fields(Section)}},
+    )
 
 
 def write_page(

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from seakeep.campaign.pipeline import redundant_pairs
-from seakeep.campaign.settings import CampaignSettings, long_name_of
+from seakeep.campaign.settings import CampaignSettings
 from seakeep.conventions import displayed
 from seakeep.files import MARK, replacing
 from seakeep.quality import compared, findings_of
 from seakeep.quality.faults import FLAGS
-from seakeep.report.figures.runs import quality_figure
+from seakeep.report.figures.histories import quality_figure
 from seakeep.report.page import Section, drawing, inline_picture, rendered, section
 from seakeep.report.style import figure_style, shown_unit
 from seakeep.report.tables import MISSING, Number, number, short, table
@@ -26,20 +24,11 @@ SHEET = "data-quality sheet"
 """Kind of the files of a sheet, which sets them apart from the user's."""
 
 
-@dataclass(frozen=True)
-class ChannelRow:
-    """Data quality of a channel: statistics (min, max, mean, SD), flagged parts, what was found."""
+def channel_rows(run: xr.Dataset) -> list[tuple[str, ...]]:
+    """Data quality of each channel of a prepared run; angles and their rates in degrees.
 
-    channel: str
-    words: str
-    unit: str
-    numbers: tuple[float, ...]
-    flagged: str
-    findings: tuple[str, ...]
-
-
-def channel_rows(run: xr.Dataset) -> list[ChannelRow]:
-    """Data quality of each channel of a prepared run; angles and their rates in degrees."""
+    Statistics (min, max, mean, SD), parts that are flagged, and what was found and done.
+    """
     findings, rows = findings_of(run), []
     for name, channel in run.data_vars.items():
         factor, unit = displayed(str(channel.attrs.get("units", "")))
@@ -57,9 +46,8 @@ def channel_rows(run: xr.Dataset) -> list[ChannelRow]:
         texts = [each.text for each in findings if each.channel == name]
         if channel.attrs.get("repaired"):
             texts.append(f"repaired: {channel.attrs['repaired']}")
-        words = long_name_of(str(name), channel.attrs.get("long_name"))
-        row = ChannelRow(str(name), words, shown_unit(unit), numbers, flagged, tuple(texts))
-        rows.append(row)
+        cells = (str(name), shown_unit(unit), *map(short, numbers))
+        rows.append((*cells, flagged, "; ".join(texts)))
     return rows
 
 
@@ -109,7 +97,7 @@ def write_quality_sheet(
     rows = [(*row, kinds or "nothing found") for *row, kinds in map(run_row, runs, runs.values())]
     rows += [(n, Number("not prepared"), MISSING, why) for n, why in (unread or {}).items()]
     marked = [k for k, row in enumerate(rows) if row[2] != "0"]
-    every = section("runs", tables=(table("runs", rows, marked=marked),))
+    every = section("runs", table("runs", rows, marked=marked))
     sections = [every, *map(_section, runs, runs.values())]
     drawn = {
         path.stem: inline_picture(path.read_bytes(), f"channels of {name}")
@@ -144,14 +132,10 @@ def _section(name: str, run: xr.Dataset) -> Section:
         f"{f' ({origin})' if offset else origin}"
         for logger, offset, drift, origin in clock_rows(run)
     ]
-    channels = channel_rows(run)
-    rows = [
-        (each.channel, each.unit, *map(short, each.numbers), each.flagged, "; ".join(each.findings))
-        for each in channels
-    ]
-    marked = [k for k, each in enumerate(channels) if each.findings]
-    shown = table("channels_of_run", rows, {"run": name}, name=f"channels_{name}", marked=marked)
-    figure = drawing("quality", partial(quality_figure, run, {}), {"run": name}, f"quality_{name}")
+    rows = channel_rows(run)
+    marked = [k for k, each in enumerate(rows) if each[-1]]
+    shown = table("channels_of_run", rows, name=f"channels_{name}", marked=marked, run=name)
+    figure = drawing("quality", quality_figure, run, {}, name=f"quality_{name}", run=name)
     points = [*clocks, *other_findings(run)]
     return Section(name, name, (steps_of(run),), points, figures=(figure,), tables=(shown,))
 

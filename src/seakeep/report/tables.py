@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from functools import cache, cached_property, partial
 from importlib import resources
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, SupportsFloat
+from typing import TYPE_CHECKING, Any, NamedTuple, SupportsFloat
 
 import numpy as np
 import numpy.typing as npt
@@ -97,13 +97,7 @@ def words() -> dict[str, Any]:
     return tomllib.loads(file.read_text("utf-8"))
 
 
-def table(
-    key: str,
-    rows: Sequence[Sequence[str]],
-    values: Mapping[str, Any] | None = None,
-    more: str = "",
-    **options: Any,
-) -> Table:
+def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any) -> Table:
     """Return a table with the words of ``words.toml``.
 
     Parameters
@@ -112,22 +106,23 @@ def table(
         Its place there.
     rows : sequence of sequence of str
         Cells.
-    values : mapping, optional
-        What the words hold in braces.
     more : str, optional
         What follows the note.
-    **options
-        Other parts of a :class:`Table`, such as ``name``, if it is not the key.
+    **given
+        Other parts of a :class:`Table`, such as ``name``, if it is not the key, and what the
+        words hold in braces.
 
     Returns
     -------
     Table
     """
-    entry = {"name": key, "columns": (), "note": "", **words()["tables"][key], **options}
-    entry["columns"] = tuple(each.format(**values or {}) for each in entry["columns"])
-    entry["title"] = entry["title"].format(**values or {})
-    entry["note"] = entry["note"].format(**values or {}) + more
-    return Table(rows=rows, **entry)
+    entry = {"name": key, "columns": (), "note": "", **words()["tables"][key], **given}
+    entry["columns"] = tuple(each.format(**given) for each in entry["columns"])
+    for part in ("title", "note"):
+        entry[part] = entry[part].format(**given)
+    entry["note"] += more
+    parts = {each.name for each in fields(Table)} & entry.keys()
+    return Table(rows=rows, **{part: entry[part] for part in parts})
 
 
 SHADES = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
@@ -185,6 +180,8 @@ def small_number(value: SupportsFloat) -> Number:
     --------
     >>> small_number(0.0186), small_number(0.00023), small_number(-1.4e-5), small_number(3e-9)
     ('0.0186', '0.00023', '-0.000014', '3.0e-09')
+    >>> small_number(0.0)
+    '0'
     """
     value = float(value)
     if not np.isfinite(value) or value == 0:
@@ -211,7 +208,13 @@ def percent(part: SupportsFloat, digits: int = 0) -> Number:
 
 
 def probability(value: SupportsFloat) -> Number:
-    """Text of a p-value."""
+    """Text of a p-value.
+
+    Examples
+    --------
+    >>> probability(0.0004), probability(0.0386)
+    ('< 0.001', '0.039')
+    """
     return Number("< 0.001") if float(value) < 0.001 else number(value)
 
 
@@ -250,9 +253,9 @@ def row(at: xr.Dataset, /, *words: str, **forms: int | Form) -> tuple[str, ...]:
     return (*texts, *numbers)
 
 
-def interval(at: xr.Dataset, key: str) -> Number:
+def interval(at: xr.Dataset, key: str, form: Form = number) -> Number:
     """Text of the bounds ``KEY_lower`` and ``KEY_upper``."""
-    return to([at[f"{key}_{bound}"] for bound in ("lower", "upper")])
+    return to([at[f"{key}_{bound}"] for bound in ("lower", "upper")], form)
 
 
 def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = number) -> Number:
@@ -264,6 +267,44 @@ def beside(value: SupportsFloat, *others: SupportsFloat, form: Form = number) ->
     ('0.481 [0.421, 0.549]', '-20 [-35, +5]')
     """
     return Number(f"{form(value)} [{', '.join(map(form, others))}]")
+
+
+class Interval(NamedTuple):
+    """A number with its 95 % interval; NaN where there is none."""
+
+    value: float
+    lower: float
+    upper: float
+
+    def below(self, bound: float) -> bool | None:
+        """Whether it lies below a bound; None where the interval holds the bound."""
+        return self.below_other(Interval(bound, bound, bound))
+
+    def below_other(self, other: Interval) -> bool | None:
+        """Whether it lies below another number; None where the intervals meet."""
+        if self.upper < other.lower:
+            return True
+        return False if self.lower > other.upper else None
+
+    def text(self, form: int | Form = 2, unit: str = "", factor: float = 1.0) -> Number:
+        """Text of the number times a factor, with its interval in brackets.
+
+        Examples
+        --------
+        >>> Interval(0.4, 0.2, 0.6).text(), Interval(0.4, np.nan, np.nan).text(0, " %", 100)
+        ('0.40 [0.20, 0.60]', '40 %')
+        """
+        each = partial(number, digits=form) if isinstance(form, int) else form
+        value, low, high = (each(factor * x) for x in self)
+        return Number(f"{value}{unit}" + f" [{low}, {high}]" * bool(np.isfinite(self.lower)))
+
+    def change(self) -> Number:
+        """Text of a ratio as a relative change."""
+        return Interval(*(x - 1 for x in self)).text(signed, " %", 100.0)
+
+    def part(self) -> Number:
+        """Text of a share."""
+        return self.text(0, " %", 100.0)
 
 
 def uncertain(value: SupportsFloat, uncertainty: SupportsFloat) -> Number:

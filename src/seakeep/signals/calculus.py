@@ -25,58 +25,46 @@ def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
     return np.asarray((np.sin(0.5 * np.pi * rise) * np.sin(0.5 * np.pi * fall)) ** 2)
 
 
-def reflections(series: FloatArray, order: int) -> FloatArray:
-    """Reflection coefficients of an autoregressive model by Burg's method, shape (order,).
+def autoregression(series: FloatArray, order: int, noise: float = 0.0) -> tuple[FloatArray, float]:
+    """Filter that leaves the innovations of a series of zero mean, and their power.
+
+    As if white noise of a part of its power were added to the series. The order is at most a third
+    of the number of samples. The inverse of the filter is stable. The power is that in data that
+    were not fitted, (n + p)/(n − p) times what is left (Akaike, 1970).
 
     Notes
     -----
-    J. P. Burg, Maximum entropy spectral analysis (1975): each one minimises the sum of forward and
-    backward prediction errors. All lie between −1 and 1.
+    J. P. Burg, Maximum entropy spectral analysis (1975): each reflection coefficient minimises the
+    sum of forward and backward prediction errors. All lie between −1 and 1.
     """
-    forward, backward = series[1:].copy(), series[:-1].copy()
-    out = np.zeros(order)
-    # Below this the errors are rounding: a pure tone needs two coefficients and gets no more.
-    floor = np.finfo(float).eps * float(series @ series)
+    order = max(1, min(order, series.size // 3))
+    forward, backward, out = series[1:], series[:-1], np.zeros(order + 1)
+    out[0], whole = 1.0, float(series @ series)
+    left, floor = whole / series.size, np.finfo(float).eps * whole
+    added = 2.0 * noise * left
     for place in range(order):
         power = float(forward @ forward + backward @ backward)
+        # Below this errors are rounding: a pure tone needs two coefficients and gets no more.
         if power <= floor:
             break
-        out[place] = -2.0 * float(forward @ backward) / power
-        updated = forward + out[place] * backward
-        backward = (backward + out[place] * forward)[:-1]
-        forward = updated[1:]
-    return out
+        reflection = -2.0 * float(forward @ backward) / (power + added * forward.size)
+        left *= 1.0 - reflection**2
+        block = out[: place + 2]  # Levinson's recursion
+        block += reflection * block[::-1]
+        forward, backward = (
+            (forward + reflection * backward)[1:],
+            (backward + reflection * forward)[:-1],
+        )
+    return out, left * (series.size + order) / (series.size - order)
 
 
-def whitening(reflection: FloatArray) -> FloatArray:
-    """Filters that leave the innovations of a series, shape (…, order + 1).
-
-    Levinson's recursion, from reflection coefficients of shape (…, order); those between −1 and 1
-    give filters whose inverses are stable.
-    """
-    order = reflection.shape[-1]
-    out = np.zeros((*reflection.shape[:-1], order + 1))
-    out[..., 0] = 1.0
-    for place in range(order):
-        block = out[..., : place + 2]
-        block += reflection[..., place, None] * block[..., ::-1]
-    return out
-
-
-def continued(past: FloatArray, filters: FloatArray, innovations: FloatArray) -> FloatArray:
-    """What innovations make after a series of zero mean, shape (number, count), of as many filters.
-
-    `filters`, shape (number, order + 1), are those of :func:`whitening`.
-    """
-    order = filters.shape[1] - 1
+def continued(past: FloatArray, whitening: FloatArray, count: int) -> FloatArray:
+    """The `count` values that are expected after a series of zero mean."""
+    order = len(whitening) - 1
     lags = scipy.linalg.toeplitz(past[: -order - 1 : -1], np.zeros(order))
-    states = -filters[:, 1:] @ lags
-    return np.stack(
-        [
-            scipy.signal.lfilter([1.0], each, given, zi=state)[0]
-            for each, given, state in zip(filters, innovations, states, strict=True)
-        ]
-    )
+    state = -whitening[1:] @ lags
+    result: FloatArray = scipy.signal.lfilter([1.0], whitening, np.zeros(count), zi=state)[0]
+    return result
 
 
 def predicted_extension(
@@ -100,14 +88,8 @@ def predicted_extension(
 
 
 def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
-    """The `count` values after a series of zero mean, by linear prediction (Burg).
-
-    The order is at most a third of the number of samples.
-    """
-    order = max(1, min(order, past.size // 3))
-    filter_taps = whitening(reflections(past, order))
-    result: FloatArray = continued(past, filter_taps[None], np.zeros((1, count)))[0]
-    return result
+    """The `count` values after a series of zero mean, by linear prediction (Burg)."""
+    return continued(past, autoregression(past, order)[0], count)
 
 
 def _check_slowest(frequency: float, dt: float, samples: int, name: str) -> None:

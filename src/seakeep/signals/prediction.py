@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import scipy
 
 from seakeep.arrays import FloatArray, as_series, whole_number
-from seakeep.signals.calculus import continued, predicted, reflections, whitening
+from seakeep.signals.calculus import autoregression, continued
 from seakeep.signals.propagation import LEAST_CORRELATION, band_limit, carry_by_dispersion
 from seakeep.waves import group_speed
 
@@ -20,8 +21,9 @@ encounter periods is 0.53 SD with one half of a period, 0.43 with one, 0.38 with
 four."""
 UNLIKE = math.sqrt(1.0 - LEAST_CORRELATION**2)
 """Part of a record's SD that may be left of it once the waves carried to it are taken off."""
-WHOLLY = 1.0 - 1e-12
-"""Largest reflection coefficient whose error is drawn: rounding hides those of a pure tone."""
+NOISE = 1e-6
+"""Part of a record's variance that counts as noise: a sum of tones, as of a simulated sea, would
+seem to be known for good without it."""
 SLOWLY, QUICKLY = 0.99, 0.05
 """Shares of a record's variance below the waves that arrive last, and below the first ones."""
 
@@ -66,133 +68,106 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
 
     def following(values: FloatArray) -> FloatArray:
         deviations = values - values.mean()
-        return np.asarray(values.mean() + predicted(deviations, number, _memory(deviations)))
+        whitening, _ = _model(deviations)
+        return np.asarray(values.mean() + continued(deviations, whitening, number))
 
     return np.asarray(np.apply_along_axis(following, 0, array))
 
 
-def draw_waves(
-    series: npt.ArrayLike, count: int, pairs: int, rng: np.random.Generator
-) -> FloatArray:
-    r"""Draw what may follow elevations, each from its own record: futures about the predicted one.
+class Foreseen(NamedTuple):
+    """What is known of inputs to come.
 
     Parameters
     ----------
-    series, count
-        As in :func:`predict_waves`.
-    pairs : int
-        Number of pairs of futures; those of a pair lie opposite each other about the prediction,
-        so that their mean is the prediction.
-    rng : Generator
-        Source of the Gaussian innovations.
-
-    Returns
-    -------
-    ndarray, shape (2 * pairs, count) or (2 * pairs, count, channel)
-        Each pair has an autoregressive model of its own, since its coefficients are known from a
-        record of n samples only: Fisher's transform of the m-th reflection coefficient has a
-        standard error of :math:`1/\sqrt{n - m - 3}`. Innovations have the power that the model
-        leaves of the record, n/(n − p) times for p coefficients.
-
-    Raises
-    ------
-    RequestError, DataError
-        As :func:`predict_waves`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> rng = np.random.default_rng(0)
-    >>> futures = draw_waves(rng.standard_normal(400), 5, 3, rng)
-    >>> futures.shape, bool(np.ptp(futures[:3] + futures[3:], axis=0).max() < 1e-12)
-    ((6, 5), True)
+    expected : ndarray, shape (count, channel)
+        The samples after a record.
+    departures : ndarray, shape (channel, count, channel)
+        What an innovation of one SD adds to them, of each channel, at the first sample. Later ones
+        add the same, later.
+    freedom : float
+        Degrees of freedom of the variance of the innovations: samples per coefficient.
     """
-    array, number = as_series(series, minimum=4, channels=True), whole_number(count, "count")
 
-    def futures(values: FloatArray) -> FloatArray:
-        deviations, size = values - values.mean(), values.size
-        order = max(1, min(_memory(deviations), size // 3))
-        coefficients = reflections(deviations, order)
-        own = whitening(coefficients)
-        expected = continued(deviations, own[None], np.zeros((1, number)))[0]
-        left = scipy.signal.lfilter(own, [1.0], deviations)[order:]
-        power = math.sqrt(size / (size - order)) * left.std()
-        apart = rng.standard_normal((pairs, order)) / np.sqrt(
-            np.maximum(size - 3 - np.arange(1, order + 1), 1)
-        )
-        filters = whitening(np.tanh(np.arctanh(np.clip(coefficients, -WHOLLY, WHOLLY)) + apart))
-        innovations = power * rng.standard_normal((pairs, number))
-        errors = continued(deviations, filters, innovations) - expected
-        middle = values.mean() + expected
-        return np.concatenate([middle + errors, middle - errors])
-
-    return np.asarray(np.apply_along_axis(futures, 0, array))
+    expected: FloatArray
+    departures: FloatArray
+    freedom: float
 
 
-def draw_sea(
-    series: npt.ArrayLike,
-    count: int,
-    pairs: int,
-    rng: np.random.Generator,
-    *,
-    dt: float,
-    positions: npt.ArrayLike,
-    depth: float,
-) -> FloatArray:
-    r"""Draw what may follow elevations at probes that see the same waves, one after the other.
+def foresee(
+    series: npt.ArrayLike, count: int, *, dt: float, positions: npt.ArrayLike, depth: float
+) -> Foreseen:
+    r"""Continue elevations at probes that see the same waves, and say how they may depart from it.
 
-    The farthest probe up-wave is drawn as :func:`draw_waves` does. Each further one is what the
-    probe before it has measured, followed by its future, carried by linear dispersion, plus what
-    the waves so carried leave of its own record, which is drawn from that.
+    The farthest probe up-wave is continued as by :func:`predict_waves`. Each further one is what
+    the probe before it has measured, followed by its future, carried by linear dispersion, plus
+    what the waves so carried leave of its own record, which is continued from that.
 
     Parameters
     ----------
     series : array_like, shape (time, channel)
-        As in :func:`draw_waves`.
-    count, pairs, rng
-        As in :func:`draw_waves`.
+        As in :func:`predict_waves`.
+    count : int
+        Number of samples to predict.
     dt : float
         Time step, s.
     positions : array_like, shape (channel,)
-        Of the probes, m, positive downstream; NaN for a channel that is drawn from its own record.
+        Of the probes, m, positive downstream; NaN for a channel with a record of its own.
     depth : float
         Water depth, m; ``numpy.inf`` for deep water.
 
     Returns
     -------
-    ndarray, shape (2 * pairs, count, channel)
-        Futures in opposite pairs. A probe whose record is not the one before it carried to it, to
-        a correlation of 0.8, is drawn from its own.
+    Foreseen
+        A probe whose record is not the one before it carried to it, to a correlation of 0.8, is
+        continued from its own.
 
     Raises
     ------
     RequestError, DataError
-        As :func:`draw_waves` and :func:`carry_by_dispersion`.
+        As :func:`predict_waves` and :func:`carry_by_dispersion`.
+
+    Notes
+    -----
+    An autoregressive model of the filter :math:`A(z)` departs from its prediction by the
+    innovations to come, filtered by :math:`1/A(z)`. Those of the power σ² have the variance
+    :math:`\sigma^2 \sum_{i<k} \psi_i^2` after k samples, with the impulse response ψ.
     """
-    array = as_series(series, minimum=4, channels=True)
-    out = draw_waves(array, count, pairs, rng)
-    places, size = np.asarray(positions, dtype=float), len(array)
+    array, number = as_series(series, minimum=4, channels=True), whole_number(count, "count")
+    size, channels = array.shape
+    expected, departures = np.empty((number, channels)), np.zeros((channels, number, channels))
+    orders = np.empty(channels)
+
+    def follow(column: int, values: FloatArray) -> None:
+        deviations, first = values - values.mean(), np.zeros(number)
+        whitening, power = _model(deviations)
+        first[0], orders[column] = math.sqrt(power), len(whitening) - 1
+        expected[:, column] = values.mean() + continued(deviations, whitening, number)
+        departures[column, :, column] = scipy.signal.lfilter([1.0], whitening, first)
+
+    places = np.asarray(positions, dtype=float)
     order = [int(each) for each in np.argsort(places) if np.isfinite(places[each])]
+    for column in set(range(channels)) - set(order[1:]):
+        follow(column, array[:, column])
     for before, here in pairwise(order):
-        if not np.ptp(array[:, before]) > 0:
-            continue
-        apart = float(places[here] - places[before])
-        expected = out[:, :, before].mean(axis=0)
-        # Prediction and departures from it, beside one another: carrying is linear.
-        past, future = np.zeros((size, pairs + 1)), np.empty((int(count), pairs + 1))
-        past[:, 0], future[:, 0] = array[:, before], expected
-        future[:, 1:] = (out[:pairs, :, before] - expected).T
-        limit = band_limit(array[:, before], dt)
-        both = np.concatenate([past, future])
-        carried = carry_by_dispersion(both, dt, (apart, apart), depth, limit).at(apart)
-        settled = apart / group_speed(2 * np.pi * band_limit(array[:, before], dt, SLOWLY), depth)
-        left = (array[:, here] - carried[:size, 0])[min(int(settled / dt), size // 2) :]
-        if left.std() > UNLIKE * array[:, here].std():
-            continue
-        drawn = draw_waves(left, count, pairs, rng) + carried[size:, 0]
-        moved = carried[size:, 1:].T
-        out[:, :, here] = drawn + np.concatenate([moved, -moved])
-    return out
+        left = array[:, here]
+        if np.ptp(array[:, before]) > 0:
+            apart, limit = float(places[here] - places[before]), band_limit(array[:, before], dt)
+            # Prediction and departures from it, beside one another: carrying is linear.
+            past = np.zeros((size, channels + 1))
+            past[:, 0] = array[:, before]
+            future = np.column_stack([expected[:, before], departures[:, :, before].T])
+            both = np.concatenate([past, future])
+            carried = carry_by_dispersion(both, dt, (apart, apart), depth, limit).at(apart)
+            slowest = 2 * np.pi * band_limit(array[:, before], dt, SLOWLY)
+            settled = min(int(apart / group_speed(slowest, depth) / dt), size // 2)
+            rest = (left - carried[:size, 0])[settled:]
+            if rest.std() <= UNLIKE * left.std():
+                departures[:, :, here] = carried[size:, 1:].T
+                follow(here, rest)
+                expected[:, here] += carried[size:, 0]
+                continue
+        follow(here, left)
+    return Foreseen(expected, departures, size / max(orders, default=1.0))
 
 
 def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: float) -> float:
@@ -232,8 +207,9 @@ def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: f
     return float(distance / group_speed(2 * np.pi * edge, depth))
 
 
-def _memory(deviations: FloatArray) -> int:
-    """Order of the autoregressive model of a record: some of its wave periods."""
-    if not np.ptp(deviations) > 0:
-        return 1
-    return round(MEMORY / max(band_limit(deviations, 1.0, 0.5), 1.0 / deviations.size))
+def _model(deviations: FloatArray) -> tuple[FloatArray, float]:
+    """Autoregressive model of a record over some of its wave periods; see ``autoregression``."""
+    order = 1
+    if np.ptp(deviations) > 0:
+        order = round(MEMORY / max(band_limit(deviations, 1.0, 0.5), 1.0 / deviations.size))
+    return autoregression(deviations, order, NOISE)

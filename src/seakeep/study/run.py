@@ -1,21 +1,60 @@
-"""Run a study, unit by unit, resumed where it was stopped."""
+"""Run a study, unit by unit, resumed where it was stopped.
+
+A unit is one model of one training set on all windows that it may be tested on. It is computed as a
+whole and kept in one file, so that its arrays are the same to the last bit whether or not a study
+was interrupted, and for any number of workers. A unit is a few Datasets by name; :func:`collect`
+puts those of all units side by side, along models and training sets.
+"""
 
 from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass, replace
 from pathlib import Path
+from time import process_time
+from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import Progress
-from seakeep.errors import warn
+from seakeep.arrays import FloatArray, Progress
+from seakeep.conventions import is_elevation
+from seakeep.core import embed, metrics
+from seakeep.errors import DataError, SeakeepError, warn
+from seakeep.formats.netcdf import opened_netcdf
+from seakeep.models.calibration import envelope_of, held_out, learn_margin
+from seakeep.models.engine import Windows, member_series, read_groups
+from seakeep.models.ensemble import spectral_radius
 from seakeep.models.executor import WorkerLostError, as_finished
+from seakeep.models.linear import HankelDMDcModel
+from seakeep.models.selection import Selected
+from seakeep.models.specs import HankelDMDc, left_open
+from seakeep.models.summaries import STATISTICS, reduce_members
+from seakeep.models.training import gather
+from seakeep.signals import envelope_squared
 from seakeep.study.describe import describe_study, words_of_repeats
-from seakeep.study.judge import judge, words_of_lost
-from seakeep.study.plan import Plan, make_plan, named, training_samples, warn_of_slow_study
+from seakeep.study.judge import (
+    BANDS,
+    MEASURES,
+    judge,
+    judge_windows,
+    numbered,
+    side_by_side,
+    words_of_lost,
+)
+from seakeep.study.plan import (
+    Plan,
+    TestWindow,
+    make_plan,
+    named,
+    parts_of,
+    training_samples,
+    warn_of_slow_study,
+)
 from seakeep.study.settings import Study
 from seakeep.study.store import (
     RESULT,
@@ -26,7 +65,6 @@ from seakeep.study.store import (
     versions,
     write_result,
 )
-from seakeep.study.units import Unit, collect, compute_task, facts_of, tasks_of, units_of
 
 
 def run_study(
@@ -175,7 +213,7 @@ def _computed(
     taken = f"{members * len(steps)} forecasts of {mebibytes:.3g} MiB"
     report(len(done), len(units), f"fitting and forecasting, {taken}")
     try:
-        for task, computed in as_finished(_work, (plan, facts), items, executor):
+        for task, computed in as_finished(compute_task, (plan, facts), items, executor):
             for unit, groups in zip(task, computed, strict=True):
                 folder.write(unit.name, groups)
                 done[unit] = groups
@@ -188,6 +226,365 @@ def _computed(
     return {unit: done[unit] for unit in units}
 
 
-def _work(data: tuple[Plan, Groups], task: tuple[Unit, ...]) -> list[Groups]:
-    """Groups of some units, which come back to be written: a worker may have another disk."""
-    return compute_task(*data, task)
+FILL = {"lost": -2, "windows": 0}
+"""What stands for a training set that tests no window, where it is not NaN."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A model and the number of a training set: what is computed and kept as a whole."""
+
+    model: str
+    training: int
+
+    @property
+    def name(self) -> str:
+        """Name of its file."""
+        return f"{self.model}.t{self.training:02d}"
+
+
+def units_of(plan: Plan) -> list[Unit]:
+    """All units, in an order that shows results early."""
+    return [
+        Unit(model, training)
+        for training in range(len(plan.training))
+        for model in plan.models
+        if tested_windows(plan, training)
+    ]
+
+
+def tasks_of(plan: Plan, units: Iterable[Unit]) -> list[tuple[Unit, ...]]:
+    """Units that one worker does in turn: what their settings leave open is chosen once."""
+    out: dict[object, tuple[Unit, ...]] = {}
+    for unit in units:
+        spec = left_open(plan.specs[unit.model])
+        key = unit.training, unit.model if spec is None else spec.central(plan.dt)
+        out[key] = (*out.get(key, ()), unit)
+    return list(out.values())
+
+
+def tested_windows(plan: Plan, training: int) -> dict[str, list[int]]:
+    """Windows that a training set may be tested on, by test set; those without any are left out."""
+    where = plan.training[training]
+    every = {
+        test: [k for k, window in enumerate(windows) if where.may_test(window.run)]
+        for test, windows in plan.tests.items()
+    }
+    return {test: numbers for test, numbers in every.items() if numbers}
+
+
+def compute_task(data: tuple[Plan, Groups], units: Sequence[Unit]) -> list[Groups]:
+    """Compute units of :func:`tasks_of`, in their order; errors name training set and model.
+
+    The groups come back to be written: a worker may have another disk.
+    """
+    (plan, facts), selected, out = data, None, []
+    for unit in units:
+        training, spec = plan.training[unit.training], left_open(plan.specs[unit.model])
+        try:
+            if selected is None and spec is not None:
+                selected = spec.central(plan.dt).settled(*plan.taught(training.spans))
+            out.append(compute(plan, facts, unit, selected))
+        except SeakeepError as error:
+            place = f"training set '{training.name}', model '{unit.model}'"
+            raise DataError(f"{place}: {error}") from error
+    return out
+
+
+def compute(
+    plan: Plan, facts: Groups, unit: Unit, selected: Selected[HankelDMDc] | None = None
+) -> Groups:
+    """Fit a model, with the settings that were chosen, and forecast all windows.
+
+    Returns
+    -------
+    dict of str to Dataset
+        ``tests/NAME``: ``mean``, and its ``error`` and ``error_over_time``; of an ensemble
+        ``bands/NAME``, the other statistics of its members and what became of each; ``chosen``;
+        ``calibration``; ``regularisation``. Of the first training set ``eigenvalues`` and
+        ``draws``.
+    """
+    training, settings = plan.training[unit.training], plan.settings
+    spec: Any = plan.specs[unit.model]
+    how = {} if selected is None else {"selected": selected}
+    fitted = spec.fit(*plan.taught(training.spans), **how)
+    ahead = (max(fitted.signature.lead_samples, 1) - 1) * plan.dt
+    words = {"units": "s", "long_name": "waves read after the instant that is forecast"}
+    chosen = {"words": getattr(fitted, "selection", ""), "look_ahead": ((), ahead, words)}
+    out = {"chosen": xr.Dataset(chosen)}
+    frequency = 1.0 / (settings.statistics.split_period * plan.encounter_period)
+    tested = tested_windows(plan, unit.training)
+    for test, series, lost, windows in _free_runs(plan, fitted, tested):
+        at = {"window": tested[test]}
+        mean = np.array(series[0])
+        if spec.is_ensemble:
+            reduced = reduce_members(series, lost, settings.statistics.level)
+            bands = numbered(reduced, ("window", "number", "time", "channel"), STATISTICS, at)
+            mean = bands["mean"].values
+            bands = bands.drop_vars("mean").assign(lost=(("window", "member"), lost.T))
+            if settings.statistics.scale == "learnt":
+                envelope = envelope_of(fitted.signature, windows)
+                bands["envelope"] = (("window", "time"), envelope)
+            out[f"bands/{test}"] = bands.assign_coords(member=np.arange(len(series)))
+        known = _known(facts[test], unit, tested[test])
+        judged = judge_windows(predicted=mean, **known, dt=plan.dt, frequency=frequency)
+        out[f"tests/{test}"] = judged.assign_coords(at)
+    if spec.is_ensemble and plan.calibrated_on:
+        out["calibration"] = band_margins(plan, unit, fitted)
+    ridged = getattr(spec, "delay_rows", "") == "ridge" and not spec.is_ensemble
+    if settings.output.regularisation and ridged:
+        out["regularisation"] = regularisation(plan, facts, unit, fitted)
+    if unit.training == units_of(plan)[0].training:
+        if spec.is_ensemble:
+            out["draws"] = fitted.draws
+        if settings.output.eigenvalues:
+            out["eigenvalues"] = _eigenvalues(fitted).assign_attrs(
+                training=training.name, dt=plan.dt
+            )
+    return out
+
+
+def _known(facts: xr.Dataset, unit: Unit, windows: Sequence[int]) -> dict[str, FloatArray]:
+    """What windows are judged by."""
+    known = facts.isel(window=windows, training=unit.training)
+    return {key: known[key].values for key in ("measured", "training_std", "noise_std")}
+
+
+def _eigenvalues(fitted: Any) -> xr.Dataset:
+    """Eigenvalues of all members, in descending order of modulus."""
+    values = [np.linalg.eigvals(matrix) for matrix in fitted.system_matrices()]
+    padded = np.full((len(values), max(each.size for each in values)), complex(np.nan, np.nan))
+    for row, each in zip(padded, values, strict=True):
+        row[: each.size] = each[np.argsort(-np.abs(each), kind="stable")]
+    parts = {key: (("member", "mode"), getattr(padded, key)) for key in ("real", "imag")}
+    return xr.Dataset(parts)
+
+
+def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcModel) -> xr.Dataset:
+    r"""Identify a model of the paper's form with λ, without it, and by truncated singular values.
+
+    As many singular values are kept as the regression with λ has degrees of freedom,
+    :math:`\sum \sigma^2 / (\sigma^2 + \lambda)`.
+
+    Returns
+    -------
+    Dataset
+        Over ``variant``: ``radius``, the spectral radius, and ``seconds`` of processor time for
+        the matrices; ``truncated_nrmse`` over (window, channel) of the first test set; ``rank``.
+    """
+    spec: Any = fitted.settings
+    parts, states, inputs = plan.taught(plan.training[unit.training].spans)
+    data = gather(parts, states, inputs, None, spec)
+    groups = (data.states, spec.state_delays), (data.delayed, spec.input_delays)
+    regressors = [
+        np.concatenate([embed(x[k], lags, at.first_column, at.columns) for x, lags in groups])
+        for k, at in enumerate(data.windows)
+    ]
+    squares = np.linalg.svd(np.concatenate(regressors, axis=1), compute_uv=False) ** 2
+    rank = round(float(np.sum(squares / (squares + fitted.training.ridge))))
+    truncated = replace(spec, ridge=0.0, rank=rank)
+    variants = {"none": replace(spec, ridge=0.0), "truncated": truncated, "ridge": spec}
+    radius, seconds, models = [], [], {}
+    for name, each in variants.items():
+        begin = process_time()
+        solution = data.regress(each, each.state_delays, all_rows=True)
+        seconds.append(process_time() - begin)
+        models[name] = HankelDMDcModel.fitted(each, data, solution, parts)
+        radius.append(spectral_radius(models[name].dynamics))
+    test, numbers = next(iter(tested_windows(plan, unit.training).items()))
+    ((_, series, *_),) = _free_runs(plan, models["truncated"], {test: numbers})
+    error = metrics.nrmse(predicted=np.array(series[0]), **_known(facts[test], unit, numbers))
+    return xr.Dataset(
+        {
+            "radius": ("variant", radius),
+            "seconds": ("variant", seconds, {"units": "s"}),
+            "truncated_nrmse": (("window", "channel"), error),
+            "rank": rank,
+        },
+        {"variant": list(variants), "window": numbers},
+    )
+
+
+def _free_runs(
+    plan: Plan, fitted: Any, tested: Mapping[str, Sequence[int]]
+) -> Iterator[tuple[str, FloatArray, npt.NDArray[np.int64], Windows]]:
+    """Free runs of all members over each test set, (member, window, steps, N), and where lost."""
+    chosen = {test: [plan.tests[test][k] for k in numbers] for test, numbers in tested.items()}
+    places = [
+        ([(each.run, each.start) for each in windows], windows[0].steps)
+        for windows in chosen.values()
+    ]
+    groups = read_groups(fitted.signature, plan.runs, places)
+    with member_series(fitted, groups) as every:
+        for test, (series, lost), windows in zip(tested, every, groups, strict=True):
+            yield test, series, lost, windows
+
+
+def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
+    """Find the band of an ensemble on windows as long as those of the first test set.
+
+    The windows lie in the training spans, clear of what the members have read. Where these read
+    all of it (runs left out, or pooled), each run is forecast by an ensemble that learnt from the
+    others, with the settings that were chosen from all of them. No test window is looked at.
+    """
+    training, statistics = plan.training[unit.training], plan.settings.statistics
+    steps = next(iter(plan.tests.values()))[0].steps
+    if training.left_out or len(training.runs) > 1:
+        spec: Any = plan.specs[unit.model].from_json(fitted.origin)
+        groups = [each.left_out for each in plan.training if each is not training and each.left_out]
+        cases = []
+        for group in groups or [(run,) for run in training.runs]:
+            rest = [span for span in training.spans if span[0] not in group]
+            tests = parts_of(plan.runs, [span for span in training.spans if span[0] in group])
+            if rest and tests:
+                cases.append((spec.fit(*plan.taught(rest)), tests))
+    else:
+        spans = [(name, *plan.runs[name].attrs["train_span"]) for name in plan.calibrated_on]
+        cases = [(fitted, parts_of(plan.runs, spans))]
+    judged = [
+        each
+        for ensemble, tests in cases
+        for each in held_out(
+            dict.fromkeys(tests, ensemble), tests, steps, statistics.level
+        ).values()
+    ]
+    nothing = np.full(len(plan.states), np.nan)
+    keys = ("margin", "blocks", "warranted")
+    out: dict[str, Any] = dict.fromkeys(keys, ("channel", nothing))
+    floor: FloatArray | None = nothing
+    law: FloatArray | None = np.tile(nothing, (4, 1))
+    if judged:
+        margin, floor, law = learn_margin(judged, statistics.level, statistics.scale)
+        out = {key: ("channel", getattr(margin, key)) for key in keys}
+    out["windows"] = sum(len(each.measured) for each in judged)
+    if statistics.scale != "constant":
+        out["floor"] = ("channel", floor)
+    if statistics.scale == "learnt":
+        out["law"] = (("term", "channel"), law)
+    return xr.Dataset(out, attrs={"level": statistics.level})
+
+
+def collect(plan: Plan, facts: Groups, computed: Mapping[Unit, Groups]) -> Groups:
+    """Put all units together, with the facts of their windows."""
+    sets = [each.name for each in plan.training]
+
+    def stacked(group: str, models: Iterable[str], dim: str) -> xr.Dataset:
+        """A group of several models, over (`dim`, training)."""
+        mine = [unit for unit in computed if group in computed[unit] and unit.model in models]
+        numbers = list(dict.fromkeys(unit.training for unit in mine))
+        names = {dim: list(models), "training": [sets[k] for k in numbers]}
+        grid = [[computed[Unit(model, k)][group] for k in numbers] for model in models]
+        return side_by_side(grid, names, FILL)
+
+    out: Groups = {}
+    for test, windows in plan.tests.items():
+        every = {"training": sets, "window": range(len(windows))}
+        means = stacked(f"tests/{test}", plan.models, "model").reindex(every)
+        parts = [means.transpose("model", "measure", "band", "training", ...)]
+        if plan.ensembles:
+            bands = stacked(f"bands/{test}", plan.ensembles, "ensemble")
+            parts.append(bands.reindex(every, fill_value=FILL))
+        data = xr.merge([*parts, facts[test]], join="outer")
+        out[f"tests/{test}"] = data.drop_vars("member", errors="ignore")
+    out["chosen"] = stacked("chosen", plan.models, "model")
+    if plan.calibrated_on and plan.ensembles:
+        margins = stacked("calibration", plan.ensembles, "ensemble")
+        margins = margins.reindex(training=sets, fill_value=FILL)
+        out["calibration"] = margins.assign_coords(channel=list(plan.states))
+    for model in plan.models:
+        first = next(groups for unit, groups in computed.items() if unit.model == model)
+        # There is one of the first training set alone, but for what regularisation changes.
+        out |= {f"{key}/{model}": first[key] for key in ("eigenvalues", "draws") if key in first}
+        if (key := "regularisation") in first:
+            out[f"{key}/{model}"] = stacked(key, [model], "model").squeeze("model", drop=True)
+    return out
+
+
+def facts_of(study: Study, plan: Plan) -> Groups:
+    """What is known of the windows of each test set without any model.
+
+    Returns
+    -------
+    dict of str to Dataset
+        ``measured`` and, where a study names a folder of them, ``truth`` over (window, time,
+        channel), ``judged``, ``start``, ``run``, moments of the training, ``noise_std`` and, with
+        an elevation among the inputs, ``wave_height``.
+    """
+    tested = {window.run: plan.runs[window.run] for window in plan.windows}
+    known = {"measured": {name: _columns(plan, run) for name, run in tested.items()}}
+    if (waves := next(filter(is_elevation, plan.inputs), None)) is not None:
+        known["wave_height"] = {n: _heights(run[waves], plan.dt) for n, run in tested.items()}
+    if (folder := study.truth_folder) is not None:
+        known["truth"] = {name: _truth(folder, plan, name) for name in tested}
+    taught = [parts_of(plan.runs, each.spans).values() for each in plan.training]
+    pooled = [np.concatenate([_columns(plan, each) for each in of]).T.copy() for of in taught]
+    out, dims = {}, ("window", "time", "channel")
+    for test, windows in plan.tests.items():
+        series = {key: _cut(plan, each, windows) for key, each in known.items()}
+        noise = [
+            [tested[each.run][name].attrs.get("noise_std", 0.0) for name in plan.states]
+            for each in windows
+        ]
+        out[test] = xr.Dataset(
+            {
+                **{key: (dims[: each.ndim], each) for key, each in series.items()},
+                "judged": (
+                    ("training", "window"),
+                    [[each.may_test(w.run) for w in windows] for each in plan.training],
+                ),
+                "start": ("window", [each.start for each in windows]),
+                "run": ("window", [each.run for each in windows]),
+                "training_mean": (("training", "channel"), [x.mean(axis=1) for x in pooled]),
+                "training_std": (("training", "channel"), [x.std(axis=1, ddof=1) for x in pooled]),
+                "noise_std": (("window", "channel"), noise),
+            },
+            coords={
+                "model": list(plan.models),
+                "ensemble": plan.ensembles,
+                "measure": list(MEASURES),
+                "band": list(BANDS),
+                "training": [each.name for each in plan.training],
+                "window": range(len(windows)),
+                "time": ("time", plan.dt * np.arange(1, windows[0].steps + 1), {"units": "s"}),
+                "channel": list(plan.states),
+            },
+        )
+    return out
+
+
+def _cut(plan: Plan, whole: Mapping[str, FloatArray], windows: Sequence[TestWindow]) -> FloatArray:
+    """Samples of arrays over the time of runs that windows forecast."""
+    parts = []
+    for each in windows:
+        at = int(np.argmin(np.abs(plan.runs[each.run]["time"].values - each.start))) + 1
+        parts.append(whole[each.run][at : at + each.steps])
+    return np.stack(parts)
+
+
+def _columns(plan: Plan, run: xr.Dataset) -> FloatArray:
+    """States of a run, (time, channel); NaN of one that it lacks."""
+    nothing = np.full(run.sizes["time"], np.nan)
+    columns = [run[name].values if name in run else nothing for name in plan.states]
+    return np.stack(columns, axis=-1).astype(float)
+
+
+def _heights(elevation: xr.DataArray, dt: float) -> FloatArray:
+    """Twice the envelope of an elevation; NaN in gaps at the ends of the record."""
+    known = np.flatnonzero(np.isfinite(elevation.values))
+    part = slice(known[0], known[-1] + 1)
+    heights = np.full(elevation.size, np.nan)
+    heights[part] = 2.0 * np.sqrt(envelope_squared(elevation.values[part].astype(float), dt))
+    return heights
+
+
+def _truth(folder: Path, plan: Plan, run: str) -> FloatArray:
+    """True states at the instants of a run; NaN of a channel that has no truth."""
+    path = folder / f"{run}.nc"
+    if not path.exists():
+        raise DataError(
+            f"the study names the folder {folder} of true channels, and {path.name} is not in "
+            "it. Play the tank again, or leave study.truth out."
+        )
+    true, time = opened_netcdf(path), plan.runs[run]["time"].values
+    values, known = _columns(plan, true), true["time"].values
+    return np.stack([np.interp(time, known, each) for each in values.T], axis=-1)

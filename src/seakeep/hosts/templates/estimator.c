@@ -21,7 +21,8 @@ enum {
     BEGINS = {{ begins }},      /* samples before the first prediction */
     LEADS = {{ errors | length }},
     SETTLED = LEADS + OLD / N,  /* samples without a measurement after which errors stay as they are */
-    FORE = {{ fore }}                   /* inputs that are predicted before each is from its own record */
+    FORE = {{ fore }},                  /* inputs that are predicted before each is from its own record */
+    RUNS = 1 + 2 * {{ waves | length }}             /* of expected waves, and of departures from each */
 };
 
 /* x' = offset + on_states [x, oldest first] + on_inputs [v, oldest first] + on_direct [w] */
@@ -37,6 +38,7 @@ enum {
 {{ array("errors", errors) }}
 /* Inputs that are predicted; the others stay at their last value. */
 static const int waves[] = { {% for q in range(Q) %}{{ 1 if q in waves else 0 }}, {% endfor %}0 };
+static const int wave[] = { {% for q in waves %}{{ q }}, {% endfor %}0 };
 {% if foresight %}
 /* Weights that predict placed probes from one another: row, probe, probe, sample, oldest first. */
 {{ array("foresight", foresight[0]) -}}
@@ -186,7 +188,7 @@ static double median_frequency(const double *series, int size)
 static void identify({{ name }}_estimator *e, int q, int rows)
 {
     double *forward = e->forward, *backward = e->backward, *filter = e->filter[q];
-    double mean = 0.0, least = INFINITY, most = -INFINITY, square = 0.0;
+    double mean = 0.0, least = INFINITY, most = -INFINITY, square = 0.0, part = 1.0;
     int size = e->filled + rows, order = 1;
     for (int t = 0; t < size; t++) {
         double value = input(e, e->filled - 1 - t)[q];
@@ -218,7 +220,8 @@ static void identify({{ name }}_estimator *e, int q, int rows)
         }
         if (power <= DBL_EPSILON * square)
             break;
-        reflection = -2.0 * both / power;
+        reflection = -2.0 * both / (power + 2.0 * {{ noise_part | hex }} * square / size * left);
+        part *= 1.0 - reflection * reflection;
         for (int t = 0; t < left; t++) {
             double ahead = forward[t] + reflection * backward[t];
             backward[t] += reflection * forward[t];
@@ -231,17 +234,16 @@ static void identify({{ name }}_estimator *e, int q, int rows)
             filter[m + 1 - i] = high + reflection * low;
         }
     }
+    e->innovation_of[q] = sqrt(square / size * part * (size + order) / (size - order));
 }
 
-/* The next value of an input that was identified. */
-static double continued({{ name }}_estimator *e, int q)
+/* What an innovation makes of an input that was identified, after a past about its mean. */
+static double continued({{ name }}_estimator *e, int q, double *past, double innovation)
 {
-    double *past = e->past[q], next = 0.0;
     for (int i = 0; i < e->order[q]; i++)
-        next -= e->filter[q][i + 1] * past[i];
+        innovation -= e->filter[q][i + 1] * past[i];
     memmove(past + 1, past, (e->order[q] - 1) * sizeof(double));
-    past[0] = next;
-    return e->mean[q] + next;
+    return past[0] = innovation;
 }
 
 /* Predict rows of inputs, FORE at most. */
@@ -267,7 +269,7 @@ static void expect({{ name }}_estimator *e, int rows)
         if (waves[q])
             identify(e, q, 0);
         for (int row = 0; row < rows; row++)
-            out[row * Q + q] = waves[q] ? continued(e, q) : input(e, 0)[q];
+            out[row * Q + q] = waves[q] ? e->mean[q] + continued(e, q, e->past[q], 0.0) : input(e, 0)[q];
     }
 }
 
@@ -508,43 +510,134 @@ double {{ name }}_deviation(const {{ name }}_estimator *e, int state)
     return sqrt(P(OLD + state, OLD + state));
 }
 
-/* From the inputs of an instant those of the next one, which is so many after the first to come. */
-static void coming({{ name }}_estimator *e, const double *future, int at, double *u)
+static int is_given(const double *future, int at, int q)
+{
+    return !waves[q] || (future && !isnan(future[at * Q + q]));
+}
+
+/* From the inputs of an instant those of the next one, which is so many after the first to come,
+ * and what one innovation of each wave, where it is first not known, adds to them. */
+static void coming({{ name }}_estimator *e, const double *future, int at, double *u, double *apart)
 {
     for (int q = 0; q < Q; q++) {
-        double next = u[q];
-        if (waves[q])
-            next = at < FORE ? e->inputs[(RECORD + at) * Q + q] : continued(e, q);
-        u[q] = future && !isnan(future[at * Q + q]) ? future[at * Q + q] : next;
+        apart[q] = 0.0;
+        if (waves[q]) {
+            u[q] = at < FORE ? e->inputs[(RECORD + at) * Q + q]
+                             : e->mean[q] + continued(e, q, e->past[q], 0.0);
+            if (e->departs[q] || !is_given(future, at, q)) {
+                double away = continued(e, q, e->apart[q], e->departs[q] ? 0.0 : e->innovation_of[q]);
+                e->departs[q] = 1;
+                apart[q] = is_given(future, at, q) ? 0.0 : away;
+            }
+        }
+        if (future && !isnan(future[at * Q + q]))
+            u[q] = future[at * Q + q];
     }
 }
 
-int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x)
+/* Inputs of a run: as expected, or departing by the innovation of one wave, or by its opposite. */
+static void depart(const double *u, const double *apart, int run, double *out)
 {
-    double u[Q + 1];
-    int begins = {{ upper }}_U_ROWS - {{ lead_samples }};
+    memcpy(out, u, Q * sizeof(double));
+    if (run > 0)
+        out[wave[(run - 1) / 2]] += (run % 2 ? 1.0 : -1.0) * apart[wave[(run - 1) / 2]];
+}
+
+/* Variance of a state that the errors of the estimate leave some steps later; `reach` are the rows
+ * of the model that carry them there. */
+static double carried_error(const {{ name }}_estimator *e, const double *reach)
+{
+    double sum = 0.0;
+    for (int j = 0; j < M; j++)
+        for (int k = 0; k < M; k++)
+            sum += reach[j] * P(j, k) * reach[k];
+    return sum;
+}
+
+/* One step more of the rows that carry errors of the estimate. */
+static void reach_on(double *reach)
+{
+    for (int i = 0; i < N; i++) {
+        double *row = reach + i * M, last[N];
+        memcpy(last, row + OLD, sizeof last);
+        memmove(row + N, row, OLD * sizeof(double));
+        memset(row, 0, N * sizeof(double));
+        for (int c = 0; c < N; c++)
+            for (int k = 0; k < M; k++)
+                row[k] += last[c] * on_states[c * M + k];
+    }
+}
+
+int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x, double *std)
+{
+    double u[Q + 1], apart[Q + 1] = { 0.0 }, row[Q + 1], moved[N] = { 0.0 }, spreads[N] = { 0.0 };
+    double weight[N], *reach = e->cross;
+    int begins = {{ upper }}_U_ROWS - {{ lead_samples }}, known = 0, runs = 1;
     if (e->taken < BEGINS)
         return 1;
+    for (int all = 1; known < n - 1 + {{ lead_samples }}; known++) {
+        for (int q = 0; q < Q; q++)
+            all = all && is_given(future, known, q);
+        if (!all) {
+            runs = RUNS;
+            break;
+        }
+    }
     expect(e, FORE);
 {% if foresight %}
     for (int p = 0; p < PLACED; p++)
         identify(e, placed[p], FORE);
 {% endif %}
+    memset(e->apart, 0, sizeof e->apart);
+    memset(e->departs, 0, sizeof e->departs);
     memcpy(e->u_history, input(e, begins), begins * Q * sizeof(double));
     memcpy(u, input(e, 0), Q * sizeof(double));
     for (int at = 0; at < {{ lead_samples }}; at++) {
         if (at > 0)
-            coming(e, future, at - 1, u);
-        memcpy(e->u_history + (begins + at) * Q, u, Q * sizeof(double));
+            coming(e, future, at - 1, u, apart);
+        memcpy(e->first + at * Q, u, Q * sizeof(double));
+        memcpy(e->first_apart + at * Q, apart, Q * sizeof(double));
     }
-    if ({{ name }}_start(&e->model, e->x + (X_ROWS - {{ upper }}_X_ROWS) * N, e->u_history))
-        return 1;
+    for (int run = 0; run < runs; run++) {
+        for (int at = 0; at < {{ lead_samples }}; at++)
+            depart(e->first + at * Q, e->first_apart + at * Q, run, e->u_history + (begins + at) * Q);
+        if ({{ name }}_start(&e->models[run], e->x + (X_ROWS - {{ upper }}_X_ROWS) * N, e->u_history))
+            return 1;
+    }
+    memcpy(reach, on_states, sizeof on_states);
+    for (int i = 0; i < N; i++)
+        weight[i] = 1.0;
     for (int step = 0; step < n; step++) {
+        const double *own = errors + (step < LEADS ? step : LEADS - 1) * N;
+        const double *bound = errors + (step + e->since < LEADS ? step + e->since : LEADS - 1) * N;
         if (step + {{ lead_samples }} > 0)
-            coming(e, future, step + {{ lead_samples }} - 1, u);
-        if ({{ name }}_step(&e->model, u))
-            return 2;
-        memcpy(x + step * N, e->model.x, sizeof e->model.x);
+            coming(e, future, step + {{ lead_samples }} - 1, u, apart);
+        for (int run = 0; run < runs; run++) {
+            depart(u, apart, run, row);
+            if ({{ name }}_step(&e->models[run], row))
+                return 2;
+        }
+        for (int i = 0; i < N; i++) {
+            double middle = e->models[0].x[i], away = 0.0, variance = bound[i] * bound[i];
+            for (int run = 1; run < runs; run += 2) {
+                double more = e->models[run].x[i], less = e->models[run + 1].x[i];
+                moved[i] += 0.5 * (more + less) - middle;
+                away += 0.5 * fabs(more - less);
+            }
+            spreads[i] += away * away;
+            if (e->partly)
+                variance = fmin(variance, own[i] * own[i] + carried_error(e, reach + i * M));
+            variance += spreads[i];
+            weight[i] = fmin(weight[i], fmax(({{ doubted[1] | hex }} - variance / (spread[i] * spread[i]))
+                                             / {{ (doubted[1] - doubted[0]) | hex }}, 0.0));
+            x[step * N + i] = middle + moved[i];
+            if (runs > 1 && step > known - {{ lead_samples }})
+                x[step * N + i] = centre[i] + weight[i] * (middle + moved[i] - centre[i]);
+            if (std)
+                std[step * N + i] = sqrt(variance);
+        }
+        if (e->partly)
+            reach_on(reach);
     }
     return 0;
 }

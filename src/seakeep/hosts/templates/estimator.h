@@ -1,4 +1,4 @@
-{% from "facts.jinja" import N, Q, s, z, n, past, upper, x_rows, u_rows, late, fore with context %}
+{% from "facts.jinja" import N, Q, s, z, n, past, upper, x_rows, u_rows, late, fore, lead_samples with context %}
 /* {{ mark }} C header of an estimator
  *
  * Follows a vessel sample by sample, beside {{ name }}.c: a Kalman filter on the delayed states
@@ -9,7 +9,7 @@
  *     for (;;) {
  *         ... NAN for what is missing ...
  *         status = {{ name }}_estimate(&e, u, y); ... {{ name }}_estimated(&e)[0] ...
- *         status = {{ name }}_forecast(&e, n, NULL, x); ... x[i * {{ upper }}_STATES] ...
+ *         status = {{ name }}_forecast(&e, n, NULL, x, NULL); ... x[i * {{ upper }}_STATES] ...
  *     }
  */
 #ifndef {{ upper }}_ESTIMATOR_H
@@ -49,9 +49,11 @@ typedef struct {
     double forward[{{ record + fore }}], backward[{{ record + fore }}];
     double filter[{{ [Q, 1] | max }}][{{ upper }}_ORDER + 1], past[{{ [Q, 1] | max }}][{{ upper }}_ORDER];
     double mean[{{ [Q, 1] | max }}];
-    int order[{{ [Q, 1] | max }}];
+    double apart[{{ [Q, 1] | max }}][{{ upper }}_ORDER], innovation_of[{{ [Q, 1] | max }}];
+    int order[{{ [Q, 1] | max }}], departs[{{ [Q, 1] | max }}];
     double u_history[{{ [u_rows * Q, 1] | max }}];
-    {{ name }}_model model;
+    double first[{{ [lead_samples * Q, 1] | max }}], first_apart[{{ [lead_samples * Q, 1] | max }}];
+    {{ name }}_model models[{{ 1 + 2 * waves | length }}];
 } {{ name }}_estimator;
 
 /* Take one sample: {{ upper }}_INPUTS inputs and {{ upper }}_STATES states, NaN for what is missing.
@@ -71,11 +73,11 @@ int {{ name }}_validity({{ name }}_estimator *e);
 
 /* Forecast n instants after the last sample into x, a row for each. `future` holds the inputs of
  * the n - 1 + {{ upper }}_LEAD instants after it, or is NULL. Waves that are NaN there are
- * predicted from the samples up to now; other inputs stay at their last value.
- * Unlike the forecast of Python it draws no waves about these, so far from the last sample it does
- * not tend to the mean of training.
- * Returns 0; 1 if there are fewer than {{ begins }} samples; 2 if the run is lost, as a step is. */
-int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x);
+ * predicted from the samples up to now; other inputs stay at their last value. Where the standard
+ * deviation of the errors comes near that of the training, x tends to the mean there. `std` takes
+ * these deviations, as x, or is NULL; they are those in data like the training.
+ * Returns 0; 1 if there are fewer than {{ begins }} samples; 2 if a run is lost, as a step is. */
+int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x, double *std);
 
 #ifdef __cplusplus
 }

@@ -39,8 +39,8 @@ enum {
     N = {{ upper }}_STATES,
     Q = {{ upper }}_INPUTS,
 {% if ahead %}
-    OUTPUTS = Q + N, /* values are inputs and what was measured, estimates, and forecasts */
-    X_HISTORY = OUTPUTS + N * {{ 1 + ahead }},
+    OUTPUTS = Q + N, /* values are inputs and what was measured, estimates, forecasts, and their errors */
+    X_HISTORY = OUTPUTS + N * {{ 1 + 2 * ahead }},
     U_HISTORY = X_HISTORY,
     COUNT = U_HISTORY
 {% else %}
@@ -299,8 +299,8 @@ EXPORT Status FMI(fmi2DoStep)(void *c, double time, double step, int no_return)
     if ({{ name }}_estimate(&state->model, values, values + Q))
         return report(instance, DISCARD, "a value is infinite, or an input missing too early");
     memcpy(values + OUTPUTS, {{ name }}_estimated(&state->model), N * sizeof(double));
-    status = {{ name }}_forecast(&state->model, {{ ahead }}, NULL, coming);
-    for (int i = 0; status == 1 && i < {{ ahead }} * N; i++)
+    status = {{ name }}_forecast(&state->model, {{ ahead }}, NULL, coming, coming + {{ ahead }} * N);
+    for (int i = 0; status == 1 && i < {{ 2 * ahead }} * N; i++)
         coming[i] = NAN; /* there is too little history yet */
 {% else %}
     status = {{ name }}_step(&state->model, state->values);

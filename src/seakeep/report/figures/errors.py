@@ -27,7 +27,7 @@ from seakeep.report.style import (
     plain_text,
     short_label,
 )
-from seakeep.report.tables import signed
+from seakeep.report.tables import Interval, Number, signed
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
 
@@ -205,10 +205,10 @@ def error_over_time_figure(result: StudyResult) -> Figure:
     return figure
 
 
-def growth_text(at: xr.Dataset) -> str:
+def growth_text(at: xr.Dataset) -> Number:
     """Change of ε(t) over the window with its interval, where there is one, in percent."""
-    value, *bounds = (signed(100 * at[key]) for key in ("change", "lower", "upper"))
-    return f"{value} %" + f" [{', '.join(bounds)}]" * bool(np.isfinite(at["lower"]))
+    change = Interval(*(float(at[key]) for key in ("change", "lower", "upper")))
+    return change.text(signed, " %", 100.0)
 
 
 @figure_style()
@@ -305,7 +305,7 @@ def error_figure(table: xr.Dataset) -> Figure:
 
     The table is that of :func:`seakeep.study.difference_table`.
     """
-    table = table.isel(run=np.argsort(table["wave_period"].values, kind="stable"))
+    table = table.sortby("wave_period")
     labels = [
         plain_text(str(run)) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
         for run, period in zip(table["run"].values, table["wave_period"].values, strict=True)

@@ -7,30 +7,30 @@ from pathlib import Path
 
 from seakeep.arrays import Progress
 from seakeep.report.page import Section, write_page
-from seakeep.report.sections import data, errors, histories, summary
+from seakeep.report.sections import data, histories, results
 from seakeep.study import StudyResult
 from seakeep.study.store import storing
 
 SECTIONS: list[Callable[[StudyResult], Section | None]] = [
-    summary.summary,
-    errors.errors,
-    errors.scales,
-    errors.regular,
+    results.summary,
+    results.errors,
+    results.scales,
+    results.regular,
     histories.explorer,
     histories.histories,
-    errors.age,
-    errors.coverage,
-    errors.bands,
-    errors.densities,
-    errors.eigenvalues,
+    results.age,
+    results.coverage,
+    results.bands,
+    results.densities,
+    results.eigenvalues,
     data.waves,
     data.data,
     data.chosen,
     data.settings,
     data.versions,
-    summary.glossary,
+    results.glossary,
 ]
-"""A section is one function here; where it has nothing to show it returns None."""
+"""A section is one function here; one that has nothing to show is left out."""
 
 
 def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
@@ -50,7 +50,8 @@ def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
     Path
         The page; errors as of :func:`seakeep.report.page.write_page`.
     """
-    sections = [section for make in SECTIONS if (section := make(result)) is not None]
+    made = [make(result) for make in SECTIONS]
+    sections = [each for each in made if each is not None and not each.is_empty]
     stamp = {key: str(result.attrs[key]) for key in ("preset", "seed", "digest", "description")}
     stamp["finished"] = data.finished(result)
     with storing(result.folder):

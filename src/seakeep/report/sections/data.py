@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from datetime import datetime
-from functools import partial
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from seakeep.report.figures.runs import spectrum_figure
+from seakeep.report.figures.histories import spectrum_figure
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.quality_sheet import clock_rows, other_findings, run_row
 from seakeep.report.style import model_words, shown_unit
@@ -20,23 +20,20 @@ from seakeep.study.plan import windows_overlap
 from seakeep.waves import phase_speed
 
 
-def waves(result: StudyResult) -> Section | None:
+def waves(result: StudyResult) -> Section:
     """Return the waves that were tested, where they were measured, and their spectra."""
-    tables, figures = wave_tables(result), []
+    figure = None
     if "spectra" in result.groups:
         regular = bool(np.isfinite(result.groups["runs"]["wave_frequency"].values).any())
         words = " Vertical lines: the regular waves." * regular
-        figures.append(drawing("spectrum", partial(spectrum_figure, result), {"regular": words}))
-    return section("waves", figures=figures, tables=tables) if tables else None
+        figure = drawing("spectrum", spectrum_figure, result, regular=words)
+    return section("waves", figure, *wave_tables(result))
 
 
 def wave_tables(result: StudyResult) -> list[Table]:
     """Waves of each run as they were measured, and where, as far as known."""
-    tables, run = [], next(iter(result.prepared.values()))
-    if "spectra" in result.groups:
-        tables.append(_wave_table(result))
-    channels = result.groups["channels"]
-    rows = [
+    run, channels = next(iter(result.prepared.values())), result.groups["channels"]
+    places = [
         (
             str(name),
             str(channel.attrs.get("long_name", name)),
@@ -46,61 +43,56 @@ def wave_tables(result: StudyResult) -> list[Table]:
         for name, channel in run.data_vars.items()
         if "x_position" in channel.attrs
     ]
-    if rows:
-        tables.append(table("positions", rows, {"frame": str(channels.attrs.get("frame", ""))}))
-    return tables
+    frame = str(channels.attrs.get("frame", ""))
+    spectra = result.groups.get("spectra", xr.Dataset())
+    rows = [_wave_row(result, name) for name in result.prepared if spectra]
+    return [table("waves", rows, **spectra.attrs), table("positions", places, frame=frame)]
 
 
-def _wave_table(result: StudyResult) -> Table:
-    spectra, rows = result.groups["spectra"], []
-    for name in result.prepared:
-        at = result.groups["runs"].sel(run=name)
-        frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
-        known = bool(np.isfinite(frequency + depth))
-        speed = float(phase_speed(2 * np.pi * frequency, depth)) if known else np.nan
-        # A sine has a height of 2√2 standard deviations, a sea one of 4.
-        factor = np.sqrt(0.5) if np.isfinite(frequency) else 1.0
-        spans = ", ".join(
-            f"{use} {float(at[f'{use}_begin']):.0f} to {float(at[f'{use}_end']):.0f} s"
-            for use in ("train", "test")
-            if np.isfinite(at[f"{use}_begin"])
-        )
-        rows.append(
-            (
-                name,
-                str(at["sea_state"].values) or str(at["waves"].values),
-                number(factor * float(spectra["significant_height"].sel(run=name))),
-                number(frequency),
-                number(speed / frequency, 2),
-                number(speed, 2),
-                spans or "test",
-            )
-        )
-    return table("waves", rows, spectra.attrs)
+def _wave_row(result: StudyResult, name: str) -> tuple[str, ...]:
+    """Waves of a run: height, frequency, length and speed, and what they are used for."""
+    at = result.groups["runs"].sel(run=name)
+    frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
+    known = bool(np.isfinite(frequency + depth))
+    speed = float(phase_speed(2 * np.pi * frequency, depth)) if known else np.nan
+    # A sine has a height of 2√2 standard deviations, a sea one of 4.
+    factor = np.sqrt(0.5) if np.isfinite(frequency) else 1.0
+    spans = ", ".join(
+        f"{use} {float(at[f'{use}_begin']):.0f} to {float(at[f'{use}_end']):.0f} s"
+        for use in ("train", "test")
+        if np.isfinite(at[f"{use}_begin"])
+    )
+    return (
+        name,
+        str(at["sea_state"].values) or str(at["waves"].values),
+        number(factor * float(result.groups["spectra"]["significant_height"].sel(run=name))),
+        number(frequency),
+        number(speed / frequency, 2),
+        number(speed, 2),
+        spans or "test",
+    )
 
 
 def data(result: StudyResult) -> Section:
     """Return channels, and what preparation found in each run."""
     channels = result.groups["channels"]
-    signs = []
+    signs, runs, clocks = [], [], []
     for at in entries(channels, "name"):
         name, use, unit, *others = row(at, "name", "use", "units", "positive", "source")
         signs.append((result.words_of(name), use, shown_unit(unit), *others))
-    frame = channels.attrs.get("frame", "")
-    runs = []
     for name, run in result.prepared.items():
         _, span, count, kinds = run_row(name, run)
         sea = row(result.groups["runs"].sel(run=name), "sea_state")
         findings = "; ".join(other_findings(run))
         runs.append((name, *sea, str(span), count, kinds.replace("_", " ") or "none", findings))
-    tables = [
-        table("signs", signs, {"frame": frame and f"Frame: {frame}."}),
+        clocks += [(name, *each) for each in clock_rows(run)]
+    frame = channels.attrs.get("frame", "")
+    return section(
+        "data",
+        table("signs", signs, frame=frame and f"Frame: {frame}."),
         table("quality_of_runs", runs, name="runs"),
-    ]
-    clocks = [(n, *each) for n, run in result.prepared.items() for each in clock_rows(run)]
-    if clocks:
-        tables.append(table("clocks", clocks))
-    return section("data", tables=tables)
+        table("clocks", clocks),
+    )
 
 
 APART = 0.005
@@ -117,14 +109,7 @@ def settings(result: StudyResult) -> Section:
     """Return settings, training sets and test windows."""
     note = str(result.attrs.get("waves_note", ""))
     waves = f"Waves of the virtual tank: {note}." if note else ""
-    words = (waves, training_overlap(result)[1], test_overlap(result))
-    tables = (_model_table(result), _settings_table(result), _windows_table(result))
-    return section("settings", more=words, tables=tables)
-
-
-def _model_table(result: StudyResult) -> Table:
-    """Each setting of each model, with where it comes from."""
-    rows = [
+    models = [
         (
             model_words(model),
             key.replace("_", " "),
@@ -134,29 +119,13 @@ def _model_table(result: StudyResult) -> Table:
         for model, stated in result.model_settings.items()
         for key, each in stated["settings"].items()
     ]
-    return table("models", rows)
-
-
-def _settings_table(result: StudyResult) -> Table:
-    """Settings of the study, defaults included; period, time step and filters of its data first."""
-    every = {key: value for key, value in result.settings.items() if key != "models"}
-    every["statistics"] = {**every["statistics"], "calibrate": result.is_calibrated}
-    period, dt = float(result.attrs["encounter_period"]), float(result.attrs["dt"])
-    preparation = json.loads(result.attrs["preparation"])
-    origin = "stated" if every["study"].get("encounter_period") else "measured"
-    filters = []
-    if preparation["low_pass"]:
-        edges = " to ".join(f"{edge:g}" for edge in preparation["low_pass"])
-        filters.append(f"low-pass {edges} Hz")
-    if preparation["anti_alias"]:
-        filters.append("low-pass below 0.8 of the new Nyquist frequency")
-    rows = [
-        ("mean encounter period T̂", f"{period:.4f} s, {origin}"),
-        ("time step", f"{dt:.4g} s, {period / dt:.4g} samples per period"),
-        ("filter before resampling", " and ".join(filters) or "none"),
-        *((key, setting_text(key, value)) for key, value in _leaves("", every)),
-    ]
-    return table("settings", rows)
+    return section(
+        "settings",
+        table("models", models),
+        table("settings", [*_data_settings(result), *_stated_settings(result)]),
+        _windows_table(result),
+        more=(waves, training_overlap(result)[1], test_overlap(result)),
+    )
 
 
 def _leaves(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -206,24 +175,46 @@ def _prior_text(prior: dict[str, Any], unit: str) -> str:
     return json.dumps(prior)
 
 
+def _data_settings(result: StudyResult) -> Iterator[tuple[str, str]]:
+    """Period, time step and filters of the data."""
+    period, dt = float(result.attrs["encounter_period"]), float(result.attrs["dt"])
+    preparation, filters = json.loads(result.attrs["preparation"]), []
+    origin = "stated" if result.settings["study"].get("encounter_period") else "measured"
+    if preparation["low_pass"]:
+        edges = " to ".join(f"{edge:g}" for edge in preparation["low_pass"])
+        filters.append(f"low-pass {edges} Hz")
+    if preparation["anti_alias"]:
+        filters.append("low-pass below 0.8 of the new Nyquist frequency")
+    yield "mean encounter period T̂", f"{period:.4f} s, {origin}"
+    yield "time step", f"{dt:.4g} s, {period / dt:.4g} samples per period"
+    yield "filter before resampling", " and ".join(filters) or "none"
+
+
+def _stated_settings(result: StudyResult) -> Iterator[tuple[str, str]]:
+    """Settings of the study, defaults included."""
+    every = {key: value for key, value in result.settings.items() if key != "models"}
+    every["statistics"] = {**every["statistics"], "calibrate": result.is_calibrated}
+    for key, value in _leaves("", every):
+        yield key, setting_text(key, value)
+
+
 def _windows_table(result: StudyResult) -> Table:
     """Training sets and test windows."""
     training = result.groups["training"]
     every = ", ".join(map(model_words, whole_readers(result)))
-    whole = f" (all of it: {every})" if every else ""
     rows = []
-    for each, spans in zip(training["training"], training_spans(result), strict=True):
+    for each, spans in zip(entries(training, "training"), training_spans(result), strict=True):
         words = ", ".join(f"{run}, {begin:.2f} to {end:.2f} s" for run, begin, end in spans)
-        left_out = str(training["left_out"].sel(training=each).values)
-        rows.append(("training", str(each.values), words, left_out))
+        name, left_out = row(each, "training", "left_out")
+        rows.append(("training", name, words, left_out))
     rows += [
         ("test", result.label_of(test), f"{run}, {begin:.2f} to {end:.2f} s", "")
         for test in result.tests
         for run, begin, end in _test_spans(result, test)
     ]
-    return table(
-        "windows", rows, {"reads": float(result.attrs["longest_training"]), "whole": whole}
-    )
+    whole = f" (all of it: {every})" if every else ""
+    reads = float(result.attrs["longest_training"])
+    return table("windows", rows, reads=reads, whole=whole)
 
 
 Spans = list[tuple[str, float, float]]
@@ -342,15 +333,15 @@ def versions(result: StudyResult) -> Section:
     rows = [(key.replace("_", " "), str(result.attrs[key])) for key in keys]
     rows.append(("finished", finished(result)))
     rows += [(name, str(each)) for name, each in json.loads(result.attrs["versions"]).items()]
-    return section("versions", tables=(table("versions", rows),))
+    return section("versions", table("versions", rows))
 
 
-def chosen(result: StudyResult) -> Section | None:
-    """Return how settings were chosen; None where all are stated and no model looks ahead."""
+def chosen(result: StudyResult) -> Section:
+    """Return how settings that are not stated were chosen, and look-aheads."""
     rows = []
     for at in entries(result.groups["chosen"].sel(model=result.models), "model", "training"):
         model, name, text = row(at, "model", "training", "words")
         if text or at["look_ahead"] > 0:
             words = "; ".join(map(str.strip, (text or "stated").splitlines()))
             rows.append((model_words(model), name, *row(at, look_ahead=2), words))
-    return section("chosen", tables=(table("chosen", rows),)) if rows else None
+    return section("chosen", table("chosen", rows))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,22 +20,23 @@ from seakeep.study import StudyResult
 MISSING = 65535
 
 
-def explorer(result: StudyResult) -> Section | None:
+def explorer(result: StudyResult) -> Section:
     """Return the interactive plot: all windows and training sets."""
-    data = history_data(result)
-    return section("explore", histories=data) if data else None
+    return section("explore", histories=history_data(result))
 
 
-def histories(result: StudyResult) -> Section | None:
+def histories(result: StudyResult) -> Section:
     """Return figures of the cells that are shown."""
-    level = 100 * float(result.settings["statistics"]["level"])
-    edges = ", and that band calibrated (dotted)" if result.is_calibrated else ""
+    words = {
+        "level": 100 * float(result.settings["statistics"]["level"]),
+        "edges": ", and that band calibrated (dotted)" if result.is_calibrated else "",
+    }
     figures = []
-    for test, training, window in shown_cells(result):
-        draw = partial(history_figure, result, test, training, window)
-        words = {"test": result.label_of(test), "level": level, "edges": edges}
-        figures.append(drawing("history", draw, words, f"history_{test}_{window:03d}"))
-    return section("histories", figures=figures) if figures else None
+    for cell in shown_cells(result):
+        test, _, window = cell
+        words |= {"name": f"history_{test}_{window:03d}", "test": result.label_of(test)}
+        figures.append(drawing("history", history_figure, result, *cell, **words))
+    return section("histories", *figures)
 
 
 def pack(values: npt.ArrayLike) -> dict[str, Any]:

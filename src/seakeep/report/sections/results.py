@@ -1,0 +1,622 @@
+"""Results of a study: their summary in sentences, errors, bands and densities, and a glossary."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from seakeep.conventions import canonical_channel
+from seakeep.report.figures.errors import (
+    BAND_WORDS,
+    FEWEST,
+    LOWEST,
+    average_boxes,
+    channel_boxes,
+    density_figure,
+    eigenvalue_figure,
+    error_over_time_figure,
+    growth_text,
+)
+from seakeep.report.figures.histories import history_figure, shown_cells
+from seakeep.report.page import Section, drawing, section
+from seakeep.report.sections.data import test_overlap, training_overlap, unequal_training
+from seakeep.report.style import HEADING, judged_models, model_words
+from seakeep.report.tables import (
+    MISSING,
+    Number,
+    Table,
+    band_verdict,
+    beside,
+    entries,
+    number,
+    numbers,
+    percent,
+    row,
+    short,
+    signed,
+    small_number,
+    table,
+    words,
+)
+from seakeep.study import StudyResult
+from seakeep.study.describe import words_of_repeats
+from seakeep.study.judge import VARIANTS, verdict, words_of_lost
+
+
+def summary(result: StudyResult) -> Section:
+    """Return what was tested and the results, on one screen."""
+    shares, words = training_overlap(result)
+    lost, repeats = (result.groups.get(key) for key in ("statistics/lost", "repeats"))
+    notices = [
+        str(result.attrs.get("preparation_note", "")),
+        words_of_lost(lost) if lost is not None else "",
+        words_of_repeats(repeats) if repeats is not None else "",
+        _few_cells(result),
+        words if shares else "",
+        test_overlap(result),
+    ]
+    name = "heave" if "heave" in result.channels else result.channels[0]
+    figures = [
+        drawing(
+            "first_history",
+            *(history_figure, result, *place, (name,)),
+            channel=result.words_of(name).capitalize(),
+            test=result.label_of(place[0]),
+        )
+        for place in shown_cells(result)[:1]
+    ]
+    return section(
+        "summary",
+        *figures,
+        _heat(result),
+        more=(_tested(result),),
+        points=findings(result),
+        notices=tuple(filter(None, notices)),
+    )
+
+
+def _tested(result: StudyResult) -> str:
+    """What was tested, in one sentence or two."""
+    period = float(result.attrs["encounter_period"])
+    sets = result.groups["training"].sizes["training"]
+    seas = [
+        f"{result.label_of(test)} ({data.sizes['window']} windows of "
+        f"{float(data['time'].values[-1]) / period:.3g} T̂)"
+        for test, data in result.tests.items()
+    ]
+    words = (
+        f"Tested: {', '.join(map(model_words, result.models))}, each learnt from {sets} training "
+        f"set{'s' * (sets > 1)} and run freely through {', '.join(seas)}; {len(result.channels)} "
+        "channels. Errors are in measured SDs of the window: 0 is perfect, 1 is no better than its "
+        "mean."
+    )
+    if condition := str(result.attrs.get("conditional_on", "")).replace("_", " "):
+        words += (
+            f" Every number is conditional on measured {condition}: the alignment of the waves "
+            "reads it after the start of a forecast. It is no forecast in the strict sense."
+        )
+    return words
+
+
+def by_channel(
+    result: StudyResult,
+    key: str,
+    cells: Callable[[str], Iterable[str]],
+    columns: Iterable[str],
+    more: str = "",
+    test: str = "",
+    **given: Any,
+) -> Table:
+    """Table of numbers with a row per channel, and one of averages; `cells` takes a channel.
+
+    One of several test sets is named after it; that of the first is not folded away.
+    """
+    rows = [(result.words_of(name), *map(Number, cells(name))) for name in result.channels]
+    rows.append(("average", *map(Number, cells("average"))))
+    if test:
+        of_test = {"name": f"{key}_{test}", "folded": test != next(iter(result.tests))}
+        given = {"test": result.label_of(test), **of_test, **given}
+    heads, last = ("channel", *columns), [len(rows) - 1]
+    return table(key, rows, more + conditional(result), columns=heads, averages=last, **given)
+
+
+def _heat(result: StudyResult) -> Table:
+    """Median error of each channel in each test set, of the models that are not baselines."""
+    places = {
+        f"{result.label_of(test)}: {model_words(model)}": {"test": test, "model": model}
+        for test in result.tests
+        for model in judged_models(result)
+    }
+    median = result.groups["statistics/boxes"]["median"].sel(measure="nrmse")
+
+    def cells(channel: str) -> Iterator[str]:
+        return (number(median.sel({**at, "channel": channel}), 2) for at in places.values())
+
+    return by_channel(result, "heat", cells, places)
+
+
+def overview_table(result: StudyResult) -> Table:
+    """Both measures of each model in each test set, averages over the channels."""
+    rows = []
+    boxes = result.groups["statistics/boxes"].sel(channel="average")
+    boxes["spread"] = boxes["upper_quartile"] - boxes["lower_quartile"]
+    for at in entries(boxes, "test", "model"):
+        test, model = row(at, "test", "model")
+        cells = [text for key in HEADING for text in row(at.sel(measure=key), median=3, spread=3)]
+        cells += row(at.sel(measure="training_nrmse"), median=3)
+        cells += row(at.sel(measure="nrmse"), count=0)
+        rows.append((result.label_of(test), model_words(model), *cells))
+    return table("overview", rows, conditional(result))
+
+
+def conditional(result: StudyResult) -> str:
+    """Sentence for tables whose forecasts read a measured output after the start."""
+    words = str(result.attrs.get("conditional_on", "")).replace("_", " ")
+    return f" Conditional on measured {words}." if words else ""
+
+
+def findings(result: StudyResult) -> list[str]:
+    """Results, one sentence each."""
+    said = []
+    singles = [m for m in result.models if not result.is_ensemble(m)]
+    ensembles = [m for m in result.models if result.is_ensemble(m)]
+    for test in result.tests:
+        median = result.groups["statistics/boxes"]["median"].sel(test=test, channel="average")
+        parts = []
+        for measure, heading in HEADING.items():
+            errors = median.sel(measure=measure)
+            listed = [f"{model_words(m)} {number(errors.sel(model=m))}" for m in result.models]
+            words = f"median {heading} {', '.join(listed)}"
+            if singles and ensembles:
+                words += _verdict(result, test, ensembles[0], singles[0], measure)
+            parts.append(words)
+        label = result.label_of(test)
+        said.append(f"{label[:1].upper()}{label[1:]}: {'; '.join(parts)}.")
+    said += filter(None, [unequal_training(result)])
+    for model in ensembles:
+        said += _coverage_findings(result, model)
+    return said + _fewer_windows(result)
+
+
+def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure: str) -> str:
+    """Whether the ensemble's mean is better than the single model, if the study can decide."""
+    at = result.groups["statistics/differences"].sel(
+        test=test, model=ensemble, other=single, measure=measure, channel="average"
+    )
+    change, *bounds = (100 * float(at[key]) for key in ("change", "lower", "upper"))
+    if not np.isfinite(change):
+        return ""
+    outcome = "as good" if np.abs(bounds).max() < 0.5 else verdict(*bounds)
+    words = f"the ensemble's mean is {outcome}"
+    if outcome == "cannot tell":
+        words = "cannot tell whether the ensemble's mean is better"
+    interval = f"[{', '.join(map(signed, bounds))}]"
+    interval = interval if np.isfinite(bounds[0]) else "with too few cells"
+    return f" ({words}: {signed(change)} % {interval})".replace("-", "−")
+
+
+def _coverage_findings(result: StudyResult, model: str) -> list[str]:
+    first = next(iter(result.tests))
+    level = float(result.settings["statistics"]["level"])
+    at = {"test": first, "model": model, "against": "measured", "channel": "average"}
+    row = result.groups["statistics/coverage"].sel(at)
+    inside = float(row["inside"].sel(band="members"))
+    words = band_verdict(inside, level)
+    calibrated = ""
+    if "calibrated" in row["band"] and np.isfinite(held := row["inside"].sel(band="calibrated")):
+        width, wider = row["relative_width"]
+        calibrated = (
+            f" Calibrated on training data it holds {percent(held)} %, "
+            f"{short(wider, 2)} measured SD wide instead of {short(width, 2)}."
+        )
+    each = [test["lost"].sel(ensemble=model) for test in result.tests.values()]
+    lost, total = (int(sum((test >= least).sum() for test in each)) for least in (0, -1))
+    return [
+        f"The {short(100 * level)} % band of the {model_words(model)} model holds "
+        f"{percent(inside)} % of the measured instants of {result.label_of(first)}, {words}: "
+        f"it carries the spread of the hyperparameters, and no noise or model error.{calibrated}",
+        f"{lost} of {total} member forecasts diverged and were left out of mean and band.",
+    ]
+
+
+def _fewer_windows(result: StudyResult) -> list[str]:
+    """Say of which windows, placed without overlap, fewer fit than were asked for."""
+    settings, places = result.settings, []
+    if settings["training"]["scheme"] == "halves":
+        used = result.groups["training"].sizes["training"]
+        places.append(("training windows", settings["training"]["windows"], used))
+    for name, data in result.tests.items():
+        asked = settings["tests"][name]["windows"]
+        places.append((f"test windows of {result.label_of(name)}", asked, data.sizes["window"]))
+    return [
+        f"{used} {what} were used of the {asked} asked for: no more fit without overlap."
+        for what, asked, used in places
+        if asked is not None and used < asked
+    ]
+
+
+def _few_cells(result: StudyResult) -> str:
+    """Sentence where a test set has too few cells for its statistics; else empty."""
+    counts = {test: int(data["judged"].sum()) for test, data in result.tests.items()}
+    small = [f"{result.label_of(test)}: n = {n}" for test, n in counts.items() if n < FEWEST]
+    if not small:
+        return ""
+    return (
+        f"Few cells ({'; '.join(small)}): medians, quartiles and differences between models say "
+        f"little below about {FEWEST}. Ask for more training or test windows before a conclusion."
+    )
+
+
+_LETTERS = {r"\theta": "θ", r"\phi": "φ", r"\psi": "ψ", r"\eta": "η"}
+_ACCENTS = {"dot": "\N{COMBINING DOT ABOVE}", "ddot": "\N{COMBINING DIAERESIS}"}
+
+
+def plain_symbol(channel: str) -> str:
+    """Symbol of a channel as figures print it, in plain letters; its name where it has none.
+
+    Examples
+    --------
+    >>> plain_symbol("mooring_bow"), plain_symbol("heave"), plain_symbol("torque")
+    ('M_bow', 'z', 'torque')
+    """
+    known = canonical_channel(channel)
+    if known is None:
+        return channel.replace("_", " ")
+    text = re.sub(r"\\mathrm\{([^}]*)\}|\\mathrm ?(\w+)", r"\1\2", known.symbol)
+    for tex, letter in _LETTERS.items():
+        text = text.replace(tex, letter)
+    return re.sub(r"\\(d?dot)\{(\w)\}", lambda m: m[2] + _ACCENTS[m[1]], text)
+
+
+def glossary(result: StudyResult) -> Section:
+    """Return terms and symbols with what they mean."""
+    symbols = {name: (plain_symbol(name), result.words_of(name)) for name in result.channels}
+    explained = "; ".join(" ".join(dict.fromkeys(each)) for each in symbols.values())
+    loads = any(name.startswith("mooring_") for name in result.channels)
+    regular = "statistics/response" in result.groups
+    same = (
+        " It is that of the irregular sea and counts lengths in regular waves too: 5 T̂ may hold "
+        "more or fewer than five regular waves."
+    )
+    slap = any("truth" in data for data in result.tests.values())
+    left_out = {"λ/L": not regular, "slap": not slap}
+    values = {
+        "period": float(result.attrs["encounter_period"]),
+        "same": same * regular,
+        "symbols": explained + ". M is a mooring load, a force in N." * loads,
+    }
+    terms = [
+        (term, meaning.format(**values))
+        for term, meaning in words()["terms"].items()
+        if not left_out.get(term)
+    ]
+    return section("words", terms=terms)
+
+
+SELDOM = 0.01
+"""Part of a run's samples below which a slack line is not worth a word."""
+
+
+def errors(result: StudyResult) -> Section:
+    """Return the errors of every model in every test set."""
+    tests = list(result.tests)
+    groups = [tests[:1], tests[1:]] if len(tests) <= 9 else [tests]
+    figures = []
+    for group in filter(None, groups):
+        words = {"tests": ", ".join(map(result.label_of, group)), "fewest": FEWEST}
+        words["name"] = f"errors_{group[0] if len(group) == 1 else 'others'}"
+        figures.append(drawing("errors", average_boxes, result, group, **words))
+    for test in tests:
+        words = {"tests": result.label_of(test), "fewest": FEWEST}
+        words["name"] = f"errors_{test}_by_channel"
+        figures.append(drawing("errors_by_channel", channel_boxes, result, test, **words))
+    tables = (error_table(result, test) for test in tests)
+    return section("errors", *figures, overview_table(result), *tables)
+
+
+def error_table(result: StudyResult, test: str) -> Table:
+    """Medians and inter-quartile ranges of both measures, average and per channel."""
+    boxes, models = result.groups["statistics/boxes"].sel(test=test), judged_models(result)
+    places = [(measure, model) for measure in HEADING for model in models]
+    spread = boxes["upper_quartile"] - boxes["lower_quartile"]
+
+    def cells(name: str) -> Iterator[Number]:
+        for measure, model in places:
+            at = {"channel": name, "measure": measure, "model": model}
+            yield beside(boxes["median"].sel(at), spread.sel(at))
+
+    more = ""
+    if left_out := int(boxes["left_out"].sel(model=models, measure="nrmse").sum()):
+        more = (
+            f" {left_out} values were left out: a channel whose measured SD is below 1 % of its "
+            "training SD (a slack line), or more than half of whose variance is noise, is not "
+            "judged, nor is a forecast that diverged."
+        )
+    heads = [f"{key.upper()} {model_words(model)}: median [IQR]" for key, model in places]
+    count = int(result.tests[test]["judged"].sum())
+    return by_channel(result, "errors", cells, heads, more, test=test, count=count)
+
+
+def scales(result: StudyResult) -> Section:
+    """Return errors counted in both standard deviations."""
+    return section("scales", *(_scales_table(result, test) for test in result.tests))
+
+
+def _scales_table(result: StudyResult, test: str) -> Table:
+    data = result.tests[test]
+    median = result.groups["statistics/boxes"]["median"].sel(test=test)
+    spread = data["measured"].std("time", ddof=1) / data["training_std"]
+    size = spread.where(data["judged"]).median(["training", "window"])
+
+    def cells(name: str) -> Iterator[str]:
+        yield "" if name == "average" else number(size.sel(channel=name), 2)
+        for model in result.models:
+            at = median.sel(channel=name, model=model)
+            yield "{} ({})".format(*numbers(at.sel(measure=["nrmse", "training_nrmse"])))
+
+    heads = ("SD of the window [training SD]", *map(model_words, result.models))
+    return by_channel(result, "scales", cells, heads, test=test)
+
+
+def regular(result: StudyResult) -> Section | None:
+    """Return the errors in regular waves, taken apart."""
+    if (response := result.groups.get("statistics/response")) is None:
+        return None
+    tests = [str(test) for test in response["test"].values]
+    table = _response_table(result, tests)
+    return section("regular", table, more=[_slack_words(result, tests)])
+
+
+def _response_table(result: StudyResult, tests: list[str]) -> Table:
+    """Amplitude ratio, phase lead and offset of each channel, test set by test set."""
+    rows, columns, response = [], ["channel", "model"], result.groups["statistics/response"]
+    for test in tests:
+        label = result.label_of(test).removeprefix("regular, ")
+        columns += [f"{label}: {key}" for key in ("amplitude", "phase [°]", "offset [SD]", "share")]
+    judged = response.sel(channel=result.channels, model=judged_models(result))
+    for of_model in entries(judged, "channel", "model"):
+        cells = [result.words_of(str(of_model["channel"].values)), _model_of(of_model)]
+        for at in entries(of_model, "test"):
+            offset, *others = (float(at[f"error_{key}"]) for key in ("offset", "wave", "rest"))
+            total = float(np.sum(np.square([offset, *others])))
+            share = Number(f"{percent(offset**2 / total)} %") if total > 0 else MISSING
+            cells += [*row(at, amplitude_ratio=2, phase_lead=signed, error_offset=2), share]
+        rows.append(tuple(cells))
+    return table("response", rows, columns=columns, more=conditional(result))
+
+
+def _slack_words(result: StudyResult, tests: list[str]) -> str:
+    """Name the lines that lose their load, run by run."""
+    runs = dict.fromkeys(str(run) for test in tests for run in result.tests[test]["run"].values)
+    slack = result.groups["runs"]["slack"].sel(run=list(runs), name=result.channels)
+    listed = [
+        f"{result.words_of(str(line['name'].values))} in {percent(line)} % of {run}"
+        for run in runs
+        for line in slack.sel(run=run)
+        if line >= SELDOM
+    ]
+    if not listed:
+        return ""
+    return (
+        f"Slack line (a load within the SD of its noise): {', '.join(listed)}. A slack line does "
+        "not respond linearly; where it is slack throughout, only noise is left to be forecast."
+    )
+
+
+def _model_of(at: xr.Dataset) -> str:
+    """Words of the model of an entry."""
+    return model_words(str(at["model"].values))
+
+
+def _test_of(result: StudyResult, at: xr.Dataset) -> str:
+    """Words of the test set of an entry."""
+    return result.label_of(str(at["test"].values))
+
+
+def bands(result: StudyResult) -> Section:
+    """Return coverage and scores of bands by wave height, horizon and channel."""
+    groups, tables = result.groups.get("statistics/bands", xr.Dataset()), []
+    level = short(100 * float(result.settings["statistics"]["level"]))
+    for model in filter(result.is_ensemble, result.models if groups else ()):
+        for at in entries(groups.sel(model=model), "band"):
+            at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
+            band = str(at["band"].values)
+            kind = "calibrated " * (band == "calibrated")
+            title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
+            name = f"bands_{band}_{model}"
+            tables += [_by_part(result, at, name, title), _of_all(result, at, name, title)]
+    return section("bands", *tables)
+
+
+def _by_part(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table:
+    """Averages over the channels, a row per test set and part."""
+    scale = at["relative_width"] / at["width"]  # one over the measured SD
+    at, rows = at.assign(at[["winkler", "crps"]] * scale), []
+    for one in entries(at, "test", "part"):
+        inside = one["inside"]
+        if inside.isnull().all():
+            continue
+        least = inside[int(np.nanargmin(inside.values))]
+        named = result.words_of(str(least["channel"].values))
+        moving = one[["relative_width", "winkler", "crps"]].map(lambda x: x.where(np.isfinite(x)))
+        means = row(moving.mean("channel"), relative_width=2, winkler=2, crps=2)
+        covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
+        rows.append((_test_of(result, one), *row(one, "part"), *covered, *means))
+    return table("bands", rows, conditional(result), name=name, band=title)
+
+
+def _of_all(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table:
+    """All instants, a row per test set and channel."""
+    units, three = result.groups["channels"]["units"], partial(short, digits=3)
+    rows = [
+        (
+            _test_of(result, one),
+            f"{result.words_of(channel)} [{units.sel(name=channel).item()}]",
+            *row(one, inside=2, relative_width=2, winkler=three, crps=three),
+        )
+        for one in entries(at.sel(part="all"), "test", "channel")
+        for channel in row(one, "channel")
+    ]
+    name = f"{name}_channels"
+    return table("bands_by_channel", rows, conditional(result), name=name, band=title)
+
+
+def age(result: StudyResult) -> Section:
+    """Return the error over the age of a forecast."""
+    split = float(result.settings["statistics"]["split_period"])
+    trend = result.groups["statistics/trend"].sel(model=judged_models(result))
+    rows = [
+        (
+            _test_of(result, at),
+            BAND_WORDS[str(at["band"].values)],
+            _model_of(at),
+            number(at["error_mean"].mean()),
+            growth_text(at),
+        )
+        for at in entries(trend, "test", "band", "model")
+    ]
+    seconds = split * float(result.attrs["encounter_period"])
+    return section(
+        "time",
+        drawing("error_over_time", error_over_time_figure, result, split=split),
+        table("trend", rows, conditional(result), split=split, seconds=seconds),
+    )
+
+
+def coverage(result: StudyResult) -> Section:
+    """Return coverage and width of the bands of ensembles."""
+    kinds = (False, True) if result.is_calibrated else (False,)
+    ensembles = filter(result.is_ensemble, result.models)
+    return section(
+        "coverage", *(coverage_table(result, m, kind) for m in ensembles for kind in kinds)
+    )
+
+
+def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
+    """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
+    prefix, band = "calibrated_" * calibrated, "calibrated" if calibrated else "members"
+    shares = result.groups["statistics/coverage"].sel(model=model, band=band)
+    true = "truth" in shares["against"].values
+    kinds, two = ("inside" + " [of the truth]" * true, "width [SD]"), partial(number, digits=2)
+
+    def cells(name: str) -> Iterator[str]:
+        for test in result.tests:
+            at = shares.sel(test=test, channel=name)
+            yield beside(*at["inside"], form=two) if true else two(*at["inside"])
+            yield two(at["relative_width"].sel(against="measured"))
+
+    level = float(result.settings["statistics"]["level"])
+    more = _calibrated_words(result, model, level) if calibrated else ""
+    if true:
+        more += (
+            " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
+            "slap; rates are not filtered."
+        )
+    heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
+    return by_channel(
+        result,
+        *("coverage", cells, heads, more),
+        name=f"coverage_{prefix}{model}",
+        kind=prefix.replace("_", " "),
+        level=short(100 * level),
+        part=level,
+        model=model_words(model),
+    )
+
+
+def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
+    """How the calibrated band is made, what it rests on, and where it is of no use."""
+    group = result.groups["calibration"].sel(ensemble=model)
+    words = "these quantiles, moved outwards by a margin found"
+    if "floor" in group:
+        scale = "the spread of the members"
+        if "law" in group:
+            scale = "a scale learnt from spread, horizon and waves"
+        words = (
+            f"the mean, and a factor times {scale} (with a "
+            "floor of a quarter of the root mean square error) to either side, found"
+        )
+    said = (
+        f" Calibrated: {words} on training data that the members had not read, in windows as long "
+        "as the first test set's. "
+    )
+    lengths = {test: float(each["length"]) for test, each in result.settings["tests"].items()}
+    first = lengths[next(iter(result.tests))]
+    others = [f"{result.label_of(k)} ({n:g} T̂)" for k, n in lengths.items() if n != first]
+    if others:
+        said += f"Those are {first:g} T̂ long; the margin is not made for {', '.join(others)}. "
+    if not group["windows"].all():
+        said += "Some training sets hold no such window. "
+    else:
+        windows, blocks = (
+            " to ".join(dict.fromkeys(f"{each:.0f}" for each in (values.min(), values.max())))
+            for values in (group["windows"].values, group["blocks"].values)
+        )
+        said += (
+            f"A training set had {windows} of them; allowing for their dependence, their "
+            f"scores are worth {blocks} independent ones. "
+        )
+        if (warranted := float(group["warranted"].min())) < level:
+            said += f"Of some channels that is too few: {warranted:.2f} is guaranteed there. "
+    return said + "The margin guarantees nothing in another kind of sea."
+
+
+def densities(result: StudyResult) -> Section:
+    """Return densities of measurement and forecasts, and their divergence."""
+    ensembles = [model for model in result.models if result.is_ensemble(model)]
+    figures = []
+    for model in ensembles or result.models[:1]:
+        words = {"name": f"densities_{model}", "model": model_words(model)}
+        figures.append(drawing("densities", density_figure, result, model, **words))
+    order = sorted(judged_models(result), key=lambda model: model not in ensembles)
+    tables = (divergence_table(result, m, variant) for m in order for variant in VARIANTS)
+    return section("densities", *figures, *tables)
+
+
+def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
+    """Jensen–Shannon divergence per channel beside its noise floor and, if asked, the paper's."""
+    data = result.groups["statistics/divergence"]
+    at = data.sel(model=model, variant=variant)
+    keys = ("mean", "lower", "upper", "uncertainty", "noise_floor")
+    comparable = result.is_ensemble(model) and result.shows_paper
+
+    def cells(name: str) -> Iterator[str]:
+        of_all = name == "average"
+        one = at.mean("channel", skipna=False) if of_all else at.sel(channel=name)
+        yield from (small_number(one[key]) for key in keys)
+        yield "" if of_all else number(one["block_length"], 0)
+        if comparable:
+            yield from words()["published"].get(name, (MISSING,) * 4)
+
+    quantiles = ("EV", "q0.025", "q0.975", "U")
+    heads = [*quantiles, "noise floor", "block (samples)"]
+    published = [f"paper: {each}" for each in quantiles] if comparable else []
+    how = "blocks may cross joins, block length and bandwidth as printed in the paper"
+    if variant == "recommended":
+        how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
+    return by_channel(
+        result,
+        "jsd",
+        cells,
+        [*heads, *published],
+        " The paper's columns are of another vessel in another tank." * comparable,
+        test=str(data.attrs["test"]),
+        name=f"jsd_{model}_{variant}",
+        elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
+        folded=not result.is_ensemble(model) and any(map(result.is_ensemble, result.models)),
+        model=model_words(model),
+        variant=variant,
+        how=how,
+    )
+
+
+def eigenvalues(result: StudyResult) -> Section | None:
+    """Return the eigenvalues of the models of the first training set."""
+    if not any(name.startswith("eigenvalues/") for name in result.groups):
+        return None
+    return section("eigenvalues", drawing("eigenvalues", eigenvalue_figure, result, lowest=LOWEST))
