@@ -244,7 +244,7 @@ CHANGES = (
     ("signals/panel.py", "np.arctan2(2 * xy, xx - yy)", "np.arctan2(xy, xx - yy)", "signals/test_tracking.py::test_centroid_and_pitch_of_every_frame"),
     ("signals/panel.py", "np.sqrt(12 * (mean + sign * half))", "np.sqrt(6 * (mean + sign * half))", "signals/test_tracking.py::test_centroid_and_pitch_of_every_frame"),
     ("signals/prediction.py", "departures[:, :, here] = carried[size:, 1:].T", "departures[here, :, here] = 0.0", "signals/test_prediction.py::test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it"),
-    ("signals/prediction.py", "return np.asarray(values.mean() + continued(", "return np.asarray(continued(", "signals/test_prediction.py::test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on"),
+    ("signals/prediction.py", "expected[:, column] = values.mean() + continued(", "expected[:, column] = continued(", "signals/test_prediction.py::test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on"),
     ("signals/prediction.py", "scipy.signal.lfilter([1.0], whitening, first)", "scipy.signal.lfilter(whitening, [1.0], first)", "signals/test_prediction.py::test_the_power_of_innovations_is_that_of_a_known_process"),
     ("signals/propagation.py", "celerity = 2 * np.pi * frequency * apart / phase", "celerity = frequency * apart / phase", "signals/test_celerity.py::test_phase_celerity_is_that_of_linear_dispersion"),
     ("signals/propagation.py", "centre + 0.5 * cycle)", "centre + 1.5 * cycle)", "signals/test_celerity.py::test_the_bound_keeps_the_peak_of_the_next_period_out"),
