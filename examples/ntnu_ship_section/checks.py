@@ -1,4 +1,4 @@
-"""Numbers of README.md that no seakeep command prints: sway, camera, record ends, periods, reach.
+"""Numbers of README.md that no seakeep command prints: sway, springs, repeats, periods, reach …
 
 Run in the repository, with SEAKEEP_DATA_DIR set:
 
@@ -58,6 +58,27 @@ def springs(campaign, runs):
             fast = signals.band_pass(tension, float(run.attrs["dt"]), BAND)
             parts.append(1 - fast.var() / tension.var())
         print(f"{name}  starboard {parts[0]:.2f}  port {parts[1]:.2f}")
+
+
+def repeats(campaign, runs):
+    """What runs of the same waves differ by, in SDs of the first, from 28 s on."""
+    channels = ["eta_wp1", "heave", "roll", "mooring_starboard", "mooring_port"]
+    print("NRMSE between runs of the same waves, at the lag of their best agreement in eta_wp1")
+    print("runs            " + "  ".join(f"{each:>17s}" for each in channels))
+    pairs = [("3061_2", "3061_1"), ("3101_3", "3101_4")]
+    pairs += [("3102_3", other) for other in ("3102_1", "3102_2", "3102_4")]
+    for name, other in pairs:
+        one, two = runs[name], runs[other]
+        dt, count = float(one.attrs["dt"]), min(one.sizes["time"], two.sizes["time"])
+        waves = [each["eta_wp1"].values[:count] for each in (one, two)]
+        lag, _ = signals.correlation_peak(*waves, dt, (-6, 6))
+        shift, first = round(lag / dt), round(28 / dt)
+        begin, end = max(first, first - shift), min(one.sizes["time"], two.sizes["time"] - shift)
+        errors = []
+        for channel in channels:
+            a, b = one[channel].values[begin:end], two[channel].values[begin + shift : end + shift]
+            errors.append(np.sqrt(np.mean((a - b) ** 2)) / a.std())
+        print(f"{name}, {other}  " + "  ".join(f"{error:17.2f}" for error in errors))
 
 
 def camera(campaign, runs):
@@ -155,7 +176,9 @@ def reach(campaign, runs):
         print(f"{ahead:5.2f}  {delays:6d}  {delays - ahead:12.2f}{words}")
 
 
-CHECKS = {each.__name__: each for each in (sway, springs, camera, means, ends, periods, reach)}
+CHECKS = {
+    each.__name__: each for each in (sway, springs, repeats, camera, means, ends, periods, reach)
+}
 
 
 def main(names):

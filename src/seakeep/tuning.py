@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Collection, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +17,11 @@ from seakeep.arrays import Progress
 from seakeep.errors import RequestError
 from seakeep.files import read_bytes, replacing
 from seakeep.models import HankelDMDc
+from seakeep.models.baselines import RIVALS
 from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
 from seakeep.models.readouts import readouts_json
 from seakeep.models.selection import Selected, select
-from seakeep.models.settings import FOLDS, Folds
+from seakeep.models.settings import FOLDS, Folds, HankelSettings
 from seakeep.models.training import check_names, until
 from seakeep.toml import Length
 
@@ -36,6 +37,7 @@ COLUMNS = {
     "observables": "observables",
     "alignment": "alignment",
     "memory": "memory",
+    "kind": "kind",
     "ridge": "λ per snapshot pair",
     "score": "mean NRMSE of free runs",
     "lower": "lower bound of the 95 % interval of the score",
@@ -46,13 +48,13 @@ COLUMNS = {
 
 
 @dataclass(frozen=True, eq=False)
-class TuneResult(Selected[HankelDMDc]):
+class TuneResult(Selected[Any]):
     """Result of :func:`tune`.
 
     Parameters
     ----------
-    settings : HankelDMDc
-        The settings that were chosen.
+    settings : HankelDMDc, FIR, ARX or Subspace
+        The settings that were chosen; another kind than the first where that is varied and better.
     rows : tuple of dict
         What was tried, as in :attr:`table`.
     note : str
@@ -63,7 +65,7 @@ class TuneResult(Selected[HankelDMDc]):
     """
 
     @property
-    def spec(self) -> HankelDMDc:
+    def spec(self) -> Any:
         """The settings; ``spec.fit(runs, states, inputs)`` fits the model."""
         return self.settings
 
@@ -72,8 +74,9 @@ class TuneResult(Selected[HankelDMDc]):
         """What was tried, a Dataset over ``trial``.
 
         ``state_delays``, ``input_delays``, ``lead`` (samples), ``observables`` (their kinds),
-        ``alignment``, ``memory`` (samples), ``ridge`` (per snapshot pair), ``score`` (mean NRMSE of
-        free runs), the bounds ``lower`` and ``upper`` of its 95 % interval, ``chosen``.
+        ``alignment``, ``memory`` (samples), ``kind``, ``ridge`` (per snapshot pair), ``score``
+        (mean NRMSE of free runs), the bounds ``lower`` and ``upper`` of its 95 % interval,
+        ``chosen``.
         """
         return xr.Dataset(
             {
@@ -135,8 +138,9 @@ def tune(
         Out of "ridge" (always chosen), "observables" (none, slow squares, powers, both; or those of
         the spec), "lead", "input_delays", "state_delays", "memory" (none, or eight periods),
         "alignment" (none, dispersion or one celerity, to the surge that is predicted or to the
-        place at rest: what the runs allow) and "readouts" (none or by the wave at the line, for
-        those of the spec or for every load).
+        place at rest: what the runs allow), "readouts" (none or by the wave at the line, for
+        those of the spec or for every load) and "kind" (FIR, ARX and subspace models in the place
+        of what the rest chose, with its delays and inputs, and no alignment to a predicted surge).
     horizon : sequence of float, optional
         Lengths of the free runs, encounter periods.
     folds : {"auto", "run", "sea_state"} or int, optional
@@ -188,13 +192,14 @@ def tune(
         horizon=horizon,
         folds=folds,
         period=None if spec.select is None else spec.select.period,
+        kinds=RIVALS if "kind" in vary else (),
         executor=executor,
         progress=progress,
         seed=seed,
         known=known,
     )
     return TuneResult(
-        replace(search_result.settings, select=None),
+        search_result.settings.having(select=None),
         search_result.rows,
         search_result.note,
         search_result.readouts,
@@ -243,7 +248,7 @@ class _Scores(dict[str, Any]):
 def tuned_campaign(
     text: str,
     model: str | None,
-    spec: HankelDMDc,
+    spec: HankelSettings,
     varied: Collection[str],
     preset: str | None,
     period: float | None,
@@ -256,8 +261,8 @@ def tuned_campaign(
         The campaign file.
     model : str or None
         Key in ``[models.NAME]``; None for the table ``[model]``.
-    spec : HankelDMDc
-        The settings that were chosen.
+    spec : HankelSettings
+        The settings that were chosen; keys of the table that their kind lacks go.
     varied : collection of str
         What they were chosen among; the ridge always.
     preset : str or None
@@ -281,6 +286,7 @@ def tuned_campaign(
         between.insert(0, body.pop())
     values = _choice(spec, table, varied, preset, period)
     stale = {"select", "rank"}  # nothing is left to be chosen
+    stale |= {each.name for each in fields(HankelDMDc) if "kind" in values}
     stale |= ({"alignment"} & set(varied)) | ({"observables", "readouts"} & set(values))
     for key in stale | ({"preset"} - set(values)):
         table.pop(key, None)
@@ -295,7 +301,7 @@ def tuned_campaign(
 
 
 def _choice(
-    spec: HankelDMDc,
+    spec: HankelSettings,
     table: Mapping[str, Any],
     varied: Collection[str],
     preset: str | None,
@@ -304,6 +310,9 @@ def _choice(
     """Keys of the table of a model that state the choice, and the preset that it goes with."""
     values: dict[str, Any] = {"ridge": spec.ridge, "ridge_scale": spec.ridge_scale}
     stated = set(varied)
+    if spec.kind != HankelDMDc.kind:  # which takes no key of the table but those stated here
+        stated, preset = {each.name for each in fields(spec) if each.init}, None
+        values = {"kind": spec.kind} | {key: v for key, v in values.items() if key in stated}
     if preset is not None and "alignment" in varied and spec.alignment is None:
         # The preset may bring an alignment, so that all which it states is stated in its place.
         stated |= {"readouts", *LENGTHS}

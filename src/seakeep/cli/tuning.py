@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -29,8 +29,8 @@ def tune(
         list[str] | None,
         typer.Option(
             help="What to choose beside the ridge: observables, lead, input_delays, state_delays, "
-            "memory, alignment, readouts. Repeat it for several. Default: observables, which are "
-            "chosen too where the file leaves them open.",
+            "memory, alignment, readouts, kind (FIR, ARX and subspace models too). Repeat it for "
+            "several. Default: observables, which are chosen too where the file leaves them open.",
         ),
     ] = None,
     out: Annotated[
@@ -52,7 +52,7 @@ def tune(
     Example: seakeep tune docs/tutorial/campaign.toml --vary input_delays
     """
     from seakeep.campaign import read_campaign
-    from seakeep.models import Select, labelled
+    from seakeep.models import HankelDMDc, Select, labelled
     from seakeep.report.comparison import plain_cells
     from seakeep.study.fit import read_training
     from seakeep.study.resolve import counts_in_periods, preset_of
@@ -78,8 +78,8 @@ def tune(
             "'recommended'."
         )
     with progress_bar("Preparing") as progress:
-        trained: Any = read_training(read, model, progress)
-    spec, _, runs, stop = trained
+        spec, _, runs, stop = read_training(read, model, progress)
+    assert isinstance(spec, HankelDMDc)
     period = read.encounter_period() if counts_in_periods(settings) else None
     scores = target.with_suffix(".scores.json")
     chosen = spec.select or Select(period=period)

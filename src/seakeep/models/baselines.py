@@ -307,6 +307,7 @@ class Subspace(Plain):
     """
 
     kind: ClassVar[str] = "subspace"
+    has_path: ClassVar[bool] = False
     ridge: float = 1e-3
     ridge_scale: RidgeScale = field(default="per_snapshot", init=False, repr=False)
     order: int | None = field(default=None, kw_only=True)
@@ -443,3 +444,7 @@ class SubspaceModel(Model):
         }
         matrices = {name: (each, getattr(self.space, name)) for name, each in dims.items()}
         return packed(self).assign(matrices)
+
+
+RIVALS = FIR(0), ARX(0, 0), Subspace(0, 0, 0.1)
+"""Kinds that a search may try beside a Hankel model, whose delays and inputs they take."""

@@ -189,13 +189,9 @@ def _series(
     starts = range(max(run.sizes["time"] // 2, model.history_samples - 1), last, steps)
     if len(starts) < 2:
         raise DataError("no two windows fit into half of the run.")
-    name, time = "the run", run["time"].values
-    windows = model.read_windows({name: run}, [(name, float(time[at])) for at in starts], steps)
-    states = labelled.channel_matrix(run, model.states, name)
-    measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
     predicted, measured = (
         (each - scale.centre) / scale.spread
-        for each in (model.free_runs([windows])[0][0], measured)
+        for each in model.judged_runs(run, "the run", starts, steps)
     )
     return np.where(np.isfinite(predicted), predicted, measured + LOST), measured
 

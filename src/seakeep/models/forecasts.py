@@ -20,7 +20,7 @@ from seakeep.models.checks import Json, check_choice
 from seakeep.models.engine import Windows, first_lost
 from seakeep.models.html import text_html
 from seakeep.models.interface import Needs, Role, Signature
-from seakeep.models.labelled import ChannelLabel, Runs, Stop, run_name
+from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix, run_name
 from seakeep.models.training import Training
 from seakeep.models.validity import outside_training
 from seakeep.signals.prediction import predict_waves
@@ -118,6 +118,16 @@ class Model:
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
         raise NotImplementedError
+
+    def judged_runs(
+        self, run: xr.Dataset, name: str, starts: Sequence[int], steps: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """Free runs from samples of a run, and the measurement, each (window, steps, N)."""
+        time = run["time"].values
+        windows = self.read_windows({name: run}, [(name, float(time[at])) for at in starts], steps)
+        states = channel_matrix(run, self.states, name)
+        measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
+        return self.free_runs([windows])[0][0], measured
 
     def summary(self) -> str:
         """Text that says what the model is."""

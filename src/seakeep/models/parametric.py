@@ -8,9 +8,7 @@ regression on the regressors and q times the regressors; its Gram matrix is a su
 
 from __future__ import annotations
 
-import itertools
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,22 +18,14 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.core.embedding import block_means, spread_means
 from seakeep.core.gram import Piece, primal_system, ridge_path
-from seakeep.core.metrics import nrmse
 from seakeep.core.solve import Solution
-from seakeep.errors import DataError, SeakeepWarning, warn
-from seakeep.models import labelled
+from seakeep.errors import DataError, warn
 from seakeep.models.engine import parameter_of
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import TrainingData
 
 GROUPS = ("state", "input", "direct")
-HORIZON = 15.0
-"""Length of the free runs that compare models, encounter periods."""
-SMALLER = (1.0, 0.1, 1e-2, 1e-3)
-"""Parts of the pooled model's λ that are tried: that is large where conditions disagree."""
-BETTER = 0.95
-"""Part of the pooled model's error below which the parameter is worth its coefficients."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,88 +172,6 @@ def regress_varying(
     )
     data = replace(data, signature=replace(data.signature, **scales, parameter=parameter))
     return Solution(fixed, "primal", ridge, len(gram)), data, variation
-
-
-def varying_then_pooled(
-    fit: Callable[[Any, dict[str, xr.Dataset]], Any],
-    pooled: Any,
-    varying: Sequence[Any],
-    runs: Mapping[str, xr.Dataset],
-    inputs: Sequence[str],
-) -> list[tuple[Any, str]]:
-    """Settings in the order of preference: those that err 5 % less than pooled ones, and these.
-
-    With three values or more, all runs of an inner value are held out in turn; with two, the second
-    half of each run.
-
-    Parameters
-    ----------
-    fit : callable
-        ``fit(settings, runs)`` gives a model.
-    pooled : HankelDMDc
-        Settings without a parameter.
-    varying : sequence of HankelDMDc
-        The same with the parameter, with several λ.
-    runs : mapping of str to Dataset
-        Training runs.
-    inputs : sequence of str
-        Inputs.
-
-    Returns
-    -------
-    list of (HankelDMDc, str)
-        Settings, and words on the errors of both kinds.
-    """
-    parameter = varying[0].parameter
-    values = {name: parameter_of(run, parameter, name) for name, run in runs.items()}
-    inner = sorted(set(values.values()))[1:-1]
-    steps = round(HORIZON * labelled.mean_period(runs, inputs))
-    halves = {name: run.isel(time=slice(run.sizes["time"] // 2)) for name, run in runs.items()}
-    folds = [
-        ({n: runs[n] for n in runs if values[n] != held}, [n for n in runs if values[n] == held])
-        for held in inner
-    ] or [(halves, list(runs))]
-    errors: dict[Any, list[float]] = {each: [] for each in (pooled, *varying)}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeakeepWarning)
-        for (training, judged), each in itertools.product(folds, errors):
-            model = fit(each, dict(training))
-            for name in judged:
-                errors[each].extend(_scores(model, runs[name], name, steps, not inner))
-    means = {each: float(np.mean(scores)) for each, scores in errors.items()}
-    order = sorted(varying, key=means.__getitem__)
-    better = [each for each in order if means[each] < BETTER * means[pooled]]
-    what = "runs of inner values" if inner else "second halves of the runs"
-    return [
-        (
-            taken,
-            f"on {what} that are held out, a model that varies with {parameter} errs "
-            f"{means[each]:.3f} ({each.ridge_text(float(each.ridge))}) and a pooled one "
-            f"{means[pooled]:.3f}; pooled unless the other errs 5 % less and does not grow\n",
-        )
-        for taken, each in zip((*better, pooled), (*better, order[0]), strict=True)
-    ]
-
-
-def _scores(model: Any, run: xr.Dataset, name: str, steps: int, is_half: bool) -> Sequence[float]:
-    """NRMSE, at most one, of each window end to end."""
-    first = max(is_half * run.sizes["time"] // 2, model.history_samples - 1)
-    starts = range(first, run.sizes["time"] - steps - max(model.lead_samples - 1, 0), steps)
-    if not starts:
-        raise DataError(
-            f"{name} is too short to judge whether the parameter is worth its coefficients: no "
-            f"window of {steps} samples can be forecast. Train on longer runs, or state ridge."
-        )
-    time = run["time"].values
-    windows = model.read_windows({name: run}, [(name, float(time[at])) for at in starts], steps)
-    states = labelled.channel_matrix(run, model.states, name)
-    measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
-    predicted = model.free_runs([windows])[0][0]
-    spread = model.signature.state_scale.spread
-    with np.errstate(invalid="ignore"):
-        each = nrmse(predicted=predicted, measured=measured, training_std=spread)
-    scores: FloatArray = np.where(np.isfinite(each), np.minimum(each, 1.0), 1.0).mean(axis=-1)
-    return [float(score) for score in scores]
 
 
 def nearest_data(

@@ -24,6 +24,7 @@ from collections.abc import (
 )
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -94,7 +95,7 @@ MEMORY = 8.0
 """Memory that is tried, encounter periods."""
 VARIED = (
     *("ridge", "observables", "lead", "input_delays", "state_delays", "alignment", "memory"),
-    "readouts",
+    *("readouts", "kind"),
 )
 """Settings that can be chosen."""
 WORST = 1.0
@@ -171,6 +172,21 @@ class FreeRuns(NamedTuple):
     predicted: FloatArray
     measured: FloatArray
     spread: FloatArray
+
+
+def scores_of(runs: FreeRuns) -> FloatArray:
+    """NRMSE averaged over the channels that move, shape (level, window), windows in which any does.
+
+    None counts worse than ``WORST``.
+    """
+    predicted, measured, spread = runs
+    with np.errstate(over="ignore", invalid="ignore"):
+        errors = metrics.nrmse(predicted=predicted, measured=measured, training_std=spread)
+    judged = ~metrics.is_slack(predicted=measured, measured=measured, training_std=spread)
+    errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
+    moved = judged.any(axis=-1)
+    result: FloatArray = np.mean(errors[:, moved], axis=-1, where=judged[moved])
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,8 +293,25 @@ class Problem:
             path = np.pad(path, ((0, 0), (0, 0), (len(x.mean), 0)))
         return Dynamics(path[0], *reach, x, u, w, chain.follows), path
 
+    def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
+        """λ that are tried of a candidate."""
+        return self.ridges if candidate.has_path else (float(candidate.ridge),)
+
+    def run(self, number: int) -> xr.Dataset:
+        """A run by its number."""
+        return self.runs[self.data.names[number]]
+
+    def fitted(self, candidate: Any, numbers: Iterable[int]) -> Any:
+        """The model that a candidate gives of some runs."""
+        signature = self.data.signature
+        given = {self.data.names[number]: self.run(number) for number in numbers}
+        return candidate.fit(given, signature.states, signature.inputs)
+
     def grows(self, candidate: HankelSettings, level: float) -> bool:
         """Whether the model that a candidate gives of all runs grows."""
+        if not candidate.has_path:
+            model = self.fitted(candidate, range(len(self.groups)))
+            return any(abs(np.linalg.eigvals(a)).max() >= 1.0 for a in model.system_matrices())
         return spectral_radius(self.models(candidate, [level], range(len(self.groups)))[0]) >= 1.0
 
     def starts(self, run: int, steps: int) -> IntArray:
@@ -298,40 +331,51 @@ class Problem:
 
         Runs of other groups teach, if there are any.
         """
-        data, (_, delayed, direct) = self.data, self.parts(candidate)
+        data = self.data
         rest = [other for other in range(len(self.groups)) if other != run]
         others = [other for other in rest if self.groups[other] != self.groups[run]]
+        if not candidate.has_path:
+            model = self.fitted(candidate, others or rest)
+            begin = round((data.begin(run) - float(self.run(run)["time"][0])) / data.signature.dt)
+            for steps in horizons:
+                if (starts := begin + self.starts(run, steps)).size:
+                    judged = model.judged_runs(self.run(run), data.names[run], starts, steps)
+                    yield FreeRuns(judged[0][None], judged[1], model.signature.state_scale.std)
+            return
+        _, delayed, direct = self.parts(candidate)
         dynamics, coefficients = self.models(candidate, levels, others or rest)
         states = data.signature.state_scale.physical(data.states[run])
-        for steps in horizons:
-            if not (starts := self.starts(run, steps)).size:
-                continue
-            places = [(data.names[run], data.begin(run) + at * data.signature.dt) for at in starts]
-            windows = read_windows(self.reader, self.runs, places, steps)
-            last = windows.delayed.shape[1] - self.ahead(candidate)
-            windows = replace(
-                windows,
-                delayed=windows.delayed[:, :last, delayed],
-                direct=windows.direct[..., direct[: windows.direct.shape[2]]],
-                table=None if windows.table is None else windows.table[..., delayed],
-            )
-            (predicted,) = model_runs(dynamics, coefficients, [windows])
-            measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
-            yield FreeRuns(predicted, measured, dynamics.state_scale.std)
+        known: dict[int, FloatArray] = {}  # by start: a longer run begins with the shorter one
+        every: dict[int, FreeRuns] = {}
+        for steps in sorted(horizons, reverse=True):
+            starts = self.starts(run, steps).tolist()
+            new = [at for at in starts if at not in known]
+            places = [(data.names[run], data.begin(run) + at * data.signature.dt) for at in new]
+            if new:
+                windows = read_windows(self.reader, self.runs, places, steps)
+                last = windows.delayed.shape[1] - self.ahead(candidate)
+                windows = replace(
+                    windows,
+                    delayed=windows.delayed[:, :last, delayed],
+                    direct=windows.direct[..., direct[: windows.direct.shape[2]]],
+                    table=None if windows.table is None else windows.table[..., delayed],
+                )
+                (computed,) = model_runs(dynamics, coefficients, [windows])
+                known |= zip(new, computed.swapaxes(0, 1), strict=True)
+            if starts:
+                predicted = np.stack([known[at][:, :steps] for at in starts], axis=1)
+                measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
+                every[steps] = FreeRuns(predicted, measured, dynamics.state_scale.std)
+        yield from (every[steps] for steps in horizons if steps in every)
 
     def judge(self, candidate: HankelSettings, fold: int) -> Scores:
         """Judge free runs on a run that is held out, over all horizons that fit."""
-        scores, ridges = [np.empty((len(self.ridges), 0))], self.ridges
-        for predicted, measured, spread in self.free_runs(candidate, ridges, fold, self.horizons):
-            with np.errstate(over="ignore", invalid="ignore"):
-                errors = metrics.nrmse(predicted=predicted, measured=measured, training_std=spread)
-            judged = ~metrics.is_slack(predicted=measured, measured=measured, training_std=spread)
-            errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
-            if (moved := judged.any(axis=-1)).any():
-                scores.append(np.mean(errors[:, moved], axis=-1, where=judged[moved]))
+        levels = self.levels(candidate)
+        every = self.free_runs(candidate, levels, fold, self.horizons)
+        scores = [each for each in map(scores_of, every) if each.size]
         counts = [each.shape[1] for each in scores]
-        weights = np.repeat(1.0 / np.maximum(counts, 1) / max(len(scores) - 1, 1), counts)
-        return np.concatenate(scores, axis=1), weights
+        weights = np.repeat(1.0 / np.maximum(counts, 1) / max(len(scores), 1), counts)
+        return np.concatenate([np.empty((len(levels), 0)), *scores], axis=1), weights
 
     def held_out(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
         """Free runs, end to end, on each run by the model of the others."""
@@ -430,7 +474,8 @@ def _judge(
         places = [firsts.index(problem.groups[fold]) for fold in folds]
         groups = np.repeat(places, [len(each) for each in weights])
         every = np.concatenate(scores, axis=1)
-        trials[candidate] = Trial(problem.ridges, every, joined / joined.sum(), groups)
+        levels = problem.levels(candidate)
+        trials[candidate] = Trial(levels, every, joined / joined.sum(), groups)
 
 
 def _key(candidate: HankelSettings, fold: int) -> str:
@@ -468,7 +513,8 @@ class Selected(Generic[Chosen]):
     def describe(self) -> str:
         """Text: how the choice was made, and the best λ of each candidate."""
         keys = ["observables", "lead", "state_delays", "input_delays"]
-        keys += [k for k in ("alignment", "memory") if len({row[k] for row in self.rows}) > 1]
+        often = ("alignment", "memory", "kind")
+        keys += [k for k in often if len({row[k] for row in self.rows}) > 1]
 
         def candidate(row: dict[str, Any]) -> tuple[Any, ...]:
             return tuple(row[key] for key in keys)
@@ -491,6 +537,7 @@ def settle(
     states: Sequence[str],
     inputs: Sequence[str],
     *,
+    kinds: Sequence[HankelSettings] = (),
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Selected[Settings]:
@@ -502,7 +549,7 @@ def settle(
         What was asked for.
     chosen : Select, optional
         What is chosen beside λ, and how.
-    runs, states, inputs, executor, progress
+    runs, states, inputs, kinds, executor, progress
         As in :func:`select`.
 
     Returns
@@ -537,6 +584,7 @@ def settle(
         horizon=asked.horizon,
         folds=asked.folds,
         period=asked.period,
+        kinds=kinds if asked.opened else (),
         executor=executor,
         progress=progress,
     )
@@ -555,6 +603,7 @@ def select(
     horizon: Sequence[float] = (15.0, 45.0),
     folds: Folds | int = "auto",
     period: float | None = None,
+    kinds: Sequence[HankelSettings] = (),
     executor: Executor | None = None,
     progress: Progress | None = None,
     seed: int = 0,
@@ -591,6 +640,9 @@ def select(
         their number. A single run is held out in three parts.
     period : float, optional
         Encounter period, s; by default that of the runs.
+    kinds : sequence of HankelSettings, optional
+        Other kinds of models, which take what they have of the settings that were chosen. One that
+        errs less, by more than the noise, is named; it is chosen where `vary` names "kind".
     executor : Executor, optional
         Judges candidates and folds side by side; the result is the same.
     progress : callable, optional
@@ -635,7 +687,7 @@ def select(
     # One that reads the measured surge is no choice.
     first = _alignments(aligned, given)[0] if "alignment" in vary else aligned
     base = settings.having(readouts=(), alignment=first)
-    for search in _Search(base, given, samples, step, vary, opened, by_sea).shorter():
+    for search in _Search(base, given, samples, step, vary, opened, by_sea, bool(kinds)).shorter():
         problems = search.problems(apart, ridges, horizons)
         if problems:
             break
@@ -671,22 +723,17 @@ def select(
     taken = start if trials[start].is_as_good_as(trials[best]) else best
     level = trials[taken].level(alike, stated if taken == start else None)
     taken, level = _stable(problems, trials, taken, level)
-    without = {
-        left_out: replace(taken, observables=tuple(o for o in taken.observables if o != left_out))
-        for left_out in taken.observables
-    }
-    _judge(problems, trials, without.values(), *work)
-    worth = "".join(
-        f"; without {named(left_out)} {trials[less].best:.3f}" for left_out, less in without.items()
-    )
-    problem = _problem_of(problems, taken)
-    assert problem is not None
+    worth = _worth(problems, trials, taken, *work)
     if taken != best or (varied and taken == start):
         worth += (
             "; what it starts from: nothing that was tried is better by more than the noise"
             if varied
             else f"; the simplest that is as good as the best ({trials[best].best:.3f})"
         )
+    taken, level, words = _rivalled(search, problems, trials, (taken, level), kinds, alike, *work)
+    problem = _problem_of(problems, taken)
+    assert problem is not None
+    readouts = readouts if taken.kind == settings.kind else {}
     fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
     return Selected(
         taken.having(ridge=level, readouts=_asked(settings, fitted, vary)),
@@ -696,7 +743,7 @@ def select(
             trials,
             taken,
             level,
-            worth,
+            worth + words,
             {*vary, *opened},
             by_sea,
             regular_periods(runs, inputs),
@@ -721,6 +768,8 @@ class _Search:
         As for :func:`select`.
     unseen : bool
         Whether what is chosen must hold in sea states that no run holds.
+    rivals : bool
+        Whether other kinds of models are tried, which follow no surge.
     cut : int
         How many of the observables are left out that could be offered.
     remembers : bool
@@ -734,6 +783,7 @@ class _Search:
     vary: Sequence[str]
     opened: Sequence[str]
     unseen: bool
+    rivals: bool
     cut: int = 0
     remembers: bool = True
 
@@ -830,6 +880,12 @@ class _Search:
             candidates += [self._fitting(best, change) for change in changes]
         return candidates
 
+    def at_rest(self, best: Any) -> Any:
+        """A candidate without the alignment to a predicted surge."""
+        return (
+            self._fitting(best, {"alignment": None}) if _columns_of(best)[1] is not None else best
+        )
+
     def _fitting(self, best: Any, changes: Changes) -> Any:
         """A candidate with the observables of the same kinds that go with its other settings."""
         candidate, kinds = replace(best, **changes), {each.kind for each in best.observables}
@@ -845,7 +901,7 @@ class _Search:
         horizons: tuple[int, ...],
     ) -> dict[Columns, Problem]:
         """The columns of all that is tried; none where what it starts from is too long."""
-        candidates = [self.base]
+        candidates = [self.base, *([self.at_rest(self.base)] * self.rivals)]
         for step_of in (*self.left_open(), *self.varied()):
             candidates += step_of(self.base)
         starts: dict[Columns, list[Any]] = {}
@@ -920,6 +976,53 @@ def _stable(
         if problem is not None and not problem.grows(candidate, ridge):
             return candidate, ridge
     return taken, level
+
+
+def _worth(
+    problems: Mapping[Columns, Problem],
+    trials: dict[Settings, Trial],
+    taken: Settings,
+    *work: Any,
+) -> str:
+    """What a candidate errs without each of its observables, in words."""
+    without = {
+        left_out: replace(taken, observables=tuple(o for o in taken.observables if o != left_out))
+        for left_out in taken.observables
+    }
+    _judge(problems, trials, without.values(), *work)
+    return "".join(f"; without {named(o)} {trials[less].best:.3f}" for o, less in without.items())
+
+
+def _rivalled(
+    search: _Search,
+    problems: Mapping[Columns, Problem],
+    trials: dict[Settings, Trial],
+    chosen: tuple[Settings, float],
+    kinds: Sequence[HankelSettings],
+    alike: float,
+    *work: Any,
+) -> tuple[Settings, float, str]:
+    """A candidate and λ, of another kind where that is varied and better, and words on the better.
+
+    The better one is the best that errs less by more than the noise and does not grow.
+    """
+    # Beside a fit only the waves themselves are tried, which takes a hundredth of its time.
+    own = {"ridge"} if "kind" in search.vary else {"ridge", "observables"}
+    plain = {key: v for key, v in vars(search.at_rest(chosen[0])).items() if key not in own}
+    rivals: list[Any] = [each.having(**plain) for each in kinds if search.given[2]]
+    others: dict[Any, Trial] = {}
+    _judge(problems, others, filter(partial(_problem_of, problems), rivals), *work)
+    words = ""
+    for other, its in sorted(others.items(), key=lambda each: each[1].best):
+        problem, level = _problem_of(problems, other), its.level(alike)
+        assert problem is not None
+        if not trials[chosen[0]].is_as_good_as(its) and not problem.grows(other, level):
+            words = f"; kind = '{other.kind}' errs {its.at(level):.3f}, less by more than the noise"
+            chosen = (other, level) if "kind" in search.vary else chosen
+            break
+    if "kind" in search.vary:
+        trials |= others
+    return *chosen, words
 
 
 def _note(
@@ -1170,6 +1273,7 @@ def _rows_of(
                 "observables": ", ".join(each.kind for each in candidate.observables) or "none",
                 "alignment": "none" if aligned is None else f"{aligned.mode}, {aligned.surge}",
                 "memory": candidate.memory,
+                "kind": candidate.kind,
                 "ridge": own,
                 "score": float(score),
                 "lower": float(low),

@@ -219,6 +219,8 @@ class HankelSettings:
     may_choose: ClassVar[bool] = False
     is_filter: ClassVar[bool] = False
     """Whether no state is a regressor."""
+    has_path: ClassVar[bool] = True
+    """Whether one Gram matrix gives the models of all λ."""
     lengths: ClassVar[Mapping[str, int]] = {
         "window": 2,
         "state_delays": 0,

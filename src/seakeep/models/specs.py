@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import warnings
 from collections.abc import Collection, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
@@ -11,9 +13,10 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Progress
-from seakeep.errors import SHOWN, DataError, RequestError
+from seakeep.errors import SHOWN, DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
+from seakeep.models.baselines import FIR
 from seakeep.models.checks import Json, check_choice, check_flag, check_integer
 from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members
 from seakeep.models.engine import parameter_of
@@ -22,14 +25,16 @@ from seakeep.models.forecasts import Spec
 from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel, LinearKind
-from seakeep.models.parametric import SMALLER, regress_varying, varying_then_pooled
+from seakeep.models.parametric import regress_varying
 from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import (
     MEMORY,
+    FreeRuns,
     Selected,
     default_observables,
     readouts_for,
+    scores_of,
     settle,
 )
 from seakeep.models.settings import (
@@ -51,6 +56,12 @@ from seakeep.models.validity import Coverage
 from seakeep.toml import Length
 
 PAPER_RIDGE = 100.0
+HORIZON = 15.0
+"""Length of the free runs that compare models with a parameter and without, encounter periods."""
+SMALLER = (1.0, 0.1, 1e-2, 1e-3)
+"""Parts of the pooled model's λ that are tried: that is large where conditions disagree."""
+BETTER = 0.95
+"""Part of the pooled model's error below which the parameter is worth its coefficients."""
 STATE_PERIODS, INPUT_PERIODS, LEAD_PERIODS = 1.0, 3.0, 0.75
 """Delays and look-ahead that we recommend; a search from there gains a twentieth at most."""
 ALIGNMENT = ProbeAlignment(mode="dispersion", surge="predicted", optional=True)
@@ -139,9 +150,8 @@ class Choosing(HankelSettings, Generic[Fitted]):
         channels = list(states), list(inputs)
         spec = self.resolved_in(named, inputs)
         central = spec.central(labelled.common_step(named))
-        choice = settle(
-            central, central.select, named, *channels, executor=executor, progress=progress
-        )
+        how: Any = {"kinds": (FIR(0),), "executor": executor, "progress": progress}
+        choice = settle(central, central.select, named, *channels, **how)
         return spec._adopt(choice)
 
     def fit(
@@ -407,13 +417,8 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         return cls(
             state_delays=samples(STATE_PERIODS),
             input_delays=samples(INPUT_PERIODS),
-            ridge="rollout",
-            delay_rows="exact",
-            ridge_scale="per_snapshot",
-            alignment=ALIGNMENT,
             lead=samples(look_ahead),
-            readouts="auto",
-            select=Select(True, True, True, True, period=encounter_period),
+            **_open_settings(encounter_period),
         )
 
     def central(self, dt: float) -> HankelDMDc:
@@ -430,16 +435,44 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         states: list[str],
         inputs: list[str],
     ) -> list[tuple[HankelDMDc, str]]:
+        """As stated; with a parameter those that err 5 % less than a pooled one, and that.
+
+        With three values or more, all runs of an inner value are held out in turn; with two, the
+        second half of each run.
+        """
         if not self.parameter:
             return [(settings, "")]
+        pooled = replace(settings, parameter="")
         parts = SMALLER if isinstance(self.ridge, str) else (1.0,)
-        return varying_then_pooled(
-            lambda spec, runs: spec._fitted(runs, states, inputs, ()),
-            replace(settings, parameter=""),
-            [replace(settings, ridge=part * float(settings.ridge)) for part in parts],
-            runs,
-            inputs,
-        )
+        varying = [replace(settings, ridge=part * float(settings.ridge)) for part in parts]
+        values = {name: parameter_of(run, self.parameter, name) for name, run in runs.items()}
+        inner = sorted(set(values.values()))[1:-1]
+        steps = round(HORIZON * labelled.mean_period(runs, inputs))
+        halves = {n: run.isel(time=slice(run.sizes["time"] // 2)) for n, run in runs.items()}
+        folds = [
+            ({n: runs[n] for n in runs if values[n] != out}, [n for n in runs if values[n] == out])
+            for out in inner
+        ] or [(halves, list(runs))]
+        errors: dict[HankelDMDc, list[float]] = {each: [] for each in (pooled, *varying)}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SeakeepWarning)
+            for (training, judged), each in itertools.product(folds, errors):
+                model = each._fitted(dict(training), states, inputs, ())
+                for name in judged:
+                    errors[each] += _window_scores(model, runs[name], name, steps, not inner)
+        means = {each: float(np.mean(scores)) for each, scores in errors.items()}
+        order = sorted(varying, key=means.__getitem__)
+        better = [each for each in order if means[each] < BETTER * means[pooled]]
+        what = "runs of inner values" if inner else "second halves of the runs"
+        return [
+            (
+                taken,
+                f"on {what} that are held out, a model that varies with {self.parameter} errs "
+                f"{means[each]:.3f} ({each.ridge_text(float(each.ridge))}) and a pooled one "
+                f"{means[pooled]:.3f}; pooled unless the other errs 5 % less and does not grow\n",
+            )
+            for taken, each in zip((*better, pooled), (*better, order[0]), strict=True)
+        ]
 
     def _fitted(
         self,
@@ -456,6 +489,24 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
             return replace(model, variation=variation)
         solution = data.regress(self, self.state_delays, all_rows=self.delay_rows == "ridge")
         return HankelDMDcModel.fitted(self, data, solution, runs, readouts)
+
+
+def _window_scores(
+    model: HankelDMDcModel, run: xr.Dataset, name: str, steps: int, is_half: bool
+) -> list[float]:
+    """Scores of windows end to end, of the second half or of the whole run."""
+    first = max(is_half * run.sizes["time"] // 2, model.history_samples - 1)
+    starts = range(first, run.sizes["time"] - steps - max(model.lead_samples - 1, 0), steps)
+    if not starts:
+        raise DataError(
+            f"{name} is too short to judge whether the parameter is worth its coefficients: no "
+            f"window of {steps} samples can be forecast. Train on longer runs, or state ridge."
+        )
+    predicted, measured = model.judged_runs(run, name, starts, steps)
+    scores: list[float] = scores_of(
+        FreeRuns(predicted[None], measured, model.signature.state_scale.spread)
+    )[0].tolist()
+    return scores
 
 
 def _largest_radius(model: HankelDMDcModel) -> float:
@@ -694,18 +745,13 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             encounter_period=encounter_period,
             state_delays=Uniform("0.5 T", "1.5 T"),
             input_delays=Uniform("2 T", "4 T"),
-            ridge="rollout",
             n_members=n_members,
             seed=seed,
             dt=dt if runs is None else _step_of(dt, runs),
-            delay_rows="exact",
-            ridge_scale="per_snapshot",
-            alignment=ALIGNMENT,
             lead=Length(LEAD_PERIODS),  # type: ignore[arg-type]
-            readouts="auto",
             train_on="auto",
             centred=True,
-            select=Select(True, True, True, True, period=encounter_period),
+            **_open_settings(encounter_period),
         )
 
     def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[BayesianHankelDMDc]:
@@ -802,6 +848,18 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
 def left_open(spec: Spec) -> HankelDMDc | BayesianHankelDMDc | None:
     """The spec, where it leaves something to be chosen by free runs."""
     return spec if isinstance(spec, HankelDMDc | BayesianHankelDMDc) and spec.is_open else None
+
+
+def _open_settings(encounter_period: float) -> dict[str, Any]:
+    """What both kinds of models that we recommend share; free runs choose in it."""
+    return {
+        "ridge": "rollout",
+        "delay_rows": "exact",
+        "ridge_scale": "per_snapshot",
+        "alignment": ALIGNMENT,
+        "readouts": "auto",
+        "select": Select(True, True, True, True, period=encounter_period),
+    }
 
 
 def _seed_sequence(seed: object) -> np.random.SeedSequence:

@@ -1,0 +1,104 @@
+"""Other kinds of models beside a Hankel model, by free runs on the same windows."""
+
+import sys
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from seakeep import HankelDMDc, Select, metrics, tune
+from seakeep.baselines import ARX, FIR, Subspace
+from seakeep.campaign.settings import ModelSettings
+from seakeep.models.selection import WORST
+from seakeep.study.resolve import resolve_model
+from seakeep.tuning import tuned_campaign
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from test_selection import DT, INPUTS, PERIOD, STATES, runs
+
+SPEC = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot", lead=3)
+
+
+def filtered(seed: int, samples: int = 200) -> xr.Dataset:
+    """A heave that is a filter of the waves, in noise as large as it."""
+    rng = np.random.default_rng(seed)
+    eta = rng.standard_normal(samples)
+    heave = np.convolve(eta, [0.0, 1.0, -0.5, 0.3])[:samples] + rng.standard_normal(samples)
+    variables = {"heave": ("time", heave, {"units": "m"}), "eta": ("time", eta, {"units": "m"})}
+    time = 0.1 * np.arange(samples)
+    return xr.Dataset(variables, coords={"time": time}, attrs={"encounter_period": 0.4})
+
+
+def test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts():
+    given = runs()
+    result = tune(SPEC, given, STATES, INPUTS, vary=["kind"], horizon=(15,))
+    table = result.table
+    kinds = {
+        "fir": FIR(12, lead=3),
+        "arx": ARX(6, 12, lead=3),
+        "subspace": Subspace(6, 12, 0.1, lead=3),
+    }
+    assert set(table["kind"].values.tolist()) == {"hankel_dmdc", *kinds}
+    steps = 15 * PERIOD
+    for kind, spec in kinds.items():
+        row = table.isel(trial=np.flatnonzero(table["kind"].values == kind)[-1])
+        own = replace(spec, ridge=float(row["ridge"]))
+        if kind == "arx":
+            own = replace(own, ridge_scale="per_snapshot")
+        found = []
+        for name, run in given.items():
+            model = own.fit([r for n, r in given.items() if n != name], STATES, INPUTS)
+            scores = []
+            for at in range(12, run.sizes["time"] - model.lead_samples - steps + 1, steps):
+                forecast = model.forecast(run, at * DT, steps)
+                measured = run[STATES].isel(time=slice(at + 1, at + 1 + steps))
+                errors = metrics.nrmse(predicted=forecast, measured=measured)
+                scores.append(np.mean([min(float(errors[state]), WORST) for state in STATES]))
+            found.append(np.mean(scores))
+        # Windows side by side are summed in another order than one by one.
+        assert float(row["score"]) == pytest.approx(np.mean(found), abs=1e-9)
+
+
+def test_a_kind_that_is_better_beyond_the_noise_is_named_by_fit_and_taken_by_tune():
+    given = {f"run {seed}": filtered(seed) for seed in range(4)}
+    # The waves tell all but the noise, which 41 delayed states in it learn by heart.
+    spec = HankelDMDc(40, 3, 1e-5, delay_rows="exact", ridge_scale="per_snapshot")
+    result = tune(spec, given, ["heave"], ["eta"], vary=["kind"], horizon=(5,))
+    assert "kind = 'fir' errs 0." in result.note
+    assert isinstance(result.spec, FIR)
+    assert result.spec.input_delays == 3
+    model = result.spec.fit(given, ["heave"], ["eta"])
+    taps = model.B[0] * model.state_std / model.input_std
+    # Of 4 runs of 200 samples in noise of SD 1: to 0.035 each.
+    np.testing.assert_allclose(taps, [1.0, -0.5, 0.3, 0.0], rtol=0, atol=0.12)
+    select = Select(memory=True, period=0.4, horizon=(5,))
+    fitted = replace(spec, ridge="rollout", select=select).fit(given, ["heave"], ["eta"])
+    assert isinstance(fitted.settings, HankelDMDc)
+    assert "kind = 'fir' errs 0." in fitted.selection
+
+
+def test_a_vessel_with_a_memory_stays_a_hankel_model():
+    result = tune(SPEC, runs(), STATES, INPUTS, vary=["kind"], horizon=(15,))
+    assert isinstance(result.spec, HankelDMDc)
+    assert "kind = " not in result.note
+
+
+@pytest.mark.parametrize("spec", [FIR(24, 1e-3, lead=3), Subspace(8, 24, 0.1), ARX(8, 16, 1e-2)])
+def test_a_tuned_file_states_the_kind_and_what_it_takes(spec, tmp_path):
+    text = """[model]
+preset = "recommended"
+states = ["heave"]
+inputs = ["eta"]
+alignment = { surge = "none" }
+lead = 0
+"""
+    written = tuned_campaign(text, None, spec, ["kind"], "recommended", 16.0)
+    table = tomllib.loads(written)["model"]
+    assert {"preset", "alignment"}.isdisjoint(table)
+    settings = ModelSettings(**table)
+    again = resolve_model(settings, 1.6, 0.1, aligned=True).spec
+    assert replace(again, ridge=spec.ridge) == again == spec
