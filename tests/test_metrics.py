@@ -158,22 +158,6 @@ def test_channels_are_matched_by_name_and_instants_by_time():
 # Refused
 
 
-def test_a_channel_that_is_mostly_noise_is_not_judged():
-    rng = np.random.default_rng(0)
-    measured = np.sin(np.arange(400) / 5)[:, None] * [1.0, 0.1] + 0.1 * rng.standard_normal(
-        (400, 2)
-    )
-    # SDs of 0.71 and 0.12 against noise of 0.1: √2 of it is more than the second moves.
-    found = metrics.nrmse(predicted=0 * measured, measured=measured, noise_std=[0.1, 0.1])
-    assert np.isfinite(found[0])
-    assert np.isnan(found[1])
-    noisy = labelled(measured)
-    for name in noisy:
-        noisy[name].attrs["noise_std"] = 0.1
-    slack = metrics.is_slack(predicted=labelled(0 * measured), measured=noisy)
-    assert [bool(slack[name]) for name in slack] == [False, True]
-
-
 def autoregression(rng, size, phi=0.9):
     noise = rng.standard_normal(size + 200)
     out = np.empty_like(noise)
@@ -248,18 +232,6 @@ def test_errors_that_models_share_cancel_in_their_difference():
         np.testing.assert_allclose(found[f"all_{key}"], [0, -0.5, 0], atol=1e-12)
 
 
-def test_the_interval_of_a_difference_holds_it_as_often_as_it_says():
-    draws = np.random.default_rng(1).normal(size=(3, 500, 150, 1))
-    measured, shared, own = ([labelled(each, ("heave",)) for each in of] for of in draws)
-    first = [m + s for m, s in zip(measured, shared, strict=True)]
-    second = [m + 0.8 * s + 0.3 * o for m, s, o in zip(measured, shared, own, strict=True)]
-    found = metrics.anrmse_differences([first, second], measured).isel(model=1)
-    truth = np.sqrt(0.8**2 + 0.3**2) - 1.0
-    held = (found["lower"] <= truth) & (truth <= found["upper"])
-    # 500 repetitions know a coverage of 95 % to 1 % (one SD).
-    assert 0.92 <= float(held.mean()) <= 0.98
-
-
 def test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise():
     measured = np.tile([[1.0, 1.0], [-1.0, -1.0]], (50, 1))
     spread = measured.std(axis=0, ddof=1)
@@ -267,3 +239,5 @@ def test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise():
         pair = both(measured, measured)
         found = metrics.is_slack(**pair, noise_std=np.sqrt(part) * spread)
         np.testing.assert_array_equal(found, [slack, slack])
+    noisy = labelled(measured, noise_std=0.8)  # stated with the measurement
+    assert all(metrics.is_slack(predicted=labelled(measured), measured=noisy).values())

@@ -21,7 +21,7 @@ import xarray as xr
 from seakeep.arrays import finite
 from seakeep.core import bootstrap, density
 from seakeep.core import coverage as of_arrays
-from seakeep.core.bands import BandErrors, band_error_over_time, split_bands
+from seakeep.core.bands import split_bands
 from seakeep.core.bootstrap import (
     BlockRule,
     block_length,
@@ -39,10 +39,8 @@ from seakeep.core.coverage import (
     winkler_score,
 )
 from seakeep.core.density import (
-    DensityInterval,
     JsdInterval,
     density_grid,
-    density_interval,
     jensen_shannon,
     kernel_bandwidth,
     kernel_density,
@@ -52,14 +50,11 @@ from seakeep.pairing import channel_names, pair
 
 __all__ = [
     "BandCoverage",
-    "BandErrors",
     "BoxStatistics",
     "ConformalMargin",
     "CoverageTable",
-    "DensityInterval",
     "JsdInterval",
     "band_crps",
-    "band_error_over_time",
     "band_scores",
     "block_length",
     "box_statistics",
@@ -67,7 +62,6 @@ __all__ = [
     "coverage",
     "coverage_table",
     "density_grid",
-    "density_interval",
     "jensen_shannon",
     "jsd_interval",
     "kernel_bandwidth",

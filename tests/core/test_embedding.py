@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
 
 from seakeep.core import embed, training_window
 
@@ -30,18 +28,3 @@ def test_windows_at_the_papers_delays(last, window, history, first, first_column
     place = training_window(last, window, 32, 160, history)
     assert (place.first, place.first_column, place.columns) == (first, first_column, columns)
     assert place.samples == slice(first, last + 1)
-
-
-@given(
-    last=st.integers(0, 300),
-    window=st.none() | st.integers(2, 300),
-    s=st.integers(0, 40),
-    z=st.integers(0, 40),
-    history=st.sampled_from(["before", "inside"]),
-)
-def test_no_column_reads_before_the_run_and_none_ends_after_the_window(last, window, s, z, history):
-    assume(window is None or window <= last + 1)
-    place = training_window(last, window, s, z, history)
-    assert place.first_column - max(s, z) >= 0
-    assert place.first_column + place.columns == last
-    assert place.first_column >= place.first

@@ -177,6 +177,11 @@ def test_free_runs_are_the_loop_over_the_extended_state(case, piece):
     ]
     driving = inputs if inputs.shape[2] else np.zeros((len(histories), steps, 0))
     options = {"direct": direct} if direct.shape[2] else {}
+    extended = histories[:, ::-1].reshape(len(histories), -1)
+    embedded = [inputs[:, z - lag : z - lag + steps] for lag in range(z + 1)]
     with patch.object(ROLLOUT, "PIECE", piece):
-        found = rollout(a[:rows], b[:rows], histories, driving, n_states=N, **options)
-    np.testing.assert_allclose(found, expected, atol=RESULT)
+        found = [
+            rollout(a[:rows], b[:rows], start, series, n_states=N, **options)
+            for start, series in ((histories, driving), (extended, np.concatenate(embedded, 2)))
+        ]
+    np.testing.assert_allclose(found, [expected] * 2, atol=RESULT)

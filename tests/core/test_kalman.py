@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy import linalg
 
 from seakeep.core.kalman import DelayFilter, process_noise
 
@@ -54,21 +53,6 @@ def test_it_is_the_textbook_filter_with_rows_missing():
         # Hundreds of products of numbers of order one.
         np.testing.assert_allclose(state, textbook.x, rtol=0, atol=1e-10)
         np.testing.assert_allclose(covariance, textbook.P, rtol=0, atol=1e-10)
-
-
-def test_without_measurements_the_covariance_is_the_sum_of_all_that_disturbed_it():
-    filter_ = DelayFilter(A, PROCESS, np.zeros(N), np.zeros((SIZE, SIZE)))
-    disturbed = np.zeros((SIZE, SIZE))
-    disturbed[-N:, -N:] = PROCESS
-    expected, carried = np.zeros((SIZE, SIZE)), disturbed
-    for _ in range(400):
-        filter_.shift()
-        expected, carried = expected + carried, companion() @ carried @ companion().T
-        # Sums of hundreds of terms of the size of the covariance itself.
-        np.testing.assert_allclose(filter_.covariance, expected, rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(filter_.covariance, filter_.covariance.T)
-    limit = linalg.solve_discrete_lyapunov(companion(), disturbed)
-    np.testing.assert_allclose(filter_.covariance, limit, rtol=1e-9)
 
 
 def test_a_state_measured_without_noise_is_known():

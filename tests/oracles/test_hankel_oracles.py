@@ -150,31 +150,6 @@ def test_scipy_simulates_the_exported_system_like_our_forecast(exported, delays)
     np.testing.assert_allclose(physical[1:], exported.forecast, rtol=0, atol=1e-10)
 
 
-def test_the_exported_system_without_standardisation_holds_the_matrices_themselves(make_run):
-    model = fit(make_run(), 2, 0)
-    system = model.to_state_space()
-    np.testing.assert_array_equal(system.A, model.A)
-    np.testing.assert_array_equal(system.B, model.B)
-
-
-@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
-@pytest.mark.parametrize("rank", [4, 12])
-def test_a_rank_equals_truncated_singular_values_in_plain_numpy(make_run, rank, delay_rows):
-    s, z = 3, 8
-    run = make_run(samples=200)
-    model = fit(run, s, z, ridge=0.0, rank=rank, delay_rows=delay_rows)
-    x, u = matrix(run, STATES), matrix(run, INPUTS)
-    columns = np.arange(z, 199)
-    y = np.vstack(
-        [x[columns - lag].T for lag in range(s + 1)] + [u[columns - lag].T for lag in range(z + 1)]
-    )
-    left, values, right = np.linalg.svd(y, full_matrices=False)
-    g = x[columns + 1].T @ right[:rank].T / values[:rank] @ left[:, :rank].T
-    ours = np.concatenate([model.A[:N], model.B[:N]], axis=1)
-    # Singular values kept are above 1e-2 of the largest, so the pseudo-inverse keeps 1e-13.
-    np.testing.assert_allclose(ours, g, rtol=0, atol=SAME_MATRICES)
-
-
 def test_the_papers_formula_in_plain_numpy_at_the_papers_size():
     rng = np.random.default_rng(0)
     n, q, m, s, z, ridge = 11, 2, 640, 32, 160, 100.0

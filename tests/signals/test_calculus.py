@@ -52,14 +52,6 @@ def test_derivative_of_a_quartic_is_exact():
     np.testing.assert_allclose(differentiate(t**4 - t, 0.1), 4 * t**3 - 1, atol=1e-11)
 
 
-def test_error_of_the_derivative_is_the_one_stated():
-    omega, dt = 2 * np.pi, 0.02
-    t = np.arange(0, 5, dt)
-    error = differentiate(np.sin(omega * t), dt) - omega * np.cos(omega * t)
-    # dt⁴ f⁗′/30, its next term (ω dt)² smaller: 1.6 %.
-    assert np.max(np.abs(error[2:-2])) == pytest.approx(dt**4 * omega**5 / 30, rel=0.02)
-
-
 def test_envelope_of_a_group():
     slow = 1.0 + 0.4 * np.cos(2 * np.pi * 0.05 * T)
     out = envelope_squared(5.0 + slow * np.sin(2 * np.pi * 1.0 * T), DT)

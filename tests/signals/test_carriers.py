@@ -58,15 +58,6 @@ def test_a_carried_wave_is_that_of_linear_dispersion_to_the_error_of_the_design(
     assert errors[1] < 0.02
 
 
-def test_probes_up_wave_tell_what_has_not_come_yet(spectrum):
-    alone, both = (
-        designed(spectrum, (0.0,), probes=probes, ahead=0, lead=32)[1][0]
-        for probes in ((0.0,), PROBES)
-    )
-    assert alone > 0.5  # a whole period ahead
-    assert both < 0.1  # the probe 3 m up-wave has seen it
-
-
 def test_a_carrier_reads_its_own_samples_alone(spectrum):
     taps, _ = designed(spectrum, (0.3,))
     record = np.random.default_rng(0).standard_normal((400, 2))

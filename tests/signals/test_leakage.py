@@ -53,14 +53,6 @@ def test_regular_waves_repeat_by_their_nature():
     assert find_leakage([sea()[:100]], sea(), DT) is None  # shorter than a stretch
 
 
-def test_the_same_record_is_a_plain_repeat():
-    found = find_leakage([sea()], sea()[500:2500], DT)
-    assert found is not None
-    assert found.share == 1.0
-    assert found.phase == pytest.approx(0.0, abs=0.05)  # the Hilbert transform's ends
-    assert found.training_start - found.test_start == pytest.approx(500 * DT, abs=DT)
-
-
 def test_still_water_before_the_waves_is_no_part_of_the_comparison():
     # Two wave trains that build up after still water: they differ in all but that.
     ramp = np.clip((TIME - 20.0) / 10.0, 0.0, 1.0)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from seas import sea
 
-from seakeep.signals import carry_by_celerity, carry_by_dispersion, encounter_period
-from seakeep.waves import wavenumber
+from seakeep.signals import carry_by_celerity, carry_by_dispersion
 
 DEPTH = 3.6
 DT = 1.64 / 32
@@ -23,17 +22,6 @@ def carried_to(place, carry, record, *how):
     """Elevation at one place, or at one per sample."""
     span = float(np.min(place)), float(np.max(place))
     return carry(record, DT, span, *how).at(place).reshape(record.shape)
-
-
-def test_a_vessel_that_drifts_downstream_meets_waves_later():
-    omega = 2 * np.pi * 0.6
-    speed = 0.1  # m/s, downstream
-    carried = carried_to(speed * TIME, carry_by_dispersion, np.cos(omega * TIME), DEPTH)
-    encountered = omega - float(wavenumber(omega, DEPTH)) * speed
-    # The record is cut: half a wave in sixty at either end.
-    period = encounter_period(carried[INNER], DT)
-    assert period == pytest.approx(2 * np.pi / encountered, rel=1e-3)
-    assert encountered < omega
 
 
 @pytest.mark.parametrize("distance", [1.0, -1.0, 3.67, "moving"])

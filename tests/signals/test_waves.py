@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from seakeep.signals import (
     encounter_period,
-    peak_period,
     wave_heights,
     wave_spectrum,
     wave_statistics,
@@ -42,22 +41,6 @@ def test_heights_are_crest_less_trough():
     assert heights.size == pytest.approx(40 * 6 / (2 * np.pi), abs=1.5)
     assert heights.mean() == pytest.approx(2.0, rel=0.01)
     assert np.ptp(heights) == pytest.approx(0.4, rel=0.05)
-
-
-def test_a_coarse_spectrum_moves_the_peak():
-    # Nominal 2.12 s: segments of 8.2 s have bins of 0.12 Hz (the paper reads 2.02 s from them).
-    rng = np.random.default_rng(0)
-    t = np.arange(0, 600, 0.02)
-    f = np.linspace(0.28, 1.13, 400) + rng.uniform(-1e-3, 1e-3, 400)
-    density = f**-5 * np.exp(-1.25 * (1 / (2.12 * f)) ** 4)
-    phase = rng.uniform(0, 2 * np.pi, 400)
-    series = sum(
-        np.sqrt(d) * np.cos(2 * np.pi * a * t + p)
-        for a, d, p in zip(f, density, phase, strict=True)
-    )
-    fine = peak_period(series, 0.02)
-    # A minute's segments: bins of 1/60 Hz and 20 of them; the peak of a random sea scatters.
-    assert fine == pytest.approx(2.12, rel=0.08)
 
 
 @given(st.floats(1.0, 4.0), st.floats(0.01, 2.0))

@@ -3,17 +3,11 @@
 import numpy as np
 import pytest
 
-from seakeep import metrics, statistics
+from seakeep import statistics
 
 DT, SPLIT = 0.05, 0.2
 TIME = np.arange(480) * DT
 INNER = slice(200, -200)  # two periods of the split frequency from either end
-
-
-def histories(slow, fast):
-    measured = np.stack([np.sin(2 * np.pi * 0.5 * TIME), np.cos(2 * np.pi * 0.6 * TIME)], axis=1)
-    error = slow * np.sin(2 * np.pi * 0.03 * TIME) + fast * np.sin(2 * np.pi * 0.7 * TIME)
-    return {"predicted": measured + error[:, None], "measured": measured}
 
 
 def test_the_parts_add_up_to_the_series():
@@ -31,39 +25,6 @@ def test_the_gain_is_that_of_the_butterworth_filter_both_ways():
         expected = 1 / (1 + ratio**8)
         found = np.sqrt(2) * low[2000:6000, 0].std()
         assert found == pytest.approx(expected, abs=1e-3)  # 4000 samples hold whole periods
-
-
-@pytest.mark.parametrize(("slow", "fast"), [(1.0, 0.0), (0.0, 1.0)])
-def test_an_error_is_found_in_its_own_band(slow, fast):
-    pair = histories(slow, fast)
-    bands = statistics.band_error_over_time(**pair, dt=DT, frequency=SPLIT)
-    whole = metrics.error_over_time(**pair)
-    own, other = (bands.low, bands.wave) if slow else (bands.wave, bands.low)
-    # The gain at 0.03 Hz is 1 − 3e-7 and at 0.7 Hz 4e-5; what the mirror images at the ends leave
-    # has died down to 0.5 % of the amplitude two periods on.
-    np.testing.assert_allclose(own[INNER], whole[INNER], rtol=0, atol=0.01)
-    assert other[INNER].max() < 0.01
-
-
-def test_both_together_are_no_less_than_the_whole():
-    pair = histories(0.5, 0.7)
-    low, wave = statistics.band_error_over_time(**pair, dt=DT, frequency=SPLIT)
-    assert np.all(low + wave >= metrics.error_over_time(**pair) - 1e-12)  # rounding
-
-
-def test_a_diverged_forecast_is_nan_and_a_slack_channel_left_out():
-    pair = histories(0.5, 0.5)
-    alone = statistics.band_error_over_time(
-        **{key: value[:, :1] for key, value in pair.items()}, dt=DT, frequency=SPLIT
-    )
-    slack = {key: value.copy() for key, value in pair.items()}
-    slack["measured"][:, 1] *= 1e-4
-    left = statistics.band_error_over_time(**slack, dt=DT, frequency=SPLIT, training_std=np.ones(2))
-    np.testing.assert_allclose(left.low, alone.low, rtol=1e-12)
-    pair["predicted"][300:] = np.nan
-    lost = statistics.band_error_over_time(**pair, dt=DT, frequency=SPLIT)
-    assert np.isnan(lost.low).all()
-    assert np.isnan(lost.wave).all()
 
 
 def test_waves_are_not_forced_to_nothing_at_the_ends():

@@ -47,7 +47,6 @@ def test_a_join_is_no_neighbour():
     pairs = [i for i in range(399) if i != 199]
     by_hand = 400 * sum(centred[i + 1] * centred[i] for i in pairs) / (398 * sum(centred**2))
     assert lag_one_correlation(x, [200, 200]) == pytest.approx(by_hand, rel=1e-12)
-    assert lag_one_correlation(x, [200, 200]) != lag_one_correlation(x)
 
 
 @pytest.mark.oracle
@@ -131,13 +130,9 @@ def redrawn(length, segments=None):
             RequestError,
             "unknown rule 'carlsten'.* Did",
         ),
-        (lambda: block_length(NOISE, segments=[50, 60]), RequestError, "add up to 110 samples and"),
         (lambda: redrawn(101), RequestError, "of 101 samples does not fit into the series of 100"),
-        (
-            lambda: redrawn(40, [70, 30]),
-            RequestError,
-            "not fit into the shortest segment of 30",
-        ),
+        (lambda: block_length(NOISE, segments=[50, 60]), RequestError, "add up to 110 samples and"),
+        (lambda: redrawn(40, [70, 30]), RequestError, "not fit into the shortest segment of 30"),
         (lambda: redrawn(2.5), RequestError, "block_length must be a whole number of at least 1"),
     ],
 )

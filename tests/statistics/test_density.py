@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import gaussian_kde, norm
 
-from seakeep.statistics import density_grid, density_interval, kernel_bandwidth, kernel_density
+from seakeep.statistics import density_grid, kernel_bandwidth, kernel_density
 
 RNG = np.random.default_rng(0)
 NORMAL = RNG.standard_normal(900)
@@ -61,44 +61,3 @@ def test_the_mass_is_one_on_the_stated_grid():
     assert grid[0] == pytest.approx(low - 3 * h, rel=1e-14)
     # Three bandwidths beyond the last sample leave 0.13 % of its kernel outside.
     assert np.trapezoid(kernel_density(NORMAL, grid), grid) == pytest.approx(1.0, abs=1e-4)
-
-
-def test_many_series_have_their_own_bandwidths():
-    grid = np.linspace(-5, 5, 64)
-    both = kernel_density(np.stack([NORMAL, FLAT]), grid)
-    assert np.array_equal(both[0], kernel_density(NORMAL, grid))
-    assert np.array_equal(both[1], kernel_density(FLAT, grid))
-
-
-def test_the_interval_holds_the_smoothed_truth():
-    series = np.random.default_rng(4).standard_normal(4000)
-    found = density_interval(series, block_length=1, rng=np.random.default_rng(5))
-    h = kernel_bandwidth(series)
-    truth = norm.pdf(found.grid, scale=np.sqrt(1 + h**2))
-    middle = np.abs(found.grid) < 2
-    held = (found.lower <= truth) & (truth <= found.upper)
-    # 95 % on average over records; the points of one record go together.
-    assert held[middle].mean() > 0.8
-    assert found.grid.size == 512
-    assert np.all(found.uncertainty >= 0)
-    # The mean of 100 draws lies within a few tenths of its interval's width of the series' own.
-    assert np.abs(found.mean - found.density).max() < 0.5 * found.uncertainty.max()
-
-
-def test_same_seed_same_bits_and_several_series_are_pooled():
-    grid = density_grid(NORMAL, FLAT)
-    settings = {"block_length": 9, "grid": grid, "n_series": 20}
-    first = density_interval(np.stack([NORMAL, FLAT]), rng=np.random.default_rng(1), **settings)
-    again = density_interval(np.stack([NORMAL, FLAT]), rng=np.random.default_rng(1), **settings)
-    assert np.array_equal(first.lower, again.lower)
-    alone = [
-        density_interval(x, rng=np.random.default_rng(1), **settings).mean for x in (NORMAL, FLAT)
-    ]
-    # The same blocks; a mean of two means.
-    assert first.mean == pytest.approx(np.mean(alone, axis=0), rel=1e-12)
-
-
-def test_a_draw_that_happens_to_be_constant_takes_the_bandwidth_of_the_series():
-    series = np.concatenate([np.zeros(60), [1.0]])
-    found = density_interval(series, block_length=20, rng=np.random.default_rng(0), n_series=20)
-    assert np.all(np.isfinite(found.mean))

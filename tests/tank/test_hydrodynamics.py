@@ -12,19 +12,12 @@ from seakeep.tank.hydrodynamics import (
     load_hydrodynamics,
     passive_damping,
     radiation_kernel,
-    response,
     shipped_hydrodynamics,
 )
 from seakeep.tank.settings import default_settings
-from seakeep.waves import GRAVITY, phase_speed, wavelength_to_frequency
+from seakeep.waves import GRAVITY, phase_speed
 
 HULL = default_settings().hull
-
-
-def test_phase_speeds_of_the_papers_table():
-    omega = wavelength_to_frequency([2.1, 2.8, 4.2], 3.6)
-    # The paper prints three decimals; its depth and gravity are ours to that digit.
-    assert phase_speed(omega, 3.6) == pytest.approx([1.811, 2.090, 2.560], abs=1.5e-3)
 
 
 def test_mesh_is_the_one_of_the_shipped_coefficients(hydro):
@@ -41,29 +34,6 @@ def test_mesh_has_the_mass_area_and_trim_asked_for():
     assert mesh.draft == pytest.approx(0.0830, abs=5e-5)
 
 
-def test_mesh_is_closed_below_the_surface():
-    mesh = hull_mesh(HULL)
-    corners = mesh.vertices[mesh.faces]
-    first = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    second = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 0])
-    total = 0.5 * (first + second).sum(axis=0)
-    # Horizontal areas cancel to rounding; the vertical one is the gross waterplane.
-    assert total[:2] == pytest.approx([0, 0], abs=1e-14)
-    assert -total[2] == pytest.approx(0.9035 + 0.45 * 0.36, rel=1e-9)
-
-
-def test_coefficients_are_reciprocal(hydro):
-    for matrices in (hydro.added_mass, hydro.damping):
-        size = np.sqrt(np.abs(np.einsum("wii,wjj->wij", matrices, matrices)))
-        rigid = (np.abs(matrices - matrices.swapaxes(1, 2)) / np.maximum(size, 1e-3))[:, :3, :3]
-        # Quadrilaterals of 8 cm: a per cent below 12 rad/s is what this mesh resolves.
-        assert rigid[hydro.omega < 12].max() < 0.012
-    added = hydro.added_mass[hydro.omega < 9]
-    size = np.sqrt(np.abs(np.einsum("wii,wjj->wij", added, added)))
-    # The pool's shelf is where the solver is weakest; the indirect method misses by 40 %.
-    assert (np.abs(added - added.swapaxes(1, 2)) / size).max() < 0.05
-
-
 def test_low_frequency_limits(hydro):
     lowest = hydro.omega[0]
     force = excitation_at(hydro, [lowest])[0]
@@ -71,25 +41,14 @@ def test_low_frequency_limits(hydro):
     # At 0.3 rad/s waves are 63 m long: radiation and diffraction still take half a per cent.
     assert abs(force[1]) == pytest.approx(1000 * GRAVITY * area, rel=0.01)
     assert abs(force[3]) == pytest.approx(1000 * GRAVITY * hydro.pool.area, rel=0.01)
-    motion = np.abs(response(hydro, [lowest])[0])
+    inertia = -(lowest**2) * (hydro.mass + hydro.added_mass[0]) - 1j * lowest * hydro.damping[0]
+    motion = np.abs(np.linalg.solve(inertia + hydro.stiffness, force))
     assert motion[1] == pytest.approx(1.0, abs=0.005)
     assert motion[3] == pytest.approx(1.0, abs=0.005)
     # In shallow, long waves water moves 1/tanh(kh) times its height to and fro.
     wavenumber = lowest / phase_speed(lowest, 3.6)
     assert motion[0] == pytest.approx(1 / np.tanh(wavenumber * 3.6), rel=0.01)
     assert motion[2] == pytest.approx(wavenumber, rel=0.02)
-
-
-def test_natural_frequencies(hydro):
-    found = {}
-    for index, name in enumerate(hydro.names[1:], 1):
-        inertia = hydro.mass[index, index] + hydro.added_mass[:, index, index]
-        natural = np.sqrt(hydro.stiffness[index, index] / inertia)
-        crossing = np.argmin(np.abs(natural - hydro.omega))
-        found[name] = natural[crossing] / (2 * np.pi)
-    # The feasibility study's values; its hull was another guess of the same vessel.
-    expected = {"heave": 1.00, "pitch": 1.13, "piston": 0.83, "slosh": 1.06}
-    assert found == pytest.approx(expected, abs=0.03)
 
 
 def test_damping_of_the_kernel_is_passive(hydro):

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from tank_figures import comparison, main, matrix_rows, realise, realised_tables
+from tank_figures import comparison, main, realise
 
 from seakeep.tank.play import play_run
 
@@ -45,34 +45,6 @@ def test_motions_and_slack_of_the_page(realised):
     slack = {run.run: run.motions.slack["mooring_stern"] for run in realised}
     assert 0.01 < max(slack[run.run] for run in realised[:3]) < 0.2  # at times
     assert 0.6 < slack["regular_1_5"] < 1.0  # mostly
-
-
-def test_test_matrix_is_the_papers_first_table(settings, realised):
-    rows = matrix_rows(settings, realised)
-    assert [row["runs"] for row in rows] == ["3", "1", "1", "1"]
-    assert [row["λ/L"] for row in rows] == ["Pierson–Moskowitz spectrum", "1.5", "2", "3"]
-    assert [row["h [m]"] for row in rows] == ["0.15", "0.10", "0.10", "0.10"]
-    phase = [float(row["phase speed [m/s]"]) for row in rows[1:]]
-    group = [float(row["group speed [m/s]"]) for row in rows[1:]]
-    # One in the last digit of the paper's table.
-    assert phase == pytest.approx([1.811, 2.090, 2.560], abs=1.5e-3)
-    assert group == pytest.approx([0.905, 1.045, 1.280], abs=1.5e-3)
-    assert rows[1]["realised h [m]"].startswith("0.105 ± 0.00")
-
-
-def test_tables_state_units_and_verdicts(settings, realised):
-    _, waves, true = realised_tables(settings, realised)
-    cells = {row[0]: row[1:] for row in waves.rows}
-    assert cells["zero-up-crossing period"][0] == "s"
-    assert cells["significant height"][0] == "m"
-    assert {row[-1] for row in waves.rows} == {"within"}
-    units = {channel: unit for _, channel, unit, *_ in true.rows}
-    assert units["surge_fast"] == units["piston"] == "m"
-    assert units["pitch"] == "rad"
-    assert units["mooring_bow"] == "N"
-    slack = {(run, channel): share for run, channel, *_, share in true.rows}
-    assert 60 < float(slack["regular_1_5", "mooring_stern"]) < 100  # percent, mostly
-    assert slack["regular_1_5", "heave"] == ""
 
 
 def test_the_script_prints_tables_and_draws_figures(tmp_path, capsys):

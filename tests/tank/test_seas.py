@@ -52,18 +52,6 @@ def test_components_hold_the_energy_of_the_band():
     assert sea.omega[[0, -1]] / (2 * np.pi) == pytest.approx([0.28, 1.13])
 
 
-def test_equal_spacing_repeats_and_jitter_does_not():
-    def repeat(spacing):
-        spectrum = SpectrumSettings(height=0.15, peak_period=2.12, spacing=spacing)
-        sea = irregular_sea(spectrum, 3.6, rng())
-        t = np.arange(0.0, 60.0, 0.05)
-        first, again = np.abs(sea.analytic(0.0, t)), np.abs(sea.analytic(0.0, t + 99 / 0.85))
-        return np.corrcoef(first, again)[0, 1]
-
-    assert repeat("equal") == pytest.approx(1.0, abs=1e-9)
-    assert abs(repeat("jittered")) < 0.6  # what is left is chance: 60 s hold a dozen groups
-
-
 def test_jitter_keeps_each_component_in_its_bin():
     spectrum = SpectrumSettings(height=0.15, peak_period=2.12, components=40)
     f = irregular_sea(spectrum, 3.6, rng()).omega / (2 * np.pi)

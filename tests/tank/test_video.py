@@ -40,15 +40,6 @@ def frames(path, wanted):
     reader.release()
 
 
-def test_video_has_the_cameras_size_and_rate(video):
-    reader = cv2.VideoCapture(str(video))
-    assert reader.get(cv2.CAP_PROP_FRAME_WIDTH) == 1280
-    assert reader.get(cv2.CAP_PROP_FRAME_HEIGHT) == 720
-    assert reader.get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
-    assert reader.get(cv2.CAP_PROP_FRAME_COUNT) == 101
-    reader.release()
-
-
 def test_white_panel_is_where_the_vessel_is(video, played):
     _, instants = clock_instants(played.settings.instruments.clocks["video"], 10.0)
     position, _, _ = played.states(instants)

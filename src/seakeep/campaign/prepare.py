@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,21 +16,15 @@ import xarray as xr
 from seakeep.arrays import Progress, number, whole_number
 from seakeep.campaign.live_chain import LiveChain
 from seakeep.campaign.pipeline import (
-    Run,
     attributes_of,
     checked,
-    cleaned,
     cropped,
-    derived,
-    mapped,
-    read,
     resampled,
     strays,
-    sync,
 )
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
-from seakeep.campaign.survey import Failures, ReadOnce, Survey, spare, survey
+from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import read_settings
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import expanded
@@ -235,20 +229,12 @@ class Campaign:
         DataError
             If the file is damaged, has gaps, or its times are not uniform.
         """
-        reader = ReadOnce()
-        surveyed, settings, _, _ = self._whole([name], None, reader, steps=False)
-        run = self._channels(name, surveyed, settings, reader)
+        surveyed, _, _ = self._whole([name], steps=False)
+        run = surveyed.channels(name)
         dt = uniform_step(run.reference_time, f"run '{name}'")
         data = resampled(run, dt).data
         assert data is not None
-        return data.assign_attrs(self._attributes(name, data, dt, surveyed, settings))
-
-    def _channels(
-        self, name: str, surveyed: Survey, settings: CampaignSettings, reader: ReadOnce
-    ) -> Run:
-        """Steps 1 to 5: the channels of a run by logger, at their own rates."""
-        run = sync(read(name, settings, self.files_of(name), reader), surveyed.clocks[name])
-        return derived(cleaned(mapped(run)))
+        return data.assign_attrs(self._attributes(name, data, dt, surveyed))
 
     def clocks(self, names: Iterable[str] | None = None) -> dict[str, dict[str, Clock]]:
         """Clocks of the loggers of each run against the reference.
@@ -278,7 +264,6 @@ class Campaign:
         self,
         wanted: list[str],
         periods: bool,
-        reader: ReadOnce | None = None,
         progress: Progress | None = None,
         failures: Failures | None = None,
     ) -> Survey:
@@ -287,8 +272,7 @@ class Campaign:
             self._run(name)
         settings = self._in_seconds(self.settings.campaign.encounter_period)
         channel = self.period_channel() if periods else None
-        reader = reader or ReadOnce()
-        return survey(settings, self.files_of, wanted, channel, reader, progress, failures)
+        return survey(settings, self.files_of, wanted, channel, progress, failures)
 
     def period_channel(self) -> str:
         """Name of the wave channel that defines the encounter period.
@@ -423,15 +407,14 @@ class Campaign:
             As :meth:`prepare`.
         """
         wanted = list(self.runs if names is None else names)
-        reader = ReadOnce()
-        surveyed, settings, period, dt = self._whole(wanted, progress, reader, failures=failures)
+        surveyed, period, dt = self._whole(wanted, progress, failures)
         stated, first = dt is not None, ""
-        reported = {(str(settings.wave_channel), "PERIOD")}  # the survey has warned of it
+        reported = {(str(self.settings.wave_channel), "PERIOD")}  # the survey has warned of it
         for done, name in enumerate(wanted, 1):
             try:
                 if failures is not None and name in failures:
                     raise failures[name]
-                run = self._channels(name, surveyed, settings, reader)
+                run = surveyed.channels(name)
                 own = uniform_step(run.reference_time, f"run '{name}'")
                 dt, first = own if dt is None else dt, first or name
                 if not stated and strays(own, run.reference_time.size, dt):
@@ -446,7 +429,7 @@ class Campaign:
                 data.attrs["quality"] = as_json(run.findings)
                 for channel in data.data_vars.values():
                     channel.attrs["noise_std"] = noise_floor(channel.to_numpy())
-                data.attrs.update(self._attributes(name, data, dt, surveyed, settings))
+                data.attrs.update(self._attributes(name, data, dt, surveyed))
             except SeakeepError as error:
                 is_named = f"'{name}'" in str(error)
                 spare(failures, name, error if is_named else type(error)(f"run '{name}': {error}"))
@@ -494,10 +477,10 @@ class Campaign:
         DataError
             If a file of the run cannot be read.
         """
-        reader = ReadOnce()
-        surveyed, settings, _, dt = self._whole([run], None, reader)
+        surveyed, _, dt = self._whole([run])
+        settings = surveyed.settings
         if dt is None:
-            dt = uniform_step(self._channels(run, surveyed, settings, reader).reference_time, run)
+            dt = uniform_step(surveyed.channels(run).reference_time, run)
         late, length = self.seconds(delay), self.seconds(window)
         if not 0 <= 4 * late <= length:
             raise RequestError(
@@ -509,23 +492,21 @@ class Campaign:
         if settings.preparation.gaps == "refuse":  # rows get lost in service
             masked = settings.preparation.model_copy(update={"gaps": "mask"})
             changed["preparation"] = masked
-        settings = settings.model_copy(update=changed)
-        source = sync(read(run, settings, self.files_of(run), reader), surveyed.clocks[run])
+        source = replace(surveyed, settings=settings.model_copy(update=changed)).read(run)
         return LiveChain(source, dt, late, length, whole_number(every, "every"))
 
     def _whole(
         self,
         wanted: list[str],
-        progress: Progress | None,
-        reader: ReadOnce,
-        steps: bool = True,
+        progress: Progress | None = None,
         failures: Failures | None = None,
-    ) -> tuple[Survey, CampaignSettings, float | None, float | None]:
-        """Clocks, settings in seconds, encounter period if it is needed, common step if stated."""
+        steps: bool = True,
+    ) -> tuple[Survey, float | None, float | None]:
+        """Survey with settings in seconds, encounter period if needed, common step if stated."""
         preparation, period = self.settings.preparation, self.settings.campaign.encounter_period
         counting = steps and preparation.steps_per_period is not None
         needed = counting or self._counts_in_periods
-        surveyed = self._survey(wanted, needed and period is None, reader, progress, failures)
+        surveyed = self._survey(wanted, needed and period is None, progress, failures)
         if needed and period is None:
             period = self._mean_period(surveyed)
         dt = preparation.dt
@@ -533,10 +514,10 @@ class Campaign:
             dt = period / preparation.steps_per_period
         elif preparation.sampling_rate is not None:
             dt = 1.0 / preparation.sampling_rate
-        return surveyed, self._in_seconds(period), period, dt
+        return replace(surveyed, settings=self._in_seconds(period)), period, dt
 
     def _attributes(
-        self, name: str, run: xr.Dataset, dt: float, surveyed: Survey, settings: CampaignSettings
+        self, name: str, run: xr.Dataset, dt: float, surveyed: Survey
     ) -> dict[str, Any]:
         own = {
             "campaign": self.name,
@@ -544,7 +525,7 @@ class Campaign:
             "file_sha256": self.checksum_of(name),
             "basis_sha256": self.basis_of(name),
         }
-        return {**own, **attributes_of(name, run, dt, surveyed.clocks[name], settings)}
+        return own | attributes_of(name, run, dt, surveyed.clocks[name], surveyed.settings)
 
 
 def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:

@@ -45,28 +45,6 @@ LISTED = 6
 """Errors of runs that one message holds at most."""
 
 
-@dataclass(frozen=True)
-class Survey:
-    """Clocks and encounter periods of runs.
-
-    Parameters
-    ----------
-    clocks : dict of str to dict of str to Clock
-        By run and logger.
-    periods : dict of str to float
-        Zero-up-crossing period of the wave channel by run, s.
-    left_out : dict of str to str
-        By run, what it is left out of because it cannot be read, and why.
-    doubts : dict of str to (float, float)
-        By run, its counted period and the energy period of its waves, s, where they disagree.
-    """
-
-    clocks: Mapping[str, Mapping[str, Clock]]
-    periods: Mapping[str, float]
-    left_out: Mapping[str, str] = field(default_factory=dict)
-    doubts: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-
-
 def spare(failures: Failures | None, run: str, error: SeakeepError) -> None:
     """Note the error of a run whose files cannot be read, or raise it."""
     if failures is None or not isinstance(error, DataError | MissingFileError):
@@ -108,12 +86,51 @@ class ReadOnce:
         return columns
 
 
+@dataclass(frozen=True)
+class Survey:
+    """What is computed from all runs together, and how each of them is read with it.
+
+    Parameters
+    ----------
+    settings : CampaignSettings
+        The campaign.
+    files_of : callable
+        Gives the paths of a run's files by logger.
+    reader : ReadOnce
+        Reads them.
+    clocks : dict of str to dict of str to Clock
+        By run and logger.
+    periods : dict of str to float
+        Zero-up-crossing period of the wave channel by run, s.
+    left_out : dict of str to str
+        By run, what it is left out of because it cannot be read, and why.
+    doubts : dict of str to (float, float)
+        By run, its counted period and the energy period of its waves, s, where they disagree.
+    """
+
+    settings: CampaignSettings
+    files_of: Callable[[str], Mapping[str, Path]]
+    reader: ReadOnce
+    clocks: Mapping[str, Mapping[str, Clock]]
+    periods: Mapping[str, float]
+    left_out: Mapping[str, str]
+    doubts: Mapping[str, tuple[float, float]]
+
+    def read(self, name: str) -> Run:
+        """Steps 1 and 2: a run's files, their clocks known."""
+        paths = self.files_of(name)
+        return sync(read(name, self.settings, paths, self.reader), self.clocks[name])
+
+    def channels(self, name: str) -> Run:
+        """Steps 1 to 5: the channels of a run by logger, at their own rates."""
+        return derived(cleaned(mapped(self.read(name))))
+
+
 def survey(
     settings: CampaignSettings,
     files_of: Callable[[str], Mapping[str, Path]],
     asked: Sequence[str],
     channel: str | None,
-    reader: ReadOnce,
     progress: Progress | None = None,
     failures: Failures | None = None,
 ) -> Survey:
@@ -123,6 +140,7 @@ def survey(
     a warning; of the others, `failures` takes the errors, or they are raised. Drifts are pooled
     where the campaign does not say otherwise, and one that is not certain is left out.
     """
+    reader = ReadOnce()
     clock_runs, period_runs = _surveyed(settings, asked, channel)
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks: dict[str, dict[str, Clock]] = {}
@@ -159,7 +177,7 @@ def survey(
     for each in clocks.values():
         each.update({logger: without_doubtful_drift(clock) for logger, clock in each.items()})
     alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}
-    return Survey(alone | clocks, periods, left_out, doubts)
+    return Survey(settings, files_of, reader, alone | clocks, periods, left_out, doubts)
 
 
 def _surveyed(

@@ -6,7 +6,6 @@ Energy of series in bands of frequency that all series share.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,26 +13,12 @@ import scipy
 from scipy import fft
 
 from seakeep.arrays import FloatArray, IntArray, as_real, number, time_step
-from seakeep.core.metrics import over_channels, paired
 from seakeep.errors import RequestError
 
 LEAST_SPLIT = 1e-6
 """Split frequency over the sampling rate: below it the filter's coefficients are rounding."""
 ORDER = 4
 """Of the Butterworth filter; forwards and backwards its gain at the split frequency is one half."""
-
-
-class BandErrors(NamedTuple):
-    """ε(t) of either band.
-
-    Attributes
-    ----------
-    low, wave : ndarray, shape (…, time)
-        Below and above the split frequency, in measured standard deviations.
-    """
-
-    low: FloatArray
-    wave: FloatArray
 
 
 def split_bands(
@@ -82,57 +67,9 @@ def split_bands(
         )
     sections = scipy.signal.butter(ORDER, frequency, fs=1.0 / dt, output="sos")
     reach = min(x.shape[-2] - 1, round(1.0 / (frequency * dt)))
-    low: FloatArray = scipy.signal.sosfiltfilt(sections, x, axis=-2, padtype="even", padlen=reach)
+    low = scipy.signal.sosfiltfilt(sections, x, axis=-2, padtype="even", padlen=reach)
     low = np.where(np.isfinite(x).all(axis=-2, keepdims=True), low, np.nan)
     return low, x - low
-
-
-def band_error_over_time(
-    *,
-    predicted: npt.ArrayLike,
-    measured: npt.ArrayLike,
-    dt: float,
-    frequency: float,
-    training_std: npt.ArrayLike | None = None,
-    noise_std: npt.ArrayLike | None = None,
-) -> BandErrors:
-    r"""ε(t) of the slow and of the fast part of the error.
-
-    Parameters
-    ----------
-    predicted, measured : array_like, shape (…, time, channel)
-        Histories in the same units.
-    dt : float
-        Time step, s.
-    frequency : float
-        Where the bands meet, Hz: below the waves, above the slow drift.
-    training_std, noise_std : array_like, shape (channel,), optional
-        Standard deviations in training and of the noise, as for :func:`seakeep.metrics.nrmse`; what
-        is not judged there is left out.
-
-    Returns
-    -------
-    BandErrors
-        Both parts divided by the SD of the whole measured channel, as in ε(t), and averaged over
-        the channels: errors of the parts add up to the error sample by sample, their absolute
-        values to no less.
-
-    Raises
-    ------
-    RequestError
-        As :func:`split_bands`, or if the shapes differ.
-
-    Notes
-    -----
-    The paper tests ε(t) over a horizon that is shorter than a period of the slow surge and finds
-    no trend. Slow surge and waves grow old differently, so each has its ε(t).
-    """
-    p, m, spread, judged = paired(predicted, measured, training_std, noise_std)
-    parts = split_bands(p - m, dt, frequency)
-    low, wave = (
-        over_channels(np.abs(part) / spread[..., None, :], judged[..., None, :]) for part in parts
-    )
-    return BandErrors(low, wave)
 
 
 PER_OCTAVE = 6
@@ -170,5 +107,4 @@ def _taper_and_bands(
 
 def band_edges(first: int, count: int) -> FloatArray:
     """Edges of the bands, Hz, shape (count + 1,)."""
-    edges: FloatArray = 2.0 ** ((first + np.arange(count + 1)) / PER_OCTAVE)
-    return edges
+    return 2.0 ** ((first + np.arange(count + 1)) / PER_OCTAVE)

@@ -39,11 +39,11 @@ FEWEST_SAMPLES = 8
 def _as_segments(segments: Sequence[int] | None, samples: int) -> IntArray:
     """Return the lengths of the pieces of which a series was joined; None is one piece."""
     if segments is None:
-        return np.array([samples], dtype=np.intp)
-    lengths = np.array([whole_number(item, "a segment") for item in segments], dtype=np.intp)
-    if int(lengths.sum()) != samples:
+        return np.array([samples])
+    lengths = np.array([whole_number(item, "a segment") for item in segments])
+    if lengths.sum() != samples:
         raise RequestError(
-            f"the segments add up to {int(lengths.sum())} samples and the series has {samples}. "
+            f"the segments add up to {lengths.sum()} samples and the series has {samples}. "
             "Give the length of each joined piece, in order."
         )
     return lengths
@@ -193,9 +193,12 @@ def resolve_block_length(
     series: npt.ArrayLike, block: int | BlockRule, segments: Sequence[int] | None = None
 ) -> int:
     """Return a block length as it is, or by the rule that it names."""
-    if isinstance(block, str):
-        return block_length(series, block, segments=segments)
-    return block
+    return block_length(series, block, segments=segments) if isinstance(block, str) else block
+
+
+def _joined(starts: IntArray, block: int, size: int) -> IntArray:
+    """Positions of blocks that start there, side by side, the last cut; shape (…, size)."""
+    return (starts[..., None] + np.arange(block)).reshape(len(starts), -1)[:, :size]
 
 
 def bootstrap_indices(
@@ -220,10 +223,8 @@ def bootstrap_indices(
     allowed = np.concatenate(
         [np.arange(a, a + n - block_length + 1) for a, n in zip(first, lengths, strict=True)]
     )
-    blocks = -(-n_samples // block_length)
-    starts = allowed[rng.integers(0, allowed.size, size=(n_series, blocks))]
-    positions = starts[:, :, None] + np.arange(block_length)
-    return positions.reshape(n_series, -1)[:, :n_samples].astype(np.intp, copy=False)
+    shape = n_series, -(-n_samples // block_length)
+    return _joined(allowed[rng.integers(0, allowed.size, size=shape)], block_length, n_samples)
 
 
 def student_interval(
@@ -396,8 +397,7 @@ def two_way_interval(
     positions = []  # of redrawn rows and columns, in circular blocks
     for size, block in zip(shape, blocks, strict=True):
         starts = rng.integers(0, size, size=(count, -(-size // block)))
-        drawn = (starts[:, :, None] + np.arange(block)) % size
-        positions.append(drawn.reshape(count, -1)[:, :size])
+        positions.append(_joined(starts, block, size) % size)
     rows, columns = positions
     step = max(1, AT_ONCE // max(each.size for each in tables))
     bounds = []

@@ -76,7 +76,7 @@ def band_scores(lower: npt.ArrayLike, upper: npt.ArrayLike, measured: npt.ArrayL
             f"lower has shape {low.shape}, upper {high.shape} and measured {y.shape}; all must be "
             "of the same shape (…, time, channel)."
         )
-    scores: FloatArray = np.maximum(low - finite(y, "measured"), y - high)
+    scores = np.maximum(low - finite(y, "measured"), y - high)
     return np.where(np.isnan(scores), np.inf, scores)
 
 
@@ -114,8 +114,7 @@ def wave_envelope(deviations: FloatArray, steps: int) -> FloatArray:
     total = np.zeros((windows, rows + 1))
     np.cumsum(np.sum(deviations**2, axis=2), axis=1, out=total[:, 1:])
     length = rows - steps + 1
-    out: FloatArray = np.sqrt((total[:, length:] - total[:, :steps]) / (length * count))
-    return out
+    return np.sqrt((total[:, length:] - total[:, :steps]) / (length * count))
 
 
 def _features(std: FloatArray, envelope: FloatArray, floor: FloatArray) -> FloatArray:
@@ -218,8 +217,7 @@ def band_scale(
     if law is None or envelope is None:
         return np.hypot(std, floor)
     exponent = np.einsum("...nk,kn->...n", _features(std, envelope, floor), law)
-    learnt: FloatArray = np.maximum(floor / FLOOR * np.exp(np.minimum(exponent, 50.0)), floor)
-    return learnt  # NaN where the forecast is lost
+    return np.maximum(floor / FLOOR * np.exp(np.minimum(exponent, 50.0)), floor)
 
 
 def scaled_scores(mean: FloatArray, scale: FloatArray, measured: FloatArray) -> FloatArray:

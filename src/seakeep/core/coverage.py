@@ -141,8 +141,7 @@ def winkler_score(
     """
     low, high, y = _triple(lower, upper, measured)
     outside = np.maximum(np.maximum(low - y, y - high), 0.0)
-    score: FloatArray = high - low + 2.0 / (1.0 - fraction(level, "level")) * outside
-    return score
+    return high - low + 2.0 / (1.0 - fraction(level, "level")) * outside
 
 
 def band_crps(

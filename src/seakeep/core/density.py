@@ -24,7 +24,6 @@ from seakeep.arrays import (
     as_bundle,
     as_real,
     as_series,
-    fraction,
     whole_number,
 )
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
@@ -43,38 +42,6 @@ REACH = 8.5
 """Bandwidths beyond the grid that are kept; the kernel there is 2e-16 of its peak."""
 COARSE = 1.5
 """Grid steps of more bandwidths than this misstate the mass of a kernel by over 3e-4."""
-
-
-@dataclass(frozen=True)
-class DensityInterval:
-    """Density of a series with its interval over bootstrapped series.
-
-    Attributes
-    ----------
-    grid : ndarray, shape (grid,)
-        Values, in the unit of the series.
-    density : ndarray, shape (grid,)
-        Density of the series itself, per unit; averaged where there are several.
-    mean, lower, upper : ndarray, shape (grid,)
-        Mean and quantiles of the densities of the bootstrapped series, point by point.
-    level : float
-        Probability between `lower` and `upper`.
-    block_length : int
-        Samples of a block.
-    """
-
-    grid: FloatArray
-    density: FloatArray
-    mean: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    level: float
-    block_length: int
-
-    @property
-    def uncertainty(self) -> FloatArray:
-        """Width of the interval, U of the paper."""
-        return self.upper - self.lower
 
 
 def _as_grid(values: npt.ArrayLike) -> FloatArray:
@@ -112,7 +79,7 @@ def _bandwidths(
             f"the series is constant ({x[np.argmin(h), 0]:g}); it has no correlation, block length "
             "or density. Leave the channel out."
         )
-    return np.asarray(h)
+    return h
 
 
 def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> float:
@@ -295,62 +262,6 @@ def bootstrapped_densities(
     return _densities(drawn, grid, _bandwidths(drawn, bandwidth, own))
 
 
-def density_interval(
-    series: npt.ArrayLike,
-    *,
-    block_length: int | BlockRule,
-    rng: np.random.Generator,
-    n_series: int = 100,
-    grid: npt.ArrayLike | None = None,
-    bandwidth: Bandwidth = "paper",
-    level: float = 0.95,
-    segments: Sequence[int] | None = None,
-) -> DensityInterval:
-    """Mean and interval of the densities of bootstrapped series (paper, U of the PDF).
-
-    Parameters
-    ----------
-    series : array_like, shape (time,) or (series, time)
-        Uniform samples; several series (say one of each training window) are redrawn from the
-        same blocks and their densities pooled.
-    block_length : int, "carlstein" or "politis_white"
-        Samples of a block, or the rule, applied to the first series.
-    rng : numpy.random.Generator
-        Source of the block starts.
-    n_series : int
-        Number of redrawn series.
-    grid : array_like, shape (grid,), optional
-        Evenly spaced values that cover the series; by default 512 from :func:`density_grid`. Give
-        one of all the series to be compared.
-    bandwidth : {"paper", "silverman"} or float
-        As for :func:`kernel_bandwidth`.
-    level : float
-        Probability of the interval.
-    segments : sequence of int, optional
-        Lengths of the joined pieces; no block then crosses a join.
-
-    Returns
-    -------
-    DensityInterval
-
-    Raises
-    ------
-    RequestError
-        If a setting is out of range, or the grid does not cover the series.
-    DataError
-        If a series is constant, has gaps, or is too short.
-    """
-    x = as_bundle(series, "the series")
-    level = fraction(level, "level")
-    points = checked_grid(grid, [x], bandwidth)
-    block = resolve_block_length(x[0], block_length, segments)
-    positions = bootstrap_indices(x.shape[1], n_series, block, rng, segments)
-    drawn = np.concatenate([bootstrapped_densities(row, positions, points, bandwidth) for row in x])
-    lower, upper = np.quantile(drawn, [(1 - level) / 2, (1 + level) / 2], axis=0)
-    own = np.atleast_2d(kernel_density(x, points, bandwidth)).mean(axis=0)
-    return DensityInterval(points, own, drawn.mean(axis=0), lower, upper, level, block)
-
-
 @dataclass(frozen=True)
 class JsdInterval:
     """Divergence of predicted and measured series over bootstrapped pairs.
@@ -422,7 +333,7 @@ def jensen_shannon(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
     second = second / second.sum(axis=-1, keepdims=True)
     middle = 0.5 * (first + second)
     total = rel_entr(first, middle).sum(axis=-1) + rel_entr(second, middle).sum(axis=-1)
-    return np.asarray(np.clip(0.5 * total, 0.0, math.log(2.0)))
+    return np.clip(0.5 * total, 0.0, math.log(2.0))
 
 
 def jsd_interval(

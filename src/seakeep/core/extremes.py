@@ -201,6 +201,6 @@ def _extremes(series: FloatArray) -> tuple[FloatArray, FloatArray]:
     before, here, after = series[places - 1], series[places], series[places + 1]
     bend = before - 2 * here + after
     shift = np.divide(0.5 * (before - after), bend, out=np.zeros_like(here), where=bend != 0)
-    values: FloatArray = here - 0.25 * (before - after) * shift
-    instants: FloatArray = places + shift
+    values = here - 0.25 * (before - after) * shift
+    instants = places + shift
     return instants, values

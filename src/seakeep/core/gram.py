@@ -34,10 +34,9 @@ eigendecomposition those of all ranks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -75,53 +74,55 @@ class Piece:
         return self.states[self.first + 1 : self.first + 1 + self.count]
 
 
-@dataclass(frozen=True)
-class Group:
-    """Where a group stands among the regressors: from row `start` on, newest lag first.
+class Group(NamedTuple):
+    """Where a group stands among the regressors: from row `start` to `stop`, newest lag first.
 
-    `head` is the place of its channels among the newest samples of all groups.
+    `head` is the place of its channels among the newest samples of all groups; `newest` are its
+    rows of lag zero, `older` those of the other lags, and `newer` those of all lags but the last:
+    `older` moved up by one lag.
     """
 
-    start: int
     channels: int
     lags: int
+    start: int
+    stop: int
     head: slice
-
-    @cached_property
-    def stop(self) -> int:
-        """Row after the last."""
-        return self.start + self.channels * self.lags
-
-    @cached_property
-    def rows(self) -> slice:
-        """All of its rows."""
-        return slice(self.start, self.stop)
-
-    @cached_property
-    def newest(self) -> slice:
-        """Rows of lag zero."""
-        return slice(self.start, self.start + self.channels)
-
-    @cached_property
-    def older(self) -> slice:
-        """Rows of the other lags."""
-        return slice(self.start + self.channels, self.stop)
-
-    @cached_property
-    def newer(self) -> slice:
-        """Rows of all lags but the last; `older` moved up by one lag."""
-        return slice(self.start, self.stop - self.channels)
+    rows: slice
+    newest: slice
+    older: slice
+    newer: slice
 
 
-def lay_out(piece: Piece, delays: Sequence[int]) -> tuple[Group, ...]:
-    """Place the groups of a run, with these delays, below each other."""
-    groups: list[Group] = []
-    start = head = 0
-    for series, delay in zip(piece.series, delays, strict=True):
-        channels = series.shape[1]
-        groups.append(Group(start, channels, delay + 1, slice(head, head + channels)))
-        start, head = groups[-1].stop, head + channels
+def lay_out(channels: Iterable[int], lags: Iterable[int]) -> tuple[Group, ...]:
+    """Place groups of so many channels and lags below each other."""
+    groups = []
+    stop = head = 0
+    for width, count in zip(channels, lags, strict=True):
+        start, stop, head = stop, stop + width * count, head + width
+        places = (start, stop), (start, start + width), (start + width, stop), (start, stop - width)
+        own = slice(head - width, head)
+        groups.append(Group(width, count, start, stop, own, *(slice(*each) for each in places)))
     return tuple(groups)
+
+
+def groups_of(piece: Piece, delays: Sequence[int]) -> tuple[Group, ...]:
+    """Places of the regressors of a run, with these delays."""
+    return lay_out((x.shape[1] for x in piece.series), (delay + 1 for delay in delays))
+
+
+def _sum_down(gram: FloatArray, heads: FloatArray, groups: Sequence[Group]) -> None:
+    """Set the first block row and column of each group to `heads`, and sum along the diagonals."""
+    for number, group in enumerate(groups):
+        later, N = groups[number + 1 :], group.channels
+        gram[group.newest, group.start :] = heads[group.head, group.start :]
+        for other in later:
+            gram[group.rows, other.newest] = heads[other.head, group.rows].T
+        for at in range(group.start + N, group.stop, N):
+            row = gram[at : at + N, at : group.stop]
+            row += gram[at - N : at, at - N : group.stop - N]
+            for other in later:
+                row = gram[at : at + N, other.older]
+                row += gram[at - N : at, other.newer]
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +170,7 @@ def primal_system(pieces: Sequence[Piece], delays: Sequence[int]) -> PrimalSyste
 
     `delays` holds those of each group.
     """
-    groups = lay_out(pieces[0], delays)
+    groups = groups_of(pieces[0], delays)
     size, width = groups[-1].stop, groups[-1].head.stop
     edges, heads = np.zeros((2 * len(pieces), size)), np.zeros((width, size))
     N = pieces[0].states.shape[1]
@@ -197,24 +198,16 @@ def primal_system(pieces: Sequence[Piece], delays: Sequence[int]) -> PrimalSyste
     signed = edges.copy()
     signed[1::2] *= -1.0
     gram = edges.T @ signed
-    for number, group in enumerate(groups):
-        later, N = groups[number + 1 :], group.channels
-        gram[group.newest, group.start :] = heads[group.head, group.start :]
-        for other in later:
-            gram[group.rows, other.newest] = heads[other.head, group.rows].T
-        for at in range(group.start + N, group.stop, N):
-            above, row = gram[at - N : at], gram[at : at + N]
-            row[:, at : group.stop] += above[:, at - N : group.stop - N]
-            for other in later:
-                row[:, other.older] += above[:, other.newer]
+    _sum_down(gram, heads, groups)
     return PrimalSystem(gram, right, heads, edges, groups)
 
 
 def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int]) -> FloatArray:
     r"""Gram matrix :math:`\hat Y^T \hat Y` of the snapshots of all runs."""
-    groups = lay_out(pieces[0], delays)
+    groups = groups_of(pieces[0], delays)
     width = groups[-1].head.stop
-    ends = np.cumsum([0, *(piece.count for piece in pieces)])
+    counts = [piece.count for piece in pieces]
+    ends = np.cumsum([0, *counts])
     steps = np.zeros((ends[-1], 2 * width))
     for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
         rows, first, count = steps[begin:stop], piece.first, piece.count
@@ -231,21 +224,8 @@ def snapshot_gram(pieces: Sequence[Piece], delays: Sequence[int]) -> FloatArray:
         for piece, begin, stop in zip(pieces, ends[:-1], ends[1:], strict=True):
             for x, weights in zip(piece.series, newest, strict=True):
                 head[begin:stop] += lagged_response(x, weights, piece.first, piece.count)
-    # As above, with blocks of one; each run has a first row, and a first column above it.
-    gram: FloatArray = steps @ signed
-    runs = list(pairwise(ends.tolist()))
-    for run, (first, last) in enumerate(runs):
-        later, above = runs[run + 1 :], gram[first, first:last]
-        gram[first, first:] = heads[run, first:]
-        for number, (other, _) in enumerate(later, run + 1):
-            gram[first:last, other] = heads[number, first:last]
-        for at in range(first + 1, last):
-            row = gram[at, at:last]
-            row += above[:-1]
-            above = row
-            for other, end in later:
-                row = gram[at, other + 1 : end]
-                row += gram[at - 1, other : end - 1]
+    gram = steps @ signed
+    _sum_down(gram, heads, lay_out([1] * len(pieces), counts))
     return gram
 
 

@@ -121,7 +121,7 @@ def harmonic_fits(
     harmonics, means = [], []
     for window in range(count):
         inside = slice(round(window * length), round((window + 1) * length))
-        time: FloatArray = dt * np.arange(inside.start, inside.stop, dtype=float)
+        time = dt * np.arange(inside.start, inside.stop, dtype=float)
         coefficients = np.linalg.lstsq(_basis(time, frequency), values[inside], rcond=None)[0]
         harmonics.append(coefficients[2] - 1j * coefficients[3])
         means.append(coefficients[0])
@@ -132,8 +132,7 @@ def _basis(time: FloatArray, frequency: float) -> FloatArray:
     """Mean, trend, cosine and sine; time of the trend counts from the middle."""
     turn = 2 * np.pi * frequency * time
     ones = np.ones_like(time)
-    result: FloatArray = np.stack([ones, time - time.mean(), np.cos(turn), np.sin(turn)], axis=1)
-    return result
+    return np.stack([ones, time - time.mean(), np.cos(turn), np.sin(turn)], axis=1)
 
 
 def estimate(ratios: ComplexArray, type_b: FloatArray) -> Estimate:

@@ -143,5 +143,4 @@ def process_noise(residual: FloatArray, a: FloatArray, noise: FloatArray) -> Flo
     left = (residual - np.diag(noise) - (a * every) @ a.T) / np.outer(spread, spread)
     values, vectors = linalg.eigh(left)
     sound = (vectors * np.maximum(values, 1e-6)) @ vectors.T
-    result: FloatArray = sound * np.outer(spread, spread)
-    return result
+    return sound * np.outer(spread, spread)

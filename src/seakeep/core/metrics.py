@@ -286,22 +286,19 @@ def fit_percent(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolAr
         As :func:`nrmse`.
     """
     norm = np.sqrt(np.sum((p - m) ** 2, axis=-2))
-    out: FloatArray = 100.0 * (1.0 - norm / (spread * np.sqrt(m.shape[-2] - 1)))
-    return out
+    return 100.0 * (1.0 - norm / (spread * np.sqrt(m.shape[-2] - 1)))
 
 
 def root_mean_square(error: FloatArray) -> FloatArray:
     """Root mean square over time."""
-    out: FloatArray = np.sqrt(np.mean(error**2, axis=-2))
-    return out
+    return np.sqrt(np.mean(error**2, axis=-2))
 
 
 def extremes_error(p: FloatArray, m: FloatArray) -> FloatArray:
     """Mean absolute error of minimum and maximum over time."""
     low = np.abs(p.min(axis=-2) - m.min(axis=-2))
     high = np.abs(p.max(axis=-2) - m.max(axis=-2))
-    out: FloatArray = 0.5 * (low + high)
-    return out
+    return 0.5 * (low + high)
 
 
 def over_channels(values: FloatArray, judged: BoolArray) -> FloatArray:
@@ -309,5 +306,4 @@ def over_channels(values: FloatArray, judged: BoolArray) -> FloatArray:
     judged = np.broadcast_to(judged, values.shape)
     count = judged.sum(axis=-1)
     total = np.where(judged, values, 0.0).sum(axis=-1)
-    out: FloatArray = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-    return out
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

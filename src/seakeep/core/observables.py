@@ -30,8 +30,7 @@ def slow_kernel(cutoff: float, half: int) -> FloatArray:
     """
     lag = np.arange(-half, half + 1)
     kernel = np.sinc(2 * cutoff * lag) * np.hanning(2 * half + 3)[1:-1]
-    result: FloatArray = kernel / kernel.sum()
-    return result
+    return kernel / kernel.sum()
 
 
 def derivative(series: FloatArray, order: int, dt: float) -> FloatArray:

@@ -125,8 +125,7 @@ def sums(values: FloatArray, load: FloatArray, knots: FloatArray) -> FloatArray:
         Where the load bends with the surge.
     """
     columns = np.stack([np.ones(len(load)), *features([*values.T], knots), load], axis=1)
-    products: FloatArray = columns.T @ columns
-    return products
+    return columns.T @ columns
 
 
 def weights_of(products: FloatArray) -> FloatArray:
@@ -134,8 +133,7 @@ def weights_of(products: FloatArray) -> FloatArray:
     gram, right = products[..., :-1, :-1].copy(), products[..., :-1, -1:]
     diagonal = np.arange(1, gram.shape[-1])
     gram[..., diagonal, diagonal] += RIDGE * gram[..., :1, 0]
-    weights: FloatArray = np.asarray(np.linalg.solve(gram, right))[..., 0]
-    return weights
+    return np.asarray(np.linalg.solve(gram, right))[..., 0]
 
 
 def best_place(products: FloatArray) -> int:
@@ -146,7 +144,7 @@ def best_place(products: FloatArray) -> int:
     products : ndarray, shape (place, run, F + 1, F + 1)
         From :func:`sums`.
     """
-    whole: FloatArray = products.sum(axis=1)
+    whole = products.sum(axis=1)
     errors = np.zeros(len(products))
     for run in range(products.shape[1]):
         others = whole - products[:, run] if products.shape[1] > 1 else whole

@@ -45,14 +45,12 @@ class Place:
     @property
     def grid(self) -> FloatArray:
         """Places, m."""
-        result: FloatArray = self.lowest + self.spacing * np.arange(float(self.count))
-        return result
+        return self.lowest + self.spacing * np.arange(float(self.count))
 
     def of(self, surge: FloatArray) -> FloatArray:
         """Places of the samples from the P-th on, of a surge of shape (time,)."""
-        position: FloatArray = np.convolve(surge, self.taps, "valid")
-        result: FloatArray = np.clip(position, self.lowest, self.grid[-1])
-        return result
+        position = np.convolve(surge, self.taps, "valid")
+        return np.clip(position, self.lowest, self.grid[-1])
 
 
 def read_table(
@@ -81,8 +79,7 @@ def read_table(
     flat = table.reshape(-1, table.shape[2])
     rows = samples * place.count + below
     lower = flat.take(rows, axis=0)
-    result: FloatArray = lower + part * (flat.take(rows + 1, axis=0) - lower)
-    return result
+    return lower + part * (flat.take(rows + 1, axis=0) - lower)
 
 
 @dataclass(frozen=True, eq=False)

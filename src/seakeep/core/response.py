@@ -57,8 +57,7 @@ def frequency_response(
         back = turn[:, None] ** -np.arange(lags)
         rows = state_rows.reshape(n_states, lags, n_states)
         system = turn[:, None, None] * np.eye(n_states) - np.einsum("fl,rlj->frj", back, rows)
-        result: ComplexArray = np.linalg.solve(system, driven)
-        return result
+        return np.linalg.solve(system, driven)
     # One frequency at a time: the whole of Â is large.
     each = [np.linalg.solve(z * np.eye(size) - state_rows, b)[:n_states]
             for z, b in zip(turn, driven, strict=True)]  # fmt: skip

@@ -379,7 +379,7 @@ def _forced(rows: Arrays, matrices: Arrays) -> FloatArray:
     out = rows[0] @ matrices[0].T
     for own, matrix in zip(rows[1:], matrices[1:], strict=True):
         out += own @ matrix.T
-    return np.asarray(out)
+    return out
 
 
 def _run_shifting(

@@ -48,8 +48,8 @@ from seakeep.core.gram import (
     Piece,
     PrimalSystem,
     gram_trace,
+    groups_of,
     lagged_sums,
-    lay_out,
     primal_system,
     snapshot_gram,
 )
@@ -218,7 +218,7 @@ class _Delayed:
     @cached_property
     def groups(self) -> tuple[Group, ...]:
         """Places of the groups; the first ends with the extended state."""
-        return lay_out(self.pieces[0], self.delays)
+        return groups_of(self.pieces[0], self.delays)
 
     @property
     def rows(self) -> int:
@@ -281,11 +281,10 @@ class _Delayed:
 
     def primal(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
-        if self.all_rows:
-            system = primal_system(self.pieces, self.delays)
-            return _all_rows(system, _factor(system.gram, ridge), ridge)
         system = primal_system(self.pieces, self.delays)
         factor = _factor(system.gram, ridge)
+        if self.all_rows:
+            return _all_rows(system, factor, ridge)
         solution = _solved(factor, system.right)
         if ridge >= GRAM_LIMIT * self.trace:
             return solution
@@ -337,12 +336,12 @@ def _factor(gram: FloatArray, ridge: float) -> FloatArray:
             f"the Gram matrix of {size} rows with ridge {ridge:g} is not positive "
             "definite. Raise ridge, or use method='svd'."
         )
-    return np.asarray(factor)
+    return factor
 
 
 def _solved(factor: FloatArray, rows: FloatArray) -> FloatArray:
     """Rows times the inverse of a matrix, by its lower Cholesky factor; in their place."""
-    return np.asarray(lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0]).T
+    return lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0].T
 
 
 def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution:

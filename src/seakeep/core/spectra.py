@@ -53,7 +53,7 @@ class Spectra:
     @property
     def input_power(self) -> FloatArray:
         """Spectra of the inputs, shape (frequency, input)."""
-        return np.asarray(np.diagonal(self.inputs, axis1=1, axis2=2).real)
+        return np.diagonal(self.inputs, axis1=1, axis2=2).real
 
     def only(self, inputs: Sequence[int]) -> Spectra:
         """Those of some of the inputs."""
@@ -64,7 +64,7 @@ class Spectra:
     def ordinary(self) -> FloatArray:
         """Coherence of each pair, shape (frequency, input, output)."""
         both = self.input_power[:, :, None] * self.outputs[:, None]
-        return np.asarray(_over(np.abs(self.cross) ** 2, both))
+        return _over(np.abs(self.cross) ** 2, both)
 
     def multiple(self) -> FloatArray:
         r"""Coherence of each output with all inputs, shape (frequency, output).
@@ -73,7 +73,7 @@ class Spectra:
         :math:`1 - (1 - \gamma^2)\,n/(n - q)`, at least zero.
         """
         rest = _over(self.unexplained(), self.outputs, 1.0)
-        return np.asarray(np.clip(1.0 - rest, 0.0, 1.0))
+        return np.clip(1.0 - rest, 0.0, 1.0)
 
     def unexplained(self) -> FloatArray:
         """Spectra of what no linear map of the inputs explains, shape (frequency, output)."""
@@ -91,7 +91,7 @@ class Spectra:
         gain = np.linalg.pinv(scaled, rcond=1e-9, hermitian=True) @ cross
         explained = np.sum(np.conj(cross) * gain, axis=1).real
         left = np.clip(self.outputs - explained, 0.0, None)
-        return np.asarray(left * self.averages / (self.averages - size))
+        return left * self.averages / (self.averages - size)
 
     def share(self) -> FloatArray:
         r"""Share of the power of each output that no linear map of the inputs explains.
@@ -110,8 +110,7 @@ class Spectra:
             freedom = left**2 / (rest**2).sum(axis=0)
             freedom *= 2 * (self.averages - self.inputs.shape[1]) / MIXED
             limits = [freedom / stats.chi2.ppf(p, freedom) for p in (0.975, 0.025)]
-            share = np.minimum([left, *(left * each for each in limits)] / total, 1.0)
-        return np.asarray(share)
+            return np.minimum([left, *(left * each for each in limits)] / total, 1.0)
 
     def gain(self) -> tuple[ComplexArray, FloatArray]:
         r"""Transfer function of each pair, and the radius of its 95 % circle.
@@ -198,7 +197,7 @@ def cross_spectra(
         power = power + count * signal.welch(series[size:], **how)[1]
         weight += count
         averages += count / (1 + 2 * OVERLAP_CORRELATION * (count - 1) / count)
-    spectra: ComplexArray = np.moveaxis(driven / weight, 2, 0).astype(complex)
+    spectra = np.moveaxis(driven / weight, 2, 0).astype(complex)
     return Spectra(
         frequency=frequency,
         inputs=spectra[:, :, :size],
@@ -226,9 +225,9 @@ def autocorrelation(pieces: Sequence[FloatArray], lags: int) -> FloatArray:
     """
     lags = min(lags, max(map(len, pieces)) - 1)
     centred = [x - x.mean(axis=0) for x in pieces]
-    total = np.asarray(sum(_products(x, x, lags) for x in centred))
+    total = np.sum([_products(x, x, lags) for x in centred], axis=0)
     with np.errstate(invalid="ignore"):
-        return np.asarray(total / total[:1])
+        return total / total[:1]
 
 
 def ljung_box(correlation: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
@@ -248,9 +247,8 @@ def ljung_box(correlation: FloatArray, samples: int) -> tuple[FloatArray, FloatA
     """
     lags = np.arange(1, len(correlation))
     weights = samples * (samples + 2) / (samples - lags)
-    statistic: FloatArray = weights @ correlation[1:] ** 2
-    probability: FloatArray = stats.chi2.sf(statistic, lags.size)
-    return statistic, probability
+    statistic = weights @ correlation[1:] ** 2
+    return statistic, stats.chi2.sf(statistic, lags.size)
 
 
 def input_correlation(
@@ -279,20 +277,14 @@ def input_correlation(
     e, u = autocorrelation(residuals, lags), autocorrelation(inputs, lags)
     both = e[:, :, None] * u[:, None]
     limit = 1.96 * np.sqrt(np.maximum(both[0] + 2 * both[1:].sum(axis=0), 1.0) / samples)
-    total = np.zeros(both.shape)
-    for r, v in zip(residuals, inputs, strict=True):
-        for column in range(v.shape[1]):
-            total[:, :, column] += _products(r, np.broadcast_to(v[:, [column]], r.shape), lags)
+    shaped = ((r[:, :, None], v[:, None]) for r, v in zip(residuals, inputs, strict=True))
+    total = np.sum([_products(*each, lags) for each in shaped], axis=0)
     of_e, of_u = (sum((part**2).sum(axis=0) for part in side) for side in (residuals, inputs))
     with np.errstate(invalid="ignore"):
         return total / np.sqrt(np.multiply.outer(of_e, of_u)), limit
 
 
 def _products(x: FloatArray, past: FloatArray, lags: int) -> FloatArray:
-    """Sums of x at an instant times `past` lag samples before, shape (lags + 1, channel)."""
-    size = len(x)
-    out = np.zeros((lags + 1, x.shape[1]))
-    for column, (a, b) in enumerate(zip(x.T, past.T, strict=True)):
-        products = signal.correlate(a, b, method="fft")[size - 1 : size + lags]
-        out[: len(products), column] = products
-    return out
+    """Sums of x at an instant times `past` lag samples before, shape (lags + 1, …)."""
+    products = signal.fftconvolve(x, past[::-1], axes=0)[len(x) - 1 : len(x) + lags]
+    return np.concatenate([products, np.zeros((lags + 1 - len(products), *products.shape[1:]))])

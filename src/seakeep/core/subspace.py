@@ -75,7 +75,7 @@ class StateSpace:
             driving = np.concatenate([driving, direct], axis=2)
         after = rollout(self.A, self.B, start, driving, n_states=len(self.A))
         states = np.concatenate([start[:, None], after[:, :-1]], axis=1)
-        return np.asarray(states @ self.C.T + driving @ self.D.T)
+        return states @ self.C.T + driving @ self.D.T
 
 
 def identify_subspace(

@@ -761,7 +761,7 @@ class _Search:
     def offered(self, candidate: HankelSettings) -> tuple[Observable, ...]:
         """Observables to choose among beside the other settings of a candidate."""
         if self.base.observables or "observables" not in {*self.vary, *self.opened}:
-            return self.base.observables  # type: ignore[no-any-return]
+            return self.base.observables
         aligned, lead = candidate.alignment, None
         if aligned is not None and aligned.surge == "predicted":
             lead = int(candidate.lead)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 import scipy
@@ -11,6 +13,13 @@ from seakeep.arrays import FloatArray, as_pair, as_series, time_step
 from seakeep.errors import RequestError
 
 SHORTEST_RECORD = 0.05
+
+
+def rising(place: FloatArray) -> FloatArray:
+    """Raised cosine from 0 at places up to zero to 1 at those from one on."""
+    return 0.5 - 0.5 * np.cos(np.pi * np.clip(place, 0.0, 1.0))
+
+
 """Part of the slowest period kept that a record must last."""
 
 
@@ -20,9 +29,8 @@ def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
     The lower flank is half the lower edge wide, the upper one a fifth of the upper edge.
     """
     low, high = band
-    rise = np.clip((frequency - 0.75 * low) / (0.5 * low), 0.0, 1.0)
-    fall = np.clip((1.1 * high - frequency) / (0.2 * high), 0.0, 1.0)
-    return np.asarray((np.sin(0.5 * np.pi * rise) * np.sin(0.5 * np.pi * fall)) ** 2)
+    rise = rising((frequency - 0.75 * low) / (0.5 * low))
+    return rise * rising((1.1 * high - frequency) / (0.2 * high))
 
 
 def autoregression(series: FloatArray, order: int, noise: float = 0.0) -> tuple[FloatArray, float]:
@@ -63,19 +71,19 @@ def continued(past: FloatArray, whitening: FloatArray, count: int) -> FloatArray
     order = len(whitening) - 1
     lags = scipy.linalg.toeplitz(past[: -order - 1 : -1], np.zeros(order))
     state = -whitening[1:] @ lags
-    result: FloatArray = scipy.signal.lfilter([1.0], whitening, np.zeros(count), zi=state)[0]
-    return result
+    return scipy.signal.lfilter([1.0], whitening, np.zeros(count), zi=state)[0]
 
 
 def predicted_extension(
-    array: FloatArray, count: int, fitted: int, order: int, fade: bool = True
+    array: FloatArray, count: int, fitted: int, order: int, whole: int = 0
 ) -> FloatArray:
     """Lengthen series at both ends by linear prediction from their own last samples.
 
     A record that stops in the middle of a wave is continued by waves, so that a filter with a
-    long response is not fed a jump. The continuation fades out as a half cosine.
+    long response is not fed a jump. The continuation fades out as a half cosine once it is `whole`
+    samples long.
     """
-    window = 0.5 * (1 + np.cos(np.pi * np.arange(1, count + 1) / (count + 1))) if fade else 1.0
+    window = rising((count - np.arange(float(count))) / (count - whole + 1))
 
     def lengthened(column: FloatArray) -> FloatArray:
         values = np.ascontiguousarray(column)
@@ -84,7 +92,7 @@ def predicted_extension(
         )
         return np.concatenate([before[::-1], values, after])
 
-    return np.asarray(np.apply_along_axis(lengthened, 0, array))
+    return np.apply_along_axis(lengthened, 0, array)
 
 
 def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
@@ -92,47 +100,32 @@ def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
     return continued(past, autoregression(past, order)[0], count)
 
 
-def _check_slowest(frequency: float, dt: float, samples: int, name: str) -> None:
-    """Refuse a period so long that eight of them, added to the record, take all memory."""
-    if frequency * dt * samples < SHORTEST_RECORD:
+def _transformed(
+    array: FloatArray, dt: float, slowest: float, name: str
+) -> tuple[FloatArray, FloatArray, Callable[[FloatArray], FloatArray]]:
+    """Frequencies (Hz) and spectra of series continued at either end, and what takes them back.
+
+    Refuses a frequency `slowest` (Hz) whose period is so long that eight of them, added to the
+    record, take all memory.
+    """
+    lasts = dt * len(array)
+    if slowest * lasts < SHORTEST_RECORD:
         raise RequestError(
-            f"{name} ({frequency:g} Hz) has a period of {1 / frequency:g} s, and the record lasts "
-            f"{dt * samples:g} s; at least {SHORTEST_RECORD:g} of a period is needed to separate "
+            f"{name} ({slowest:g} Hz) has a period of {1 / slowest:g} s, and the record lasts "
+            f"{lasts:g} s; at least {SHORTEST_RECORD:g} of a period is needed to separate "
             "it from a drift. Raise it, or give a longer record."
         )
-
-
-def _extended(array: FloatArray, frequency: float) -> tuple[FloatArray, int]:
-    """Series continued at either end, and by how many samples; the frequency is per sample."""
     # Eight periods outlast the ringing of a flank there; a prediction needs to look back one and
     # a half of them to separate the slowest wave from a trend.
-    padding, order = int(np.ceil(8.0 / frequency)), min(int(np.ceil(1.6 / frequency)), 2000)
-    return predicted_extension(array, padding, fitted=padding, order=order), padding
+    padding = int(np.ceil(8.0 / (slowest * dt)))
+    order = min(int(np.ceil(1.6 / (slowest * dt))), 2000)
+    extended = predicted_extension(array, padding, fitted=padding, order=order)
+    frequency = fft.rfftfreq(len(extended), dt)
 
+    def back(spectrum: FloatArray) -> FloatArray:
+        return fft.irfft(spectrum, n=len(extended), axis=0)[padding:-padding]
 
-def _integrated(
-    series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int
-) -> FloatArray:
-    array = as_series(series, minimum=4, channels=True)
-    (low, high), nyquist = band, 0.5 / time_step(dt)
-    if not 0 < low < high <= nyquist:
-        raise RequestError(
-            f"a band needs 0 < low < high, and high at most the Nyquist frequency ({nyquist:g} "
-            f"Hz); received ({low:g}, {high:g}) Hz. The lower edge keeps drift out: set it below "
-            "the slowest wave and above the drift."
-        )
-    _check_slowest(low, dt, array.shape[0], "the lower edge of the band")
-    # Averaged column by column, so that a channel has the same bits alone and beside others.
-    columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
-    array = (columns - columns.mean(axis=1, keepdims=True)).T.reshape(array.shape)
-    extended, padding = _extended(array, low * dt)
-    frequency = fft.rfftfreq(extended.shape[0], dt)
-    gain = band_gain(frequency, band)
-    omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
-    transfer = (gain / (1j * omega) ** times).reshape((-1,) + (1,) * (array.ndim - 1))
-    spectrum = fft.rfft(extended, axis=0) * transfer
-    out: FloatArray = fft.irfft(spectrum, n=extended.shape[0], axis=0)
-    return out[padding:-padding]
+    return frequency, fft.rfft(extended, axis=0), back
 
 
 def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> FloatArray:
@@ -157,7 +150,7 @@ def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> Fl
     RequestError
         As :func:`integrate`, of which this is the case of no integration.
     """
-    return _integrated(series, dt, band, 0)
+    return integrate(series, dt, band, 0)
 
 
 def integrate(
@@ -203,7 +196,21 @@ def integrate(
     >>> bool(np.max(np.abs(heave - np.cos(omega * t))) < 0.01)  # to the very ends
     True
     """
-    return _integrated(series, dt, band, times)
+    array = as_series(series, minimum=4, channels=True)
+    (low, high), nyquist = band, 0.5 / time_step(dt)
+    if not 0 < low < high <= nyquist:
+        raise RequestError(
+            f"a band needs 0 < low < high, and high at most the Nyquist frequency ({nyquist:g} "
+            f"Hz); received ({low:g}, {high:g}) Hz. The lower edge keeps drift out: set it below "
+            "the slowest wave and above the drift."
+        )
+    # Averaged column by column, so that a channel has the same bits alone and beside others.
+    columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
+    columns = columns - columns.mean(axis=1, keepdims=True)
+    frequency, spectrum, back = _transformed(columns.T, dt, low, "the lower edge of the band")
+    gain = band_gain(frequency, band)
+    omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
+    return back(spectrum * (gain / (1j * omega) ** times)[:, None]).reshape(array.shape)
 
 
 def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
@@ -241,7 +248,7 @@ def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     """
     x, step = as_series(series, minimum=5, channels=True), time_step(dt)
     # The slope of the quartic through five samples: a filter of Savitzky and Golay.
-    return np.asarray(scipy.signal.savgol_filter(x, 5, 4, deriv=1, delta=step, axis=0))
+    return scipy.signal.savgol_filter(x, 5, 4, deriv=1, delta=step, axis=0)
 
 
 def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
@@ -279,9 +286,9 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     time_step(dt)
     array = array - array.mean(axis=0)
     padding = array.shape[0] - 1
-    extended = np.pad(array, [(padding, padding)] + [(0, 0)] * (array.ndim - 1), mode="reflect")
+    extended = np.concatenate([array[:0:-1], array, array[-2::-1]])
     analytic = scipy.signal.hilbert(extended, axis=0)[padding:-padding]
-    return np.asarray(np.abs(analytic) ** 2)
+    return np.abs(analytic) ** 2
 
 
 def complementary_filter(
@@ -351,19 +358,13 @@ def complementary_filter(
             f"the crossover must lie between 0 and {0.8 * nyquist:g} Hz (0.8 of the Nyquist "
             f"frequency); received {crossover:g} Hz. Set it below the slowest wave."
         )
-    _check_slowest(crossover, dt, x.size, "the crossover")
     at = np.arange(x.size) - 0.5 * (x.size - 1)
     slope = float(at @ x / (at @ at))
     trend = x.mean() + slope * at
     both = np.column_stack([x - trend, a - a.mean()])
-    long, padding = _extended(both, crossover * dt)
-    frequency = fft.rfftfreq(long.shape[0], dt)
-    spectrum = fft.rfft(long, axis=0)
-    weight = 0.5 + 0.5 * np.cos(np.pi * np.clip((frequency / crossover - 0.75) / 0.5, 0.0, 1.0))
+    frequency, spectrum, back = _transformed(both, dt, crossover, "the crossover")
+    fast = rising((frequency / crossover - 0.75) / 0.5)
     omega = 2j * np.pi * frequency
-    safe = np.where(frequency > 0, omega, 1.0)
-    slow = spectrum[:, 0] * (omega if times == 1 else 1.0)
-    fast = np.where(weight < 1, spectrum[:, 1] / safe**times, 0.0)
-    joined = fft.irfft(weight * slow + (1 - weight) * fast, n=long.shape[0])
-    out: FloatArray = joined[padding:-padding]
-    return out + (slope / dt if times == 1 else trend)
+    integral = spectrum[:, 1] / np.where(frequency > 0, omega, 1.0) ** times
+    joined = back((1 - fast) * omega ** (2 - times) * spectrum[:, 0] + fast * integral)
+    return joined + (slope / dt if times == 1 else trend)

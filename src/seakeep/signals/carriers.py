@@ -116,10 +116,7 @@ def carriers(
 
     def waves(place: FloatArray, instant: FloatArray) -> FloatArray:
         phase = np.outer(place, k) - np.outer(instant, omega)
-        basis: FloatArray = np.concatenate(
-            [np.cos(phase) * amplitude, np.sin(phase) * amplitude], 1
-        )
-        return basis
+        return np.concatenate([np.cos(phase) * amplitude, np.sin(phase) * amplitude], 1)
 
     places = np.repeat(np.asarray(probes, dtype=float), lags.size)
     read = waves(places, np.tile(lags * dt, len(probes)))
@@ -159,8 +156,7 @@ def slow_position(surge: FloatArray, period: float) -> FloatArray:
     """Surge below ``CUTOFF`` without delay; `period` in samples."""
     sections = signal.butter(4, 2 * CUTOFF / period, output="sos")
     padding = min(len(surge) - 1, round(SETTLED * period))
-    result: FloatArray = signal.sosfiltfilt(sections, surge, padlen=padding)
-    return result
+    return signal.sosfiltfilt(sections, surge, padlen=padding)
 
 
 def position_taps(
@@ -202,5 +198,4 @@ def position_taps(
     gram[np.diag_indices_from(gram)] += RIDGE * total
     # Least squares under the condition that the weights sum to one.
     free, ones = linalg.solve(gram, np.stack([right, np.ones(count)], axis=1), assume_a="pos").T
-    result: FloatArray = free + ones * (1.0 - free.sum()) / ones.sum()
-    return result
+    return free + ones * (1.0 - free.sum()) / ones.sum()

@@ -87,7 +87,7 @@ class Expression:
         with np.errstate(all="ignore"):
             out = self.of(arrays.__getitem__)
         # Of means alone it is one number.
-        result: FloatArray = np.array(np.broadcast_to(out, arrays[self.channels[0]].shape))
+        result = np.array(np.broadcast_to(out, arrays[self.channels[0]].shape))
         if not np.all(np.isfinite(result)):
             bad = np.flatnonzero(~np.isfinite(result))
             raise DataError(
@@ -264,9 +264,9 @@ def parse(text: str) -> Expression:
 def _is_exponent(node: ast.expr) -> bool:
     """Whether a node is a number that a physical law may have as an exponent."""
     match node:
-        case ast.UnaryOp(ast.USub(), ast.Constant(float() | int() as size)):
-            return size <= GREATEST_EXPONENT
-        case ast.Constant(float() | int() as size):
+        case ast.Constant(float() | int() as size) | ast.UnaryOp(
+            ast.USub(), ast.Constant(float() | int() as size)
+        ):
             return size <= GREATEST_EXPONENT
     return False
 

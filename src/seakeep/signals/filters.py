@@ -58,7 +58,7 @@ def lowpass_taps(
     for extra in range(7):  # Kaiser's formula is a fit, some 3 dB short for short filters
         count, beta = scipy.signal.kaiserord(attenuation + extra, 2 * (edges[1] - edges[0]))
         count += 1 - count % 2
-        taps: FloatArray = scipy.signal.firwin(
+        taps = scipy.signal.firwin(
             count, sum(edges) / 2, window=("kaiser", beta), fs=1.0, scale=True
         )
         if _deviation(taps, edges) <= 10 ** (-attenuation / 20):
@@ -136,8 +136,7 @@ def low_pass(
     taps = lowpass_taps(1.0 / time_step(dt), passband, edge, attenuation)
     extended = odd_extension(array, taps.size // 2)  # so that length and phase are unchanged
     columns = taps.reshape((-1,) + (1,) * (array.ndim - 1))
-    filtered: FloatArray = scipy.signal.oaconvolve(extended, columns, mode="valid", axes=0)
-    return filtered
+    return scipy.signal.oaconvolve(extended, columns, mode="valid", axes=0)
 
 
 PASSBAND = 0.8
@@ -203,8 +202,7 @@ def resample(
     position = (wanted - t[0]) / dt
     nearest = np.rint(position)
     if abs(new_dt - dt) < 1e-9 * dt and np.max(np.abs(position - nearest)) < 1e-6:
-        same: FloatArray = array[nearest.astype(int)]
-        return same
+        return array[nearest.astype(int)]
 
     # The lower one, in cycles per old sample.
     nyquist = 0.5 * min(1.0, dt / new_dt if anti_alias else 1.0)
@@ -263,7 +261,7 @@ def _kernels(half: int, beta: float, band: float) -> FloatArray:
         special.i0(beta * np.sqrt(np.maximum(inside, 0.0))),
         special.j0(beta * np.sqrt(np.maximum(-inside, 0.0))),
     )
-    kernels: FloatArray = window * np.sinc(band * lag)
+    kernels = window * np.sinc(band * lag)
     kernels /= kernels.sum(axis=1, keepdims=True)
     return kernels
 

@@ -170,7 +170,7 @@ def _correlation(a: FloatArray, b: FloatArray, lags: IntArray) -> FloatArray:
     """Correlation of a(t) and b(t + lag) over their common samples."""
 
     def summed(x: FloatArray, y: FloatArray) -> FloatArray:
-        return np.asarray(scipy.signal.correlate(y, x, method="fft")[a.size - 1 + lags])
+        return scipy.signal.correlate(y, x, method="fft")[a.size - 1 + lags]
 
     one = np.ones(a.size)
     count = a.size - np.abs(lags)
@@ -178,7 +178,7 @@ def _correlation(a: FloatArray, b: FloatArray, lags: IntArray) -> FloatArray:
     power_a = summed(a**2, one) / count - mean_a**2
     power_b = summed(one, b**2) / count - mean_b**2
     covariance = summed(a, b) / count - mean_a * mean_b
-    return np.asarray(covariance / np.sqrt(np.maximum(power_a * power_b, 1e-300)))
+    return covariance / np.sqrt(np.maximum(power_a * power_b, 1e-300))
 
 
 def parabola_peak(values: FloatArray, at: int | None = None) -> tuple[float, float]:

@@ -33,7 +33,7 @@ EDGE, CLEAR = 5, 11
 CORNERS = ("left_top", "left_bottom", "right_top", "right_bottom")
 """Fields that say how much of each corner is seen."""
 FIELDS = ("x", "y", "angle", "length", "height", "area", "fill", "cut", "saturation", "brightness",
-          *CORNERS)  # fmt: skip
+          *CORNERS, "picture", "lamp")  # fmt: skip
 """Measurements of a frame: centroid, pixels; orientation of the long axis, rad in (−π/2, π/2],
 positive clockwise as seen; sides of the rectangle of the same second moments; pixels, holes
 included; area by that of the smallest rectangle around it; one where it touches the border of the
@@ -143,9 +143,12 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     cv2 = opencv()
     left, top, width, height = how.region or (0, 0, frame.shape[1], frame.shape[0])
     part = frame[top : top + height, left : left + width]
-    panel = dict.fromkeys(FIELDS, np.nan) | {"area": 0.0, "cut": 0.0}
-    panel["saturation"] = float(cv2.countNonZero(cv2.inRange(part, (SATURATED,) * 3, (255,) * 3)))
-    panel["brightness"] = float(np.mean(cv2.mean(part)[:3]))
+    panel = {
+        "area": 0.0,
+        "cut": 0.0,
+        "saturation": float(cv2.countNonZero(cv2.inRange(part, (SATURATED,) * 3, (255,) * 3))),
+        "brightness": float(np.mean(cv2.mean(part)[:3])),
+    }
     mask = cv2.inRange(part, how.lower[::-1], (255,) * 3)
     for side, step in ((OPENING, cv2.MORPH_OPEN), (CLOSING, cv2.MORPH_CLOSE)):
         mask = cv2.morphologyEx(mask, step, np.ones((side, side), np.uint8))
@@ -163,7 +166,7 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     if area < SMALLEST:
         return panel
     weights = _weights(patch, filled)
-    moments = cv2.moments(filled if weights is None else weights, binaryImage=weights is None)
+    moments = cv2.moments(weights)
     mass = moments["m00"]
     centre = moments["m10"] / mass, moments["m01"] / mass
     xx, xy, yy = (moments[name] / mass for name in ("mu20", "mu11", "mu02"))
@@ -171,7 +174,6 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
     long_side, short_side = (float(np.sqrt(12 * (mean + sign * half))) for sign in (1, -1))
     _, sides, _ = cv2.minAreaRect(outline)  # runs through the centres of the outermost pixels
-    seen = (filled > 0).astype(np.float32) if weights is None else weights
     cut = min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0]
     return panel | {
         "x": left + x0 + centre[0],
@@ -182,7 +184,7 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
         "area": area,
         "fill": area / ((sides[0] + 1.0) * (sides[1] + 1.0)),
         "cut": float(cut),
-        **_corners(seen, centre, angle, long_side, short_side),
+        **_corners(weights, centre, angle, long_side, short_side),
     }
 
 
@@ -204,8 +206,8 @@ def _corners(
     return dict(zip(CORNERS, out, strict=True))
 
 
-def _weights(patch: Image, filled: Image) -> Weights | None:
-    """Part of each pixel that the component covers, from its brightness; None if it has no inside.
+def _weights(patch: Image, filled: Image) -> Weights:
+    """Part of each pixel that the component covers, from its brightness if it has an inside.
 
     A binary mask shows an edge that runs nearly along the rows as one step or none, which turns a
     panel of 120 × 40 pixels by up to 0.7 degrees; the brightness of the edge's pixels says where
@@ -216,13 +218,10 @@ def _weights(patch: Image, filled: Image) -> Weights | None:
     inside = cv2.erode(filled, edge, borderType=cv2.BORDER_CONSTANT, borderValue=0) > 0
     near = cv2.dilate(filled, edge) > 0
     outside = cv2.dilate(filled, clear) == 0
-    if not inside.any() or not outside.any():
-        return None
     grey = cv2.cvtColor(patch, cv2.COLOR_BGR2GRAY).astype(np.float32)
-    bright, dark = float(np.median(grey[inside])), float(np.median(grey[outside]))
-    if bright <= dark:
-        return None
-    weights = np.clip((grey - dark) / (bright - dark), 0.0, 1.0).astype(np.float32)
-    weights[inside] = 1.0
-    weights[~near] = 0.0
-    return np.asarray(weights, dtype=np.float32)
+    if inside.any() and outside.any():
+        bright, dark = float(np.median(grey[inside])), float(np.median(grey[outside]))
+        if bright > dark:
+            part = np.clip((grey - dark) / (bright - dark), 0.0, 1.0)
+            return np.where(inside, 1.0, np.where(near, part, 0.0)).astype(np.float32)
+    return (filled > 0).astype(np.float32)

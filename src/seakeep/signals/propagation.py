@@ -31,7 +31,7 @@ from seakeep.arrays import (
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
 from seakeep.signals.lags import correlation_peak, parabola_peak
-from seakeep.signals.waves import encounter_period, is_regular, welch_segments
+from seakeep.signals.waves import encounter_period, is_regular
 from seakeep.waves import group_speed, phase_speed, wavenumber
 
 EARLIEST = 1e-3
@@ -87,11 +87,7 @@ class EffectiveCelerity:
 
 
 def phase_celerity(
-    upstream: npt.ArrayLike,
-    downstream: npt.ArrayLike,
-    dt: float,
-    separation: float,
-    depth: float,
+    upstream: npt.ArrayLike, downstream: npt.ArrayLike, dt: float, separation: float, depth: float
 ) -> PhaseCelerity:
     r"""Phase speed between two probes from the phase of their cross-spectrum.
 
@@ -128,19 +124,18 @@ def phase_celerity(
     """
     first, second = as_pair(upstream, downstream, minimum=8, moving=True)
     step, apart = time_step(dt), positive(separation, "the separation", "m")
-    segment = min(round(60.0 / step), first.size // 2)
-    length, shared = welch_segments(first.size, step, segment, None)
-    options = {"fs": 1.0 / step, "window": "hamming", "nperseg": length, "noverlap": shared}
+    length = min(round(60.0 / step), first.size // 2)
+    options = {"fs": 1.0 / step, "window": "hamming", "nperseg": length}
+    # Without zero frequency, which has no phase.
     frequency, cross = (each[1:] for each in scipy.signal.csd(first, second, **options))
     coherence = np.minimum(scipy.signal.coherence(first, second, **options)[1][1:], 1.0)
     expected = wavenumber(2 * np.pi * frequency, depth) * apart
-    # csd takes conj(first) · second, so that a later second record has a negative phase.
+    # The nearest phase to linear theory's; np.angle gives that of the transform, −ωτ.
     phase = expected + np.angle(np.conj(cross) * np.exp(-1j * expected))
     phase = np.maximum(phase, 1e-9)
     celerity = 2 * np.pi * frequency * apart / phase
-    segments = first.size / length
     with np.errstate(divide="ignore"):
-        error = np.sqrt((1.0 - coherence) / (2.0 * segments * coherence))
+        error = np.sqrt((1.0 - coherence) * length / (2.0 * first.size * coherence))
     return PhaseCelerity(frequency, celerity, coherence, celerity * error / phase)
 
 
@@ -427,7 +422,7 @@ def probe_separation(
     """
     a, b = as_pair(first, second, minimum=64, moving=True)
     interval, place = time_step(dt), number(stated, "the stated separation")
-    cross, power, k = _spectra(a, b, interval, depth)
+    cross, k = _spectra(a, b, interval, depth)
     period = encounter_period(a, interval)
     reach = float(group_speed(2 * np.pi / period, depth)) * REACH * a.size * interval
     reach = max(reach, abs(place) + np.pi / float(k[np.argmax(np.abs(cross))]))
@@ -438,22 +433,19 @@ def probe_separation(
             f"record of {a.size * interval:.4g} s. Correct the positions of the probes (m)."
         )
     coarse = np.arange(-reach, reach, step)
-    scores = _scores(cross, power, k, coarse)
+    scores = _scores(cross, k, coarse)
     best = coarse[_chosen(scores, int(np.argmin(np.abs(coarse - place))))]
     fine = best + step * np.arange(-2 * FINER, 2 * FINER + 1) / FINER
-    scores = _scores(cross, power, k, fine)
+    scores = _scores(cross, k, fine)
     total = scores.sum(axis=0)
     separation, *without = (
         fine[0] + parabola_peak(values)[0] * step / FINER for values in (total, *(total - scores))
     )
-    left_out = np.array(without)
-    count = GROUPS
-    spread = np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean()) ** 2))
     turned = np.abs(1.0 - np.exp(1j * k * (separation - place))) ** 2
     weight = np.abs(cross)
     return ProbeSeparation(
         separation=float(separation),
-        spread=float(spread),
+        spread=float(_jackknife(np.array(without))),
         correlation=float(total.max()),
         stated=place,
         input_error=float(np.sqrt(np.sum(weight * turned) / np.sum(weight))),
@@ -462,34 +454,36 @@ def probe_separation(
 
 def _spectra(
     a: FloatArray, b: FloatArray, dt: float, depth: float
-) -> tuple[ComplexArray, float, FloatArray]:
-    """Cross-spectrum where there is energy, the product of the records' norms, wavenumbers."""
+) -> tuple[ComplexArray, FloatArray]:
+    """Cross-spectrum over the records' norms, and wavenumbers, where there is energy."""
     taper = scipy.signal.windows.tukey(a.size, 0.2)
     first, second = (fft.rfft(taper * (each - each.mean())) for each in (a, b))
     frequency = fft.rfftfreq(a.size, dt)
-    cross = np.conj(first) * second
-    norm = float(np.sqrt(np.sum(np.abs(first[1:]) ** 2) * np.sum(np.abs(second[1:]) ** 2)))
+    cross = np.conj(first) * second / (np.linalg.norm(first[1:]) * np.linalg.norm(second[1:]))
     smooth = np.convolve(np.abs(cross), np.ones(9) / 9, mode="same")
     energetic = (smooth > ENERGY * smooth[1:].max()) & (frequency > 0)
-    return cross[energetic], norm, wavenumber(2 * np.pi * frequency[energetic], depth)
+    return cross[energetic], wavenumber(2 * np.pi * frequency[energetic], depth)
 
 
-def _scores(cross: ComplexArray, norm: float, k: FloatArray, distances: FloatArray) -> FloatArray:
+def _scores(cross: ComplexArray, k: FloatArray, distances: FloatArray) -> FloatArray:
     """Parts of the correlation that the groups of frequencies make, shape (group, distance).
 
     Distances are equally spaced: each is a start and an offset, whose phases multiply.
     """
     group = (np.arange(k.size) // NEIGHBOURS) % GROUPS
     length = int(np.sqrt(distances.size))
-    starts = distances[::length]
-    offsets = distances[:length] - distances[0]
-    out = np.zeros((GROUPS, distances.size))
-    for each in range(GROUPS):
-        own = group == each
-        turned = cross[own] * np.exp(1j * np.outer(starts, k[own]))
-        scores = turned @ np.exp(1j * np.outer(k[own], offsets))
-        out[each] = scores.real.ravel()[: distances.size] / norm
+    starts, offsets = distances[::length], distances[:length] - distances[0]
+    out = np.empty((GROUPS, distances.size))
+    for each, row in enumerate(out):
+        own = k[group == each]
+        turned = cross[group == each] * np.exp(1j * np.outer(starts, own))
+        row[:] = (turned @ np.exp(1j * np.outer(own, offsets))).real.ravel()[: row.size]
     return out
+
+
+def _jackknife(values: FloatArray) -> FloatArray:
+    """Standard error of a sum from its values without, or the parts of, each group."""
+    return np.sqrt((GROUPS - 1) / GROUPS * np.sum((values - values.mean(axis=0)) ** 2, axis=0))
 
 
 def _chosen(scores: FloatArray, stated: int) -> int:
@@ -498,10 +492,8 @@ def _chosen(scores: FloatArray, stated: int) -> int:
     peaks = scipy.signal.find_peaks(total)[0]
     best = peaks[np.argmax(total[peaks])]
     parts = scores[:, [best]] - scores[:, peaks]
-    # Jackknife of a sum over groups: leaving one out leaves its part out.
-    error = np.sqrt((GROUPS - 1) / GROUPS * np.sum((parts - parts.mean(axis=0)) ** 2, axis=0))
-    alike = (total[peaks] >= NEARLY * total[best]) & (parts.sum(axis=0) <= SURELY * error)
-    near = peaks[alike]
+    alike = total[peaks] >= NEARLY * total[best]
+    near = peaks[alike & (parts.sum(axis=0) <= SURELY * _jackknife(parts))]
     return int(near[np.argmin(np.abs(near - stated))])
 
 
@@ -568,7 +560,7 @@ def carry_by_dispersion(
 
     def numbers(omega: FloatArray) -> FloatArray:
         beyond = np.maximum(omega - edge, 0.0) / group_speed(edge, depth)
-        return np.asarray(wavenumber(np.minimum(omega, edge), depth) + beyond)
+        return wavenumber(np.minimum(omega, edge), depth) + beyond
 
     return _carried(array, dt, distances, numbers)
 
@@ -578,9 +570,8 @@ def carry_by_celerity(
 ) -> CarriedElevation:
     """Prepare a record to be carried over a range of distances (m) at one celerity (m/s)."""
     speed = positive(celerity, "the celerity", "m/s")
-    return _carried(
-        as_series(series, minimum=4, channels=True), dt, distances, lambda omega: omega / speed
-    )
+    array = as_series(series, minimum=4, channels=True)
+    return _carried(array, dt, distances, lambda omega: omega / speed)
 
 
 def _carried(
@@ -595,16 +586,18 @@ def _carried(
     coefficients vanish beyond p = kh faster than any power.
     """
     step, (lowest, highest) = time_step(dt), distances
-    flat = array.reshape(array.shape[0], -1)
+    flat = array.reshape(len(array), -1)
     mean = flat.mean(axis=0)
     centre, half = 0.5 * (lowest + highest), 0.5 * (highest - lowest)
-    # The slowest energy of interest travels at half the lowest phase speed.
+    # The slowest energy of interest travels at half the lowest phase speed. What is predicted at
+    # either end fades out once no delay reaches it. In samples:
     top = float(numbers(np.array([np.pi / step]))[0])
-    farthest = max(abs(lowest), abs(highest))
-    delay = 2.0 * farthest * top * step / np.pi
-    period = 1.0 / max(band_limit(flat, step, 0.5), 2.0 / (flat.shape[0] * step))
-    extended, padding = _continued(flat - mean, delay / step, period / step)
-    size = fft.next_fast_len(extended.shape[0], real=True)
+    delay = 2.0 * max(abs(lowest), abs(highest)) * top / np.pi
+    period = 1.0 / max(band_limit(flat, 1.0, 0.5), 2.0 / len(flat))
+    whole, order = int(np.ceil(delay + period)), min(int(np.ceil(2.0 * period)), 500)
+    padding, fitted = whole + int(np.ceil(4.0 * period)), max(8 * order, 64)
+    extended = predicted_extension(flat - mean, padding, fitted, order, whole)
+    size = fft.next_fast_len(len(extended), real=True)
     spectrum = fft.rfft(extended, n=size, axis=0)
     k = numbers(2 * np.pi * fft.rfftfreq(size, step))
     reach = float(k[-1]) * half
@@ -616,27 +609,12 @@ def _carried(
             f"wavelengths that a step of {step:g} s resolves. Resample the elevation to some 30 "
             "samples per wave period first."
         )
-    turned = spectrum * np.exp(-1j * k * centre)[:, None]
-    nodes = half * np.cos(np.pi * (np.arange(count) + 0.5) / count)
     records = np.empty((count, *flat.shape))
-    for record, node in zip(records, nodes, strict=True):
-        carried = fft.irfft(turned * np.exp(-1j * k * node)[:, None], n=size, axis=0)
-        record[:] = carried[padding : padding + flat.shape[0]]
-    terms = fft.dct(records, type=2, axis=0, overwrite_x=True) / count
+    nodes = chebyshev.chebpts1(count)
+    for record, node in zip(records, centre + half * nodes, strict=True):
+        carried = fft.irfft(spectrum * np.exp(-1j * k * node)[:, None], n=size, axis=0)
+        record[:] = carried[padding : padding + len(flat)]
+    terms = fft.dct(records[::-1], type=2, axis=0) / count
     terms[0] *= 0.5
     terms[0] += mean
     return CarriedElevation(lowest, highest, terms)
-
-
-def _continued(deviations: FloatArray, delay: float, period: float) -> tuple[FloatArray, int]:
-    """Lengthen at both ends by predicted waves that fade out once no delay reaches them."""
-    whole, fading = int(np.ceil(delay + period)), int(np.ceil(4.0 * period))
-    order = min(int(np.ceil(2.0 * period)), 500)
-    padding = whole + fading
-    extended = predicted_extension(
-        deviations, padding, fitted=max(8 * order, 64), order=order, fade=False
-    )
-    fade = 0.5 * (1.0 + np.cos(np.pi * np.arange(1, fading + 1) / (fading + 1)))
-    extended[padding + deviations.shape[0] + whole :] *= fade[:, None]
-    extended[:fading] *= fade[::-1, None]
-    return extended, padding

@@ -63,7 +63,7 @@ def rotation_matrix(angles: npt.ArrayLike) -> FloatArray:
     >>> bool(bow[2] > 0)  # a positive pitch lifts the bow, which points against the waves
     True
     """
-    return np.asarray(Rotation.from_euler("xyz", _vectors(angles=angles)[0]).as_matrix())
+    return Rotation.from_euler("xyz", _vectors(angles=angles)[0]).as_matrix()
 
 
 def transfer_position(
@@ -99,8 +99,7 @@ def transfer_position(
     """
     r = _offset(offset)
     moved, turn = _vectors(position=position, angles=angles)
-    turned: FloatArray = moved + rotation_matrix(turn) @ r - r
-    return turned
+    return moved + rotation_matrix(turn) @ r - r
 
 
 def transfer_velocity(
@@ -132,8 +131,7 @@ def transfer_velocity(
     """
     v, turned, omega = _vectors(velocity=velocity, angles=angles, rates=rates)
     turn = np.cross(omega, _offset(offset))
-    moved: FloatArray = v + np.einsum("tij,tj->ti", rotation_matrix(turned), turn)
-    return moved
+    return v + np.einsum("tij,tj->ti", rotation_matrix(turned), turn)
 
 
 def transfer_acceleration(
@@ -173,8 +171,7 @@ def transfer_acceleration(
         angular_acceleration=angular_acceleration,
     )
     turn = np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
-    moved: FloatArray = a + np.einsum("tij,tj->ti", rotation_matrix(turned), turn)
-    return moved
+    return a + np.einsum("tij,tj->ti", rotation_matrix(turned), turn)
 
 
 def remove_gravity(
@@ -213,5 +210,4 @@ def remove_gravity(
     upward = np.array([0.0, 0.0, GRAVITY])
     read, angles = _vectors(specific_force=specific_force, angles=angles)
     force = read + (upward if zeroed else 0.0)
-    turned: FloatArray = np.einsum("tij,tj->ti", rotation_matrix(angles), force) - upward
-    return turned
+    return np.einsum("tij,tj->ti", rotation_matrix(angles), force) - upward

@@ -84,20 +84,21 @@ class Clock:
         """One line for people: offset and drift with their errors, and where they come from."""
         if not self.known:
             return self.method
-        words = (
-            f"{1e3 * self.offset:+z.2f}{_error(1e3 * self.offset_error, 2)} ms, "
-            f"{1e6 * self.drift:+z.1f}{_error(1e6 * self.drift_error, 1)} ppm"
+        doubt = [1e3 * self.offset_error, 1e6 * self.drift_error]
+        errors = [f" ± {doubt[0]:.2f}", f" ± {doubt[1]:.1f}"] if np.isfinite(doubt[1]) else ["", ""]
+        return (
+            f"{1e3 * self.offset:+z.2f}{errors[0]} ms, {1e6 * self.drift:+z.1f}{errors[1]} ppm "
+            f"({self.method}, n = {self.count})"
         )
-        return f"{words} ({self.method}, n = {self.count})"
+
+    def with_drift(self, drift: float, why: str) -> Clock:
+        """Clock of another drift, which reads the same in the middle of what this rests on."""
+        offset = self.offset + (self.drift - drift) * self.centre
+        return replace(self, offset=offset, drift=drift, method=f"{self.method}, {why}")
 
 
-def _error(value: float, digits: int) -> str:
-    """A standard error behind its number; nothing where it is not known."""
-    return f" ± {value:.{digits}f}" if np.isfinite(value) else ""
-
-
-def _line(own: FloatArray, reference: FloatArray, errors: FloatArray | None) -> Clock:
-    """Straight line of one clock over another, outliers left out."""
+def _line(own: FloatArray, reference: FloatArray, errors: FloatArray, method: str) -> Clock:
+    """Straight line of one clock over another, outliers left out, at least as wrong as `errors`."""
     late, inliers = own - reference, np.ones(own.size, dtype=bool)
     for _ in range(5):
         centre, level = float(reference[inliers].mean()), float(late[inliers].mean())
@@ -112,13 +113,12 @@ def _line(own: FloatArray, reference: FloatArray, errors: FloatArray | None) -> 
         inliers = updated
     count = int(inliers.sum())
     rms = float(np.sqrt(np.mean(residual[inliers] ** 2)))
-    formal = 0.0 if errors is None else float(np.sqrt(np.mean(errors[inliers] ** 2)))
+    formal = float(np.sqrt(np.mean(errors[inliers] ** 2)))
     sigma = max(rms * np.sqrt(count / (count - 2)) if count > 2 else 0.0, formal)
     drift_error = sigma / np.sqrt(spread) if spread > 0 else float("nan")
     offset_error = float(np.hypot(sigma / np.sqrt(count), centre * drift_error))
-    return Clock(
-        level - drift * centre, drift, offset_error, drift_error, "", count, rms, centre=centre
-    )
+    offset = level - drift * centre
+    return Clock(offset, drift, offset_error, drift_error, method, count, rms, centre=centre)
 
 
 def _adjusted(
@@ -129,18 +129,17 @@ def _adjusted(
     Returns
     -------
     shifts, errors : ndarray, shape (slope,)
-        Shifts, and their standard errors per standard deviation of what is left.
+        Shifts, and their standard errors if what is left is white.
     left : ndarray
         What the fit leaves of the values.
     gain : float
     """
     design = np.column_stack([shape, np.ones(shape.size), *slopes])
     solution = np.linalg.lstsq(design, values, rcond=None)[0]
-    gain = float(solution[0]) or 1.0
-    variances = np.diagonal(np.linalg.pinv(design.T @ design))[2:]
-    errors: FloatArray = np.sqrt(variances) / abs(gain)
-    shifts = np.asarray(solution[2:] / gain, dtype=np.float64)
-    return shifts, errors, np.asarray(values - design @ solution), gain
+    left, gain = values - design @ solution, float(solution[0]) or 1.0
+    variance = left @ left / max(left.size - len(solution), 1)
+    errors = np.sqrt(variance * np.diagonal(np.linalg.pinv(design.T @ design))[2:]) / abs(gain)
+    return np.asarray(solution[2:] / gain), errors, left, gain
 
 
 def clock_from_pulses(
@@ -199,16 +198,16 @@ def clock_from_pulses(
     fast = int(np.median(np.diff(sides[1][1])) <= np.median(np.diff(sides[0][1])))
     template = pulse_template(*sides[fast], pulses[fast][1], matched[fast])
     timed = [time_pulses(*side, at, template) for side, at in zip(sides, matched, strict=True)]
-    (own, own_error), (reference, reference_error) = timed
-    errors = np.hypot(own_error, reference_error)
+    (own, reference), errors = (np.stack(each) for each in zip(*timed, strict=True))
+    errors = np.hypot(*errors)
     sound = np.isfinite(errors)
     if not sound.any():
         raise DataError(
             "no pulse of the trigger could be timed: the pulses of the two loggers differ in "
             "shape. Check that both columns hold the same trigger."
         )
-    clock = _line(own[sound], reference[sound], errors[sound])
-    return replace(clock, method="trigger pulses", modulus=modulus)
+    clock = _line(own[sound], reference[sound], errors[sound], "trigger pulses")
+    return replace(clock, modulus=modulus)
 
 
 def clock_from_correlation(
@@ -273,8 +272,7 @@ def clock_from_correlation(
             "larger lag."
         )
     instants = begin + lags.centre[good]
-    clock = _line(instants + lags.lag[good], instants, None)
-    return replace(clock, method="correlation of windows")
+    return _line(instants + lags.lag[good], instants, 0 * instants, "correlation of windows")
 
 
 def clock_from_shared(
@@ -308,43 +306,35 @@ def clock_from_shared(
     first = clock_from_correlation(series, time, reference, reference_time, window, largest_lag)
     a, c = record(series, time, "the logger")
     b, t = record(reference, reference_time, "the reference")
-    offset, drift = first.offset, first.drift
+    offset, rate = first.offset, 1 + first.drift
     turned = np.median(np.diff(c)) < np.median(np.diff(t))  # the spline is of the faster one
     if turned:
-        (a, c), (b, t) = (b, t), (a, c)
-        offset, drift = _inverse(offset, drift)
+        (a, c), (b, t), offset, rate = (b, t), (a, c), -offset / rate, 1 / rate
     other = scipy.interpolate.CubicSpline(t, b)
     centre = float(c.mean())
     for _ in range(6):
-        instants = (c - offset) / (1 + drift)
+        instants = (c - offset) / rate
         inside = (instants >= t[0]) & (instants <= t[-1])
         slope = other(instants[inside], 1)
         turn = -slope * (c[inside] - centre)
         (shift, stretch), errors, left, gain = _adjusted(
             a[inside], other(instants[inside]), -slope, turn
         )
-        offset, drift = float(offset + shift - stretch * centre), float(drift + stretch)
+        offset, rate = float(offset + shift - stretch * centre), float(rate + stretch)
         if abs(shift) < 1e-9 and abs(stretch) < 1e-12:
             break
     # Samples of a residual that is itself a wave count less than once each.
     power = float(left @ left)
     whiteness = float(left[1:] @ left[:-1]) / max(power, 1e-300)
     inflation = np.sqrt((1 + max(whiteness, 0.0)) / max(1 - whiteness, 1e-3))
-    level_error, drift_error = (
-        errors * np.sqrt(power / max(left.size - 4, 1)) * inflation
-    ).tolist()
-    rms = float(np.sqrt(np.mean(left**2)) / (abs(gain) * float(np.std(slope)) + 1e-300))
+    level_error, drift_error = (errors * inflation).tolist()
+    rms = float(np.sqrt(power / left.size) / (abs(gain) * float(np.std(slope)) + 1e-300))
     if turned:
-        offset, drift = _inverse(offset, drift)
+        offset, rate = -offset / rate, 1 / rate
     offset_error = float(np.hypot(level_error, centre * drift_error))
     return Clock(
-        offset, drift, offset_error, drift_error, "shared channel", left.size, rms, centre=centre
+        offset, rate - 1, offset_error, drift_error, "shared channel", left.size, rms, centre=centre
     )
-
-
-def _inverse(offset: float, drift: float) -> tuple[float, float]:
-    """Offset and drift of the reference's clock against this one."""
-    return -offset / (1 + drift), 1 / (1 + drift) - 1
 
 
 def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
@@ -380,24 +370,19 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
     error = float(weights.sum() ** -0.5)
     if float(weights @ (drifts - mean) ** 2) > scipy.stats.chi2.ppf(0.999, len(known) - 1):
         return list(clocks)
-    pooled = []
-    for clock in clocks:
+
+    def pooled(clock: Clock) -> Clock:
         if not clock.known:
-            pooled.append(clock)
-            continue
-        own = clock.drift_error if np.isfinite(clock.drift_error) else 0.0
+            return clock
+        own = float(np.nan_to_num(clock.drift_error))
         level = max(clock.offset_error**2 - (clock.centre * own) ** 2, 0.0)
-        pooled.append(
-            replace(
-                clock,
-                offset=clock.offset + (clock.drift - mean) * clock.centre,
-                drift=mean,
-                offset_error=float(np.sqrt(level + (clock.centre * error) ** 2)),
-                drift_error=error,
-                method=f"{clock.method}, drift of {len(known)} runs",
-            )
+        return replace(
+            clock.with_drift(mean, f"drift of {len(known)} runs"),
+            offset_error=float(np.sqrt(level + (clock.centre * error) ** 2)),
+            drift_error=error,
         )
-    return pooled
+
+    return [pooled(clock) for clock in clocks]
 
 
 def without_doubtful_drift(clock: Clock) -> Clock:
@@ -414,15 +399,10 @@ def without_doubtful_drift(clock: Clock) -> Clock:
     >>> kept.drift, round(kept.offset, 4), kept.method
     (0.0, 0.1006, 'trigger pulses, offset only: a drift of +20.0 ppm is not certain')
     """
-    doubtful = 0 < abs(clock.drift) <= 2.0 * clock.drift_error
-    if not doubtful:
+    if not 0 < abs(clock.drift) <= 2.0 * clock.drift_error:
         return clock
-    doubt = f"offset only: a drift of {1e6 * clock.drift:+z.1f} ppm is not certain"
-    return replace(
-        clock,
-        offset=clock.offset + clock.drift * clock.centre,
-        drift=0.0,
-        method=f"{clock.method}, {doubt}",
+    return clock.with_drift(
+        0.0, f"offset only: a drift of {1e6 * clock.drift:+z.1f} ppm is not certain"
     )
 
 
@@ -446,7 +426,8 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str) -> tuple[Float
     >>> [round(float(c), 3) for c in centres], round(width, 2)
     ([4.003], 0.17)
     """
-    x = np.where(np.isfinite(trigger), trigger, np.nanmedian(trigger)) - np.nanmedian(trigger)
+    x = trigger - np.nanmedian(trigger)
+    x[~np.isfinite(x)] = 0.0
     x = x if x.max() >= -x.min() else -x
     noise = 1.4826 * float(np.median(np.abs(x)))
     # Wide stretches outvote spikes: the height is that of the sample in the middle of the time
@@ -457,9 +438,9 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str) -> tuple[Float
         whole = [(a, b) for a, b in stretches(x > level) if a > 0 and b < x.size]
         if not whole:
             break
-        first, after = np.array(whole).T
+        edges = np.array(whole)
         peaks = np.array([x[a:b].max() for a, b in whole])
-        top = float(np.quantile(np.repeat(peaks, after - first), 0.5, method="lower"))
+        top = float(np.quantile(np.repeat(peaks, np.ptp(edges, axis=1)), 0.5, method="lower"))
         level = 0.5 * top
     if not whole or top < 6 * noise:
         raise DataError(
@@ -468,13 +449,9 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str) -> tuple[Float
             "or synchronise by another signal: state instead shared (one signal both record), "
             "correlated (two that go together) or offset (s)."
         )
-
-    def crossing(after: IntArray) -> FloatArray:
-        part = (level - x[after - 1]) / (x[after] - x[after - 1])
-        instants: FloatArray = time[after - 1] + part * (time[after] - time[after - 1])
-        return instants
-
-    rise, fall = crossing(first), crossing(after)
+    before = edges - 1
+    part = (level - x[before]) / (x[edges] - x[before])
+    rise, fall = (time[before] + part * (time[edges] - time[before])).T
     width = fall - rise
     sound = (peaks > 0.5 * top) & (peaks < 2 * top)
     usual = np.median(width[sound])
@@ -490,16 +467,23 @@ def match_pulses(
     Also the distance to the next offset that would fit nearly as well, ``inf`` if none does. Of
     offsets that fit equally well, the one nearest to `expected_offset` is taken.
     """
-    spacing = min((float(np.diff(each).min()) for each in (own, reference) if each.size > 1),
-                  default=1.0)  # fmt: skip
-    reach = 0.02 * spacing + LARGEST_DRIFT * float(np.ptp(reference))
-    candidates = np.unique(np.round((own[:, None] - reference[None, :]).ravel(), 6))
-    counts = np.array([_pairs(own - shift, reference, reach)[0].size for shift in candidates])
+    spacing = min([np.diff(each).min() for each in (own, reference) if each.size > 1], default=1.0)
+    reach = 0.02 * spacing + LARGEST_DRIFT * np.ptp(reference)
+
+    def pairs(shift: float) -> tuple[IntArray, IntArray]:
+        apart = np.abs(own[:, None] - shift - reference)
+        nearest = apart.argmin(axis=1)
+        close = np.flatnonzero(apart.min(axis=1) <= reach)
+        _, unique = np.unique(nearest[close], return_index=True)
+        return close[unique], nearest[close[unique]]
+
+    candidates = np.unique(np.round(own[:, None] - reference, 6))
+    counts = np.array([pairs(shift)[0].size for shift in candidates])
     near = candidates[counts >= max(counts.max() - 1, 1)]
-    best = float(near[np.argmin(np.abs(near - expected_offset))])
-    rivals = near[np.abs(near - best) > 4 * reach]
-    modulus = float(np.abs(rivals - best).min()) if rivals.size else float("inf")
-    first, second = _pairs(own - best, reference, reach)
+    best = near[np.argmin(np.abs(near - expected_offset))]
+    rivals = np.abs(near - best)
+    modulus = float(np.min(rivals[rivals > 4 * reach], initial=np.inf))
+    first, second = pairs(best)
     if first.size < max(1, min(own.size, reference.size) // 3):
         raise DataError(
             f"of {own.size} pulses of the logger and {reference.size} of the reference only "
@@ -508,13 +492,6 @@ def match_pulses(
             "the same trigger, and the unit of both times."
         )
     return first, second, modulus
-
-
-def _pairs(own: FloatArray, reference: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
-    nearest = np.abs(own[:, None] - reference[None, :]).argmin(axis=1)
-    close = np.flatnonzero(np.abs(own - reference[nearest]) <= reach)
-    _, unique = np.unique(nearest[close], return_index=True)
-    return close[unique], nearest[close[unique]]
 
 
 def pulse_template(
@@ -527,7 +504,7 @@ def pulse_template(
     x = np.where(np.isfinite(trigger), trigger, np.nanmedian(trigger))
     inside = (centres + away[0] >= time[0]) & (centres + away[-1] <= time[-1])
     whole = centres[inside] if inside.any() else centres
-    mean = np.mean([np.interp(c + away, time, x) for c in whole], axis=0)
+    mean = np.interp(whole[:, None] + away, time, x).mean(axis=0)
     return scipy.interpolate.CubicSpline(away, mean - np.median(x))
 
 
@@ -542,8 +519,7 @@ def time_pulses(
     By least squares of height, level and instant of a template.
     """
     reach = float(template.x[-1])
-    instants, errors = np.full(centres.size, np.nan), np.full(centres.size, np.nan)
-    slope = template.derivative()
+    instants, errors = np.full((2, centres.size), np.nan)
     for pulse, centre in enumerate(centres):
         at = float(centre)
         for _ in range(8):
@@ -551,12 +527,11 @@ def time_pulses(
             if near.sum() < 5:
                 break
             away = time[near] - at
-            (shift,), (error,), left, _ = _adjusted(trigger[near], template(away), -slope(away))
+            (shift,), (error,), *_ = _adjusted(trigger[near], template(away), -template(away, 1))
             move = float(np.clip(shift, -0.25 * reach, 0.25 * reach))
             at += move
             if abs(move) < 1e-9:
                 break
-        if near.sum() < 5 or abs(at - centre) > 0.5 * reach:
-            continue
-        instants[pulse], errors[pulse] = at, error * np.sqrt(left @ left / max(left.size - 3, 1))
+        if near.sum() >= 5 and abs(at - centre) <= 0.5 * reach:
+            instants[pulse], errors[pulse] = at, error
     return instants, errors

@@ -30,8 +30,8 @@ from seakeep.signals.filters import low_pass
 from seakeep.signals.panel import CORNERS, FIELDS, Image, TrackingSettings, find_panel, opencv
 from seakeep.signals.time_axis import stretches
 
-Seen = Mapping[str, FloatArray]
-
+Seen = dict[str, FloatArray]
+"""Fields of all frames."""
 FLAGS = {
     "good": 0,
     "lost": 1,  # nothing of the panel's colour
@@ -224,9 +224,9 @@ def track_video(
     how = settings or TrackingSettings()
     with _open_video(path) as video:
         _check_fit(video, how)
-        frames, seen, lamp = _measure(video, how, progress)
+        seen = _measure(video, how, progress)
         size, rate = video.size, video.rate
-    count = int(frames[-1]) + 1
+    count = seen["area"].size
     if count < 2:
         raise DataError(f"{path} holds one frame; a motion needs at least two. Export it again.")
     usual = _usual_panel(seen, how, str(path))
@@ -242,22 +242,20 @@ def track_video(
             "distorts."
         )
     motion, bridged = _motions(seen, flag == FLAGS["good"], usual, how, rate, str(path))
-    picture = np.full(count, -1)
-    picture[frames] = np.arange(frames.size)
+    panel = ("angle", "length", "height", "area", "fill")
     channels: dict[str, npt.NDArray[Any]] = {
         **motion,
         "centroid_x": seen["x"],
         "centroid_y": seen["y"],
-        **{f"panel_{name}": seen[name] for name in ("angle", "length", "height", "area", "fill")},
+        **{f"panel_{name}": seen[name] for name in panel},
         "saturation": seen["saturation"] / pixels,
         "quality": quality,
         "bridged": bridged.astype(np.int8),
-        "picture": picture,
+        "picture": np.nan_to_num(seen["picture"], nan=-1.0).astype(int),
         "flag": flag.astype(np.int8),
     }
     if how.lamp is not None:
-        channels["lamp"] = np.full(count, np.nan)
-        channels["lamp"][frames] = lamp
+        channels["lamp"] = seen["lamp"]
     attributes = {
         "source": Path(path).name,
         "frame": "x downstream, z up, pitch positive bow up; motions of the centre of gravity",
@@ -298,64 +296,56 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
         )
 
 
-def _measure(
-    video: _Video, how: TrackingSettings, progress: Progress | None
-) -> tuple[IntArray, dict[str, FloatArray], FloatArray]:
-    """Numbers of the frames, what was seen in each, on the uniform grid, and the lamp."""
+def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) -> Seen:
+    """What was seen of the panel and of the lamp in each frame; NaN of one that was dropped."""
     numbers: list[int] = []
     rows: list[list[float]] = []
-    lamp: list[float] = []
     at_rest = how.origin is None
-    disc = None
     if how.lamp is not None:
         x, y, radius = how.lamp
         below, right = np.ogrid[: video.size[1], : video.size[0]]
         disc = np.nonzero((right - x) ** 2 + (below - y) ** 2 <= radius**2)
+
+    def seen() -> Seen:
+        table = np.full((numbers[-1] + 1, len(FIELDS)), np.nan)
+        table[numbers] = rows
+        return dict(zip(FIELDS, table.T, strict=True))
+
     for number, frame in video.frames():
         if at_rest and rows and number >= how.rest * video.rate:
             at_rest = False  # refuse after the first frames what would be refused after the last
             where = f"first {how.rest:g} s (unless the origin is stated, zero lies there)"
-            early = dict(zip(FIELDS, np.array(rows).T, strict=True))
-            _usual_panel(early, how, f"{video.path}, {where}")
+            _usual_panel(seen(), how, f"{video.path}, {where}")
+        row = find_panel(frame, how) | {"picture": len(rows)}
+        if how.lamp is not None:
+            row["lamp"] = float(np.mean(frame[disc])) / 255.0
         numbers.append(number)
-        rows.append(list(find_panel(frame, how).values()))
-        if disc is not None:
-            lamp.append(float(np.mean(frame[disc])) / 255.0)
-        if progress is not None and len(numbers) % REPORT_EVERY == 0:
-            progress(len(numbers), max(video.announced, len(numbers)), "frames")
+        rows.append([row.get(field, np.nan) for field in FIELDS])
+        if progress is not None and len(rows) % REPORT_EVERY == 0:
+            progress(len(rows), max(video.announced, len(rows)), "frames")
     if progress is not None:
-        progress(len(numbers), len(numbers), "frames")
-    table = np.full((numbers[-1] + 1, len(FIELDS)), np.nan)  # dropped frames are NaN
-    table[numbers] = rows
-    return np.array(numbers), dict(zip(FIELDS, table.T, strict=True)), np.array(lamp)
+        progress(len(rows), len(rows), "frames")
+    return seen()
 
 
-def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, Any]:
+def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, float]:
     """Medians over the frames in which the largest component looks like the panel.
 
-    Of the fields of a frame; `scale` is m per pixel, `corners` an array, `corner_noise` the robust
-    standard deviation of the corner seen least.
+    Of the fields of a frame; `scale` is m per pixel, `corner_noise` the robust standard deviation
+    of the corner seen least.
     """
     panel, known = how.panel, how.metres_per_pixel
-    with np.errstate(invalid="ignore", divide="ignore"):
-        aspect = (seen["length"] / seen["height"]) / (panel[0] / panel[1])
-        like = (np.abs(aspect - 1) < ASPECT_BAND) & (seen["fill"] > LEAST_FILL)
-        like &= seen["cut"] == 0
-        if known is not None:
-            like &= np.abs(seen["length"] / (panel[0] / known) - 1) < SIZE_BAND
+    aspect = (seen["length"] / seen["height"]) / (panel[0] / panel[1])
+    like = (abs(aspect - 1) < ASPECT_BAND) & (seen["fill"] > LEAST_FILL) & (seen["cut"] == 0)
+    if known is not None:
+        like &= abs(seen["length"] / (panel[0] / known) - 1) < SIZE_BAND
     if not like.any():
         raise DataError(_not_found(seen, how, name))
-    usual: dict[str, Any] = {
-        field: float(np.median(seen[field][like]))
-        for field in ("length", "height", "fill", "saturation", "brightness")
-    }
-    usual["scale"] = known or float(
-        np.sqrt(panel[0] * panel[1] / (usual["length"] * usual["height"]))
-    )
-    corners = np.stack([seen[corner][like] for corner in CORNERS])
-    usual["corners"] = np.median(corners, axis=1)
-    lowest = np.min(corners - usual["corners"][:, None], axis=0)
-    usual["corner_noise"] = 1.4826 * float(np.median(np.abs(lowest - np.median(lowest))))
+    usual = {field: float(np.median(values[like])) for field, values in seen.items()}
+    lowest = np.min([seen[corner][like] - usual[corner] for corner in CORNERS], axis=0)
+    usual["corner_noise"] = 1.4826 * float(np.median(abs(lowest - np.median(lowest))))
+    square = panel[0] * panel[1] / (usual["length"] * usual["height"])
+    usual["scale"] = known or float(np.sqrt(square))
     return usual
 
 
@@ -370,17 +360,17 @@ def _not_found(seen: Seen, how: TrackingSettings, name: str) -> str:
             "nothing is as bright as the thresholds ask. Reduce the least red, green and blue "
             "(lower; --threshold), or correct the region."
         )
-    length, height = np.median(seen["length"][there]), np.median(seen["height"][there])
+    length, height = (np.median(seen[side][there]) for side in ("length", "height"))
     return start + (
         f"the largest bright component measures {length:.0f} × {height:.0f} pixels (median of "
-        f"{int(there.sum())} frames), which is not its shape. Raise the least red, green and blue "
+        f"{there.sum()} frames), which is not its shape. Raise the least red, green and blue "
         "(lower; --threshold), state a region that holds no other bright thing, or correct the "
         "panel's size."
     )
 
 
 def _judge(
-    seen: Seen, usual: Mapping[str, Any], how: TrackingSettings, step: float, pixels: int
+    seen: Seen, usual: Mapping[str, float], how: TrackingSettings, step: float, pixels: int
 ) -> tuple[IntArray, FloatArray]:
     """Flag frames that cannot be trusted, and give each a quality figure.
 
@@ -388,27 +378,23 @@ def _judge(
     the shape is good; 0 where there is nothing to see. A flagged frame has less than 0.5.
     """
     tolerance, panel_area = how.tolerance * usual["length"], usual["length"] * usual["height"]
-    excess = np.nan_to_num(seen["saturation"] - usual["saturation"])
-    corners = usual["corners"][:, None] - np.stack([seen[name] for name in CORNERS])
+    less = {field: usual[field] - values for field, values in seen.items()}
     drop = max(CORNER_DROP, CORNER_NOISE * usual["corner_noise"])
-    hidden = np.max(np.nan_to_num(corners, nan=np.inf), axis=0) / drop
-    deviations = (
-        hidden,
-        np.abs(seen["length"] - usual["length"]) / tolerance,
-        np.abs(seen["height"] - usual["height"]) / tolerance,
-        (usual["fill"] - seen["fill"]) / FILL_DROP,
-    )
-    shape = np.max(np.nan_to_num(np.stack(deviations), nan=np.inf), axis=0)
-    off = (shape > 1) | (seen["cut"] > 0)
-    flag = np.full(shape.size, FLAGS["good"])
-    flag[off] = FLAGS["misshapen"]
-    small = (seen["area"] < panel_area) | (hidden > 1) | (seen["cut"] > 0)
-    flag[off & small] = FLAGS["occluded"]
+    hidden = np.max([less[corner] for corner in CORNERS], axis=0) / drop
+    sides = (abs(less[side]) / tolerance for side in ("length", "height"))
+    shape = np.max([hidden, *sides, less["fill"] / FILL_DROP], axis=0)
+    shape[np.isnan(shape)] = np.inf
+    cut, area, excess = seen["cut"] > 0, seen["area"], np.nan_to_num(-less["saturation"])
+    off, glare = (shape > 1) | cut, excess > GLARE * panel_area
     brighter = seen["brightness"] > BRIGHTER * usual["brightness"]
-    flag[(off | brighter) & (excess > GLARE * panel_area)] = FLAGS["overexposed"]
-    flag[excess > FLOOD * pixels] = FLAGS["overexposed"]
-    flag[(seen["area"] == 0) & (excess <= GLARE * panel_area)] = FLAGS["lost"]
-    flag[~np.isfinite(seen["area"])] = FLAGS["dropped"]
+    kinds = {
+        "dropped": np.isnan(area),
+        "lost": (area == 0) & ~glare,
+        "overexposed": (excess > FLOOD * pixels) | ((off | brighter) & glare),
+        "occluded": off & ((area < panel_area) | ~(hidden <= 1) | cut),
+        "misshapen": off,
+    }
+    flag = np.select(list(kinds.values()), [FLAGS[kind] for kind in kinds], FLAGS["good"])
     # From the middle of the neighbours to either end; twice that where some of them are flagged.
     reach = how.max_speed * step * NEIGHBOURS / usual["scale"] + tolerance
     at = np.flatnonzero(flag == FLAGS["good"])
@@ -417,15 +403,14 @@ def _judge(
         middle = scipy.ndimage.median_filter(place, (1, NEIGHBOURS), mode="nearest")
         flag[at[np.hypot(*(place - middle)) > reach]] = FLAGS["jump"]
     quality = np.clip(1.0 - 0.5 * shape, 0.0, 1.0)
-    flagged = flag != FLAGS["good"]
-    quality[flagged] = np.minimum(quality[flagged], FLAGGED_QUALITY)
-    return flag, quality
+    most = np.where(flag == FLAGS["good"], 1.0, FLAGGED_QUALITY)
+    return flag, np.minimum(quality, most)
 
 
 def _motions(
     seen: Seen,
     good: BoolArray,
-    usual: Mapping[str, Any],
+    usual: Mapping[str, float],
     how: TrackingSettings,
     rate: float,
     name: str,
@@ -437,8 +422,9 @@ def _motions(
     # Where the panel's centre would be if the vessel had turned about its centre of gravity alone.
     x = side * scale * seen["x"] - along * np.cos(pitch) - up * np.sin(pitch)
     z = -scale * seen["y"] + along * np.sin(pitch) - up * np.cos(pitch)
+    table = np.stack([x, z, pitch], axis=1)
     if how.origin is not None:
-        at = side * scale * how.origin[0] - along, -scale * how.origin[1] - up
+        table[:, :2] -= side * scale * how.origin[0] - along, -scale * how.origin[1] - up
     else:
         rest = good & (np.arange(good.size) < max(1, round(how.rest * rate)))
         if not rest.any():
@@ -446,8 +432,7 @@ def _motions(
                 f"{name}: no good frame among the first {how.rest:g} s, over which surge and heave "
                 "would be made zero. State the origin, or a longer rest."
             )
-        at = float(np.mean(x[rest])), float(np.mean(z[rest]))
-    table = np.stack([x - at[0], z - at[1], pitch], axis=1)
+        table[:, :2] -= table[rest, :2].mean(axis=0)
     table[~good] = np.nan
     filled = np.zeros(good.size, dtype=bool)
     for begin, end in stretches(~good):

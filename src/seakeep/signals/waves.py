@@ -106,8 +106,7 @@ def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
 
 def first_wave(series: npt.ArrayLike, is_motion: bool) -> int:
     """Sample at which the waves have come: of a motion by its rate, which slow drifts hide less."""
-    begin: int = waves_part(np.gradient(series) if is_motion else series, 1.0).start
-    return begin
+    return waves_part(np.gradient(series) if is_motion else series, 1.0).start
 
 
 ALIKE = 0.9
@@ -195,8 +194,7 @@ def dominant_period(series: npt.ArrayLike, dt: float) -> float:
 
 def tapered_power(x: FloatArray) -> FloatArray:
     """Squared modulus of the spectrum of a series, its mean removed, under a Hann window."""
-    power: FloatArray = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
-    return power
+    return np.abs(np.fft.rfft((x - x.mean()) * np.hanning(x.size))) ** 2
 
 
 def _dominant_period(x: FloatArray) -> float:
@@ -255,7 +253,7 @@ def zero_up_crossings(
     if hysteresis > 0:
         before = _clear(x, before, hysteresis * float(x.std()))
     first = before - x[before] / (x[before + 1] - x[before])
-    return np.asarray((part.start + first) * time_step(dt))
+    return (part.start + first) * time_step(dt)
 
 
 def _clear(x: FloatArray, before: IntArray, limit: float) -> IntArray:
@@ -264,8 +262,7 @@ def _clear(x: FloatArray, before: IntArray, limit: float) -> IntArray:
     rising = np.flatnonzero((x[beyond[:-1]] < 0) & (x[beyond[1:]] > 0))
     lowest = np.searchsorted(before, beyond[rising])
     highest = np.searchsorted(before, beyond[rising + 1]) - 1
-    middle: IntArray = before[(lowest + highest) // 2]
-    return middle
+    return before[(lowest + highest) // 2]
 
 
 def encounter_period(
@@ -727,7 +724,7 @@ def find_leakage(
     length = min(max(length, 1), record.size)
     if _even(waves):
         return None
-    best: Leakage | None = None
+    found: list[Leakage] = []
     repeated = np.zeros(record.size, dtype=bool)
     pool = [as_series(each, minimum=8) for each in training]
     ready = [(index, _analytic(each)) for index, each in enumerate(pool) if each.size >= length]
@@ -737,20 +734,18 @@ def find_leakage(
         for index, reference in ready:
             match = _correlation(reference, piece)
             at = int(np.argmax(np.abs(match)))
-            height = float(np.abs(match[at]))
-            if height < REPEATED:
-                continue
-            repeated[start : start + length] = True
-            if best is None or height > best.correlation:
-                phase = float(np.angle(match[at]))
+            height, phase = float(np.abs(match[at])), float(np.angle(match[at]))
+            if height >= REPEATED:
+                repeated[start : start + length] = True
                 begin = (part.start + start) * step
-                best = Leakage(0.0, height, index, at * step, begin, phase)
+                found.append(Leakage(0.0, height, index, at * step, begin, phase))
+    best = max(found, key=lambda each: each.correlation, default=None)
     return best and replace(best, share=float(repeated.mean()))
 
 
 def _analytic(series: FloatArray) -> ComplexArray:
     centred = series - series.mean()
-    out: ComplexArray = scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))
+    out = scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))
     return out[: centred.size]
 
 
@@ -771,4 +766,4 @@ def _correlation(reference: ComplexArray, piece: ComplexArray) -> ComplexArray:
     power = np.cumsum(np.concatenate([[0.0], np.abs(reference) ** 2]))
     energy = power[piece.size :] - power[: -piece.size]
     norm = np.sqrt(np.maximum(energy * float(np.sum(np.abs(piece) ** 2)), 1e-300))
-    return np.asarray(summed / norm)
+    return summed / norm

@@ -278,10 +278,6 @@ class StudyResult:
         """Whether a model is an ensemble."""
         return bool(self.model_settings[model]["ensemble"])
 
-    def members_of(self, model: str) -> int:
-        """Number of members of a model, 1 of a single one."""
-        return int(self.model_settings[model]["n_members"])
-
     def label_of(self, test: str) -> str:
         """Words for a test set."""
         return str(self.settings["tests"][test]["label"] or test.replace("_", " "))

@@ -235,8 +235,7 @@ def _turned(points: npt.ArrayLike, centre: tuple[float, float], pitch: float) ->
 
 
 def _corners(points: FloatArray) -> npt.NDArray[np.int32]:
-    corners: npt.NDArray[np.int32] = np.round(points * 2**FRACTION_BITS).astype(np.int32)
-    return corners
+    return np.round(points * 2**FRACTION_BITS).astype(np.int32)
 
 
 def _fill_exactly(cv2: Any, frame: Image, points: FloatArray, level: int) -> None:

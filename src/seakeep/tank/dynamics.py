@@ -25,10 +25,9 @@ from seakeep.tank.hydrodynamics import (
     Kernel,
     excitation_at,
     far_field_at,
-    impedance,
+    kernel_coefficients,
     load_hydrodynamics,
     radiation_kernel,
-    response,
     trapezoid,
 )
 from seakeep.tank.moorings import line_table, mooring_stiffness
@@ -87,13 +86,17 @@ class Rig:
         return total
 
     @property
+    def flow(self) -> FloatArray:
+        """Flows that lose energy per velocity: of each motion and out of the pool's opening."""
+        through = np.zeros(len(self.names))
+        if self.hydro.pool is not None:
+            through[1:4] = -1.0, self.pool[0], 1.0
+        return np.vstack([np.eye(len(self.names)), through])
+
+    @property
     def linear_damping(self) -> FloatArray:
         """Linear viscous damping, the pool's coupling included, shape (dof, dof)."""
-        total = np.diag(self.linear)
-        if self.hydro.pool is not None:
-            flow = np.array([0.0, -1.0, self.pool[0], 1.0, 0.0])
-            total = total + self.pool[2] * np.outer(flow, flow)
-        return total
+        return (self.flow.T * np.append(self.linear, self.pool[2])) @ self.flow
 
 
 @dataclass(frozen=True)
@@ -204,19 +207,11 @@ def sea_losses(rig: Rig, sea: Sea) -> FloatArray:
     :math:`8/(3\pi)` amplitudes of a regular wave, :math:`\sqrt{8/\pi}` standard deviations of an
     irregular sea. The speeds are those of the linear response with the same losses.
     """
-    losses = rig.linear_damping
-    flow = np.zeros((len(rig.names) + 1, len(rig.names)))
-    flow[:-1] = np.eye(len(rig.names))
-    if rig.hydro.pool is not None:
-        flow[-1] = [0.0, -1.0, rig.pool[0], 1.0, 0.0]
-    drag = np.append(rig.quadratic, rig.pool[1])
+    losses, drag = rig.linear_damping, np.append(rig.quadratic, rig.pool[1])
     weights = np.zeros(drag.size)
-    dynamic = impedance(rig.hydro, sea.omega, rig.mooring_stiffness, rig.kernel)
-    force = excitation_at(rig.hydro, sea.omega)[..., None]
     for _ in range(ITERATIONS):
-        damped = dynamic - 1j * sea.omega[:, None, None] * losses
-        motion = np.linalg.solve(damped, force)[..., 0]
-        power = 0.5 * np.abs(sea.omega * sea.amplitude * (flow @ motion.T)) ** 2
+        motion = linear_response(rig, sea.omega, losses)
+        power = 0.5 * np.abs(sea.omega * sea.amplitude * (rig.flow @ motion.T)) ** 2
         total = power.sum(axis=1)
         steady = power.max(axis=1) > 0.5 * total
         damping = drag * np.where(steady, 8 * np.sqrt(2) / (3 * np.pi), np.sqrt(8 / np.pi))
@@ -224,7 +219,7 @@ def sea_losses(rig: Rig, sea: Sea) -> FloatArray:
         if np.allclose(damping, weights, rtol=1e-9, atol=1e-12):
             break
         weights = damping
-        losses = rig.linear_damping + (flow.T * weights) @ flow
+        losses = rig.linear_damping + (rig.flow.T * weights) @ rig.flow
     return losses
 
 
@@ -238,7 +233,7 @@ def _drift_terms(
     :math:`D = \frac{k}{\omega}\,[P_\mathrm{absorbed} + \int p(\theta)(1 - \cos\theta)\,d\theta]`.
     Every part is a quadratic form in u. Shape (frequency, 1 + dof) each.
     """
-    motion = response(rig.hydro, omega, losses, rig.mooring_stiffness, rig.kernel)
+    motion = linear_response(rig, omega, losses)
     both = np.column_stack([np.ones(omega.size), motion])
     out, along = far_field_at(rig.hydro, omega).swapaxes(0, 1)
     form = out - along
@@ -247,11 +242,10 @@ def _drift_terms(
     return both, ratio[:, None] * np.einsum("nij,nj->ni", form, both)
 
 
-def mean_drift(rig: Rig, omega: npt.ArrayLike, losses: FloatArray) -> FloatArray:
+def mean_drift(rig: Rig, omega: FloatArray, losses: FloatArray) -> FloatArray:
     """Mean drift force per metre² of amplitude, N/m², from the balance of energy and momentum."""
-    both, force = _drift_terms(rig, np.atleast_1d(np.asarray(omega, dtype=float)), losses)
-    mean: FloatArray = np.maximum(np.sum(both.conj() * force, axis=1).real, 0.0)
-    return mean
+    both, force = _drift_terms(rig, omega, losses)
+    return np.maximum(np.sum(both.conj() * force, axis=1).real, 0.0)
 
 
 def drift_coefficient(rig: Rig, sea: Sea) -> tuple[FloatArray, FloatArray]:
@@ -296,13 +290,21 @@ def drift_envelopes(rig: Rig, sea: Sea) -> tuple[FloatArray, ComplexArray]:
     return values[significant], (basis @ vectors[:, significant]).conj().T
 
 
-def linear_response(rig: Rig, omega: npt.ArrayLike) -> npt.NDArray[np.complex128]:
-    """Linear response of the moored vessel as the time loop sees it, shape (frequency, dof).
+def linear_response(rig: Rig, omega: FloatArray, losses: FloatArray | None = None) -> ComplexArray:
+    r"""Linear response of the moored vessel as the time loop sees it, shape (frequency, dof).
 
-    Per metre of wave amplitude, with the kernel's coefficients, the linear part of the viscous
-    damping and the taut lines' stiffness.
+    Per metre of wave amplitude, q of :math:`(-\omega^2 (M + A) - i\omega (B + C) + K)\,q = X`,
+    with the kernel's A and B, the stiffness K of water and taut lines, and as damping C `losses`,
+    by default the linear part of the viscous ones. Raises RequestError if a frequency lies
+    outside the hydrodynamics file's band.
     """
-    return response(rig.hydro, omega, rig.linear_damping, rig.mooring_stiffness, rig.kernel)
+    force = excitation_at(rig.hydro, omega)[..., None]
+    added, radiated = kernel_coefficients(rig.kernel, omega)
+    damping = radiated + (rig.linear_damping if losses is None else losses)
+    w = omega[:, None, None]
+    dynamic = -(w**2) * (rig.hydro.mass + added) - 1j * w * damping
+    dynamic = dynamic + rig.hydro.stiffness + rig.mooring_stiffness
+    return np.asarray(np.linalg.solve(dynamic, force)[..., 0], dtype=complex)
 
 
 def _wave_arrays(rig: Rig, sea: Sea) -> tuple[Any, ...]:
@@ -367,18 +369,15 @@ def simulate(
     waves, excitation, *drift = _wave_arrays(rig, sea)
     pairs, kernel = _kernel_arrays(rig)
     state = np.zeros((2, dofs)) if start is None else np.array(start, dtype=float)
+    inverse, hydro = np.linalg.inv(rig.inertia), rig.hydro
+    body = (inverse, hydro.stiffness, rig.linear, rig.quadratic, rig.pool, rig.lines)
     q, v, a, memory, slow, failed, which = loop.integrate(
         steps,
         rig.step,
         rig.ramp,
         state,
         # Contiguous, so that every hull runs the same compiled code.
-        np.ascontiguousarray(np.linalg.inv(rig.inertia)),
-        np.ascontiguousarray(rig.hydro.stiffness),
-        np.ascontiguousarray(rig.linear),
-        np.ascontiguousarray(rig.quadratic),
-        np.ascontiguousarray(rig.pool),
-        np.ascontiguousarray(rig.lines),
+        *map(np.ascontiguousarray, body),
         pairs,
         kernel,
         waves,
@@ -400,7 +399,6 @@ def simulate(
 
 def tensions(rig: Rig, position: FloatArray, velocity: FloatArray) -> FloatArray:
     """Tension of each line along a motion of shape (dof, time), N, shape (line, time)."""
-    result: FloatArray = _loop().line_tensions(
+    return _loop().line_tensions(
         rig.lines, np.ascontiguousarray(position), np.ascontiguousarray(velocity)
     )
-    return result

@@ -160,8 +160,7 @@ def _passive(matrices: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(0.5 * (matrices + matrices.swapaxes(-1, -2)))
     clipped = np.maximum(values, 0.0)[..., None, :]
     projected = (vectors * clipped) @ vectors.swapaxes(-1, -2)
-    result: FloatArray = 0.5 * (projected + projected.swapaxes(-1, -2))
-    return result
+    return 0.5 * (projected + projected.swapaxes(-1, -2))
 
 
 def passive_damping(hydro: Hydrodynamics) -> tuple[FloatArray, FloatArray]:
@@ -242,9 +241,7 @@ def _inside(hydro: Hydrodynamics, omega: npt.ArrayLike) -> FloatArray:
 
 def _between(hydro: Hydrodynamics, values: ComplexArray, omega: npt.ArrayLike) -> ComplexArray:
     """Values between the solver's frequencies, by cubic splines."""
-    parts = np.stack([values.real, values.imag], axis=-1)
-    spline = scipy.interpolate.CubicSpline(hydro.omega, parts, axis=0)(_inside(hydro, omega))
-    return np.asarray(spline[..., 0] + 1j * spline[..., 1], dtype=complex)
+    return scipy.interpolate.CubicSpline(hydro.omega, values, axis=0)(_inside(hydro, omega))
 
 
 def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
@@ -258,50 +255,3 @@ def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
 def far_field_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
     """Forms of the outgoing waves between the solver's frequencies, by cubic splines."""
     return _between(hydro, hydro.far_field, omega)
-
-
-def impedance(
-    hydro: Hydrodynamics,
-    omega: npt.ArrayLike,
-    stiffness: npt.ArrayLike = 0.0,
-    kernel: Kernel | None = None,
-) -> ComplexArray:
-    r"""Force per motion without viscous losses, shape (frequency, dof, dof).
-
-    :math:`-\omega^2 (M + A) - i\omega B + K_h + K` with the stiffness K besides the hydrodynamic
-    one. A and B are made symmetric, as they are in nature and in the time domain; with a kernel
-    they are those that the time domain sees. Raises RequestError if a frequency lies outside the
-    file's band.
-    """
-    wanted = _inside(hydro, omega)
-    if kernel is None:
-        added, radiated = (
-            scipy.interpolate.CubicSpline(hydro.omega, 0.5 * (m + m.swapaxes(1, 2)), axis=0)(wanted)
-            for m in (hydro.added_mass, hydro.damping)
-        )
-    else:
-        added, radiated = kernel_coefficients(kernel, wanted)
-    w = wanted[:, None, None]
-    dynamic = -(w**2) * (hydro.mass + added) - 1j * w * radiated
-    result: ComplexArray = dynamic + hydro.stiffness + np.asarray(stiffness)
-    return result
-
-
-def response(
-    hydro: Hydrodynamics,
-    omega: npt.ArrayLike,
-    damping: npt.ArrayLike = 0.0,
-    stiffness: npt.ArrayLike = 0.0,
-    kernel: Kernel | None = None,
-) -> ComplexArray:
-    r"""Linear response per metre of wave amplitude, shape (frequency, dof).
-
-    Solves :math:`(Z - i\omega C)\,q = X` with the :func:`impedance` Z and the linear damping C.
-    Raises RequestError if a frequency lies outside the file's band.
-    """
-    wanted = _inside(hydro, omega)
-    dynamic = impedance(hydro, wanted, stiffness, kernel)
-    dynamic = dynamic - 1j * wanted[:, None, None] * np.asarray(damping)
-    solved = np.linalg.solve(dynamic, excitation_at(hydro, wanted)[..., None])
-    result: ComplexArray = np.asarray(solved[..., 0], dtype=complex)
-    return result

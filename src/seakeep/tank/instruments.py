@@ -54,8 +54,7 @@ class Played:
     def ramp(self, time: FloatArray) -> FloatArray:
         """Part of their height to which the waves have grown, shape (time,)."""
         elapsed = np.clip((time - self.motion.time[0]) / self.rig.ramp, 0.0, 1.0)
-        grown: FloatArray = 0.5 * (1.0 - np.cos(np.pi * elapsed))
-        return grown
+        return 0.5 * (1.0 - np.cos(np.pi * elapsed))
 
     def elevation(self, place: npt.ArrayLike, time: FloatArray) -> FloatArray:
         """Linear elevation at a place in the tank (m from the wave maker), m."""
@@ -65,7 +64,7 @@ class Played:
     def crest(self, place: float, time: FloatArray) -> FloatArray:
         """Second-order part of the elevation at a fixed place, ½k(η² − η_H²), m."""
         analytic = self.sea.analytic(place - self.settings.vessel.position, time)
-        squared: FloatArray = np.real(analytic**2) * self.ramp(time) ** 2
+        squared = np.real(analytic**2) * self.ramp(time) ** 2
         return 0.5 * self.sea.mean_wavenumber * squared
 
     def loads(self, time: FloatArray) -> FloatArray:
@@ -169,8 +168,7 @@ def _immersed(played: Played, time: FloatArray, line: int) -> npt.NDArray[np.boo
     eye_x = q[0] + settings.eye[0] + played.settings.vessel.position
     eye_z = q[1] - settings.eye[0] * q[2] + settings.eye[1]
     middle_x, middle_z = 0.5 * (eye_x + settings.pole[0]), 0.5 * (eye_z + settings.pole[1])
-    under: npt.NDArray[np.bool_] = played.elevation(middle_x, time) > middle_z
-    return under
+    return played.elevation(middle_x, time) > middle_z
 
 
 def _loads(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -> Columns:

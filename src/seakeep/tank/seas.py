@@ -52,7 +52,7 @@ class Sea:
         )
         inside = np.exp(-1j * np.outer(self.omega, step * np.arange(BLOCK)))
         # einsum, not a matrix product: its bits do not depend on the number of threads.
-        blocks: ComplexArray = np.einsum("sn,nb->sb", heads, inside)
+        blocks = np.einsum("sn,nb->sb", heads, inside)
         return blocks.ravel()[: time.size]
 
     def elevation(self, x: npt.ArrayLike, time: npt.ArrayLike) -> FloatArray:
@@ -80,8 +80,7 @@ def pierson_moskowitz(frequency: npt.ArrayLike, height: float, peak_period: floa
     """
     f = np.asarray(frequency, dtype=float)
     relative = (peak_period * f) ** -4.0
-    density: FloatArray = 5 / 16 * height**2 * relative / f * np.exp(-1.25 * relative)
-    return density
+    return 5 / 16 * height**2 * relative / f * np.exp(-1.25 * relative)
 
 
 def jonswap(
@@ -100,8 +99,7 @@ def jonswap(
 
     grid = np.geomspace(0.1, 40.0, 8001) / peak_period
     variance = np.trapezoid(shape(grid), grid)
-    density: FloatArray = shape(np.asarray(frequency, dtype=float)) * (height**2 / 16 / variance)
-    return density
+    return shape(np.asarray(frequency, dtype=float)) * (height**2 / 16 / variance)
 
 
 def spectral_density(settings: SpectrumSettings, frequency: npt.ArrayLike) -> FloatArray:
@@ -112,8 +110,7 @@ def spectral_density(settings: SpectrumSettings, frequency: npt.ArrayLike) -> Fl
     f = np.asarray(frequency, dtype=float)
     if settings.kind == "table":
         known = (np.asarray(settings.frequencies), np.asarray(settings.densities))
-        density: FloatArray = np.interp(f, *known, left=0.0, right=0.0)
-        return density
+        return np.interp(f, *known, left=0.0, right=0.0)
     height, period = settings.height or 0.0, settings.peak_period or 0.0
     if settings.kind == "jonswap":
         return jonswap(f, height, period, settings.peak_enhancement)
