@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import h5py
     import xarray as xr
 
-FORMAT = 7
+FORMAT = 8
 """Format of sealed files; one of another format is refused, and made again."""
 MARK = "seakeep_file"
 """Attribute of a NetCDF file of ours, and word near the start of a text or picture: ``KIND``."""

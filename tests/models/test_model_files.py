@@ -106,7 +106,7 @@ def test_another_format_is_refused_in_one_line(saved, number):
     )
 
 
-@pytest.mark.parametrize("part", ["coefficients", "state_std", "settings", "signature"])
+@pytest.mark.parametrize("part", ["coefficients", "learnt.rms", "settings", "signature"])
 def test_a_single_bit_that_changed_is_noticed(saved, part):
     content, dataset = saved.read_bytes(), xr.load_dataset(saved, engine="h5netcdf")
     held = dataset.attrs[part].encode() if part in dataset.attrs else dataset[part].values.tobytes()

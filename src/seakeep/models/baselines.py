@@ -7,7 +7,7 @@ through studies and reports by their ``kind``. :mod:`seakeep.baselines` is the p
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -26,7 +26,7 @@ from seakeep.models.linear import HankelDMDcModel, LinearKind, packed, unpacked
 from seakeep.models.readouts import ReadOuts
 from seakeep.models.selection import RIDGES, select
 from seakeep.models.settings import DelayRows, HankelSettings, RidgeScale, periods_to_samples
-from seakeep.models.store import content, numbers
+from seakeep.models.store import unpack
 from seakeep.models.training import Training, TrainingData, gather, until
 from seakeep.models.validity import Coverage
 
@@ -368,9 +368,7 @@ class Subspace(Plain):
     @classmethod
     def restore(cls, dataset: xr.Dataset) -> SubspaceModel:
         """Rebuild the model that a file holds."""
-        matrices = (numbers(dataset, each.name) for each in fields(StateSpace))
-        settings = cls.from_json(content(dataset, "settings"))
-        return SubspaceModel(settings=settings, space=StateSpace(*matrices), **unpacked(dataset))
+        return SubspaceModel(**unpack(dataset, space=StateSpace), **unpacked(dataset, cls))
 
 
 @dataclass(frozen=True, eq=False)
@@ -435,15 +433,7 @@ class SubspaceModel(Model):
 
     def to_dataset(self) -> xr.Dataset:
         """The model as a Dataset: what :meth:`save` writes."""
-        dims = {
-            "A": ("latent", "latent_before"),
-            "B": ("latent", "regressor"),
-            "C": ("state", "latent"),
-            "D": ("state", "regressor"),
-            "filter": ("latent", "past"),
-        }
-        matrices = {name: (each, getattr(self.space, name)) for name, each in dims.items()}
-        return packed(self).assign(matrices)
+        return packed(self, space=self.space)
 
 
 RIVALS = FIR(0), ARX(0, 0), Subspace(0, 0, 0.1)

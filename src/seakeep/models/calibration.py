@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol, get_args
+from typing import Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 import xarray as xr
@@ -25,7 +24,7 @@ from seakeep.core.calibration import (
 )
 from seakeep.errors import RequestError, warn
 from seakeep.models import labelled
-from seakeep.models.checks import Json, check_choice
+from seakeep.models.checks import check_choice
 from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series, read_windows
 from seakeep.models.interface import Signature
@@ -133,32 +132,6 @@ class Calibration:
             )
         quantiles = f"the quantiles {0.5 - level / 2:g} and {0.5 + level / 2:g} of the members"
         return f"{quantiles}, moved outwards by the margin of a calibration"
-
-    def to_json(self) -> str:
-        """As text; a margin that is infinite is kept as such."""
-        arrays: Json = {key: getattr(self.conformal, key).tolist() for key in NUMBERS}
-        floor = None if self.floor is None else self.floor.tolist()
-        law = None if self.law is None else self.law.tolist()
-        words = {"level": self.conformal.level, "windows": self.windows, "steps": self.steps}
-        return json.dumps(
-            arrays | words | {"spans": self.spans, "floor": floor, "law": law, "folds": self.folds}
-        )
-
-    @classmethod
-    def from_json(cls, content: Json | None) -> Calibration | None:
-        """Rebuild from the values of :meth:`to_json`; None stays None."""
-        if content is None:
-            return None
-        arrays: dict[str, Any] = {
-            key: None if content[key] is None else np.array(content[key])
-            for key in (*NUMBERS, "floor", "law")
-        }
-        floor, law = arrays.pop("floor"), arrays.pop("law")
-        margin = ConformalMargin(**arrays, level=content["level"])
-        spans = {run: (first, last) for run, (first, last) in content["spans"].items()}
-        return cls(
-            margin, floor, law, content["windows"], content["steps"], spans, content["folds"]
-        )
 
 
 def calibrate(

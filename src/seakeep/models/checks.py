@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from typing import Any, TypeVar
 
 import numpy as np
-from pydantic import TypeAdapter
 
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 
@@ -18,7 +16,6 @@ Json = dict[str, Any]
 TINY = float(np.finfo(float).tiny)
 """Least number above zero."""
 Settings = TypeVar("Settings")
-Made = TypeVar("Made")
 
 
 def check_choice(name: str, value: object, choices: Sequence[str]) -> None:
@@ -156,14 +153,3 @@ def check_keys(kind: type, table: Mapping[str, object], what: str = "") -> None:
             raise RequestError(f"{what}unknown key '{key}'.{near} {listed}")
     if missing := [key for key in needed if key not in table]:
         raise RequestError(f"{what}the key '{missing[0]}' is missing. {listed}")
-
-
-def of_json(kind: type[Made], content: Mapping[str, Any]) -> Made:
-    """Rebuild a dataclass from its fields as JSON values, those of dataclasses in it included."""
-    value: Made = _adapter(kind).validate_python(content)  # type: ignore[arg-type]
-    return value
-
-
-@functools.cache
-def _adapter(kind: Any) -> Any:
-    return TypeAdapter(kind)

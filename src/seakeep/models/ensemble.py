@@ -27,7 +27,7 @@ from seakeep.models.calibration import (
     widened,
 )
 from seakeep.models.checks import Json
-from seakeep.models.draws import Draw, draws_dataset, draws_of
+from seakeep.models.draws import Draw, draws_dataset
 from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
 from seakeep.models.executor import in_order
 from seakeep.models.forecasts import (
@@ -55,6 +55,14 @@ from seakeep.models.training import TrainingArrays, TrainingData
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
 
+PARTS: dict[str, Any] = {
+    "arrays": TrainingArrays,
+    "signature": Signature,
+    "coverage": Coverage,
+    "calibration": Calibration | None,
+    "selection": str,
+}
+"""What a file keeps beside the draws."""
 SAMPLING = {"monte_carlo": "Monte Carlo", "sobol": "Sobol"}
 TRAIN_ON = {
     "all": "together",
@@ -818,62 +826,9 @@ class HankelEnsemble(Model):
 
     def to_dataset(self) -> xr.Dataset:
         """The ensemble as a Dataset: what :meth:`save` writes."""
-        arrays, variables = self.arrays, {}
-        for group in ("states", "delayed", "direct"):
-            for number, values in enumerate(getattr(arrays, group)):
-                variables[f"{group}_{number}"] = ((f"{group}_{number}_sample", group), values)
-        place = {
-            "names": arrays.names,
-            "offsets": [int(offset) for offset in arrays.offsets],
-            "begins": arrays.begins,
-        }
-        calibration = "null" if self.calibration is None else self.calibration.to_json()
-        return (
-            draws_dataset(self.members, self.origin)
-            .assign(
-                {
-                    **variables,
-                    **store.pack_signature(self.signature),
-                    **self.coverage.to_variables(),
-                }
-            )
-            .assign_attrs(
-                runs=json.dumps(place),
-                signature=store.as_json(store.signature_json(self.signature)),
-                calibration=calibration,
-                selection=self.selection,
-            )
-        )
-
-    @classmethod
-    def from_dataset(
-        cls,
-        dataset: xr.Dataset,
-        signature: Signature,
-        settings: HankelSettings,
-        origin: Json,
-        centre: Draw | None,
-    ) -> HankelEnsemble:
-        """Rebuild an ensemble from :meth:`to_dataset`; its members are equal to the last bit."""
-        place = store.content(dataset, "runs")
-        series: dict[str, Any] = {
-            group: tuple(
-                store.numbers(dataset, f"{group}_{run}") for run in range(len(place["names"]))
-            )
-            for group in ("states", "delayed", "direct")
-        }
-        places = {key: tuple(values) for key, values in place.items()}
-        return cls(
-            settings=settings,
-            origin=origin,
-            members=draws_of(dataset, settings),
-            arrays=TrainingArrays(**series, **places),
-            signature=signature,
-            coverage=Coverage.from_dataset(dataset, signature),
-            calibration=Calibration.from_json(store.content(dataset, "calibration")),
-            selection=str(dataset.attrs["selection"]),
-            centre=centre,
-        )
+        parts = store.pack({name: getattr(self, name) for name in PARTS})
+        draws = draws_dataset(self.members, self.origin)
+        return draws.assign(parts.data_vars).assign_attrs(parts.attrs)
 
 
 def _spectral_radius(ensemble: HankelEnsemble, number: int) -> float:

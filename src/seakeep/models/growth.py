@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,6 @@ import xarray as xr
 from scipy.optimize import isotonic_regression
 
 from seakeep.arrays import FloatArray
-from seakeep.models import store
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_windows
 from seakeep.models.interface import Signature
 from seakeep.models.readouts import FittedReadOut
@@ -57,21 +56,6 @@ class LeadErrors:
         places = np.minimum(np.asarray(leads, dtype=int), len(self.rms)) - 1
         errors: FloatArray = self.rms[places]
         return errors
-
-    def to_variables(self) -> dict[str, tuple[tuple[str, ...], FloatArray]]:
-        """Variables of a file."""
-        return {
-            "residual_covariance": (("state", "other_state"), self.residual),
-            "lead_errors": (("lead", "state"), self.rms),
-        }
-
-    @classmethod
-    def from_dataset(cls, dataset: xr.Dataset) -> Self | None:
-        """Rebuild from :meth:`to_variables`; None where a file keeps none."""
-        if "lead_errors" not in dataset:
-            return None
-        keys = ("residual_covariance", "lead_errors")
-        return cls(*(store.numbers(dataset, key) for key in keys))
 
 
 class Source(NamedTuple):

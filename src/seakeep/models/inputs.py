@@ -10,17 +10,16 @@ beside them. The elevation is carried to a vessel whose position is measured as 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.core.recursion import Place, read_table
+from seakeep.core.recursion import read_table
 from seakeep.models.alignment import FittedAlignment
-from seakeep.models.checks import Json, of_json, plain
 from seakeep.models.following import SQUARED, Bank, Following
 from seakeep.models.labelled import ChannelLabel, Span
 from seakeep.models.observables import Observed
@@ -179,35 +178,6 @@ class InputMap:
                 f"{(self.lead - 1) * dt:.3g} s after the instant that it forecasts"
             )
         return lines + ([] if self.observed is None else self.observed.describe(dt, self.lead))
-
-    def to_json(self) -> Json:
-        """All that was fitted, as JSON values."""
-        follows = None if self.follows is None else asdict(self.follows)
-        content: Json = plain(
-            {
-                "alignment": None if self.alignment is None else asdict(self.alignment),
-                "lead": self.lead,
-                "observed": None if self.observed is None else self.observed.to_json(),
-                "follows": follows and {k: v for k, v in follows.items() if k != "alignment"},
-            }
-        )
-        return content
-
-    @classmethod
-    def from_json(cls, content: Json) -> Self:
-        """Rebuild from :meth:`to_json`; an observable of an unknown kind raises an error."""
-        alignment, observed, follows = (
-            content[key] for key in ("alignment", "observed", "follows")
-        )
-        if alignment is not None:
-            alignment = of_json(FittedAlignment, alignment)
-        if follows is not None:
-            place = Place(**follows["place"] | {"taps": np.array(follows["place"]["taps"])})
-            waves = {key: tuple(follows[key]) for key in ("band", "power")}
-            follows = Following(**follows | waves | {"alignment": alignment, "place": place})
-        if observed is not None:
-            observed = Observed.from_json(observed)
-        return cls(alignment, content["lead"], observed, follows)
 
 
 @dataclass(frozen=True, eq=False)

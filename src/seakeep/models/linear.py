@@ -587,13 +587,14 @@ class HankelDMDcModel(Model):
 
     def to_dataset(self) -> xr.Dataset:
         """The model as a Dataset: what :meth:`save` writes."""
-        label = {"long_name": "regressed rows of [A B] on standardised deviations", "units": "1"}
-        dataset = packed(self).assign(coefficients=(("row", "regressor"), self.coefficients, label))
         is_plain = self.variation is None
-        errors = self.errors.to_variables() if is_plain and self.errors is not None else {}
-        if self.variation is not None:
-            errors = self.variation.to_variables()
-        return dataset.assign(errors).assign_attrs(selection=self.selection)
+        return packed(
+            self,
+            coefficients=self.coefficients,
+            learnt=self.errors if is_plain else None,
+            selection=self.selection,
+            variation=self.variation,
+        )
 
 
 class LinearKind:
@@ -603,36 +604,27 @@ class LinearKind:
     def restore(cls, dataset: xr.Dataset) -> HankelDMDcModel:
         """Rebuild the model that a file holds; it is equal to the last bit."""
         spec: Any = cls
-        return HankelDMDcModel(
-            settings=spec.from_json(store.content(dataset, "settings")),
-            coefficients=store.numbers(dataset, "coefficients"),
-            learnt=LeadErrors.from_dataset(dataset),
-            selection=str(dataset.attrs["selection"]),
-            variation=Variation.from_dataset(dataset),
-            **unpacked(dataset),
+        parts = store.unpack(
+            dataset,
+            coefficients=FloatArray,
+            learnt=LeadErrors | None,
+            selection=str,
+            variation=Variation | None,
         )
+        return HankelDMDcModel(**parts, **unpacked(dataset, spec))
 
 
-def packed(model: Any) -> xr.Dataset:
-    """What all single models keep in their files; see :func:`unpacked`."""
-    attrs = {
-        "settings": model.settings.to_json(),
-        "training": model.training.to_json(),
-        "signature": store.signature_json(model.signature),
-    }
-    return xr.Dataset(
-        store.pack_signature(model.signature) | model.coverage.to_variables(),
-        attrs={key: store.as_json(each) for key, each in attrs.items()},
-    )
+def packed(model: Any, **parts: Any) -> xr.Dataset:
+    """What all single models keep in their files, and parts of this one; see :func:`unpacked`."""
+    common = {name: getattr(model, name) for name in ("training", "signature", "coverage")}
+    return store.pack({"settings": model.settings.to_json(), **common, **parts})
 
 
-def unpacked(dataset: xr.Dataset) -> dict[str, Any]:
-    """Signature, training and coverage of a single model from its file."""
-    signature = store.unpack_signature(dataset)
+def unpacked(dataset: xr.Dataset, spec: Any) -> dict[str, Any]:
+    """Settings, signature, training and coverage of a single model from its file."""
     return {
-        "signature": signature,
-        "training": Training.from_json(store.content(dataset, "training")),
-        "coverage": Coverage.from_dataset(dataset, signature),
+        "settings": spec.from_json(store.content(dataset, "settings")),
+        **store.unpack(dataset, training=Training, signature=Signature, coverage=Coverage),
     }
 
 

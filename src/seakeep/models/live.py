@@ -839,7 +839,7 @@ class Live:
     @cached_property
     def _identity(self) -> str:
         """Identity of the model."""
-        digest = hashlib.sha256(store.as_json(store.signature_json(self.signature)).encode())
+        digest = hashlib.sha256(store.as_json(asdict(self.signature)).encode())
         for each in (self._a, self._b, self._d, self._offset):
             digest.update(np.ascontiguousarray(each).tobytes())
         return digest.hexdigest()

@@ -442,15 +442,3 @@ class Observed:
                 f"{max(ahead - 1, 0) * dt:.3g} s after the instant forecast"
             )
         return lines
-
-    def to_json(self) -> dict[str, Any]:
-        """All that was fitted, as JSON values."""
-        return asdict(self) | {"observables": [to_json(each) for each in self.observables]}
-
-    @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> Self:
-        """Rebuild from :meth:`to_json`."""
-        observables = tuple(from_json(each) for each in content["observables"])
-        inputs = tuple(ChannelLabel(**each) for each in content["inputs"])
-        moments = {key: tuple(content[key]) for key in ("spreads", "tops")}
-        return cls(**{**content, **moments, "observables": observables, "inputs": inputs})

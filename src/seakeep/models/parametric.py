@@ -67,27 +67,6 @@ class Variation:
             scales[f"{group}_scale"] = replace(scale, mean=scale.mean + q * shift)
         return coefficients + q * self.slopes, replace(signature, parameter="", **scales)
 
-    def to_variables(self) -> dict[str, Any]:
-        """Variables of a file."""
-        shifts = {
-            f"{group}_slope": (group, shift)
-            for group, shift in zip(GROUPS, self.shifts, strict=True)
-        }
-        numbers = np.array([self.centre, self.spread, self.low, self.high])
-        return {
-            "slopes": (("row", "regressor"), self.slopes),
-            "parameter": ("moment", numbers),
-            **shifts,
-        }
-
-    @classmethod
-    def from_dataset(cls, dataset: xr.Dataset) -> Variation | None:
-        """Rebuild from :meth:`to_variables`; None where a file has none."""
-        if "slopes" not in dataset:
-            return None
-        shifts = tuple(dataset[f"{group}_slope"].values for group in GROUPS)
-        return cls(dataset["slopes"].values, shifts, *map(float, dataset["parameter"].values))  # type: ignore[arg-type]
-
 
 def regress_varying(
     data: TrainingData, settings: HankelSettings, parameter: str, values: Sequence[float]

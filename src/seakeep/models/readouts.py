@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal, Self, get_args
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from seakeep.arrays import FloatArray, as_table
 from seakeep.conventions import MOTIONS
 from seakeep.core.readouts import LoadMap
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.models.checks import Json, check_choice, plain
+from seakeep.models.checks import check_choice
 from seakeep.models.labelled import ChannelLabel
 
 ReadOutKind = Literal["none", "wave"]
@@ -78,20 +78,6 @@ class FittedReadOut:
         elif self.kind == "none":
             text += " (not judged: no waves are carried, or no two runs can be held out)"
         return f"  read-out      {text}"
-
-    def to_json(self) -> Json:
-        """As JSON values; numbers keep all their digits."""
-        content: Json = plain(asdict(self))
-        return content
-
-    @classmethod
-    def from_json(cls, content: Json) -> Self:
-        """Rebuild from :meth:`to_json`."""
-        load = content["load"]
-        if load is not None:
-            arrays = {key: np.array(value) for key, value in load.items() if key in ARRAYS}
-            load = LoadMap(**load | arrays)
-        return cls(**content | {"load": load})
 
 
 def read_out(

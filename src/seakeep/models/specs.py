@@ -18,9 +18,9 @@ from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.baselines import FIR
 from seakeep.models.checks import Json, check_choice, check_flag, check_integer
-from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members
+from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members, draws_of
 from seakeep.models.engine import parameter_of
-from seakeep.models.ensemble import HankelEnsemble, spectral_radius
+from seakeep.models.ensemble import PARTS, HankelEnsemble, spectral_radius
 from seakeep.models.forecasts import Spec
 from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
@@ -672,9 +672,14 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
     def restore(cls, dataset: xr.Dataset) -> HankelEnsemble:
         """Rebuild the ensemble that a file holds."""
         spec = cls.from_json(store.content(dataset, "ensemble"))
-        signature = store.unpack_signature(dataset)
-        return HankelEnsemble.from_dataset(
-            dataset, signature, spec.shared(dt := signature.dt), spec.to_json(), spec.centre(dt)
+        parts = store.unpack(dataset, **PARTS)
+        settings = spec.shared(dt := parts["signature"].dt)
+        return HankelEnsemble(
+            settings=settings,
+            origin=spec.to_json(),
+            members=draws_of(dataset, settings),
+            centre=spec.centre(dt),
+            **parts,
         )
 
     @classmethod

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import json
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import xarray as xr
@@ -13,62 +16,63 @@ import xarray as xr
 from seakeep.arrays import FloatArray
 from seakeep.errors import MissingFileError, RequestError
 from seakeep.files import load_sealed
-from seakeep.models.checks import Json, plain
-from seakeep.models.inputs import InputMap
-from seakeep.models.interface import Scale, Signature
-from seakeep.models.labelled import ChannelLabel
-from seakeep.models.readouts import FittedReadOut
+from seakeep.models.checks import plain
+from seakeep.models.observables import from_json
+from seakeep.models.terms import Observable
 
 MODEL = "model"
 """Kind of these files."""
-SCALES = ("state", "input", "direct")
-MOMENTS = ("mean", "std", "spread", "centre", "reach")
 
 
-def pack_signature(signature: Signature) -> dict[str, Any]:
-    """Moments of a signature as variables of a file."""
-    return {
-        f"{group}_{name}": (group, getattr(getattr(signature, f"{group}_scale"), name))
-        for group in SCALES
-        for name in MOMENTS
-    }
+def pack(parts: Mapping[str, Any]) -> xr.Dataset:
+    """Dataclasses as a Dataset: arrays as variables, all else as JSON of an attribute for each."""
+    variables: dict[str, Any] = {}
+
+    def described(value: Any, path: str) -> Any:
+        if isinstance(value, np.ndarray):
+            variables[path] = ([f"{path}_{axis}" for axis in range(value.ndim)], value)
+            return path
+        if is_dataclass(value):
+            own = {each.name: getattr(value, each.name) for each in fields(value) if each.init}
+            value = {"kind": value.kind, **own} if hasattr(value, "kind") else own
+        if isinstance(value, Mapping):
+            return {str(key): described(each, f"{path}.{key}") for key, each in value.items()}
+        if isinstance(value, list | tuple):
+            return [described(each, f"{path}.{number}") for number, each in enumerate(value)]
+        return plain(value)
+
+    attrs = {name: json.dumps(described(part, name)) for name, part in parts.items()}
+    return xr.Dataset(variables, attrs=attrs)
 
 
-def signature_json(signature: Signature) -> Json:
-    """What a signature holds beside the moments, as JSON values."""
-    return {
-        "dt": signature.dt,
-        "states": [asdict(label) for label in signature.state_labels],
-        "inputs": [asdict(label) for label in signature.input_labels],
-        "state_delays": signature.state_delays,
-        "input_delays": signature.input_delays,
-        "input_map": signature.input_map.to_json(),
-        "readouts": [each.to_json() for each in signature.readouts],
-        "parameter": signature.parameter,
-    }
+def unpack(dataset: xr.Dataset, **kinds: Any) -> dict[str, Any]:
+    """Rebuild parts of :func:`pack`, each of its kind: a dataclass, an array, or such and None."""
+    return {name: _rebuilt(kind, content(dataset, name), dataset) for name, kind in kinds.items()}
 
 
-def unpack_signature(dataset: xr.Dataset) -> Signature:
-    """Rebuild a signature from :func:`pack_signature` and :func:`signature_json`."""
-    values = content(dataset, "signature")
-    labels = {
-        key: tuple(ChannelLabel(**each) for each in values[key]) for key in ("states", "inputs")
-    }
-    scales = (Scale(*(numbers(dataset, f"{group}_{each}") for each in MOMENTS)) for group in SCALES)
-    state_scale, input_scale, direct_scale = scales
-    return Signature(
-        dt=values["dt"],
-        state_labels=labels["states"],
-        input_labels=labels["inputs"],
-        state_delays=values["state_delays"],
-        input_delays=values["input_delays"],
-        input_map=InputMap.from_json(values["input_map"]),
-        state_scale=state_scale,
-        input_scale=input_scale,
-        direct_scale=direct_scale,
-        readouts=tuple(FittedReadOut.from_json(each) for each in values["readouts"]),
-        parameter=values["parameter"],
-    )
+def _rebuilt(kind: Any, value: Any, dataset: xr.Dataset) -> Any:
+    origin, inside = get_origin(kind) or kind, get_args(kind)
+    if value is None:
+        return None
+    if origin in (Union, UnionType):
+        ways = (_rebuilt(each, value, dataset) for each in inside)
+        return next((each for each in ways if each is not value), value)
+    if origin is np.ndarray:
+        return numbers(dataset, value)
+    if kind is Observable:
+        return from_json(value)
+    if origin is tuple:
+        kinds = inside[:1] * len(value) if inside[-1] is Ellipsis else inside
+        return tuple(_rebuilt(*pair, dataset) for pair in zip(kinds, value, strict=True))
+    if isinstance(value, dict):
+        is_class = is_dataclass(kind)
+        hints = _hints(kind) if is_class else dict.fromkeys(value, inside[-1])
+        own = {key: _rebuilt(hints[key], each, dataset) for key, each in value.items()}
+        return kind(**own) if is_class else own
+    return value
+
+
+_hints = functools.cache(get_type_hints)
 
 
 def content(dataset: xr.Dataset, name: str) -> Any:

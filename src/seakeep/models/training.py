@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
@@ -22,7 +22,6 @@ from seakeep.core.embedding import (
 from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import labelled
-from seakeep.models.checks import Json, of_json
 from seakeep.models.inputs import InputMap, Regressors
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import ChannelLabel, Span, Stop
@@ -59,15 +58,6 @@ class Training:
     ridge: float
     rank: int
     clipped: tuple[float, ...] = ()
-
-    def to_json(self) -> Json:
-        """As JSON values."""
-        return asdict(self)
-
-    @classmethod
-    def from_json(cls, content: Json) -> Self:
-        """Rebuild from :meth:`to_json`."""
-        return of_json(cls, content)
 
 
 @dataclass(frozen=True, eq=False)

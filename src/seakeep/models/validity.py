@@ -18,7 +18,7 @@ from seakeep.arrays import BoolArray, FloatArray, IntArray
 from seakeep.conventions import is_elevation
 from seakeep.core.bands import PER_OCTAVE, band_edges, band_energy, split_bands
 from seakeep.errors import warn
-from seakeep.models import labelled, store
+from seakeep.models import labelled
 from seakeep.models.interface import Signature
 from seakeep.waves import GRAVITY
 
@@ -251,24 +251,6 @@ class Coverage:
         return Conditions(
             self, periods, peak, unseen, heights, steepnesses, reasons, mean, reach, units
         )
-
-    def to_variables(self) -> dict[str, Any]:
-        """Variables of a file."""
-        label = {"long_name": "part of the training energy", "units": "1", "first": self.first}
-        height = {"long_name": "wave height, most of a training run"}
-        steepness = {"long_name": "wave steepness, most of a training run", "units": "1"}
-        return {
-            "wave_shares": (("channel", "band"), self.shares, label),
-            "wave_heights": ("channel", self.heights, height),
-            "wave_steepnesses": ("channel", self.steepnesses, steepness),
-        }
-
-    @classmethod
-    def from_dataset(cls, dataset: xr.Dataset, signature: Signature) -> Coverage:
-        """Rebuild from :meth:`to_variables`."""
-        keys = ("wave_shares", "wave_heights", "wave_steepnesses")
-        first = int(dataset["wave_shares"].attrs["first"])
-        return cls(tuple(signature.inputs), first, *(store.numbers(dataset, key) for key in keys))
 
 
 def outside_training(
