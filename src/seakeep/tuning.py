@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Collection, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -198,12 +198,8 @@ def tune(
         seed=seed,
         known=known,
     )
-    return TuneResult(
-        search_result.settings.having(select=None),
-        search_result.rows,
-        search_result.note,
-        search_result.readouts,
-    )
+    settings = search_result.settings.having(select=None)
+    return TuneResult(**vars(replace(search_result, settings=settings)))
 
 
 def _digest(asked: object, runs: dict[str, xr.Dataset], channels: Sequence[str]) -> str:

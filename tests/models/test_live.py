@@ -260,7 +260,7 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     assert ended[1][0][0] == pytest.approx(1.0, abs=0.3)
 
 
-def test_outside_the_training_the_band_widens_and_says_why(models, run):
+def test_outside_the_training_the_band_widens_and_says_why(models, run, monkeypatch):
     model, higher = models["plain"], run.copy(deep=True)
     for name in (*STATES, *INPUTS):
         higher[name].values *= 1.7
@@ -286,6 +286,11 @@ def test_outside_the_training_the_band_widens_and_says_why(models, run):
     play(drifted, run.assign(surge=run.surge + 5), 0, START)
     assert drifted.conditions.validity == Validity.SURGE
     assert started(model, run).forecast(1).attrs["validity"] == "inside"
+    # Without errors of late, the height alone.
+    monkeypatch.setattr(type(live), "consistency_by_state", np.ones((2, len(STATES))))
+    made = live.forecast(STEPS, matrix(higher, INPUTS)[START:])
+    std = np.stack([made[name].sel(statistic="std") for name in STATES], axis=1)
+    np.testing.assert_allclose(std, ratio * model.errors.at(np.arange(STEPS) + 1), rtol=1e-12)
 
 
 @pytest.mark.parametrize("value", [9.97e36, 1e200])

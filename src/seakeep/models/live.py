@@ -973,11 +973,6 @@ def _rig(signature: Signature, like: xr.Dataset | None) -> xr.Dataset:
     rig = xr.Dataset({each: ("time", np.zeros(0)) for each in signature.inputs})
     if like is None:
         return rig
-    given: object = like
-    if not isinstance(given, xr.Dataset):
-        raise RequestError(
-            f"like must be a Dataset, a run of the rig in service; received {type(given).__name__}."
-        )
     rig.attrs = {key: float(like.attrs[key]) for key in RIG if key in like.attrs}
     for name in signature.inputs:
         if name in like and "x_position" in like[name].attrs:

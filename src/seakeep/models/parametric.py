@@ -16,14 +16,14 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.core.embedding import block_means, spread_means
-from seakeep.core.gram import Piece, primal_system, ridge_path
+from seakeep.core.embedding import spread_means
+from seakeep.core.gram import ridge_path
 from seakeep.core.solve import Solution
 from seakeep.errors import DataError, warn
 from seakeep.models.engine import parameter_of
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.settings import HankelSettings
-from seakeep.models.training import TrainingData
+from seakeep.models.training import TrainingData, system_of
 
 GROUPS = ("state", "input", "direct")
 
@@ -125,14 +125,10 @@ def regress_varying(
         shifts.append(slope * scale.std)
         scales[f"{group}_scale"] = replace(scale, mean=scale.mean + at_zero * scale.std)
     states, delayed, direct = series
-    blocks, delays = settings.blocks, (settings.state_delays, settings.input_delays, 0)
     gram: Any = 0.0
     right: Any = 0.0
     for x, u, w, window, part in zip(states, delayed, direct, data.windows, q, strict=True):
-        groups = (x, u, np.concatenate([w, block_means(x, blocks)], axis=1))
-        there = [number for number, each in enumerate(groups) if each.shape[1]]
-        piece = Piece(x, tuple(groups[n] for n in there), window.first_column, window.columns)
-        system = primal_system([piece], [delays[n] for n in there])
+        system = system_of(([x], [u], [w]), [window], settings)
         own = np.triu(system.gram) + np.triu(system.gram, 1).T
         gram = gram + np.kron(np.array([[1.0, part], [part, part**2]]), own)
         right = right + np.concatenate([system.right, part * system.right], axis=1)
@@ -140,7 +136,9 @@ def regress_varying(
     ridge = factor * float(settings.ridge)
     both = np.split(ridge_path(gram, right, [ridge])[0], 2, axis=1)
     size = len(data.signature.states)
-    fixed, slopes = (spread_means(each, size, settings.state_delays, blocks) for each in both)
+    fixed, slopes = (
+        spread_means(each, size, settings.state_delays, settings.blocks) for each in both
+    )
     variation = Variation(
         slopes,
         (shifts[0], shifts[1], shifts[2]),

@@ -25,7 +25,7 @@ from collections.abc import (
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 import numpy as np
 import xarray as xr
@@ -33,8 +33,8 @@ import xarray as xr
 from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
-from seakeep.core.embedding import block_means, spread_means
-from seakeep.core.gram import Piece, primal_system, ridge_path
+from seakeep.core.embedding import spread_means
+from seakeep.core.gram import ridge_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
@@ -48,7 +48,7 @@ from seakeep.models.observables import Powers, SlowSquares, named
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
 from seakeep.models.terms import Observable
-from seakeep.models.training import TrainingData, gather, scales_of
+from seakeep.models.training import TrainingData, gather, scales_of, system_of
 from seakeep.signals import encounter_period, repeated_waves
 from seakeep.signals.waves import is_regular
 
@@ -230,8 +230,8 @@ class Problem:
         )
         return replace(signature, state_labels=states, input_labels=inputs)
 
-    def parts(self, candidate: HankelSettings) -> tuple[BoolArray, BoolArray, BoolArray]:
-        """Which states (all), delayed and direct regressors a candidate has."""
+    def parts(self, candidate: HankelSettings) -> tuple[BoolArray, BoolArray]:
+        """Which delayed and direct regressors a candidate has."""
         signature, direct = self.data.signature, list[bool]()
         chain, delayed = signature.input_map, [True] * len(signature.inputs)
         bound = () if chain.observed is None else chain.observed.bound
@@ -239,16 +239,14 @@ class Problem:
             columns = [observable in candidate.observables] * len(each.labels)
             (delayed if each.delayed else direct).extend(columns)
         direct += [True] * (chain.follows is not None)  # the slow surge squared
-        states = np.ones(len(signature.states), dtype=bool)
-        return states, np.array(delayed, dtype=bool), np.array(direct, dtype=bool)
+        return np.array(delayed, dtype=bool), np.array(direct, dtype=bool)
 
     def models(
         self, candidate: HankelSettings, levels: Sequence[float], runs: Sequence[int]
     ) -> tuple[Dynamics, FloatArray]:
         """Models of some runs: the first of them, and coefficients, shape (level, N, p)."""
-        data, parts = self.data, self.parts(candidate)
+        data, parts = self.data, (slice(None), *self.parts(candidate))
         chain, labels = data.signature.input_map, data.signature.state_labels
-        delays = candidate.state_delays, candidate.input_delays, 0
         windows = [data.windows[run] for run in runs]
         groups_of = labels, *chain.regressors(data.signature.input_labels)
         names = [[label.name for label in group] for group in groups_of]
@@ -265,28 +263,11 @@ class Problem:
             [scale.deviations(each[:, part]) for each in group]
             for group, scale, part in zip(series, scales, parts, strict=True)
         ]
-        blocks, count = candidate.blocks, len(labels)
-        groups[2] = [
-            np.concatenate([direct, block_means(states, blocks)], axis=1)
-            for direct, states in zip(groups[2], groups[0], strict=True)
-        ]
-        there = [n for n, group in enumerate(groups) if group[0].shape[1]][candidate.is_filter :]
-        system = primal_system(
-            [
-                Piece(
-                    groups[0][run],
-                    tuple(groups[number][run] for number in there),
-                    window.first_column,
-                    window.columns,
-                )
-                for run, window in enumerate(windows)
-            ],
-            [delays[number] for number in there],
-        )
+        system = system_of(groups, windows, candidate)
         pairs = sum(window.columns for window in windows)
         factor = pairs if candidate.ridge_scale == "per_snapshot" else 1
         path = ridge_path(system.gram, system.right, [factor * level for level in levels])
-        path = spread_means(path, count, candidate.state_delays, blocks)
+        path = spread_means(path, len(labels), candidate.state_delays, candidate.blocks)
         reach = candidate.state_reach, candidate.input_delays
         x, u, w = scales
         if candidate.is_filter:
@@ -297,21 +278,10 @@ class Problem:
         """λ that are tried of a candidate."""
         return self.ridges if candidate.has_path else (float(candidate.ridge),)
 
-    def run(self, number: int) -> xr.Dataset:
-        """A run by its number."""
-        return self.runs[self.data.names[number]]
-
-    def fitted(self, candidate: Any, numbers: Iterable[int]) -> Any:
-        """The model that a candidate gives of some runs."""
-        signature = self.data.signature
-        given = {self.data.names[number]: self.run(number) for number in numbers}
-        return candidate.fit(given, signature.states, signature.inputs)
-
     def grows(self, candidate: HankelSettings, level: float) -> bool:
-        """Whether the model that a candidate gives of all runs grows."""
+        """Whether the model that a candidate gives of all runs grows; a subspace model does not."""
         if not candidate.has_path:
-            model = self.fitted(candidate, range(len(self.groups)))
-            return any(abs(np.linalg.eigvals(a)).max() >= 1.0 for a in model.system_matrices())
+            return False
         return spectral_radius(self.models(candidate, [level], range(len(self.groups)))[0]) >= 1.0
 
     def starts(self, run: int, steps: int) -> IntArray:
@@ -335,14 +305,16 @@ class Problem:
         rest = [other for other in range(len(self.groups)) if other != run]
         others = [other for other in rest if self.groups[other] != self.groups[run]]
         if not candidate.has_path:
-            model = self.fitted(candidate, others or rest)
-            begin = round((data.begin(run) - float(self.run(run)["time"][0])) / data.signature.dt)
+            spec, own, name = cast("Any", candidate), data.signature, data.names[run]
+            given = {data.names[other]: self.runs[data.names[other]] for other in others or rest}
+            model, judged = spec.fit(given, own.states, own.inputs), self.runs[name]
+            begin = round((data.begin(run) - float(judged["time"][0])) / own.dt)
             for steps in horizons:
                 if (starts := begin + self.starts(run, steps)).size:
-                    judged = model.judged_runs(self.run(run), data.names[run], starts, steps)
-                    yield FreeRuns(judged[0][None], judged[1], model.signature.state_scale.std)
+                    predicted, measured = model.judged_runs(judged, name, starts, steps)
+                    yield FreeRuns(predicted[None], measured, model.signature.state_scale.std)
             return
-        _, delayed, direct = self.parts(candidate)
+        delayed, direct = self.parts(candidate)
         dynamics, coefficients = self.models(candidate, levels, others or rest)
         states = data.signature.state_scale.physical(data.states[run])
         known: dict[int, FloatArray] = {}  # by start: a longer run begins with the shorter one
@@ -532,25 +504,21 @@ class Selected(Generic[Chosen]):
 
 def settle(
     settings: Settings,
-    chosen: Select | None,
     runs: Mapping[str, xr.Dataset],
     states: Sequence[str],
     inputs: Sequence[str],
-    *,
-    kinds: Sequence[HankelSettings] = (),
-    executor: Executor | None = None,
-    progress: Progress | None = None,
+    **how: Any,
 ) -> Selected[Settings]:
     """Choose all that settings leave open.
 
     Parameters
     ----------
     settings : HankelSettings
-        What was asked for.
-    chosen : Select, optional
-        What is chosen beside λ, and how.
-    runs, states, inputs, kinds, executor, progress
+        What was asked for; its ``select`` says what is chosen beside λ, and how.
+    runs, states, inputs
         As in :func:`select`.
+    **how
+        Its ``kinds``, ``executor`` and ``progress``.
 
     Returns
     -------
@@ -564,7 +532,7 @@ def settle(
     """
     lacking = _lacking(settings, (runs, states, inputs))
     without = f"not aligned to the surge: {lacking}" if lacking else ""
-    stated = not isinstance(settings.ridge, str)
+    stated, chosen = not isinstance(settings.ridge, str), getattr(settings, "select", None)
     if stated and chosen is None:
         return Selected(settings, (), without)
     if settings.ridge == 0:
@@ -584,9 +552,7 @@ def settle(
         horizon=asked.horizon,
         folds=asked.folds,
         period=asked.period,
-        kinds=kinds if asked.opened else (),
-        executor=executor,
-        progress=progress,
+        **how,
     )
     return replace(selected, note="; ".join(filter(None, (selected.note, without))))
 

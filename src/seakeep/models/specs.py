@@ -147,12 +147,10 @@ class Choosing(HankelSettings, Generic[Fitted]):
         """
         named = until(as_runs(runs), stop)
         check_names(states, inputs)
-        channels = list(states), list(inputs)
         spec = self.resolved_in(named, inputs)
         central = spec.central(labelled.common_step(named))
-        how: Any = {"kinds": (FIR(0),), "executor": executor, "progress": progress}
-        choice = settle(central, central.select, named, *channels, **how)
-        return spec._adopt(choice)
+        how: dict[str, Any] = {"kinds": (FIR(0),), "executor": executor, "progress": progress}
+        return spec._adopt(settle(central, named, list(states), list(inputs), **how))
 
     def fit(
         self,

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray
+from seakeep.core import gram
 from seakeep.core.embedding import (
     History,
     TrainingWindow,
@@ -116,10 +117,7 @@ class TrainingData:
             self.windows,
             state_delays=state_delays,
             input_delays=settings.input_delays,
-            direct=[
-                np.concatenate([direct, block_means(states, blocks)], axis=1)
-                for direct, states in zip(self.direct, self.states, strict=True)
-            ],
+            direct=with_means(settings, self.states, self.direct),
             ridge=float(settings.ridge),
             per_snapshot=settings.ridge_scale == "per_snapshot",
             rank=settings.rank,
@@ -144,6 +142,33 @@ class TrainingData:
             rank=solution.rank,
             clipped=solution.clipped,
         )
+
+
+def with_means(
+    settings: HankelSettings, states: Sequence[FloatArray], direct: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """Direct regressors of each run, and the means over blocks of its delayed states."""
+    return [
+        np.concatenate([own, block_means(x, settings.blocks)], axis=1)
+        for own, x in zip(direct, states, strict=True)
+    ]
+
+
+def system_of(
+    groups: Sequence[Sequence[FloatArray]],
+    windows: Sequence[TrainingWindow],
+    settings: HankelSettings,
+) -> gram.PrimalSystem:
+    """Gram matrix of runs, given as states, delayed and direct regressors, each by run."""
+    states, delayed, direct = groups
+    series = states, delayed, with_means(settings, states, direct)
+    delays = settings.state_delays, settings.input_delays, 0
+    there = [n for n, group in enumerate(series) if group[0].shape[1]][settings.is_filter :]
+    pieces = [
+        gram.Piece(x, tuple(series[n][run] for n in there), window.first_column, window.columns)
+        for run, (x, window) in enumerate(zip(states, windows, strict=True))
+    ]
+    return gram.primal_system(pieces, [delays[n] for n in there])
 
 
 def gather(

@@ -88,16 +88,12 @@ def predicted_extension(
     def lengthened(column: FloatArray) -> FloatArray:
         values = np.ascontiguousarray(column)
         before, after = (
-            predicted(inward[-fitted:], count, order) * window for inward in (values[::-1], values)
+            continued(each, autoregression(each, order)[0], count) * window
+            for each in (values[::-1][-fitted:], values[-fitted:])
         )
         return np.concatenate([before[::-1], values, after])
 
     return np.apply_along_axis(lengthened, 0, array)
-
-
-def predicted(past: FloatArray, count: int, order: int) -> FloatArray:
-    """The `count` values after a series of zero mean, by linear prediction (Burg)."""
-    return continued(past, autoregression(past, order)[0], count)
 
 
 def _transformed(

@@ -64,14 +64,11 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     >>> bool(np.max(np.abs(predict_waves(tone[:1000], 32) - tone[1000:1032])) < 0.02)
     True
     """
-    array, number = as_series(series, minimum=4, channels=True), whole_number(count, "count")
-
-    def following(values: FloatArray) -> FloatArray:
-        deviations = values - values.mean()
-        whitening, _ = _model(deviations)
-        return np.asarray(values.mean() + continued(deviations, whitening, number))
-
-    return np.asarray(np.apply_along_axis(following, 0, array))
+    array = as_series(series, minimum=4, channels=True)
+    table = array.reshape(len(array), -1)
+    nowhere = np.full(table.shape[1], np.nan)
+    found = foresee(table, count, dt=1.0, positions=nowhere, depth=np.inf)
+    return found.expected.reshape(-1, *array.shape[1:])
 
 
 class Foreseen(NamedTuple):
@@ -139,7 +136,10 @@ def foresee(
 
     def follow(column: int, values: FloatArray) -> None:
         deviations, first = values - values.mean(), np.zeros(number)
-        whitening, power = _model(deviations)
+        order = 1
+        if np.ptp(deviations) > 0:
+            order = round(MEMORY / max(band_limit(deviations, 1.0, 0.5), 1.0 / deviations.size))
+        whitening, power = autoregression(deviations, order, NOISE)
         first[0], orders[column] = math.sqrt(power), len(whitening) - 1
         expected[:, column] = values.mean() + continued(deviations, whitening, number)
         departures[column, :, column] = scipy.signal.lfilter([1.0], whitening, first)
@@ -205,11 +205,3 @@ def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: f
     """
     edge = band_limit(series, dt, QUICKLY)
     return float(distance / group_speed(2 * np.pi * edge, depth))
-
-
-def _model(deviations: FloatArray) -> tuple[FloatArray, float]:
-    """Autoregressive model of a record over some of its wave periods; see ``autoregression``."""
-    order = 1
-    if np.ptp(deviations) > 0:
-        order = round(MEMORY / max(band_limit(deviations, 1.0, 0.5), 1.0 / deviations.size))
-    return autoregression(deviations, order, NOISE)
