@@ -152,8 +152,7 @@ class Run:
     @property
     def reference_time(self) -> FloatArray:
         """Instants of the reference logger, s."""
-        time: FloatArray = next(iter(self.groups.values()))["time"].to_numpy()
-        return time
+        return next(iter(self.groups.values()))["time"].to_numpy()
 
 
 def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reader: Reader) -> Run:
@@ -547,8 +546,7 @@ def _axis(run: Run, dt: float) -> FloatArray:
             f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. Correct "
             "sampling_rate, dt or steps_per_period in [preparation]."
         )
-    instants: FloatArray = origin + dt * np.arange(first, last + 1)
-    return instants
+    return origin + dt * np.arange(first, last + 1)
 
 
 def _on_axis(

@@ -185,5 +185,4 @@ def pooled_nrmse(runs: Mapping[str, FreeRun]) -> FloatArray:
     """NRMSE of each state over all free runs, deviations from the mean of each run."""
     errors = np.concatenate([run.forecast - run.measured for run in runs.values()])
     moved = np.concatenate([run.measured - run.measured.mean(axis=0) for run in runs.values()])
-    result: FloatArray = np.sqrt(ratio((errors**2).sum(axis=0), (moved**2).sum(axis=0)))
-    return result
+    return np.sqrt(ratio((errors**2).sum(axis=0), (moved**2).sum(axis=0)))

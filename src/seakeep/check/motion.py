@@ -287,15 +287,13 @@ def _probed(model: HankelDMDcModel, step: float) -> IntArray:
     if not known.size:
         raise DataError("training holds no waves by which the model could be probed.")
     chosen = np.linspace(0, known.size - 1, min(12, known.size)).round().astype(int)
-    result: IntArray = known[chosen]
-    return result
+    return known[chosen]
 
 
 def _wave(samples: int, cycles: int, turns: FloatArray, amplitude: float) -> FloatArray:
     """A wave at each input, (samples, input); inputs that are not elevations are zero."""
     turn = 2 * np.pi * cycles * np.arange(samples) / samples
-    result: FloatArray = amplitude * np.nan_to_num(np.cos(turn[:, None] - turns))
-    return result
+    return amplitude * np.nan_to_num(np.cos(turn[:, None] - turns))
 
 
 def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:

@@ -298,8 +298,7 @@ def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) 
     forecasts = model.forecast_windows(run, starts.tolist(), steps)
     if "member" in forecasts.dims:
         forecasts = forecasts[model.states].mean("member", skipna=False)
-    values: FloatArray = np.stack([forecasts[name].values for name in model.states], axis=-1)
-    return values
+    return np.stack([forecasts[name].values for name in model.states], axis=-1)
 
 
 def whole_span(run: xr.Dataset) -> tuple[float, float]:
@@ -415,8 +414,7 @@ def wave_turns(
     if places is None or not depths:
         return None
     k = wavenumber(2 * np.pi * frequency, float(depths[0]))
-    result: FloatArray = np.asarray(k)[:, None] * (places - places[reference])
-    return result
+    return np.asarray(k)[:, None] * (places - places[reference])
 
 
 def units_of(model: Model, names: Sequence[str]) -> list[str]:

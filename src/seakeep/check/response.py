@@ -158,8 +158,7 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
     lead = (input_map.follows or input_map).lead  # of delayed columns, in samples
     early = np.exp(2j * np.pi * frequency * model.dt * lead)
     early = np.where(np.arange(scale.size) < len(model.inputs), early[:, None], 1.0)
-    result: ComplexArray = gain * dynamics.state_scale.std[:, None] / scale * early[:, None]
-    return result
+    return gain * dynamics.state_scale.std[:, None] / scale * early[:, None]
 
 
 def _matrices(model: Model) -> tuple[Coverage, list[Dynamics]]:

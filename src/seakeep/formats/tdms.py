@@ -136,8 +136,7 @@ def _columns(path: Path, channels: list[Any], data: list[npt.NDArray[Any]]) -> C
 
 def _seconds(instants: npt.NDArray[Any]) -> FloatArray:
     """Seconds after the first instant; a missing one is NaN."""
-    elapsed: FloatArray = (instants - instants[0]) / np.timedelta64(1, "ns") * 1e-9
-    return elapsed
+    return (instants - instants[0]) / np.timedelta64(1, "ns") * 1e-9
 
 
 def _waveform_time(path: Path, channels: list[Any], count: int) -> FloatArray | None:
@@ -159,5 +158,4 @@ def _waveform_time(path: Path, channels: list[Any], count: int) -> FloatArray | 
             "into one group, and state it with group = 'NAME' in [files]."
         )
     step, first = next(iter(axes.values()))
-    time: FloatArray = first + step * np.arange(count, dtype=float)
-    return time
+    return first + step * np.arange(count, dtype=float)

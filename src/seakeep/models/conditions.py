@@ -169,8 +169,7 @@ def disagreements(
 
 def _scores(errors: FloatArray) -> FloatArray:
     """NRMSE of each window."""
-    result: FloatArray = np.sqrt((errors**2).mean(axis=1)).mean(axis=1)
-    return result
+    return np.sqrt((errors**2).mean(axis=1)).mean(axis=1)
 
 
 def _gain(pooled: FloatArray, own: FloatArray) -> float:
@@ -199,8 +198,7 @@ def _series(
 def _errors(model: HankelDMDcModel, run: xr.Dataset, steps: int, scale: Scale) -> FloatArray:
     """Errors of these, at most LOST."""
     predicted, measured = _series(model, run, steps, scale)
-    errors: FloatArray = np.clip(measured - predicted, -LOST, LOST)
-    return errors
+    return np.clip(measured - predicted, -LOST, LOST)
 
 
 def _reason(

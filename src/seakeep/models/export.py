@@ -217,8 +217,7 @@ def truncated(system: System, signature: Signature, order: int) -> tuple[System,
 
     def root(matrix: FloatArray, gain: FloatArray) -> FloatArray:
         values, vectors = linalg.eigh(linalg.solve_discrete_lyapunov(matrix, gain @ gain.T))
-        factor: FloatArray = vectors * np.sqrt(np.maximum(values, 0.0))
-        return factor
+        return vectors * np.sqrt(np.maximum(values, 0.0))
 
     reached, seen = root(a, gains[0]), root(a.T, gains[1])
     u, sigma, v = linalg.svd(seen.T @ reached)

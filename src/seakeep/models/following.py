@@ -239,8 +239,7 @@ class Following:
     def errors(self) -> FloatArray:
         """Largest error of a carrier at each place in the rig of training, per SD of the waves."""
         banks = _banks(self, self.alignment.rig())
-        result: FloatArray = np.max([bank.errors for bank in banks], axis=0)
-        return result
+        return np.max([bank.errors for bank in banks], axis=0)
 
     @property
     def reach(self) -> tuple[float, float]:

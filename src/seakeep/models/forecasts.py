@@ -40,8 +40,7 @@ class Model:
     @property
     def kind(self) -> str:
         """Word of its spec in TOML files and in :data:`seakeep.models.registry.KINDS`."""
-        kind: str = self.settings.kind
-        return kind
+        return self.settings.kind
 
     @property
     def n_members(self) -> int:

@@ -48,14 +48,12 @@ class LeadErrors:
 
     def of_forecast(self, steps: int, since: int = 0) -> FloatArray:
         """Mean squares over a forecast, shape (steps, N), `since` samples after measured states."""
-        variances: FloatArray = self.at(np.arange(1, steps + 1) + since) ** 2
-        return variances
+        return self.at(np.arange(1, steps + 1) + since) ** 2
 
     def at(self, leads: npt.ArrayLike) -> FloatArray:
         """RMS errors at leads (samples from 1 on), shape (…, N); held after the last."""
         places = np.minimum(np.asarray(leads, dtype=int), len(self.rms)) - 1
-        errors: FloatArray = self.rms[places]
-        return errors
+        return self.rms[places]
 
 
 class Source(NamedTuple):
@@ -178,8 +176,7 @@ def _errors(
     """Forecast minus measurement, shape (window, steps, N)."""
     windows = stretch.windows(starts, s, z, steps)
     mean = linear_runs(members, [windows], readouts)[0].mean(axis=0)
-    errors: FloatArray = mean - np.stack([stretch.states[at + 1 : at + steps + 1] for at in starts])
-    return errors
+    return mean - np.stack([stretch.states[at + 1 : at + steps + 1] for at in starts])
 
 
 def training_errors(

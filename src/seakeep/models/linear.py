@@ -340,8 +340,7 @@ class HankelDMDcModel(Model):
             missing, or a value that is needed is not finite or masked.
         """
         windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
-        values: FloatArray = self.free_runs([windows])[0][0, 0]
-        return values
+        return self.free_runs([windows])[0][0, 0]
 
     def jacobian(
         self, x_history: npt.ArrayLike, u_history: npt.ArrayLike

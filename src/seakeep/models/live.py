@@ -251,8 +251,7 @@ class Live:
     @property
     def state(self) -> FloatArray:
         """Estimate of the states at :attr:`time`, shape (N,), physical units."""
-        state: FloatArray = self._rows("x", self._count.taken - 1, self._count.taken)[0].copy()
-        return state
+        return self._rows("x", self._count.taken - 1, self._count.taken)[0].copy()
 
     @property
     def covariance(self) -> FloatArray:
@@ -326,8 +325,7 @@ class Live:
         if "surge" not in self.signature.states:
             return None
         rows = self._rows("x", max(self._count.taken - self._record, 0), self._count.taken)
-        surge: FloatArray = rows[:, self.signature.states.index("surge")]
-        return surge
+        return rows[:, self.signature.states.index("surge")]
 
     @property
     def equations(self) -> dict[str, Any]:
@@ -906,8 +904,7 @@ def load_live(model: Servable, path: str | Path) -> Live:
 def held_samples(inside: BoolArray) -> npt.NDArray[np.intp]:
     """Leads that are all `inside` from the first on: how many of (steps, N), shape (N,)."""
     ended = np.concatenate([inside, np.zeros((1, inside.shape[1]), bool)])
-    samples: npt.NDArray[np.intp] = np.argmin(ended, axis=0)
-    return samples
+    return np.argmin(ended, axis=0)
 
 
 def _moments(runs: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -935,8 +932,7 @@ def _quantile(level: float, spread: FloatArray, variance: FloatArray, freedom: f
     """
     share = spread / np.maximum(variance, np.finfo(float).tiny)
     doubt = (1.0 - share) ** 2 / WINDOWS + share**2 / freedom
-    quantile: FloatArray = special.stdtrit(1.0 / np.maximum(doubt, 1e-6), 0.5 + 0.5 * level)
-    return quantile
+    return special.stdtrit(1.0 / np.maximum(doubt, 1e-6), 0.5 + 0.5 * level)
 
 
 def _mean_predictor(

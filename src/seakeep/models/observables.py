@@ -386,8 +386,7 @@ class Observed:
     @cached_property
     def limits(self) -> FloatArray:
         """Squares at which powers of each input begin to grow like the input."""
-        result: FloatArray = BOUND * np.square(self.spreads) + TINY
-        return result
+        return BOUND * np.square(self.spreads) + TINY
 
     @cached_property
     def groups(self) -> tuple[tuple[Bound, ...], tuple[Bound, ...]]:

@@ -250,8 +250,7 @@ def prior_of(name: str, value: object) -> Prior | None:
         if "distribution" in value:
             return Distribution(**value)
         ((key, given),) = value.items()
-        prior: Prior = _OWN[key](*(given if isinstance(given, list | tuple) else (given,)))
-        return prior
+        return _OWN[key](*(given if isinstance(given, list | tuple) else (given,)))
     except RequestError as error:
         raise RequestError(f"{name}: {error}") from None
     except (TypeError, ValueError, KeyError):

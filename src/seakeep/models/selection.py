@@ -130,8 +130,7 @@ class Trial:
     @property
     def means(self) -> FloatArray:
         """Score at each level."""
-        result: FloatArray = self.scores @ self.weights
-        return result
+        return self.scores @ self.weights
 
     @property
     def best(self) -> float:
@@ -185,8 +184,7 @@ def scores_of(runs: FreeRuns) -> FloatArray:
     judged = ~metrics.is_slack(predicted=measured, measured=measured, training_std=spread)
     errors = np.where(np.isfinite(errors), np.minimum(errors, WORST), WORST)
     moved = judged.any(axis=-1)
-    result: FloatArray = np.mean(errors[:, moved], axis=-1, where=judged[moved])
-    return result
+    return np.mean(errors[:, moved], axis=-1, where=judged[moved])
 
 
 @dataclass(frozen=True, eq=False)

@@ -443,8 +443,7 @@ class HankelSettings:
             "readouts": readouts_json(self.readouts),
             "select": None if select is None else asdict(select),
         }
-        written: Json = plain({key: maps.get(key, _written(each)) for key, each in content.items()})
-        return written
+        return plain({key: maps.get(key, _written(each)) for key, each in content.items()})
 
     @classmethod
     def from_json(cls, content: Json) -> Self:

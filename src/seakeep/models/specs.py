@@ -501,10 +501,9 @@ def _window_scores(
             f"window of {steps} samples can be forecast. Train on longer runs, or state ridge."
         )
     predicted, measured = model.judged_runs(run, name, starts, steps)
-    scores: list[float] = scores_of(
-        FreeRuns(predicted[None], measured, model.signature.state_scale.spread)
-    )[0].tolist()
-    return scores
+    return scores_of(FreeRuns(predicted[None], measured, model.signature.state_scale.spread))[
+        0
+    ].tolist()
 
 
 def _largest_radius(model: HankelDMDcModel) -> float:

@@ -522,8 +522,7 @@ def is_constant(values: FloatArray) -> BoolArray:
     """Channels, shape (channel,), that do not move; values are (time, channel)."""
     # A constant that is not a binary fraction has a spread of rounding, not of zero.
     largest = np.abs(values).max(axis=0, initial=0.0)
-    still: BoolArray = np.ptp(values, axis=0) <= 1e-12 * largest
-    return still
+    return np.ptp(values, axis=0) <= 1e-12 * largest
 
 
 def _check_length(

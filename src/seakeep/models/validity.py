@@ -204,8 +204,7 @@ class Coverage:
         """
         edges = band_edges(self.first, self.shares.shape[1])
         known = np.pad(self.known, ((0, 0), (1, 1)))  # nothing below and above the bands
-        result: BoolArray = known[:, np.searchsorted(edges, frequency, side="right")]
-        return result
+        return known[:, np.searchsorted(edges, frequency, side="right")]
 
     def conditions(
         self,
@@ -294,8 +293,7 @@ def outside_training(
 
 def _shares(energy: FloatArray) -> FloatArray:
     total = energy.sum(axis=1, keepdims=True)
-    out: FloatArray = np.divide(energy, total, out=np.zeros_like(energy), where=total > 0)
-    return out
+    return np.divide(energy, total, out=np.zeros_like(energy), where=total > 0)
 
 
 def _heights(inputs: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:

@@ -168,8 +168,7 @@ def _median(drawn: FloatArray) -> FloatArray:
 def _spread(drawn: FloatArray) -> FloatArray:
     """Inter-quartile range over cells of the average over channels."""
     low, high = np.nanquantile(_flat(average_of(drawn)), [0.25, 0.75], axis=1)
-    out: FloatArray = high - low
-    return out
+    return high - low
 
 
 def _robust(paper: Evidence, raw: Evidence) -> Judged:
@@ -202,8 +201,7 @@ def _share(act: Evidence, measure: str, channels: Sequence[str]) -> Interval:
 
     def statistic(drawn: FloatArray) -> FloatArray:
         means = average_of(drawn.reshape(len(drawn), -1, drawn.shape[-1]).swapaxes(1, 2))
-        out: FloatArray = means[:, picked].sum(axis=1) / np.nansum(means, axis=1)
-        return out
+        return means[:, picked].sum(axis=1) / np.nansum(means, axis=1)
 
     return act.interval(statistic, act.cells(measure=measure))
 

@@ -34,8 +34,7 @@ def track_text(track: Track) -> str:
         if np.issubdtype(numbers.dtype, np.floating):
             numbers = np.round(numbers, DECIMALS[unit]) + 0.0
         columns[f"{name} [{'-' if unit == '1' else unit}]"] = numbers
-    text: str = pd.DataFrame(columns).to_csv(index=False, lineterminator="\n")
-    return text
+    return pd.DataFrame(columns).to_csv(index=False, lineterminator="\n")
 
 
 def write_track(track: Track, path: Path) -> None:

@@ -255,8 +255,7 @@ def median_of(cells: FloatArray) -> FloatArray:
     count = np.isfinite(ordered).sum(axis=1, keepdims=True)
     low, high = np.maximum(count - 1, 0) // 2, count // 2
     pair = np.take_along_axis(ordered, np.concatenate([low, high], axis=1), axis=1)
-    out: FloatArray = pair.mean(axis=1)
-    return out
+    return pair.mean(axis=1)
 
 
 def verdict(lower: float, upper: float) -> Literal["better", "worse", "cannot tell"]:
@@ -320,8 +319,7 @@ def band_tables(
 
     def cells(key: str) -> FloatArray:
         values = test[key].values
-        out: FloatArray = np.broadcast_to(values, (*judged.shape, *values.shape[1:]))[judged]
-        return out
+        return np.broadcast_to(values, (*judged.shape, *values.shape[1:]))[judged]
 
     against = {key: cells(key) for key in ("measured", "truth") if key in test}
     known = "wave_height" in test and np.isfinite(test["wave_height"]).all()
@@ -532,8 +530,7 @@ def is_regular(groups: Mapping[str, xr.Dataset], test: str) -> bool:
 def _frequencies(groups: Mapping[str, xr.Dataset], test: str) -> FloatArray:
     """Frequency of the regular wave in each window, Hz; NaN in other waves."""
     runs = groups[f"tests/{test}"]["run"].values.astype(str)
-    out: FloatArray = groups["runs"]["wave_frequency"].sel(run=runs).values
-    return out
+    return groups["runs"]["wave_frequency"].sel(run=runs).values
 
 
 RESPONSE = ("error_offset", "error_wave", "error_rest", "amplitude_ratio", "phase_lead")
@@ -592,5 +589,4 @@ def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> Floa
     NaN where a cell or a channel is not judged.
     """
     place = list(groups[f"tests/{test}"]["model"].values).index(model)
-    leads: FloatArray = np.degrees(np.angle(_responses(groups, test)[1][place]))
-    return leads
+    return np.degrees(np.angle(_responses(groups, test)[1][place]))

@@ -229,8 +229,7 @@ class StudyResult:
     @property
     def settings(self) -> dict[str, Any]:
         """Settings of the study as plain data."""
-        settings: dict[str, Any] = json.loads(self.attrs["settings"])
-        return settings
+        return json.loads(self.attrs["settings"])
 
     @cached_property
     def model_settings(self) -> dict[str, Any]:
@@ -239,8 +238,7 @@ class StudyResult:
         ``settings`` gives for each key its ``value`` (a JSON value) and its ``source``: "stated",
         "preset", "study" (the study's seed) or "default".
         """
-        out: dict[str, Any] = json.loads(self.attrs["models"])
-        return out
+        return json.loads(self.attrs["models"])
 
     @property
     def models(self) -> list[str]:

@@ -90,8 +90,7 @@ def _cells(result: StudyResult, test: str, model: str, measure: str) -> FloatArr
     """Errors of all judged cells, shape (cell, channel)."""
     data = result.tests[test]
     errors = data["error"].sel(model=model, measure=measure).values
-    cells: FloatArray = errors[data["judged"].values]
-    return cells
+    return errors[data["judged"].values]
 
 
 @figure_style()
