@@ -16,6 +16,7 @@ import xarray as xr
 
 from seakeep.campaign import read_table
 from seakeep.campaign.pipeline import flag_samples
+from seakeep.campaign.settings import PreparationSettings
 from seakeep.quality.findings import Record
 from seakeep.quality.samples import constant, flagged, noise
 from seakeep.signals.time_axis import over_gaps
@@ -75,7 +76,7 @@ def reported(x: np.ndarray, dt: float) -> set[str]:
     """Kinds of findings of the checks of samples."""
     time = dt * np.arange(x.size)
     group = xr.Dataset({"x": ("time", x, {"units": "1"})}, {"time": ("time", time)})
-    record = Record("run", group, {"": flag_samples(group, replaced=False)})
+    record = Record("run", group, {"": flag_samples(group, PreparationSettings())})
     return {found.kind.word for check in (flagged, constant, noise) for found in check(record)}
 
 

@@ -20,6 +20,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.campaign.pipeline import flag_samples
+from seakeep.campaign.settings import PreparationSettings
 from seakeep.quality.faults import MISSING, flag_attributes
 from seakeep.quality.findings import Record, Redundant
 from seakeep.quality.samples import constant, flagged, levels
@@ -115,7 +116,7 @@ def kinds(x: np.ndarray, trusted: np.ndarray, dt: float) -> set[str]:
     if filled.long.any():
         flags = (MISSING * filled.long).astype(np.int16)
         group.coords["heave_flags"] = ("time", flags, flag_attributes("heave"))
-    group = flag_samples(group, replaced=False)
+    group = flag_samples(group, PreparationSettings())
     both = group.assign(trusted=("time", trusted, {"units": "m"}))[["trusted", "heave"]]
     record = Record("run", both, {"": group}, redundant=PAIRS)
     checks = (flagged, constant, levels, redundant)

@@ -64,8 +64,8 @@ def test_what_alignment_brings():
 
 def test_where_the_solver_is_weakest():
     pytest.importorskip("numba", reason="the virtual tank's time loop")
-    from seakeep.tank.dynamics import assemble_rig
-    from seakeep.tank.hydrodynamics import excitation_at, load_hydrodynamics, response
+    from seakeep.tank.dynamics import assemble_rig, linear_response
+    from seakeep.tank.hydrodynamics import excitation_at, load_hydrodynamics
     from seakeep.tank.settings import default_settings
     from seakeep.waves import wavelength_to_frequency
 
@@ -74,10 +74,10 @@ def test_where_the_solver_is_weakest():
     damping = rig.linear_damping.copy()
     damping[0, 0] += rig.lines[:, 6].sum()
 
-    def solved(omega, turn):
-        """Motions by the solver's own coefficients, or with rows and columns exchanged."""
+    def solved(omega, part):
+        """Motions by the solver's coefficients, in part with rows and columns exchanged."""
         added, radiated = (
-            CubicSpline(hydro.omega, each.swapaxes(1, 2) if turn else each)(omega)
+            CubicSpline(hydro.omega, (1 - part) * each + part * each.swapaxes(1, 2))(omega)
             for each in (hydro.added_mass, hydro.damping)
         )
         stiffness = hydro.stiffness + rig.mooring_stiffness
@@ -87,10 +87,8 @@ def test_where_the_solver_is_weakest():
     found = []
     for ratio, motion in ((1.5, 1), (1.0, 0)):  # heave, surge
         omega = wavelength_to_frequency(1.4 * ratio, 3.6)
-        own, turned = (solved(omega, turn)[motion] for turn in (False, True))
-        how = damping, rig.mooring_stiffness
-        ours = response(hydro, [omega], *how, rig.kernel)[0, motion]
-        even = response(hydro, [omega], *how)[0, motion]
+        own, turned, even = (solved(omega, part)[motion] for part in (0.0, 1.0, 0.5))
+        ours = linear_response(rig, np.array([omega]), damping)[0, motion]
         pairs = (ours, own), (turned, own), (ours, even)
         found.append([100 * abs(a / b - 1) for a, b in pairs])
     said = TANK[TANK.index("**Where the solver is weakest.**") :]

@@ -42,7 +42,7 @@ def _prepared_once(section, section_runs):
     for module in ("fit", "comparison"):
         target = f"seakeep.study.{module}.load_prepared"
 
-        def taken(campaign, names, progress=None):
+        def taken(campaign, names, progress=None, channels=()):
             runs = section_runs if campaign.path == section.path else campaign.prepare(names)
             return {name: runs[name] for name in names}
 
