@@ -29,7 +29,7 @@ CHANGES = (
     ("models/conditions.py", "window=None, memory=0)", "window=None)", "models/test_conditions.py::test_an_offset_is_named_also_for_a_model_with_a_memory"),
     ("campaign/derivation.py", "rotation_matrix(angles)[:, 2, axis]", "rotation_matrix(angles)[:, axis, 2]", "campaign/test_steps.py::test_gravity_is_removed_from_one_accelerometer"),
     ("campaign/pipeline.py", 'attributes["accuracy"] = factor * settings.accuracy', 'attributes["accuracy"] = settings.accuracy', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
-    ("campaign/pipeline.py", "instants: FloatArray = origin + dt * np.arange(first, last + 1)", "instants: FloatArray = origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
+    ("campaign/pipeline.py", "return origin + dt * np.arange(first, last + 1)", "return origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
     ("campaign/pipeline.py", "settings.sign * factor * (logger.columns.values[column] + settings.offset)", "settings.sign * factor * logger.columns.values[column] + settings.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ("campaign/prepare.py", "dt = period / preparation.steps_per_period", "dt = period / (preparation.steps_per_period - 1)", "campaign/test_prepare.py::TestStep"),
     ("campaign/readers.py", "times = table.values[name] * factor", "times = table.values[name]", "formats/test_read_text.py::test_options"),
