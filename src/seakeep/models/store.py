@@ -57,7 +57,7 @@ def _rebuilt(kind: Any, value: Any, dataset: xr.Dataset) -> Any:
     if origin in (Union, UnionType):
         ways = (_rebuilt(each, value, dataset) for each in inside)
         return next((each for each in ways if each is not value), value)
-    if origin is np.ndarray:
+    if kind == FloatArray:
         return numbers(dataset, value)
     if kind is Observable:
         return from_json(value)
