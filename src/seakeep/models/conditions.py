@@ -184,8 +184,7 @@ def _series(
     model: HankelDMDcModel, run: xr.Dataset, steps: int, scale: Scale
 ) -> tuple[FloatArray, FloatArray]:
     """Free runs end to end in the second half, and the measurement, (window, steps, N), in SD."""
-    last = run.sizes["time"] - steps - max(model.lead_samples - 1, 0)
-    starts = range(max(run.sizes["time"] // 2, model.history_samples - 1), last, steps)
+    starts = model.judged_starts(run, steps, run.sizes["time"] // 2)
     if len(starts) < 2:
         raise DataError("no two windows fit into half of the run.")
     predicted, measured = (

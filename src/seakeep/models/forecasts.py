@@ -118,6 +118,11 @@ class Model:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
         raise NotImplementedError
 
+    def judged_starts(self, run: xr.Dataset, steps: int, first: int = 0) -> range:
+        """Samples from which windows end to end can be forecast in a run, from `first` on."""
+        last = run.sizes["time"] - steps - max(self.lead_samples - 1, 0)
+        return range(max(first, self.history_samples - 1), last, steps)
+
     def judged_runs(
         self, run: xr.Dataset, name: str, starts: Sequence[int], steps: int
     ) -> tuple[FloatArray, FloatArray]:

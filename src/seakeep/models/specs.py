@@ -493,17 +493,15 @@ def _window_scores(
     model: HankelDMDcModel, run: xr.Dataset, name: str, steps: int, is_half: bool
 ) -> list[float]:
     """Scores of windows end to end, of the second half or of the whole run."""
-    first = max(is_half * run.sizes["time"] // 2, model.history_samples - 1)
-    starts = range(first, run.sizes["time"] - steps - max(model.lead_samples - 1, 0), steps)
+    starts = model.judged_starts(run, steps, is_half * run.sizes["time"] // 2)
     if not starts:
         raise DataError(
             f"{name} is too short to judge whether the parameter is worth its coefficients: no "
             f"window of {steps} samples can be forecast. Train on longer runs, or state ridge."
         )
     predicted, measured = model.judged_runs(run, name, starts, steps)
-    return scores_of(FreeRuns(predicted[None], measured, model.signature.state_scale.spread))[
-        0
-    ].tolist()
+    runs = FreeRuns(predicted[None], measured, model.signature.state_scale.spread)
+    return scores_of(runs)[0].tolist()
 
 
 def _largest_radius(model: HankelDMDcModel) -> float:
