@@ -10,6 +10,7 @@ from scipy import io
 from seakeep import DataError, HankelDMDc, RequestError, load_live, load_model
 from seakeep.files import FORMAT, write_netcdf, write_sealed
 
+
 @pytest.fixture(params=["ridge", "exact"])
 def model(request, make_run, channels):
     spec = HankelDMDc(3, 8, 1.0, window=np.int64(200), delay_rows=request.param)
