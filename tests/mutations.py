@@ -150,7 +150,7 @@ CHANGES = (
     ("models/engine.py", "first = span.known + 1 - signature.state_samples", "first = span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
     ("models/engine.py", "run[name].values[end:] = predict_waves(known, stop - end)", "run[name].values[end:] = 0.0", "models/test_ahead.py::test_missing_waves_are_those_of_a_record_that_was_continued"),
     ("models/engine.py", "self.known - math.ceil(ahead - 1e-6) - span.known + 1", "self.known - span.known + 1", "models/test_ahead.py::test_the_status_says_from_when_and_before_that_nothing_changes"),
-    ("models/ensemble.py", "data.regress(settings, settings.state_delays, all_rows=all_rows)", "data.regress(settings, settings.state_delays, all_rows=True)", "models/test_ensemble.py::test_members_equal_the_deterministic_model"),
+    ("models/ensemble.py", "data.regress(settings, settings.state_delays, all_rows=all_rows)", "data.regress(settings, settings.state_delays, all_rows=True)", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
     ("models/ensemble.py", "replace(draw, run=draw.run - 1)", "draw", "models/test_calibration.py::test_members_that_learn_from_the_run_alone_do_not_forecast_it"),
     ("models/export.py", "A[:extended, extended:] = b[:, n : n + line]", "A[:extended, extended:] = 0.0", "oracles/test_hankel_oracles.py::test_scipy_simulates_the_exported_system_like_our_forecast"),
     ("models/export.py", "b = b_hat * scale_x[:, None] / scale_u", "b = b_hat / scale_u", "oracles/test_hankel_oracles.py::test_scipy_simulates_the_exported_system_like_our_forecast"),
