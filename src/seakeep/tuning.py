@@ -183,7 +183,7 @@ def tune(
         asked = [spec.to_json(), sorted(vary), list(horizon), folds]
         known = _Scores(Path(resume), _digest(asked, named, [*states, *inputs]))
     search_result = select(
-        spec,
+        spec.resolved_in(named, inputs),
         named,
         list(states),
         list(inputs),

@@ -179,6 +179,7 @@ class Live:
             )
         self.model, self.signature, self.errors = model, model.signature, errors
         signature = self.signature
+        signature.check_fixed()
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
         self._roles = _roles(signature, roles)

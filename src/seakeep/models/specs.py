@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Progress
+from seakeep.core.embedding import TrainingWindow
 from seakeep.errors import SHOWN, DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
@@ -48,6 +49,7 @@ from seakeep.models.terms import Observable
 from seakeep.models.training import (
     TrainingArrays,
     check_names,
+    departures,
     gather,
     moments,
     until,
@@ -285,6 +287,11 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         Longest delay of averages of the states, such as ``"8 T"``: beyond `state_delays` their
         means over blocks of delays that double in length are further regressors. It takes exact
         delay rows.
+    centre : {"pooled", "run"} or length, optional
+        Whether a model is one of departures from the means of all runs, or from those of each run:
+        then a forecast takes the means of states and regressors over 30 encounter periods (or
+        another length) before its start in their place, which is history that it needs. A surge
+        that is followed stays as it is. For runs whose zeros differ; what drifts for long is lost.
     select : Select, optional
         What `fit` chooses by free runs beside λ; a mapping of its keys is taken too.
     parameter : str, optional
@@ -560,6 +567,8 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         Time step the runs must have, s; None takes theirs.
     lead, history, delay_rows, ridge_scale, rank, standardize, observables, stable, memory, select
         As in :class:`HankelDMDc`.
+    centre
+        As in :class:`HankelDMDc`.
     alignment
         As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
         from all that is given up to ``stop``: no member's draw moves another's input.
@@ -636,7 +645,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         """The single model at the medians of the priors."""
         return self._single(0.5, dt)
 
-    def centre(self, dt: float) -> Draw | None:
+    def centred_on(self, dt: float) -> Draw | None:
         """The single model of all runs that members are centred on, if they are."""
         if not self.centred:
             return None
@@ -675,7 +684,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             settings=settings,
             origin=spec.to_json(),
             members=draws_of(dataset, settings),
-            centre=spec.centre(dt),
+            centre=spec.centred_on(dt),
             **parts,
         )
 
@@ -799,7 +808,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         input_map = shared.input_map(runs, states, inputs, None)
         samples = [run.sizes["time"] for run in runs.values()]
         spec = self._taught_by(runs.values(), min(samples) * dt)
-        members, centre = draw_members(spec, dt, samples, input_map), spec.centre(dt)
+        members, centre = draw_members(spec, dt, samples, input_map), spec.centred_on(dt)
         every = members if centre is None else [*members, centre]
         reads = [
             (min(draw.first(run, count, input_map) for draw in every), count)
@@ -815,7 +824,11 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         # Direct regressors have no value where they need inputs from before the record; no member
         # reads them there.
         direct = tuple(values[np.isfinite(values).all(axis=1)] for values in arrays.direct)
-        series = (arrays.states, arrays.delayed, direct)
+        series: Any = arrays.states, arrays.delayed, direct
+        if shared.centre:
+            pieces = [each for each in zip(*series, strict=True) if len(each[0])]
+            whole = [TrainingWindow(0, len(each[0]), 0) for each in pieces]
+            series = zip(*departures(pieces, whole, input_map)[0], strict=True)
         arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
         groups = (labels[0], *input_map.regressors(labels[1]))
         scales = [
@@ -828,7 +841,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             input_labels=labels[1],
             state_delays=max(draw.settings.state_reach for draw in every),
             input_delays=max(draw.settings.input_delays for draw in every),
-            input_map=input_map,
+            input_map=replace(input_map, reference=shared.centre),
             state_scale=scales[0],
             input_scale=scales[1],
             direct_scale=scales[2],
