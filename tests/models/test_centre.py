@@ -141,7 +141,7 @@ def test_words():
     model = SPEC.fit(runs_of(0.0, 1.0), *CHANNELS)
     run = vessel(9)
     for refused in (model.live, model.to_state_space, lambda: exportable(model)):
-        with pytest.raises(RequestError, match=r"\(centre = 'run'\), which takes forecast"):
+        with pytest.raises(RequestError, match=r"\(centre = 'run'\), which forecast"):
             refused()
     with pytest.raises(RequestError, match="the model needs 240"):
         model.forecast(run, start=20.0, steps=10)

@@ -18,6 +18,7 @@ from seakeep.check.parts import (
     no_energy,
     read_off,
     reference_probe,
+    single_model,
     units_of,
     used_parts,
     wave_turns,
@@ -163,7 +164,7 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
 
 def _matrices(model: Model) -> tuple[Coverage, list[Dynamics]]:
     if is_linear(model):
-        return model.coverage, [model.dynamics]
+        return model.coverage, [single_model(model).dynamics]
     if is_ensemble(model):
         return model.coverage, [model.dynamics(member) for member in range(model.n_members)]
     raise RequestError(

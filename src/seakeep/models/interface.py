@@ -129,8 +129,8 @@ class Signature:
         if self.input_map.reference:
             raise RequestError(
                 "the model forecasts departures from the means before each start (centre = 'run'), "
-                "which takes forecast, compare or forecast_arrays in Python. For other hosts, fit "
-                "it with centre = 'pooled'."
+                "which forecast, compare and forecast_arrays take from what they are given. For "
+                "anything else, fit it with centre = 'pooled'."
             )
 
 

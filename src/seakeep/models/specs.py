@@ -100,11 +100,11 @@ class Choosing(HankelSettings, Generic[Fitted]):
         """These settings with what was chosen for :meth:`central`."""
         raise NotImplementedError
 
-    def _variants(
-        self, settings: Self, runs: dict[str, xr.Dataset], states: list[str], inputs: list[str]
+    def variants(
+        self, runs: dict[str, xr.Dataset], states: list[str], inputs: list[str], *settings: Self
     ) -> list[tuple[Self, str]]:
         """Settings to fit until a model does not grow, each with words on its choice."""
-        return [(settings, "")]
+        return [(each, "") for each in settings]
 
     def _fitted(
         self,
@@ -216,9 +216,9 @@ class Choosing(HankelSettings, Generic[Fitted]):
         if not self.is_open:
             model = choice.settings._fitted(named, states, inputs, choice.readouts)
             return replace(model, selection=choice.describe())
-        for settings, words in self._variants(choice.settings, named, states, inputs):
+        for settings, words in self.variants(named, states, inputs, choice.settings):
             model = settings._fitted(named, states, inputs, choice.readouts)
-            radius = _largest_radius(model) if isinstance(model, HankelDMDcModel) else 0.0
+            radius = largest_radius(model) if isinstance(model, HankelDMDcModel) else 0.0
             if radius < 1.0:
                 return replace(model, selection=words + choice.describe())
         raise DataError(
@@ -433,23 +433,27 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
     def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[HankelDMDc]:
         return replace(choice, settings=replace(choice.settings, select=None))
 
-    def _variants(
+    def variants(
         self,
-        settings: HankelDMDc,
         runs: dict[str, xr.Dataset],
         states: list[str],
         inputs: list[str],
+        *settings: HankelDMDc,
     ) -> list[tuple[HankelDMDc, str]]:
-        """As stated; with a parameter those that err 5 % less than a pooled one, and that.
+        """As stated; with a parameter those that err 5 % less than the best pooled one, and that.
 
         With three values or more, all runs of an inner value are held out in turn; with two, the
         second half of each run.
         """
         if not self.parameter:
-            return [(settings, "")]
-        pooled = replace(settings, parameter="")
-        parts = SMALLER if isinstance(self.ridge, str) else (1.0,)
-        varying = [replace(settings, ridge=part * float(settings.ridge)) for part in parts]
+            return [(each, "") for each in settings]
+        every = [replace(each, parameter="") for each in settings]
+        parts = SMALLER if isinstance(self.ridge, str) or len(settings) > 1 else (1.0,)
+        varying = [
+            replace(each, ridge=float(f"{part * float(each.ridge):.6g}"))
+            for each in settings
+            for part in parts
+        ]
         values = {name: parameter_of(run, self.parameter, name) for name, run in runs.items()}
         inner = sorted(set(values.values()))[1:-1]
         steps = round(HORIZON * labelled.mean_period(runs, inputs))
@@ -458,7 +462,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
             ({n: runs[n] for n in runs if values[n] != out}, [n for n in runs if values[n] == out])
             for out in inner
         ] or [(halves, list(runs))]
-        errors: dict[HankelDMDc, list[float]] = {each: [] for each in (pooled, *varying)}
+        errors: dict[HankelDMDc, list[float]] = {each: [] for each in (*every, *varying)}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeakeepWarning)
             for (training, judged), each in itertools.product(folds, errors):
@@ -466,7 +470,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
                 for name in judged:
                     errors[each] += _window_scores(model, runs[name], name, steps, not inner)
         means = {each: float(np.mean(scores)) for each, scores in errors.items()}
-        order = sorted(varying, key=means.__getitem__)
+        pooled, order = min(every, key=means.__getitem__), sorted(varying, key=means.__getitem__)
         better = [each for each in order if means[each] < BETTER * means[pooled]]
         what = "runs of inner values" if inner else "second halves of the runs"
         return [
@@ -511,7 +515,7 @@ def _window_scores(
     return scores_of(runs)[0].tolist()
 
 
-def _largest_radius(model: HankelDMDcModel) -> float:
+def largest_radius(model: HankelDMDcModel) -> float:
     """Spectral radius, the largest over the trained range of a parameter."""
     varies = model.variation
     values = () if varies is None else (varies.low, varies.centre, varies.high)
