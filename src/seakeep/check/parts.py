@@ -346,7 +346,7 @@ def _at_once(input_map: InputMap) -> InputMap:
         observed = replace(observed, observables=tuple(now), tops=())
     if follows is not None:
         follows = replace(follows, lead=0)
-    return replace(input_map, lead=0, observed=observed, follows=follows)
+    return replace(input_map, lead=0, observed=observed, follows=follows, reference=0)
 
 
 def single_model(model: Model) -> HankelDMDcModel:
@@ -357,9 +357,9 @@ def single_model(model: Model) -> HankelDMDcModel:
     """
     if not is_linear(model):
         raise RequestError(
-            "free motion and second order are those of one Hankel or ARX model; received one of "
-            f"kind '{model.kind}'. For an ensemble, check a member: "
-            "seakeep.check.modes(ensemble.member(0))."
+            "response, free motion and second order are read off the matrices of one Hankel, ARX "
+            f"or FIR model; received one of kind '{model.kind}'. For free motion of an ensemble, "
+            "check a member: seakeep.check.modes(ensemble.member(0))."
         )
     if (varies := model.variation) is not None:
         warn(

@@ -153,7 +153,7 @@ def disagreements(
                 break
             judged.remove(odd)
             del left[odd]
-            reason: tuple[Any, ...] | None = None
+            reason: tuple[Any, ...] | None
             reason = _reason(fitted(left), runs[odd], steps, scales[odd], own[odd])
             placed = False
             if reason is None or reason[0] != "offset":

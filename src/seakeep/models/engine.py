@@ -252,7 +252,7 @@ def _driven(
 
 def _series(
     signature: Signature,
-    histories: Sequence[FloatArray] | FloatArray,
+    histories: Sequence[FloatArray],
     drives: Sequence[Drive],
     spans: Sequence[Span],
 ) -> dict[str, Any]:
@@ -505,7 +505,7 @@ def array_windows(
         places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
         time=(time,) * len(histories),
-        **_series(signature, histories, drives, [span] * len(drives)),
+        **_series(signature, [*histories], drives, [span] * len(drives)),
     )
 
 

@@ -115,9 +115,10 @@ class Signature:
     def state_samples(self) -> int:
         """Samples of the states among these: where the vessel was counts for delayed waves too."""
         follows, reference = self.input_map.follows, self.input_map.reference
-        where = max(self.input_delays, reference - 1) if follows is not None else 0
-        taps = 0 if follows is None else follows.place.taps.size
-        return max(self.state_delays + 1, reference, where + taps)
+        where = 0
+        if follows is not None:
+            where = max(self.input_delays, reference - 1) + follows.place.taps.size
+        return max(self.state_delays + 1, reference, where)
 
     @property
     def lead_samples(self) -> int:

@@ -271,7 +271,7 @@ def _standardised(
 ) -> TrainingData:
     """Deviations from the moments of these windows (paper, System identification setup)."""
     names, series, windows, instants = zip(*pieces, strict=True)
-    zeros = tuple(np.zeros(each[0].shape[1]) for each in series)
+    zeros: tuple[FloatArray, ...] = ()
     if settings.centre:
         series, zeros = departures(series, windows, input_map)
     groups = [
@@ -294,7 +294,7 @@ def _standardised(
 
 def departures(
     series: Sequence[Sequence[FloatArray]], windows: Sequence[TrainingWindow], input_map: InputMap
-) -> tuple[list[tuple[FloatArray, ...]], tuple[FloatArray, ...]]:
+) -> tuple[tuple[Sequence[FloatArray], ...], tuple[FloatArray, ...]]:
     """Series of each run less their means over its window, and those of the states.
 
     A surge that is followed and its slow square stay, since they say where the vessel is.
@@ -307,7 +307,7 @@ def departures(
             means[0][input_map.follows.column] = means[2][-1] = 0.0
         out.append(tuple(values - mean for values, mean in zip(each, means, strict=True)))
         zeros.append(means[0])
-    return out, tuple(zeros)
+    return tuple(out), tuple(zeros)
 
 
 @dataclass(frozen=True, eq=False)
