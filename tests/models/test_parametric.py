@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning, load_model, tune
+from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning, check, load_model, tune
 from seakeep.hosts.program import exportable
 from seakeep.models import specs
 
@@ -130,6 +130,13 @@ def test_what_grows_in_the_trained_range_is_passed_over(model, monkeypatch):
     spec = replace(SPEC, ridge="rollout", ridge_scale="per_snapshot", standardize=True)
     runs = [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
     assert spec.fit(runs, ["heave"], ["eta"]).settings.parameter == ""
+
+
+def test_a_check_takes_the_middle_of_the_training(model):
+    with pytest.warns(SeakeepWarning, match="the one in the middle of the training, "):
+        shown = check.response(model, [1.0])
+    at_centre = model.at(parameter=model.variation.centre)
+    xr.testing.assert_identical(shown, check.response(at_centre, [1.0]))
 
 
 def test_words(model):
