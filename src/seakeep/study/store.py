@@ -67,7 +67,7 @@ def write_groups(
 ) -> None:
     """Write groups into one sealed file, renamed into place; errors as :func:`storing`."""
     with storing(path.parent), replacing(path) as temporary:
-        write_netcdf(temporary, xr.Dataset(attrs={**head_of(kind), **attrs}), groups, packed=True)
+        write_netcdf(temporary, xr.Dataset(attrs={**head_of(kind), **attrs}), groups)
 
 
 @dataclass(frozen=True)
