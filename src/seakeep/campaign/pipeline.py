@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray
+from seakeep.arrays import BoolArray, Datasets, FloatArray
 from seakeep.campaign.derivation import derive
 from seakeep.campaign.guesses import is_wave
 from seakeep.campaign.readers import (
@@ -139,7 +139,7 @@ class Run:
     settings: CampaignSettings
     loggers: Mapping[str, Logger]
     clocks: Mapping[str, Clock] = field(default_factory=dict)
-    groups: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    groups: Datasets = field(default_factory=dict)
     late: tuple[str, ...] = ()
     data: xr.Dataset | None = None
     findings: tuple[Finding, ...] = ()
@@ -297,24 +297,19 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
 def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings]) -> xr.Dataset:
     """Channels of one logger, gaps and jitter as they are."""
     time = run.clocks[logger.name].reference(logger.time)
-    records = _recorded(time, run, logger)
+    records: slice | BoolArray = slice(None)
+    if run.own.record is not None:
+        start, end = (number(edge) for edge in run.own.record)
+        step, whole = float(np.median(np.diff(time))), (float(time[0]), float(time[-1]))
+        slack = step * (1 + 1e-6) if logger.name == next(iter(run.loggers)) else np.inf
+        place = f"runs.{run.name}.record"
+        records = _part(place, (start, end), time, step, whole, slack)
     variables = {}
     for name, each in channels.items():
         values, attributes = _converted(name, each, run, logger)
         variables[name] = ("time", values[records], attributes)
     coordinate = ("time", time[records], {"units": "s", "long_name": "time"})
     return xr.Dataset(variables, {"time": coordinate})
-
-
-def _recorded(time: FloatArray, run: Run, logger: Logger) -> slice | BoolArray:
-    """Part of a file that `record` asks for."""
-    if run.own.record is None:
-        return slice(None)
-    start, end = (number(edge) for edge in run.own.record)
-    step, whole = float(np.median(np.diff(time))), (float(time[0]), float(time[-1]))
-    is_reference = logger.name == next(iter(run.loggers))
-    slack = step * (1 + 1e-6) if is_reference else np.inf
-    return _part(f"runs.{run.name}.record", (start, end), time, step, whole, slack)
 
 
 def _converted(

@@ -14,7 +14,7 @@ from typing import Any
 
 import xarray as xr
 
-from seakeep.arrays import Progress
+from seakeep.arrays import Datasets, Progress
 from seakeep.check.coherence import coherence
 from seakeep.check.motion import decay, drift, measured_decay, modes
 from seakeep.check.parts import Known, of_part
@@ -93,7 +93,7 @@ class Checked:
 
 def check_model(
     model: Model,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     progress: Progress | None = None,
     baselines: Mapping[str, Model] | None = None,
 ) -> Checked:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Datasets
 from seakeep.check.parts import is_regular, no_energy, reference_probe, used_parts
 from seakeep.core.harmonics import dominant_frequency
 from seakeep.errors import DataError
@@ -15,7 +14,7 @@ from seakeep.signals import encounter_period
 from seakeep.waves import wavenumber
 
 
-def validity(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def validity(model: Model, runs: Datasets) -> xr.Dataset:
     """Height, period, steepness and drift of each run, and what lies outside the training.
 
     Parameters

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import FreeRun, Known, beside, free_runs, is_regular, judged
 from seakeep.metrics import anrmse_differences
 from seakeep.models import Model
@@ -18,7 +18,7 @@ LIMITS = (0.1, 0.3, 0.7)
 
 def worth(
     model: Model,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     baselines: Mapping[str, Model] | None = None,
     free: Known | None = None,
 ) -> xr.Dataset:

@@ -14,8 +14,7 @@ from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import check_output, is_there, replacing
 
 if TYPE_CHECKING:
-    import xarray as xr
-
+    from seakeep.arrays import Datasets
     from seakeep.campaign import Campaign
 
 
@@ -190,7 +189,7 @@ def _report_runs(
     say(f"Wrote {page}: check it before you use the runs.")
 
 
-def _print_findings(runs: Mapping[str, xr.Dataset]) -> None:
+def _print_findings(runs: Datasets) -> None:
     """Print what the checks found and no warning said: one line per channel and kind."""
     from seakeep.quality import Finding, findings_of
 

@@ -37,6 +37,7 @@ from seakeep.files import check_output, check_place, make_folder
 if TYPE_CHECKING:
     import xarray as xr
 
+    from seakeep.arrays import Datasets
     from seakeep.campaign import Campaign
     from seakeep.models import Model
     from seakeep.study import Comparison
@@ -392,7 +393,7 @@ def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str
     return {**fitted, **{names[kind]: each for kind, each in baselines.items()}}
 
 
-def _print_comparison(tables: Mapping[str, xr.Dataset]) -> None:
+def _print_comparison(tables: Datasets) -> None:
     from seakeep.report.comparison import band_findings, comparison_blocks, model_blocks
 
     several = len(tables) > 1

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.conventions import displayed
 from seakeep.errors import warn
 from seakeep.quality.faults import OUTLIER, STUCK
@@ -233,7 +233,7 @@ class Record:
 
     run: str
     whole: xr.Dataset
-    groups: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    groups: Datasets = field(default_factory=dict)
     clocks: Mapping[str, Clock] = field(default_factory=dict)
     span: tuple[float, float] = (-np.inf, np.inf)
     waves: str | None = None

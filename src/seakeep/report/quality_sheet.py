@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Datasets
 from seakeep.campaign.pipeline import redundant_pairs
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.conventions import displayed
@@ -74,7 +75,7 @@ def clock_rows(run: xr.Dataset) -> list[tuple[str, str, str, str]]:
 
 
 def write_quality_sheet(
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     settings: CampaignSettings,
     title: str,
     folder: Path,

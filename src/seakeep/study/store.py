@@ -16,6 +16,7 @@ from typing import Any
 import xarray as xr
 from filelock import FileLock, Timeout
 
+from seakeep.arrays import Datasets
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.files import (
     check_report,
@@ -62,9 +63,7 @@ def storing(folder: Path) -> Iterator[None]:
         ) from error
 
 
-def write_groups(
-    path: Path, kind: str, attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]
-) -> None:
+def write_groups(path: Path, kind: str, attrs: Mapping[str, Any], groups: Datasets) -> None:
     """Write groups into one sealed file, renamed into place; errors as :func:`storing`."""
     with storing(path.parent), replacing(path) as temporary:
         write_netcdf(temporary, xr.Dataset(attrs={**head_of(kind), **attrs}), groups)
@@ -288,7 +287,7 @@ class StudyResult:
 def write_result(
     folder: Path,
     attrs: Mapping[str, Any],
-    groups: Mapping[str, xr.Dataset],
+    groups: Datasets,
     finished: Callable[[StudyResult], None] | None = None,
 ) -> StudyResult:
     """Write a result into its folder, once it was handed to `finished`; errors as there."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.report.style import (
     COLOURS,
     DASHED,
@@ -336,7 +336,7 @@ def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Seque
 
 
 @figure_style()
-def nowcast_figure(nowcasts: Mapping[str, xr.Dataset], run: str) -> Figure:
+def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
     """Error, and the model's own estimate of it, against lead time, a panel per channel."""
     first = next(iter(nowcasts.values()))
     names, share = list(map(str, first["channel"].values)), float(first.attrs["share"])
