@@ -240,6 +240,12 @@ def replacing(path: Path) -> Iterator[Path]:
         ) from error
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text as UTF-8, its ends of lines as they are; raises as :func:`replacing`."""
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="")
+
+
 def write_netcdf(
     path: Path, dataset: xr.Dataset, groups: Mapping[str, xr.Dataset] | None = None
 ) -> None:

@@ -18,7 +18,7 @@ import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
 from seakeep.conventions import displayed
-from seakeep.files import MARK, replacing, write_netcdf
+from seakeep.files import MARK, replacing, write_netcdf, write_text
 from seakeep.models import HankelEnsemble
 from seakeep.models.forecasts import counted
 from seakeep.report.tables import (
@@ -312,15 +312,14 @@ def look_ahead_words(seconds: float) -> str:
 
 def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
     """Write a forecast as NetCDF, or as CSV with a column per channel, full precision."""
-    with replacing(path) as temporary:
-        if path.suffix == ".nc":
+    if path.suffix == ".nc":
+        with replacing(path) as temporary:
             write_netcdf(temporary, forecast.assign_attrs({MARK: "forecast"}))
-        else:
-            # Instants are multiples of a step; nine decimals hide the rounding of the product.
-            time = pd.Index(forecast["time"].values.round(9), name="time [s]")
-            text = pd.DataFrame(_columns(forecast), index=time).to_csv(lineterminator="\n")
-            header, rows = text.split("\n", 1)
-            temporary.write_text(f"{header}\r\n{rows}", encoding="utf-8", newline="")
+        return path
+    # Instants are multiples of a step; nine decimals hide the rounding of the product.
+    time = pd.Index(forecast["time"].values.round(9), name="time [s]")
+    text = pd.DataFrame(_columns(forecast), index=time).to_csv(lineterminator="\n")
+    write_text(path, text.replace("\n", "\r\n", 1))
     return path
 
 

@@ -12,7 +12,7 @@ from seakeep.arrays import Datasets
 from seakeep.campaign.pipeline import redundant_pairs
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.conventions import displayed
-from seakeep.files import MARK, replacing
+from seakeep.files import MARK, replacing, write_text
 from seakeep.quality import compared, findings_of
 from seakeep.quality.faults import FLAGS
 from seakeep.report.figures.histories import quality_figure
@@ -104,12 +104,10 @@ def write_quality_sheet(
         path.stem: inline_picture(path.read_bytes(), f"channels of {name}")
         for name, path in pictures.items()
     }
-    page = folder / "quality.html"
-    with replacing(page) as temporary:
-        stamp = {"description": "", "finished": ""}
-        content = {"stamp": stamp, "sections": sections, "drawn": drawn, "files": False}
-        text = rendered("report.html", kind=SHEET, title=f"Data quality: {title}", **content)
-        temporary.write_text(text, encoding="utf-8")
+    page, stamp = folder / "quality.html", {"description": "", "finished": ""}
+    content = {"stamp": stamp, "sections": sections, "drawn": drawn, "files": False}
+    title = f"Data quality: {title}"
+    write_text(page, rendered("report.html", kind=SHEET, title=title, **content))
     return [page, *pictures.values()]
 
 

@@ -26,6 +26,7 @@ from seakeep.files import (
     read_bytes,
     replacing,
     write_netcdf,
+    write_text,
 )
 
 RESULT = "study.nc"
@@ -133,8 +134,8 @@ class UnitFolder:
         """Make the folder this study's, or see that it belongs to it; errors as :meth:`check`."""
         self.check()
         header = {"study": name, "digest": self.digest, "versions": versions()}
-        with storing(self.folder), replacing(self.folder / HEADER) as temporary:
-            temporary.write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
+        with storing(self.folder):
+            write_text(self.folder / HEADER, json.dumps(header, indent=1) + "\n")
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -225,10 +226,25 @@ class StudyResult:
     attrs: dict[str, Any]
     groups: Groups
 
-    @property
+    @cached_property
     def settings(self) -> dict[str, Any]:
         """Settings of the study as plain data."""
         return json.loads(self.attrs["settings"])
+
+    @property
+    def encounter_period(self) -> float:
+        """Mean encounter period, s."""
+        return float(self.attrs["encounter_period"])
+
+    @property
+    def dt(self) -> float:
+        """Time step, s."""
+        return float(self.attrs["dt"])
+
+    @property
+    def level(self) -> float:
+        """Probability of the bands."""
+        return float(self.settings["statistics"]["level"])
 
     @cached_property
     def model_settings(self) -> dict[str, Any]:

@@ -21,7 +21,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import SeakeepError
-from seakeep.files import MARK, replacing, write_netcdf
+from seakeep.files import MARK, replacing, write_netcdf, write_text
 from seakeep.signals.panel import opencv
 from seakeep.tank.instruments import Played, clock_instants, trigger
 from seakeep.tank.settings import RunPlan, TankSettings
@@ -59,12 +59,6 @@ HEADING = (
 def _header(name: str, unit: str) -> str:
     """Head of a column of a text file."""
     return f"{name} [{unit}]"
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file under a temporary name, then rename it."""
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def write_record(record: xr.Dataset, path: Path) -> Path:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.conventions import displayed, is_elevation
-from seakeep.files import replacing
+from seakeep.files import write_text
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.style import judged_models, line_of, model_words, shown_unit
@@ -28,7 +28,7 @@ def explorer(result: StudyResult) -> Section:
 def histories(result: StudyResult) -> Section:
     """Return figures of the cells that are shown."""
     words = {
-        "level": 100 * float(result.settings["statistics"]["level"]),
+        "level": 100 * result.level,
         "edges": ", and that band calibrated (dotted)" if result.is_calibrated else "",
     }
     figures = []
@@ -100,7 +100,7 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
         for name, data in result.tests.items()
     ]
     return {
-        "step": float(result.attrs["dt"]),
+        "step": result.dt,
         "channels": channels,
         "waves": waves,
         "models": models,
@@ -124,8 +124,8 @@ def write_histories(result: StudyResult) -> None:
             windows = np.flatnonzero(judged).tolist()
             cells = {window: _cell(result, test, training, window) for window in windows}
             text = json.dumps(cells, separators=(",", ":"))
-            with replacing(folder / f"{test}-{training}.js") as temporary:
-                temporary.write_text(f'seakeepCells["{test}-{training}"]={text};\n', "utf-8")
+            name = f"{test}-{training}"
+            write_text(folder / f"{name}.js", f'seakeepCells["{name}"]={text};\n')
 
 
 def _elevations(result: StudyResult) -> list[str]:
