@@ -418,11 +418,12 @@ def write_sealed(
 
 def head_of(kind: str) -> dict[str, Any]:
     """Attributes of a file of ours: its kind, its format and what wrote it."""
-    return {MARK: kind, "seakeep_format": FORMAT, "seakeep_version": _version()}
+    return {MARK: kind, "seakeep_format": FORMAT, "seakeep_version": version()}
 
 
 @functools.cache
-def _version() -> str:
+def version() -> str:
+    """Version of seakeep."""
     return metadata.version("seakeep")
 
 

@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +48,7 @@ from seakeep.campaign.settings import (
 from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
 from seakeep.conventions import MOTIONS, canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
+from seakeep.files import version
 from seakeep.formats import Columns, Options
 from seakeep.formats.columns import is_unit, meant_column, same_unit
 from seakeep.quality import Finding, Rate, Record, Redundant, check
@@ -791,11 +791,3 @@ def celerity_of(run: xr.Dataset, dt: float, campaign: CampaignSettings) -> float
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
         return None
     return celerity.celerity
-
-
-def version() -> str:
-    """Version of seakeep, "unknown" where it is not installed."""
-    try:
-        return metadata.version("seakeep")
-    except metadata.PackageNotFoundError:
-        return "unknown"

@@ -21,8 +21,7 @@ from seakeep.check.parts import Known, of_part
 from seakeep.check.peaks import statistics
 from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
-from seakeep.check.sea import validity
-from seakeep.check.worth import worth
+from seakeep.check.worth import validity, worth
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models import Model
 from seakeep.models.labelled import check_channels
