@@ -600,15 +600,12 @@ def strays(own: float, samples: int, dt: float) -> bool:
     return bool(abs(own - dt) * samples > 0.05 * dt)
 
 
-def redundant_pairs(settings: CampaignSettings, period: float | None) -> tuple[Redundant, ...]:
-    """Groups of ``[redundant]``, windows in seconds, for an encounter period (s)."""
-    out = []
-    for each in settings.redundant.values():
-        window = each.window
-        if isinstance(window, Length):
-            window = None if period is None else window.at(period)
-        out.append(Redundant(each.channels, window))
-    return tuple(out)
+def redundant_pairs(settings: CampaignSettings, period: float) -> Redundant:
+    """Groups of ``[redundant]`` with their windows in seconds, for an encounter period (s)."""
+    return {
+        each.channels: each.window.at(period) if isinstance(each.window, Length) else each.window
+        for each in settings.redundant.values()
+    }
 
 
 def checked(
@@ -651,7 +648,7 @@ def checked(
         water_depth=settings.rig.water_depth,
         wave_channel=settings.wave_channel,
         period=period,
-        redundant=redundant_pairs(settings, None),
+        redundant=redundant_pairs(settings, np.nan),
         rates=rates,
         assumed_units=units,
         wave_columns=waves,

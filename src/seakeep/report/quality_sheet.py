@@ -88,8 +88,8 @@ def write_quality_sheet(
     pictures = {name: folder / f"quality_{name}.png" for name in runs}
     for name, path in pictures.items():
         if not is_newer(path, folder / f"{name}.nc"):
-            run = runs[name]
-            pairs = compared(run, redundant_pairs(settings, run.attrs.get("encounter_period")))
+            run, period = runs[name], runs[name].attrs.get("encounter_period", np.nan)
+            pairs = compared(run, redundant_pairs(settings, period))
             agreements = {channel: each for (channel, _), each in pairs.items()}
             figure = quality_figure(run, agreements)
             with figure_style(), replacing(path) as temporary:  # all colours: marks are small
