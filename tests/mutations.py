@@ -219,7 +219,7 @@ CHANGES = (
     ("report/acts.py", "all_of([own.below(USEFUL), worst < 1.0])", "all_of([fir.below(USEFUL), worst < 1.0])", "report/test_claims.py::test_errors_decide"),
     ("report/acts.py", "e.below(1 + AGED), opposite(e.below(1 - AGED))", "e.below(1 + AGED), e.below(1 + AGED)", "report/test_claims.py::test_errors_that_grow_or_fall_with_time_have_a_trend"),
     ("report/acts.py", "errors[longer].below_other(errors[shorter])", "errors[shorter].below_other(errors[longer])", "report/test_claims.py::test_the_error_of_the_stern_line_falls_as_it_is_less_slack"),
-    ("report/acts.py", 'float(attrs["dt"]), frequency)[0]', 'float(attrs["dt"]), frequency)[1]', "report/test_claims.py::test_the_slow_part_of_loads_is_judged_without_the_waves"),
+    ("report/acts.py", '1 / (split * result.encounter_period))[0]', '1 / (split * result.encounter_period))[1]', "report/test_claims.py::test_the_slow_part_of_loads_is_judged_without_the_waves"),
     ("report/acts.py", "for m in (ENSEMBLE, SINGLE)]", "for m in (SINGLE, ENSEMBLE)]", "report/test_claims.py::test_errors_decide"),
     ("report/tables.py", "if self.upper < other.lower:", "if self.value < other.value:", "report/test_claims.py::test_errors_that_grow_or_fall_with_time_have_a_trend"),
     ("report/acts.py", 'loads = paper.error(SEA, LOADS, "nammae")', 'loads = paper.error(SEA, LOADS)', "report/test_claims.py::test_errors_decide"),
