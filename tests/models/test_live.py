@@ -342,7 +342,7 @@ def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, run):
     made = live.forecast(STEPS)
     error = np.stack([made[name].sel(statistic="std") for name in STATES], axis=1)
     scale = model.state_scale
-    weight = np.minimum.accumulate(np.clip((1.2 - (error / scale.spread) ** 2) / 0.5, 0, 1))
+    weight = np.minimum.accumulate(np.clip((0.9 - (error / scale.spread) ** 2) / 0.4, 0, 1))
     shrunk = scale.centre + weight * (matrix(expected, STATES) - scale.centre)
     np.testing.assert_allclose(mean(made), shrunk, atol=1e-9)
     assert weight.min() < 0.5 < weight.max() == 1

@@ -1,8 +1,6 @@
-"""Models on disk: the same bits in another process, and what a wrong file is told."""
+"""Models on disk: the same bits, and what a wrong file is told."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -11,16 +9,6 @@ from scipy import io
 
 from seakeep import DataError, HankelDMDc, RequestError, load_live, load_model
 from seakeep.files import FORMAT, write_netcdf, write_sealed
-
-FORECAST_ELSEWHERE = """
-import sys
-import numpy as np, xarray as xr
-import seakeep
-model = seakeep.load_model(sys.argv[1])
-run = xr.load_dataset(sys.argv[2], engine="h5netcdf")
-forecast = model.forecast(run, start=5.0, steps=120)
-np.save(sys.argv[3], np.stack([forecast[name].values for name in model.states], axis=1))
-"""
 
 
 @pytest.fixture(params=["ridge", "exact"])
@@ -38,18 +26,6 @@ def edited(path, **attrs):
     """The file at `path` with other attributes."""
     write_netcdf(path, xr.load_dataset(path, engine="h5netcdf").assign_attrs(attrs))
     return path
-
-
-@pytest.mark.parametrize("model", ["exact"], indirect=True)
-def test_a_new_process_forecasts_the_same_bits(model, make_run, tmp_path):
-    run = make_run(samples=300, seed=5)
-    model.save(tmp_path / "rom.nc")
-    run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
-    paths = [str(tmp_path / name) for name in ("rom.nc", "run.nc", "out.npy")]
-    subprocess.run([sys.executable, "-c", FORECAST_ELSEWHERE, *paths], check=True)
-    here = model.forecast(run, start=5.0, steps=120)
-    there = np.load(tmp_path / "out.npy")
-    np.testing.assert_array_equal(there, np.stack([here.heave, here.pitch], axis=1))
 
 
 def test_everything_a_model_is_comes_back(model, make_run, tmp_path):

@@ -226,6 +226,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     DataError
         If the runs do not state positions and water depth, where there are several probes.
     """
+    model.signature.check_fixed()
     single = single_model(model)
     if len(single.regressors) == len(single.inputs):
         raise RequestError(
