@@ -14,9 +14,9 @@ import xarray as xr
 from seakeep.arrays import BoolArray, Datasets, FloatArray
 from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
-from seakeep.models import HankelDMDcModel, InputMap, Model, SlowSquares, is_ensemble
+from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
 from seakeep.models.labelled import Span, channel_matrix, check_step
-from seakeep.models.observables import HALF_WIDTH
+from seakeep.models.observables import at_once
 from seakeep.models.registry import is_linear
 from seakeep.signals.time_axis import stretches
 from seakeep.signals.waves import first_wave
@@ -337,13 +337,7 @@ def _at_once(input_map: InputMap) -> InputMap:
     """The map without look-ahead and lags, and without limits of what is above training."""
     follows, observed = input_map.follows, input_map.observed
     if observed is not None:
-        now = [
-            replace(each, lags=(0,), lead=HALF_WIDTH / each.cutoff)  # the middle of its filter
-            if isinstance(each, SlowSquares)
-            else each
-            for each in observed.observables
-        ]
-        observed = replace(observed, observables=tuple(now), tops=())
+        observed = replace(observed, observables=tuple(map(at_once, observed.observables)), tops=())
     if follows is not None:
         follows = replace(follows, lead=0)
     return replace(input_map, lead=0, observed=observed, follows=follows, reference=0)
