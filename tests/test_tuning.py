@@ -47,7 +47,7 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, ce
     assert words in result.describe()
     assert ("held out with each" in result.describe()) == (folds != "run")
     assert set(table["observables"].values.tolist()) == {"none", "powers"}
-    steps, first = 15 * PERIOD, spec.input_delays + max(centre - 1, 0)
+    steps, first = 15 * PERIOD, spec.input_delays + centre
     for trial in range(0, table.sizes["trial"], 4):
         row, found = table.isel(trial=trial), []
         chosen = (powers,) if row["observables"] == "powers" else ()
