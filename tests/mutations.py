@@ -154,7 +154,7 @@ CHANGES = (
     ("models/engine.py", "states[:, -reference:].mean(axis=1)", "states[:, -1:].mean(axis=1)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
     ("models/engine.py", "zero[:, follows.column] = 0.0", "pass", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
     ("models/engine.py", "values += windows.zero[:, None]", "pass", "models/test_centre.py::test_a_zero_moves_the_forecast_and_changes_nothing_else"),
-    ("models/ensemble.py", "data.regress(settings, settings.state_delays, all_rows=all_rows)", "data.regress(settings, settings.state_delays, all_rows=True)", "models/test_ensemble.py::test_members_equal_the_deterministic_model"),
+    ("models/ensemble.py", "data.regress(settings, settings.state_delays, all_rows=all_rows)", "data.regress(settings, settings.state_delays, all_rows=True)", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
     ("models/ensemble.py", "replace(draw, run=draw.run - 1)", "draw", "models/test_calibration.py::test_members_that_learn_from_the_run_alone_do_not_forecast_it"),
     ("models/export.py", "A[:extended, extended:] = b[:, n : n + line]", "A[:extended, extended:] = 0.0", "oracles/test_hankel_oracles.py::test_scipy_simulates_the_exported_system_like_our_forecast"),
     ("models/export.py", "b = b_hat * scale_x[:, None] / scale_u", "b = b_hat / scale_u", "oracles/test_hankel_oracles.py::test_scipy_simulates_the_exported_system_like_our_forecast"),

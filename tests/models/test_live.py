@@ -159,23 +159,6 @@ def test_waves_that_come_later_mend_an_estimate_with_a_look_ahead(models, run):
     assert np.all(np.abs(mean(more)[0] - matrix(following, STATES)[-1]) < 0.2 * spread)
 
 
-@pytest.mark.parametrize("lead", [0, 6])
-def test_with_samples_lost_the_error_grows_up_to_the_open_loops(make_run, channels, lead):
-    """On a linear vessel; one that the model does not know may err more after a bad correction."""
-    model = spec(lead=lead).fit([make_run(1200, seed) for seed in (1, 2)], **channels)
-    names, run, rng = channels["states"], make_run(560, 7), np.random.default_rng(0)
-    u, y = matrix(run, channels["inputs"]), matrix(run, names)
-    errors = []
-    for share in (0.1, 0.5, 1.0):
-        live = model.live()
-        lost = (np.arange(560) >= START) & (rng.uniform(size=560) < share)
-        found = [
-            live.step(*each) for each in zip(u, np.where(lost[:, None], np.nan, y), strict=True)
-        ]
-        errors.append(np.sqrt(np.mean((np.array(found) - y)[START:] ** 2, axis=0)))
-    assert np.all(np.diff(errors, axis=0) > 0)
-
-
 def test_a_dead_sensor_is_followed_through_the_others(models, run):
     model, steps = models["plain"], 200
     live = started(model, run)
