@@ -767,7 +767,8 @@ class Live:
             return inputs[None], math.inf, len(given)
         count = int(gaps.any(axis=1).argmax())
         begin, missing = len(record) + count, gaps[count:, waves]
-        rest, foreseen = inputs[begin:], self._foreseen(inputs[:begin], len(missing))
+        last = inputs[max(begin - self._record, 0) : begin]
+        rest, foreseen = inputs[begin:], self._foreseen(last, len(missing))
         rest[:, waves] = np.where(missing, foreseen.expected, rest[:, waves])
         departures = np.zeros((len(waves), *inputs.shape))
         for each, late, of_one in zip(
