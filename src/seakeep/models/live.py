@@ -700,6 +700,7 @@ class Live:
             if self._count.partly:
                 own = self.errors.of_forecast(count)
                 errors = np.minimum(own + self._filter.ahead(count), errors)
+            variance = spread + wider * errors
             if len(futures) > 1:
                 foreseen = np.arange(count) <= known - self._ahead  # their waves are known
                 low, high = DOUBTED
@@ -707,7 +708,11 @@ class Live:
                 lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0))
                 weight = np.where(foreseen[:, None], 1.0, lasting)
                 table[0] = scale.centre + weight * (table[0] - scale.centre)
-            table[1] = np.sqrt(spread + wider * errors)
+                # What errs more than the mean of training, by as much less as it passes over to it.
+                most = wider * scale.spread**2
+                variance = np.where(variance > most, most + weight * (variance - most), variance)
+                spread *= weight
+            table[1] = np.sqrt(variance)
             half = _quantile(level, spread, table[1] ** 2, freedom) * table[1]
             table[2:] = table[0] - half, table[0] + half
         variables = label_channels(signature, table, ("statistic", "time"))

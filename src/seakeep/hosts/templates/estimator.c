@@ -652,8 +652,12 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
             weight[i] = fmin(weight[i], fmax(({{ doubted[1] | hex }} - variance / (spread[i] * spread[i]))
                                              / {{ (doubted[1] - doubted[0]) | hex }}, 0.0));
             x[step * N + i] = middle + moved[i];
-            if (runs > 1 && step > known - {{ lead_samples }})
+            if (runs > 1 && step > known - {{ lead_samples }}) {
+                double most = spread[i] * spread[i];
                 x[step * N + i] = centre[i] + weight[i] * (middle + moved[i] - centre[i]);
+                if (variance > most)
+                    variance = most + weight[i] * (variance - most);
+            }
             if (std)
                 std[step * N + i] = sqrt(variance);
         }
