@@ -1,7 +1,6 @@
-"""Every kind of model, by every preset, on every set of data, is the same after its file."""
+"""Every kind of model by every preset, and a model of every set of data: the same after a file."""
 
 import importlib.util
-import os
 import re
 import shutil
 import tomllib
@@ -12,7 +11,6 @@ from pathlib import Path
 import ground
 import numpy as np
 import pytest
-import small_tank
 import tomlkit
 import xarray as xr
 
@@ -31,32 +29,14 @@ MADE = [("own", ""), *((kind, each) for kind, spec in KINDS.items()
 """Kinds by their presets, or without one where there is none; and the campaign's own table."""
 FEWER = {"bayesian_hankel_dmdc": {"n_members": 3}, "subspace": {"order": 8}}
 """What two states and a short run allow."""
-MEASURED = pytest.mark.skipif(
-    not os.environ.get("SEAKEEP_DATA_DIR"), reason="SEAKEEP_DATA_DIR is not set"
-)
 TANK = pytest.mark.skipif(not importlib.util.find_spec("numba"), reason="needs the extra tank")
-SETS = [
-    "tutorial",
-    "small tank",
-    pytest.param("virtual tank", marks=TANK),
-    "two loggers",
-    *(
-        pytest.param(name, marks=[pytest.mark.data, MEASURED])
-        for name in ("ntnu_ship_section", "sjtu_semisub")
-    ),
-]
 
 
 def written(name: str, folder: Path) -> str:
-    """Text of the campaign of a set of data, whose files lie in `folder` or are found anyhow."""
+    """Text of the campaign of a set of data, whose files are put into `folder`."""
     if name == "tutorial":
         shutil.copytree(ROOT / "docs/tutorial", folder, dirs_exist_ok=True)
         return (folder / "campaign.toml").read_text(encoding="utf-8")
-    if name == "small tank":
-        for seed, run in enumerate(("first", "second")):
-            columns = small_tank.tank_columns(seed, seconds=60.0)
-            small_tank.write_csv(folder / f"{run}.csv", columns)
-        return small_tank.CAMPAIGN.replace("[0, 10]", "[0, 40]").replace("[10, inf]", "[40, inf]")
     if name == "virtual tank":
         from seakeep.tank.play import play
         from seakeep.tank.settings import default_settings
@@ -66,10 +46,8 @@ def written(name: str, folder: Path) -> str:
         play(settings.model_copy(update={"runs": {"irregular_1": run}}), folder, kind="nc")
         text = (folder / "campaign.toml").read_text(encoding="utf-8")
         return re.sub("states = .*", 'states = ["surge", "heave", "pitch", "mooring_stern"]', text)
-    if name == "two loggers":
-        shutil.copytree(ground.write(folder), folder, dirs_exist_ok=True)
-        return ground.CAMPAIGN
-    return (ROOT / "examples" / name / "campaign.toml").read_text(encoding="utf-8")
+    shutil.copytree(ground.write(folder), folder, dirs_exist_ok=True)
+    return ground.CAMPAIGN
 
 
 @pytest.fixture(scope="module")
@@ -146,8 +124,14 @@ def follow(model, run, path):
 
 
 @pytest.mark.filterwarnings("ignore::seakeep.errors.SeakeepWarning")
-@pytest.mark.parametrize(("kind", "preset"), MADE)
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize(
+    ("name", "kind", "preset"),
+    [
+        *(("tutorial", *each) for each in MADE),
+        ("two loggers", "own", ""),
+        pytest.param("virtual tank", "own", "", marks=TANK),
+    ],
+)
 def test_a_model_is_the_same_after_its_file(campaign_of, tmp_path, monkeypatch, name, kind, preset):
     campaign = campaign_of(name)
     monkeypatch.setenv("PATH", "")  # FMUs hold sources alone: no compiler is found

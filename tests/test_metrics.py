@@ -103,21 +103,6 @@ def test_a_diverged_forecast_and_a_gap_are_nan_and_not_left_out():
 # Members
 
 
-def test_members_are_judged_one_by_one():
-    members = np.stack([PREDICTED, MEASURED, 2 * MEASURED])
-    for measure, shape in (
-        (metrics.nrmse, (3, 2)),
-        (metrics.fit_percent, (3, 2)),
-        (metrics.anrmse, (3,)),
-        (metrics.nammae, (3,)),
-        (metrics.error_over_time, (3, 4)),
-    ):
-        together = measure(**both(members))
-        assert together.shape == shape
-        for one in range(3):
-            np.testing.assert_array_equal(together[one], measure(**both(members[one])))
-
-
 # Datasets
 
 

@@ -5,7 +5,7 @@ import pytest
 from moored import moored_run
 
 import seakeep
-from seakeep import BayesianHankelDMDc, HankelDMDc, Uniform, check
+from seakeep import BayesianHankelDMDc, HankelDMDc, Uniform
 from seakeep.errors import RequestError
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
@@ -60,27 +60,3 @@ def test_band_takes_members_or_their_statistics(run, model):
         seakeep.plot.band(members, run.drop_vars("time"))
     with pytest.raises(RequestError, match=r"it has no band\. Draw it with seakeep\.plot\.overlay"):
         seakeep.plot.band(model.forecast(run, start=10.0, steps=50), run)
-
-
-def test_every_check_has_a_figure_with_labelled_axes(run, model):
-    squares = (seakeep.Powers("eta", (2,)),)
-    curved = HankelDMDc(2, 4, 0.01, delay_rows="exact", observables=squares)
-    curved = curved.fit(run, STATES, ["eta"])
-    runs = {"run": run}
-    drawn = {
-        seakeep.plot.response: (check.response(model), check.measured_response(model, runs)),
-        seakeep.plot.coherence: (check.coherence(curved, runs),),
-        seakeep.plot.decay: (check.decay(model),),
-        seakeep.plot.modes: (check.modes(model),),
-        seakeep.plot.residuals: (check.residuals(model, runs),),
-        seakeep.plot.exceedance: (check.statistics(model, runs),),
-        seakeep.plot.density: (check.statistics(model, runs),),
-        seakeep.plot.validity: (check.validity(model, runs),),
-        seakeep.plot.drift: (check.drift(curved, runs),),
-    }
-    for draw, results in drawn.items():
-        figure = draw(*results)
-        assert figure.axes
-        bare = [each for each in labels(figure)[1::2] if not each]
-        assert not bare, draw.__name__
-        figure.canvas.draw()

@@ -14,7 +14,6 @@ import pytest
 import seakeep
 from seakeep import HankelDMDc, RequestError, metrics
 from seakeep.cli import main
-from seakeep.models import processes
 from seakeep.models.selection import WORST
 from seakeep.tuning import tuned_campaign
 
@@ -67,30 +66,6 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words):
         # by that of those that train here.
         tolerance = 1e-3 if chosen else 1e-10
         assert float(row["score"]) == pytest.approx(np.mean(found), abs=tolerance)
-
-
-def test_the_result_is_the_same_for_any_number_of_workers():
-    alone = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,))
-    with processes(2) as executor:
-        other = seakeep.tune(
-            SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,), executor=executor
-        )
-    assert alone.table.identical(other.table)
-
-
-def test_the_figure_has_a_line_per_candidate_and_units():
-    pyplot = pytest.importorskip("matplotlib.pyplot")
-    result = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["lead"], horizon=(15,))
-    table = result.table.isel(trial=np.flatnonzero(result.table["chosen"].values))
-    assert (table["ridge"].item(), table["memory"].item()) == (result.spec.ridge, 0)
-    assert "(chosen)" in result.describe()
-    before = pyplot.get_fignums()
-    (axes,) = result.figure().axes
-    assert pyplot.get_fignums() == before  # pyplot keeps what it makes until it is closed
-    assert axes.get_xlabel() == "ridge per snapshot pair (1)"
-    words = [text.get_text() for text in axes.get_legend().get_texts()]
-    leads = np.unique(result.table["lead"].values)
-    assert words == [*(f"lead {lead}" for lead in leads), "chosen"]
 
 
 @pytest.fixture

@@ -22,6 +22,7 @@ from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
 from seakeep.models.readouts import readouts_json
 from seakeep.models.selection import Selected, select
 from seakeep.models.settings import FOLDS, Folds, HankelSettings
+from seakeep.models.specs import largest_radius
 from seakeep.models.training import check_names, until
 from seakeep.toml import Length
 
@@ -182,11 +183,10 @@ def tune(
     if resume is not None:
         asked = [spec.to_json(), sorted(vary), list(horizon), folds]
         known = _Scores(Path(resume), _digest(asked, named, [*states, *inputs]))
-    search_result = select(
+    spec, given = spec.resolved_in(named, inputs), (named, list(states), list(inputs))
+    found = select(
         spec,
-        named,
-        list(states),
-        list(inputs),
+        *given,
         vary=vary,
         opened=() if spec.select is None else spec.select.opened,
         horizon=horizon,
@@ -198,8 +198,14 @@ def tune(
         seed=seed,
         known=known,
     )
-    settings = search_result.settings.having(select=None)
-    return TuneResult(**vars(replace(search_result, settings=settings)))
+    settings, note = found.settings.having(select=None), found.note
+    if getattr(settings, "parameter", ""):  # which the search leaves out, as pooled models do
+        start = spec.settled(*given, executor=executor).settings
+        every = spec.variants(*given, start, settings)
+        sound = (each for each in every if largest_radius(each[0].fit(*given)) < 1.0)
+        settings, words = next(sound, every[-1])
+        note = words + note
+    return TuneResult(**vars(replace(found, settings=settings, note=note)))
 
 
 def _digest(asked: object, runs: dict[str, xr.Dataset], channels: Sequence[str]) -> str:
@@ -283,6 +289,8 @@ def tuned_campaign(
     values = _choice(spec, table, varied, preset, period)
     stale = {"select", "rank"}  # nothing is left to be chosen
     stale |= {each.name for each in fields(HankelDMDc) if "kind" in values}
+    if not getattr(spec, "parameter", ""):
+        stale.add("parameter")
     stale |= ({"alignment"} & set(varied)) | ({"observables", "readouts"} & set(values))
     for key in stale | ({"preset"} - set(values)):
         table.pop(key, None)

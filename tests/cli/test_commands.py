@@ -59,24 +59,26 @@ CAMPAIGN = "docs/tutorial/campaign.toml"
 
 @pytest.fixture
 def drawn():
-    """The figures of compare are drawn; elsewhere they stay empty, which saves a second each."""
+    """Figures are drawn; elsewhere they stay empty, which saves a second each."""
 
 
 @pytest.fixture(autouse=True)
 def _empty_figures(request, monkeypatch):
     if "drawn" in request.fixturenames or importlib.util.find_spec("matplotlib") is None:
         return
+    from seakeep.report import quality_sheet
     from seakeep.report.figures import histories
 
-    monkeypatch.setattr(histories, "overlay_figure", lambda found: histories.new_figure(1, 1))
+    for module, name in ((histories, "overlay_figure"), (quality_sheet, "quality_figure")):
+        monkeypatch.setattr(module, name, lambda *_: histories.new_figure(1, 1))
 
 
-@pytest.mark.usefixtures("drawn")
 @pytest.mark.parametrize("verb", VERBS)
-def test_the_example_of_each_help_runs(verb, run, place):
+def test_the_example_of_each_help_runs(verb, run, place, monkeypatch):
     """What --help shows works as it stands (fetching aside: it needs the network)."""
     if verb == "tank":
         pytest.importorskip("numba")
+        monkeypatch.setattr("seakeep.tank.play.play", lambda *_, **__: {})  # as tests/tank does
     status, out, _ = run(f"{verb} --help")
     assert status == 0
     examples = re.findall(
@@ -85,8 +87,6 @@ def test_the_example_of_each_help_runs(verb, run, place):
     assert len(examples) == {"fit": 2, "forecast": 2, "compare": 3}.get(verb, 1)
     for example in examples:
         words = " ".join(example.split())
-        if verb == "tank":
-            words += " --run regular_1_5"  # a minute of the campaign, which tests/tank plays whole
         if verb == "init":
             words = words.replace("campaign.toml", "draft.toml")
         status, _, err = run(words.removeprefix("seakeep "))
@@ -207,7 +207,6 @@ def test_compare_judges_models_in_service_against_lead_time(run, place):
     assert "served/nowcast.csv, served/nowcast_unseen.png" in err
 
 
-@pytest.mark.usefixtures("drawn")
 def test_several_models_are_judged_over_the_same_instants(run, place):
     status, out, err = run(f"compare model.nc ensemble.nc {CAMPAIGN} --steps 200 -o both")
     assert status == 0, err

@@ -3,9 +3,7 @@
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
 
 ROOT = Path(__file__).parents[2]
 TANK, STUDY = (
@@ -60,42 +58,3 @@ def test_what_alignment_brings():
     ):
         made = [cell for table in (paper, ours) for cell in table.get(name, ["–", ""])[:2]]
         assert [cell.replace("−", "-") for cell in row] == made, mode
-
-
-def test_where_the_solver_is_weakest():
-    pytest.importorskip("numba", reason="the virtual tank's time loop")
-    from seakeep.tank.dynamics import assemble_rig, linear_response
-    from seakeep.tank.hydrodynamics import excitation_at, load_hydrodynamics
-    from seakeep.tank.settings import default_settings
-    from seakeep.waves import wavelength_to_frequency
-
-    hydro = load_hydrodynamics()
-    rig = assemble_rig(default_settings(), hydro)
-    damping = rig.linear_damping.copy()
-    damping[0, 0] += rig.lines[:, 6].sum()
-
-    def solved(omega, part):
-        """Motions by the solver's coefficients, in part with rows and columns exchanged."""
-        added, radiated = (
-            CubicSpline(hydro.omega, (1 - part) * each + part * each.swapaxes(1, 2))(omega)
-            for each in (hydro.added_mass, hydro.damping)
-        )
-        stiffness = hydro.stiffness + rig.mooring_stiffness
-        dynamic = stiffness - omega**2 * (hydro.mass + added) - 1j * omega * (radiated + damping)
-        return np.linalg.solve(dynamic, excitation_at(hydro, [omega])[0])
-
-    found = []
-    for ratio, motion in ((1.5, 1), (1.0, 0)):  # heave, surge
-        omega = wavelength_to_frequency(1.4 * ratio, 3.6)
-        own, turned, even = (solved(omega, part)[motion] for part in (0.0, 1.0, 0.5))
-        ours = linear_response(rig, np.array([omega]), damping)[0, motion]
-        pairs = (ours, own), (turned, own), (ours, even)
-        found.append([100 * abs(a / b - 1) for a, b in pairs])
-    said = TANK[TANK.index("**Where the solver is weakest.**") :]
-    said = " ".join(said[: said.index("A mesh of twice")].split())
-    quoted = re.findall(r"([\d.]+) % and ([\d.]+) %", said)
-    assert len(quoted) == 3
-    for heave, surge, texts in zip(*found, quoted, strict=True):
-        for value, text in zip((heave, surge), texts, strict=True):
-            # As printed; another linear algebra moves the tenth digit.
-            assert value == pytest.approx(float(text), abs=0.051), said

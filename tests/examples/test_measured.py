@@ -26,8 +26,13 @@ SPAN = (0.0, 3065.0)  # s, the first 30 % of Data02
 
 
 @pytest.fixture(scope="module")
-def section():
-    return seakeep.read_campaign(EXAMPLES / "ntnu_ship_section" / "campaign.toml")
+def section(tmp_path_factory):
+    """The campaign; motions try no observables, of which the whole search takes none either."""
+    text = (EXAMPLES / "ntnu_ship_section" / "campaign.toml").read_text(encoding="utf-8")
+    path = tmp_path_factory.mktemp("section") / "campaign.toml"
+    motions = text.replace("observables = true", "observables = false", 2)
+    path.write_text(motions, encoding="utf-8")
+    return seakeep.read_campaign(path)
 
 
 @pytest.fixture(scope="module")

@@ -21,9 +21,12 @@ class Cluster:
         self._folder = folder
         scheduler = self._start("scheduler", "--port", "0", "--dashboard-address", "127.0.0.1:0")
         self.address = self._read(*scheduler, r"Scheduler at:\s+(tcp://\S+)")
+        self.add_workers(workers)
+
+    def add_workers(self, count):
+        """Start workers and wait until the scheduler knows them."""
         worker = ("worker", self.address, "--nthreads", "1", "--no-nanny")
-        started = [self._start(*worker) for _ in range(workers)]
-        for process, log in started:
+        for process, log in [self._start(*worker) for _ in range(count)]:
             self._read(process, log, r"Registered to:\s+(tcp://\S+)")
 
     def _start(self, *arguments):

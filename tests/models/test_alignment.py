@@ -15,7 +15,6 @@ from seakeep import (
     ProbeAlignment,
     Uniform,
     estimate_probe_offset,
-    load_model,
 )
 
 
@@ -119,17 +118,6 @@ def test_an_ensemble_and_a_single_model_take_the_celerity_from_the_same_span(run
     assert aligned_ensemble(cut, **alignment).alignment.celerity == alone
 
 
-@pytest.mark.parametrize("key", ["dispersion", "effective", "predicted"])
-def test_a_file_keeps_the_alignment(models, key, tmp_path):
-    model, run = models[key], drifting_run(7)
-    loaded = load_model(model.save(tmp_path / "rom.nc"))
-    assert loaded.alignment == model.alignment
-    assert loaded.settings == model.settings
-    xr.testing.assert_identical(
-        loaded.forecast(run, start=60.0, steps=50), model.forecast(run, start=60.0, steps=50)
-    )
-
-
 def test_a_probe_that_was_moved_and_says_so_changes_nothing(models):
     run = drifting_run(7, moved=0.5)
     wrong = heave_error(models["dispersion"], run)
@@ -151,15 +139,6 @@ def test_an_offset_is_found_with_its_spread(models):
     assert corrected < 0.1
 
 
-def test_training_reads_nothing_after_its_stop(runs):
-    alignment = ProbeAlignment(mode="dispersion", surge="measured")
-    run = runs[0]
-    cut = run.sel(time=slice(None, 100.0 + 1e-6))
-    one, other = (spec(alignment).fit(r, STATES, INPUTS, stop=100.0) for r in (run, cut))
-    np.testing.assert_array_equal(one.coefficients, other.coefficients)
-    assert one.training == replace(other.training)
-
-
 def test_a_gap_in_the_surge_is_named_in_a_forecast(models):
     run = drifting_run(7)
     run["surge"].values[700] = np.nan
@@ -179,32 +158,6 @@ def aligned_ensemble(runs, **alignment):
         delay_rows="exact",
         alignment=ProbeAlignment(**alignment),
     ).fit(runs, STATES, INPUTS)
-
-
-@pytest.mark.parametrize(
-    "alignment",
-    [
-        {"mode": "effective", "surge": "measured", "celerity": 3.0},
-        {"mode": "dispersion", "surge": "none"},
-    ],
-    ids=lambda each: f"{each['mode']}-{each['surge']}",
-)
-def test_aligned_members_equal_the_deterministic_model(runs, alignment):
-    ensemble = aligned_ensemble(runs, **alignment)
-    run = drifting_run(7)
-    forecast = ensemble.forecast(run, start=60.0, steps=200)
-    for number, draw in enumerate(ensemble.members):
-        model = HankelDMDc(
-            draw.settings.state_delays,
-            draw.settings.input_delays,
-            draw.settings.ridge,
-            window=draw.settings.window,
-            delay_rows="exact",
-            alignment=ProbeAlignment(**alignment),
-        ).fit(runs, STATES, INPUTS)
-        alone = model.forecast(run, start=60.0, steps=200)
-        for name in STATES:
-            np.testing.assert_allclose(forecast[name][number], alone[name], rtol=0, atol=1e-10)
 
 
 def test_the_celerity_is_that_of_the_mean_slowness():

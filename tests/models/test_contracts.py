@@ -79,31 +79,6 @@ class TestLead:
         assert (seeing.lead_samples, seeing.history_samples) == (5, 9)
         assert "lead          5 samples: a step is driven by waves up to 0.4 s" in seeing.summary()
 
-    def test_nothing_beyond_the_lead_is_read_and_the_forecast_says_how_far(self):
-        run = sea(ahead=4)
-        model = HankelDMDc(1, 8, 1.0, lead=5).fit(run, ["heave"], ["eta"])
-        expected = model.forecast(run, start=20.0, steps=50)
-        assert expected.attrs["reads_input_until"] == pytest.approx(4 * DT)
-        poisoned = run.copy(deep=True)
-        last = 200 + 49 + 5  # the last step starts 49 samples after the start
-        poisoned.eta.values[last + 1 :] = np.nan
-        poisoned.heave.values[201:] = np.nan
-        xr.testing.assert_identical(model.forecast(poisoned, start=20.0, steps=50), expected)
-        poisoned.eta.values[last] = np.nan
-        with pytest.raises(DataError, match=r"channel 'eta' of .* missing"):
-            model.forecast(poisoned, start=20.0, steps=50)
-
-    def test_training_reads_no_input_after_its_stop(self):
-        run = sea(ahead=4)
-        spec = HankelDMDc(1, 8, 1.0, window=200, lead=5)
-        expected = spec.fit(run, ["heave"], ["eta"], stop=40.0)
-        poisoned = run.copy(deep=True)
-        for name in ("heave", "eta"):
-            poisoned[name].values[401:] = np.nan
-        found = spec.fit(poisoned, ["heave"], ["eta"], stop=40.0)
-        np.testing.assert_array_equal(found.coefficients, expected.coefficients)
-        assert found.training.columns == (200 - 1 - 4,)
-
 
 @dataclass(frozen=True)
 class Half:

@@ -89,26 +89,6 @@ def arrays(forecast):
     return np.stack([forecast[name].values for name in STATES], axis=-1)
 
 
-@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
-@pytest.mark.parametrize("history", ["before", "inside"])
-@pytest.mark.parametrize("ridge_scale", ["absolute", "per_snapshot"])
-def test_members_equal_the_deterministic_model(run, delay_rows, history, ridge_scale):
-    shared = {"delay_rows": delay_rows, "history": history, "ridge_scale": ridge_scale}
-    ensemble = fitted(run, **shared)
-    forecast = ensemble.forecast(run, start=65.0, steps=120)
-    for number in range(ensemble.n_members):
-        model = alone(ensemble, number, **shared).fit(run, STATES, INPUTS, stop=60.0)
-        expected = model.forecast(run, start=65.0, steps=120)
-        # One arithmetic in another order: the house rule for results.
-        np.testing.assert_allclose(arrays(forecast)[number], arrays(expected), rtol=0, atol=1e-10)
-        member = ensemble.member(number)
-        np.testing.assert_allclose(member.A, model.A, rtol=0, atol=1e-10)
-        np.testing.assert_array_equal(member.state_mean, model.state_mean)
-        assert member.training.columns == model.training.columns
-        assert member.training.stop == pytest.approx(model.training.stop)
-        assert member.training.first == pytest.approx(model.training.first)
-
-
 def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays(tmp_path):
     runs, unseen = {name: wave_run(seed) for seed, name in enumerate("abc")}, wave_run(7)
     spec = small(train_on="windows", ridge=LogUniform(1, 100), delay_rows="exact", lead=4)
@@ -281,17 +261,6 @@ def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
     assert set(found.draws.last_sample.values) == {175}
 
 
-def test_a_file_gives_back_the_ensemble_to_the_last_bit(run, tmp_path):
-    ensemble = small(train_on="windows").fit([run, wave_run(1, name="b")], STATES, INPUTS)
-    path = ensemble.save(tmp_path / "ensemble.nc")
-    back = seakeep.load_model(path)
-    assert back.members == ensemble.members
-    xr.testing.assert_identical(back.draws, ensemble.draws)
-    xr.testing.assert_identical(
-        back.forecast(run, start=65.0, steps=20), ensemble.forecast(run, start=65.0, steps=20)
-    )
-
-
 def test_members_that_diverge_say_when():
     # Explosive data make explosive members.
     rng = np.random.default_rng(0)
@@ -383,10 +352,3 @@ def test_the_presets():
     assert (ours.window, ours.delay_rows) == (None, "exact")
     assert (ours.ridge, ours.lead, ours.alignment.surge) == ("rollout", Length(0.75), "predicted")
     assert [ours.input_delays.ppf(q) for q in (0, 0.5, 1)] == [2, 3, 4]
-
-
-def test_all_of_the_runs_train_where_no_length_is_drawn(run):
-    ensemble = fitted(run, window=None)
-    assert set(ensemble.draws.window_samples.values) == {-1}
-    model = alone(ensemble, 0).fit(run, STATES, INPUTS, stop=60.0)
-    np.testing.assert_allclose(ensemble.member(0).A, model.A, atol=1e-10)

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from drifting import DT, INPUTS, STATES, drifting_run
 
 from seakeep import (
@@ -13,7 +12,6 @@ from seakeep import (
     ProbeAlignment,
     RequestError,
     SlowSquares,
-    load_model,
 )
 from seakeep.core.recursion import Place, Recursion, recursion
 from seakeep.models.calibration import envelope_of
@@ -59,44 +57,9 @@ def test_the_wave_is_read_where_the_vessel_goes(models):
     assert errors["rest"] > 0.35
 
 
-@pytest.mark.parametrize("name", ["ahead", "now"])
-def test_nothing_is_read_beyond_the_look_ahead_and_no_state_after_the_start(models, name):
-    model, run, steps, start = models[name], drifting_run(7), 80, 600
-    expected = model.forecast(run, start=start * DT, steps=steps)
-    poisoned = run.copy(deep=True)
-    for channel in STATES:
-        poisoned[channel].values[start + 1 :] = np.nan
-        poisoned[channel].values[: start + 1 - model.signature.state_samples] = np.nan
-    for channel in INPUTS:  # the last step starts an instant before the last state
-        poisoned[channel].values[start + steps + model.lead_samples :] = np.nan
-        poisoned[channel].values[: start + 1 - model.history_samples] = np.nan
-    xr.testing.assert_identical(model.forecast(poisoned, start=start * DT, steps=steps), expected)
-    assert model.lead_samples == {"ahead": 12, "now": 0}[name]
-    assert expected.attrs["reads_input_until"] == pytest.approx((model.lead_samples - 1) * DT)
-
-
 def test_settings_know_the_history_that_carriers_read(models):
     model, period = models["now"], drifting_run(7).attrs["encounter_period"]
     assert model.history_samples == model.settings.needs(DT, period).history + 1
-
-
-@pytest.mark.parametrize("name", ["ahead", "now"])
-def test_runs_arrays_members_and_service_are_one_recursion(models, name):
-    model, run, steps, start = models[name], drifting_run(7), 60, 600
-    x, u = table_of(run, STATES), table_of(run, INPUTS)
-    expected = table_of(model.forecast(run, start=start * DT, steps=steps), STATES)
-    past, after = slice(start + 1), slice(start + 1, None)
-    arrays = model.forecast_arrays(x[past], u[past], u[after], steps)
-    live = model.live(like=run)
-    for row in range(start + 1):
-        live.step(u[row], x[row])
-    served = live.forecast(steps, u[after]).isel(statistic=0)
-    for found in (arrays, table_of(served, STATES)):
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)  # rounding
-    many = model.forecast_windows(run, [start * DT, 50.0], steps=steps)
-    np.testing.assert_allclose(
-        np.stack([many[each][0] for each in STATES], axis=1), expected, rtol=0, atol=1e-12
-    )
 
 
 def test_a_step_is_the_equation(models):
@@ -168,13 +131,6 @@ def test_training_is_the_recursion_on_the_measured_surge(models):
     )
     np.testing.assert_array_equal(other.delayed[:60], found.delayed[:60])
     assert not np.allclose(other.delayed[60:], found.delayed[60:])
-
-
-def test_a_file_holds_the_recursion(models, tmp_path):
-    model, run = models["ahead"], drifting_run(7)
-    again = load_model(model.save(tmp_path / "rom.nc"))
-    forecasts = [each.forecast(run, start=60.0, steps=50) for each in (again, model)]
-    xr.testing.assert_identical(*forecasts)
 
 
 def test_models_and_windows_side_by_side_are_each_alone():

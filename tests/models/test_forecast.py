@@ -103,23 +103,6 @@ def test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it(model, test_
     assert float(last.time[0]) == pytest.approx(300 * DT)
 
 
-def test_arrays_give_the_same_bits_as_a_run_from_the_rows_that_are_needed(model, test_run):
-    x, u = values(test_run, model.states), values(test_run, model.inputs)
-    expected = values(model.forecast(test_run, start=5.0, steps=60), model.states)
-    x[: 100 - S], u[: 100 - Z], u[160:] = np.nan, np.nan, np.nan
-    before = x.copy(), u.copy()
-    arrays = model.forecast_arrays(x[:101], u[:101], u[101:], steps=60)
-    np.testing.assert_array_equal(arrays, expected)
-    np.testing.assert_array_equal(x, before[0])
-    np.testing.assert_array_equal(u, before[1])
-    shortest = model.forecast_arrays(x[100 - S : 101], u[100 - Z : 101], u[101:160], steps=60)
-    np.testing.assert_array_equal(shortest, arrays)
-    # One step needs no input after the start.
-    one = model.forecast_arrays(x[:101], u[:101], np.zeros((0, 0)), steps=1)
-    alone = model.forecast(test_run, start=5.0, steps=1)
-    np.testing.assert_array_equal(one, values(alone, model.states))
-
-
 def test_a_forecast_in_other_consistent_units_is_the_same_forecast(make_run, channels):
     # Standardisation makes the regression blind to units; a power of two changes no bit.
     def scaled(run):

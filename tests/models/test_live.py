@@ -159,23 +159,6 @@ def test_waves_that_come_later_mend_an_estimate_with_a_look_ahead(models, run):
     assert np.all(np.abs(mean(more)[0] - matrix(following, STATES)[-1]) < 0.2 * spread)
 
 
-@pytest.mark.parametrize("lead", [0, 6])
-def test_with_samples_lost_the_error_grows_up_to_the_open_loops(make_run, channels, lead):
-    """On a linear vessel; one that the model does not know may err more after a bad correction."""
-    model = spec(lead=lead).fit([make_run(1200, seed) for seed in (1, 2)], **channels)
-    names, run, rng = channels["states"], make_run(560, 7), np.random.default_rng(0)
-    u, y = matrix(run, channels["inputs"]), matrix(run, names)
-    errors = []
-    for share in (0.1, 0.5, 1.0):
-        live = model.live()
-        lost = (np.arange(560) >= START) & (rng.uniform(size=560) < share)
-        found = [
-            live.step(*each) for each in zip(u, np.where(lost[:, None], np.nan, y), strict=True)
-        ]
-        errors.append(np.sqrt(np.mean((np.array(found) - y)[START:] ** 2, axis=0)))
-    assert np.all(np.diff(errors, axis=0) > 0)
-
-
 def test_a_dead_sensor_is_followed_through_the_others(models, run):
     model, steps = models["plain"], 200
     live = started(model, run)
@@ -342,7 +325,7 @@ def test_what_follows_is_predicted_as_the_forecast_predicts_it(models, run):
     made = live.forecast(STEPS)
     error = np.stack([made[name].sel(statistic="std") for name in STATES], axis=1)
     scale = model.state_scale
-    weight = np.minimum.accumulate(np.clip((1.2 - (error / scale.spread) ** 2) / 0.5, 0, 1))
+    weight = np.minimum.accumulate(np.clip((0.9 - (error / scale.spread) ** 2) / 0.4, 0, 1))
     shrunk = scale.centre + weight * (matrix(expected, STATES) - scale.centre)
     np.testing.assert_allclose(mean(made), shrunk, atol=1e-9)
     assert weight.min() < 0.5 < weight.max() == 1

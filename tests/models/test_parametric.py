@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning, load_model
+from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning, check, load_model, tune
 from seakeep.hosts.program import exportable
 from seakeep.models import specs
 
@@ -99,6 +99,23 @@ def test_free_runs_choose_between_the_parameter_and_one_pooled_model():
     same = spec.fit(alike, ["heave"], ["eta"])
     assert same.settings.parameter == ""
     assert "a pooled one" in same.selection
+    assert tune(spec, alike, ["heave"], ["eta"]).spec.parameter == ""
+
+
+def test_a_search_keeps_what_varies_better_and_ends_no_worse_than_it_started():
+    start = HankelDMDc(
+        2, 1, 1e-6, delay_rows="exact", ridge_scale="per_snapshot", parameter="rig.draught"
+    )
+    runs = [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
+    result = tune(start, runs, ["heave"], ["eta"], vary=["state_delays"])
+    assert result.spec.parameter == "rig.draught"
+    assert result.note.startswith("on runs of inner values that are held out, a model that varies")
+    run = vessel(0.45, 40, 800)
+    errors = [
+        float(np.sqrt(((each.forecast(run, 5.0, 200).heave - run.heave[51:251]) ** 2).mean()))
+        for each in (s.fit(runs, ["heave"], ["eta"]) for s in (start, result.spec))
+    ]
+    assert errors[1] < 1.01 * errors[0]
 
 
 def test_what_grows_in_the_trained_range_is_passed_over(model, monkeypatch):
@@ -106,13 +123,20 @@ def test_what_grows_in_the_trained_range_is_passed_over(model, monkeypatch):
     a = ON_STATE[0] + 3.3 * ON_STATE[1]
     radius = np.abs(np.roots([1.0, *-a])).max()
     # As the coefficients.
-    assert specs._largest_radius(wide) == pytest.approx(radius, abs=1e-7)
-    assert specs._largest_radius(model) < 1.0 < radius
-    largest = specs._largest_radius
-    monkeypatch.setattr(specs, "_largest_radius", lambda m: 1.0 if m.variation else largest(m))
+    assert specs.largest_radius(wide) == pytest.approx(radius, abs=1e-7)
+    assert specs.largest_radius(model) < 1.0 < radius
+    largest = specs.largest_radius
+    monkeypatch.setattr(specs, "largest_radius", lambda m: 1.0 if m.variation else largest(m))
     spec = replace(SPEC, ridge="rollout", ridge_scale="per_snapshot", standardize=True)
     runs = [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
     assert spec.fit(runs, ["heave"], ["eta"]).settings.parameter == ""
+
+
+def test_a_check_takes_the_middle_of_the_training(model):
+    with pytest.warns(SeakeepWarning, match="the one in the middle of the training, "):
+        shown = check.response(model, [1.0])
+    at_centre = model.at(parameter=model.variation.centre)
+    xr.testing.assert_identical(shown, check.response(at_centre, [1.0]))
 
 
 def test_words(model):

@@ -1,8 +1,5 @@
 """Loads that are read off what a model forecasts, by the wave at their lines."""
 
-import json
-import pickle
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -18,10 +15,8 @@ from seakeep import (
     BayesianHankelDMDc,
     Fixed,
     HankelDMDc,
-    LogUniform,
     ProbeAlignment,
     RequestError,
-    load_model,
 )
 from seakeep.models.selection import select
 
@@ -181,57 +176,6 @@ class TestFloor:
 
 
 class TestOneEngine:
-    def test_a_file_gives_the_same_bits(self, chosen, test_run, tmp_path):
-        again = load_model(chosen.save(tmp_path / "model.nc"))
-        xr.testing.assert_identical(
-            again.forecast(test_run, START, STEPS), chosen.forecast(test_run, START, STEPS)
-        )
-        assert again.summary() == chosen.summary()
-        assert again.settings == chosen.settings
-
-    def test_an_ensemble_of_one_member_is_the_model(self, runs, test_run, chosen, tmp_path):
-        one = ensemble(readouts=bow("auto").readouts).fit(runs, STATES, INPUTS)
-        members, single = (each.forecast(test_run, START, STEPS) for each in (one, chosen))
-        for name in STATES:
-            np.testing.assert_array_equal(members[name][0], single[name])
-        again = load_model(one.save(tmp_path / "ensemble.nc"))
-        xr.testing.assert_identical(again.forecast(test_run, START, STEPS), members)
-        xr.testing.assert_identical(one.member(0).forecast(test_run, START, STEPS), single)
-
-    def test_members_pass_through_it_wherever_they_run(self, runs, test_run):
-        spec = ensemble(n_members=3, ridge=LogUniform(1e-4, 1e-2), readouts=bow("wave").readouts)
-        several = spec.fit(runs, STATES, INPUTS)
-        expected = several.forecast(test_run, START, 50)
-        elsewhere = pickle.loads(pickle.dumps(several))  # as a worker gets it
-        with ThreadPoolExecutor(2) as executor:
-            found = elsewhere.forecast(test_run, START, 50, executor=executor)
-        xr.testing.assert_identical(found, expected)
-        xr.testing.assert_identical(several.hold().forecast(test_run, START, 50), expected)
-
-    def test_windows_arrays_and_service_give_the_same(self, chosen, test_run):
-        steps, k = 60, round(START / DT)
-        alone = table_of(chosen.forecast(test_run, START, steps), STATES)
-        side = chosen.forecast_windows(test_run, [START, 70.0], steps).isel(window=0)
-        x, u = table_of(test_run, STATES), table_of(test_run, INPUTS)
-        arrays = chosen.forecast_arrays(x[: k + 1], u[: k + 1], u[k + 1 :], steps)
-        live = chosen.live(like=test_run)
-        for row in range(k + 1):
-            live.step(u[row], x[row])
-        served = table_of(live.forecast(steps, u[k + 1 :]).isel(statistic=0), STATES)
-        for found in (table_of(side, STATES), arrays, served):
-            np.testing.assert_allclose(found, alone, rtol=0, atol=1e-11)  # rounding, of 30 N
-
-    def test_nothing_is_read_beyond_the_look_ahead(self, chosen, test_run):
-        poisoned, k = test_run.copy(deep=True), round(START / DT)
-        for name in STATES:
-            poisoned[name].values[k + 1 :] = np.nan
-        for name in INPUTS:
-            poisoned[name].values[k + STEPS + chosen.lead_samples :] = np.nan
-            poisoned[name].values[: k + 1 - chosen.history_samples] = np.nan
-        xr.testing.assert_identical(
-            chosen.forecast(poisoned, START, STEPS), chosen.forecast(test_run, START, STEPS)
-        )
-
     @pytest.mark.parametrize("kind", ["wave", "auto"])
     def test_nothing_after_the_stop_of_training_is_read(self, runs, test_run, kind):
         poisoned = {name: run.copy(deep=True) for name, run in runs.items()}
@@ -278,8 +222,3 @@ class TestFitting:
         found = select(SPEC, runs, STATES, INPUTS, vary=("ridge", "readouts"), horizon=(15.0,))
         assert found.settings.readouts == (("mooring_bow", "wave"),)
         assert [each.kind for each in found.readouts] == ["wave"]
-
-    def test_settings_come_back_from_json(self):
-        for spec in (bow("auto"), replace(SPEC, readouts="auto"), ensemble(readouts="auto")):
-            again = type(spec).from_json(json.loads(json.dumps(spec.to_json())))
-            assert again.readouts == spec.readouts

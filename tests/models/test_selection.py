@@ -15,7 +15,6 @@ from seakeep import (
     HankelDMDc,
     ProbeAlignment,
     SlowSquares,
-    load_model,
     metrics,
 )
 from seakeep.models.labelled import mean_period
@@ -127,19 +126,6 @@ def test_runs_that_repeat_the_wave_are_one_group_whatever_stands_first():
     assert len(set(groups_of(given, "run", ["eta"]).values())) == 3
     # Nothing tells of waves, so that nothing is held out together.
     assert len(set(groups_of({"again": again, "b": again}, "auto", ["wind"]).values())) == 2
-
-
-def test_a_model_chooses_its_ridge_and_says_how(tmp_path):
-    given = runs()
-    model = SPEC.fit(given, STATES, INPUTS)
-    chosen = select(SPEC, given, STATES, INPUTS)
-    assert model.settings.ridge == chosen.settings.ridge
-    assert model.settings.ridge_scale == "per_snapshot"
-    assert "in free runs on 3 parts held out in turn, mean NRMSE" in model.selection
-    for line in model.selection.splitlines():
-        assert line.strip() in model.summary()
-    again = load_model(model.save(tmp_path / "model.nc"))
-    assert again.selection == model.selection
 
 
 def test_squares_are_chosen_where_the_drift_goes_with_them_and_not_without_it():

@@ -10,7 +10,6 @@ from seakeep import (
     BayesianHankelDMDc,
     Fixed,
     HankelDMDc,
-    RequestError,
     SeakeepWarning,
     Uniform,
     load_model,
@@ -164,11 +163,6 @@ class TestStable:
         np.testing.assert_allclose(ensemble.spectral_radii(), 0.95, rtol=1e-9)
         assert len(ensemble.member(0).training.clipped) == 1
         assert "(stable, clipped to 0.95)" in ensemble.summary()
-
-    @pytest.mark.parametrize("value", [1.0, 0.0, "yes", 2])
-    def test_a_radius_out_of_range_is_refused(self, value):
-        with pytest.raises(RequestError, match="stable must be True, False or a radius above 0"):
-            HankelDMDc(1, 1, 1.0, stable=value)
 
 
 def test_an_answer_to_waves_thirty_times_as_high_is_not_lost(make_run, channels):

@@ -2,11 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from seakeep import HankelDMDc, SeakeepWarning
-from seakeep.models.interface import Scale
 
 DT = 0.05
 
@@ -68,22 +65,6 @@ def test_moments_are_those_of_the_windows_pooled_with_ddof_one(make_run, channel
         # The same sums in the same order, or nearly.
         np.testing.assert_allclose(mean, pooled.mean(axis=0), rtol=1e-13)
         np.testing.assert_allclose(std, pooled.std(axis=0, ddof=1), rtol=1e-13)
-
-
-def test_history_inside_reads_nothing_before_the_window(run, channels):
-    spec = HankelDMDc(3, 8, 1.0, window=100, history="inside")
-    scrambled = run.copy(deep=True)
-    scrambled.heave[:300] = np.nan
-    scrambled.eta_cog[:300] = np.nan
-    np.testing.assert_array_equal(spec.fit(scrambled, **channels).A, spec.fit(run, **channels).A)
-
-
-def test_history_before_reads_the_delays_and_nothing_earlier(run, channels):
-    spec = HankelDMDc(3, 8, 1.0, window=100)
-    scrambled = run.copy(deep=True)
-    scrambled.heave[: 300 - 3] = np.nan
-    scrambled.eta_cog[: 300 - 8] = np.nan
-    np.testing.assert_array_equal(spec.fit(scrambled, **channels).A, spec.fit(run, **channels).A)
 
 
 def test_without_standardisation_channels_are_taken_as_they_are(run, channels):
@@ -175,15 +156,3 @@ def test_the_recommended_preset_uses_all_of_the_runs_and_exact_rows():
             "period": 1.64,
         },
     )
-
-
-@given(
-    mean=st.floats(-1e3, 1e3),
-    std=st.floats(1e-3, 1e3),
-    values=st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=20),
-)
-def test_standardising_and_back_returns_the_values(mean, std, values):
-    scale = Scale(*(np.array([each]) for each in (mean, std, std, mean, std)))
-    series = np.array(values)[:, None]
-    # Numbers up to 2e3 are subtracted and added: rounding of these.
-    np.testing.assert_allclose(scale.physical(scale.deviations(series)), series, rtol=0, atol=1e-12)

@@ -24,7 +24,11 @@ from seakeep.report.check_page import check_sections
 def checked(tmp_path_factory):
     folder = tmp_path_factory.mktemp("check")
     put_tutorial(folder, "")
-    campaign, model = str(folder / "campaign.toml"), str(folder / "model.nc")
+    path = folder / "campaign.toml"
+    every = '"heave", "pitch", "heave_rate", "pitch_rate", "mooring_bow"'
+    fewer = path.read_text("utf-8").replace(every, '"heave", "pitch"')  # panels take a second each
+    path.write_text(fewer, "utf-8")
+    campaign, model = str(path), str(folder / "model.nc")
     assert main(["fit", campaign, "-o", model]) == 0
     assert main(["check", model, campaign, "-o", str(folder / "out")]) == 0
     return folder / "out"
@@ -64,7 +68,7 @@ def test_the_page_holds_its_figures_and_tables(checked):
         assert f'id="figure-{name}"' in page
     with (checked / "tables" / "possible.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert {"heave", "pitch"} < {row["state"] for row in rows}
+    assert {"heave", "pitch"} == {row["state"] for row in rows}
     for row in rows:
         assert 0 < float(row["linear bound"]) <= 1
         assert f"{row['state']}: model" in page

@@ -31,6 +31,8 @@ STUDY = """
 [study]
 campaign = "campaign.toml"
 preset = "recommended"
+states = ["heave", "pitch", "heave_rate"]
+inputs = ["eta_fwd", "eta_mid"]
 [training]
 windows = 2
 [models.deterministic]

@@ -23,7 +23,7 @@ pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libr
 from seakeep.tank.delivery import campaign_text, write_record
 from seakeep.tank.settings import default_settings
 
-SMALL = Size(training=2, tests=2, members=2, series=4)
+SMALL = Size(training=1, tests=2, members=2, series=4)
 RATE = 50.0
 """Of the tutorial."""
 

@@ -38,7 +38,7 @@ def same(first, second):
 def finished_once(tmp_path_factory, put_study):
     folder = tmp_path_factory.mktemp("finished")
     put_study(folder)
-    with processes(2) as pool:
+    with processes(1) as pool:
         return run_study(read_study(folder / "study.toml"), folder / "out", executor=pool)
 
 

@@ -221,17 +221,16 @@ def test_differences_between_models_have_intervals_and_verdicts():
     assert verdict(np.nan, np.nan) == "cannot tell"
 
 
-@pytest.mark.parametrize(("growth", "lost"), [(0.0, 0), (0.5, 0), (0.5, 1)])
-def test_growth_is_pooled_over_cells_and_its_interval_holds_it(growth, lost):
-    """Windows and channels grow differently, by SDs of 0.2; 100 tables of ten windows."""
-    inside, changes = 0, []
+def test_growth_is_pooled_over_cells_and_its_interval_holds_it():
+    """Windows and channels grow differently, by SDs of 0.2; 100 tables of nine windows of ten."""
+    growth, inside, changes = 0.5, 0, []
     for seed in range(100):
         rng = np.random.default_rng(seed)
         test = crossed(rng, {"m": 1.0}).isel(channel=[0] * 9)
         windows, channels = rng.normal(0, 0.2, (10, 1)), rng.normal(0, 0.2, 9)
         grows = np.broadcast_to(growth + windows + channels, (1, 1, 10, 10, 9)).copy()
         level = np.ones(grows.shape)
-        grows[:, :, :lost], level[:, :, :lost] = np.nan, np.nan
+        grows[:, :, 0], level[:, :, 0] = np.nan, np.nan
         dims = ("model", "band", "training", "window", "channel")
         test = test.assign(
             level=(dims, level),

@@ -36,10 +36,3 @@ def test_one_logger_and_the_truth(run, tmp_path):
     assert (out / "raw" / "sea" / "all.csv").is_file()
     assert (out / "truth" / "sea.nc").is_file()
     assert not (out / "figures").exists()
-
-
-def test_one_run_alone(run, tmp_path):
-    out = tmp_path / "out"
-    assert run("--out", out, "--run", "regular", "--raw-format", "nc").exit_code == 0
-    assert [p.name for p in (out / "raw").iterdir()] == ["regular"]
-    assert (out / "raw" / "regular" / "loads.nc").is_file()

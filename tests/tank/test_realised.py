@@ -1,9 +1,8 @@
-"""What `benchmarks/tank_figures.py` prints and draws."""
+"""What `benchmarks/tank_figures.py` says of the sea and the motions that are played."""
 
 import numpy as np
-import pandas as pd
 import pytest
-from tank_figures import comparison, main, realise
+from tank_figures import comparison, realise
 
 from seakeep.tank.play import play_run
 
@@ -45,22 +44,3 @@ def test_motions_and_slack_of_the_page(realised):
     slack = {run.run: run.motions.slack["mooring_stern"] for run in realised}
     assert 0.01 < max(slack[run.run] for run in realised[:3]) < 0.2  # at times
     assert 0.6 < slack["regular_1_5"] < 1.0  # mostly
-
-
-def test_the_script_prints_tables_and_draws_figures(tmp_path, capsys):
-    short = tmp_path / "short.toml"
-    short.write_text(
-        "[runs.sea]\nstartup = 5.0\nduration = 30.0\n"
-        "spectrum = { height = 0.15, peak_period = 2.0 }\n"
-        "[runs.regular]\nstartup = 5.0\nduration = 20.0\nwavelength = 2.8\nheight = 0.1\n",
-        encoding="utf-8",
-    )
-    out = tmp_path / "out"
-    main([str(short), "--out", str(out), "--seed", "3", "--run", "sea"])
-    printed = capsys.readouterr().out
-    for text in ("Test matrix", "Realised waves", "significant height", "Pierson", "True motions"):
-        assert text in printed
-    figures = list(out.glob("*.png"))
-    assert {p.name for p in figures} == {"hydrodynamics.png", "spectrum.png", "run_sea.png"}
-    assert all(p.stat().st_size > 10_000 for p in figures)
-    assert set(pd.read_csv(out / "truth.csv")["run"]) == {"sea"}

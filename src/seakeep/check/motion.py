@@ -228,6 +228,7 @@ def drift(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
     DataError
         If the runs do not state positions and water depth, where there are several probes.
     """
+    model.signature.check_fixed()
     single = single_model(model)
     if len(single.regressors) == len(single.inputs):
         raise RequestError(

@@ -346,18 +346,31 @@ def _at_once(input_map: InputMap) -> InputMap:
         observed = replace(observed, observables=tuple(now), tops=())
     if follows is not None:
         follows = replace(follows, lead=0)
-    return replace(input_map, lead=0, observed=observed, follows=follows)
+    return replace(input_map, lead=0, observed=observed, follows=follows, reference=0)
 
 
 def single_model(model: Model) -> HankelDMDcModel:
-    """The model itself, where it is one of delayed states and inputs."""
+    """The model itself, where it is one of delayed states and inputs.
+
+    One that varies with a parameter is taken in the middle of its training, and a warning says so;
+    one of departures from the means before each start as these departures.
+    """
     if not is_linear(model):
         raise RequestError(
-            "free motion and second order are those of one Hankel or ARX model; received one of "
-            f"kind '{model.kind}'. For an ensemble, check a member: "
-            "seakeep.check.modes(ensemble.member(0))."
+            "response, free motion and second order are read off the matrices of one Hankel, ARX "
+            f"or FIR model; received one of kind '{model.kind}'. For free motion of an ensemble, "
+            "check a member: seakeep.check.modes(ensemble.member(0))."
         )
-    return model
+    if (varies := model.variation) is not None:
+        warn(
+            f"the model varies with {model.signature.parameter}: what is shown is the one in the "
+            f"middle of the training, {varies.centre:g}."
+        )
+        model = model.at(parameter=varies.centre)
+    if not (input_map := model.signature.input_map).reference:
+        return model
+    signature = replace(model.signature, input_map=replace(input_map, reference=0))
+    return replace(model, signature=signature)
 
 
 def reference_probe(model: Model, runs: Mapping[str, xr.Dataset]) -> int:

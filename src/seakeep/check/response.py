@@ -18,6 +18,7 @@ from seakeep.check.parts import (
     no_energy,
     read_off,
     reference_probe,
+    single_model,
     units_of,
     used_parts,
     wave_turns,
@@ -29,7 +30,6 @@ from seakeep.errors import DataError, RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.engine import Dynamics
 from seakeep.models.labelled import mean_period
-from seakeep.models.registry import is_linear
 from seakeep.models.validity import Coverage
 
 WAVE = "wave"
@@ -162,14 +162,10 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
 
 
 def _matrices(model: Model) -> tuple[Coverage, list[Dynamics]]:
-    if is_linear(model):
-        return model.coverage, [model.dynamics]
     if is_ensemble(model):
         return model.coverage, [model.dynamics(member) for member in range(model.n_members)]
-    raise RequestError(
-        f"a model of kind '{model.kind}' has no matrices of delayed states and inputs, from which "
-        "a response is read. Check a Hankel model, an ARX or a FIR model."
-    )
+    single = single_model(model)
+    return single.coverage, [single.dynamics]
 
 
 def _default_frequencies(coverage: Coverage, dt: float) -> FloatArray:

@@ -58,6 +58,7 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             f"the model varies with {model.signature.parameter}. Export it at a value: in Python, "
             "model.at(parameter=…)."
         )
+    model.signature.check_fixed()
     input_map = model.signature.input_map
     aligned, observed = input_map.alignment, input_map.observed
     if input_map.follows is None and aligned is not None and aligned.settings.carries:

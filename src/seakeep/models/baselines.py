@@ -333,10 +333,12 @@ class Subspace(Plain):
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str], stop: Stop = None
     ) -> SubspaceModel:
         """Identify a model; arguments and errors as :meth:`seakeep.HankelDMDc.fit`."""
-        data = gather(as_runs(runs), states, inputs, stop, self)
-        future = self.state_delays + 1 if self.future is None else self.future
+        named = as_runs(runs)
+        spec = self.resolved_in(named, inputs)
+        data = gather(named, states, inputs, stop, spec)
+        future = spec.state_delays + 1 if spec.future is None else spec.future
         most = future * len(data.signature.states)
-        order = min(ORDER, most) if self.order is None else self.order
+        order = min(ORDER, most) if spec.order is None else spec.order
         if order > most:
             raise RequestError(
                 f"order = {order} is more than the {most} values of {future} future instants "
@@ -348,17 +350,17 @@ class Subspace(Plain):
             data.delayed,
             data.windows,
             order=order,
-            output_delays=self.state_delays,
-            input_delays=self.input_delays,
+            output_delays=spec.state_delays,
+            input_delays=spec.input_delays,
             future=future,
-            ridge=float(self.ridge),
+            ridge=float(spec.ridge),
             direct=data.direct,
         )
         columns = sum(window.columns for window in data.windows)
-        solution = Solution(space.A, "svd", float(self.ridge) * columns, order)
+        solution = Solution(space.A, "svd", float(spec.ridge) * columns, order)
         signature = data.signature
         return SubspaceModel(
-            settings=replace(self, order=order),
+            settings=replace(spec, order=order),
             space=space,
             signature=signature,
             training=data.training(solution),
@@ -414,7 +416,8 @@ class SubspaceModel(Model):
         )
         with np.errstate(over="ignore"):  # a run that is lost is cut just below
             values = signature.state_scale.physical(values, out=values)
-        return cut_lost(values, signature, windows)
+        values = cut_lost(values, signature, windows)
+        return values if windows.zero is None else values + windows.zero[:, None]
 
     def system_matrices(self) -> Iterator[FloatArray]:
         """A."""

@@ -85,7 +85,7 @@ class Disagreement:
             )
         what = {
             "offset": f"{self.channel} lies {self.value:+.3g} off where a model of {rest} has it. "
-            "Correct its zero, or take the mean of each run off",
+            "Correct its zero, or set centre = 'run' in [model]: departures from each run's means",
             "probe position": "its waves fit where they are carried by "
             f"{self.value:.3g} ± {self.spread:.1g} m, as if the probe stood elsewhere. Set "
             f"probe_offset = {self.value:.3g} in [runs.{self.run}], with alignment = "
@@ -153,7 +153,7 @@ def disagreements(
                 break
             judged.remove(odd)
             del left[odd]
-            reason: tuple[Any, ...] | None = None
+            reason: tuple[Any, ...] | None
             reason = _reason(fitted(left), runs[odd], steps, scales[odd], own[odd])
             placed = False
             if reason is None or reason[0] != "offset":

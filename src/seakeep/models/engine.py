@@ -83,6 +83,8 @@ class Windows:
         Elevation and rate of the wave at the line of each load that reads it.
     parameters : tuple of float
         Parameter of the run of each window, where the model varies with one.
+    zero : ndarray, shape (window, N), optional
+        What the states of each window depart from: it is to be added to free runs.
     """
 
     places: tuple[tuple[str, float], ...]
@@ -98,6 +100,7 @@ class Windows:
     predicted: tuple[int, ...] = ()
     waves: FloatArray | None = None
     parameters: tuple[float, ...] = ()
+    zero: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.histories)
@@ -235,7 +238,6 @@ def _driven(
         places=tuple((run.name, float(run.time[span.known])) for run, span in pairs),
         steps=spans[0].stop - spans[0].known,
         time=tuple(run.instants(dt, span) for run, span in pairs),
-        histories=np.stack([run.history(signature, span) for run, span in pairs]),
         look_ahead=tuple(maps.look_ahead(run.run, dt) for run in runs),
         notes=maps.notes(runs[0].run),
         predicted=tuple(run.first_predicted(signature, span) for run, span in pairs),
@@ -244,8 +246,25 @@ def _driven(
             for run in runs
             if signature.parameter
         ),
-        **_regressors(signature, drives, spans),
+        **_series(signature, [run.history(signature, span) for run, span in pairs], drives, spans),
     )
+
+
+def _series(
+    signature: Signature,
+    histories: Sequence[FloatArray],
+    drives: Sequence[Drive],
+    spans: Sequence[Span],
+) -> dict[str, Any]:
+    """What windows of one length start from, and what drives each, from its run's drive."""
+    states, zero = np.stack(histories), None
+    if reference := signature.input_map.reference:
+        zero = states[:, -reference:].mean(axis=1)
+        if (follows := signature.input_map.follows) is not None:
+            zero[:, follows.column] = 0.0  # it is a place
+        states -= zero[:, None]
+        drives = [drive.about(span.known) for drive, span in zip(drives, spans, strict=True)]
+    return {"histories": states, "zero": zero, **_regressors(signature, drives, spans)}
 
 
 def _regressors(
@@ -486,8 +505,7 @@ def array_windows(
         places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
         time=(time,) * len(histories),
-        histories=histories,
-        **_regressors(signature, drives, [span] * len(drives)),
+        **_series(signature, [*histories], drives, [span] * len(drives)),
     )
 
 
@@ -504,6 +522,8 @@ def linear_runs(
     for every in runs:
         for values, windows in zip(every, groups, strict=True):
             read_out(readouts, values, windows.waves)
+            if windows.zero is not None:
+                values += windows.zero[:, None]
     # One member needs no copy.
     return [each[0] if len(each) == 1 else np.concatenate(each) for each in zip(*runs, strict=True)]
 

@@ -156,7 +156,8 @@ def _shifted(rows: list[dict[tuple[int, int], float]], inputs: int) -> dict[str,
 
 
 def check_linear(signature: Signature) -> None:
-    """Refuse a model that follows its own surge."""
+    """Refuse a model that follows its own surge, or whose means are not fixed."""
+    signature.check_fixed()
     if signature.input_map.follows is not None:
         raise RequestError(
             "the model reads the waves where its own surge takes it, which no linear system can "

@@ -10,7 +10,7 @@ beside them. The elevation is carried to a vessel whose position is measured as 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -54,12 +54,15 @@ class InputMap:
         follows its own surge.
     follows : Following, optional
         Carriers to the place where the surge that the model predicts takes the vessel.
+    reference : int, optional
+        Samples up to the start of a forecast whose means states and regressors depart from.
     """
 
     alignment: FittedAlignment | None = None
     lead: int = 0
     observed: Observed | None = None
     follows: Following | None = None
+    reference: int = 0
 
     @cached_property
     def _around(self) -> tuple[int, int, int]:
@@ -115,7 +118,7 @@ class InputMap:
         first = min(span.first - back, span.known - before)
         if self.observed is None and self.follows is None:
             first = span.first + self.lead
-        return Span(first, span.known, span.stop + ahead)
+        return Span(first - max(self.reference - 1, 0), span.known, span.stop + ahead)
 
     def history(self, input_delays: int) -> int:
         """Samples of input before the start that a forecast with these delays reads."""
@@ -177,6 +180,10 @@ class InputMap:
                 f"  lead          {self.lead} samples: a step is driven by waves up to "
                 f"{(self.lead - 1) * dt:.3g} s after the instant that it forecasts"
             )
+        if self.reference:
+            lines.append(
+                f"  centre        departures from means of {self.reference} samples up to a start"
+            )
         return lines + ([] if self.observed is None else self.observed.describe(dt, self.lead))
 
 
@@ -198,6 +205,8 @@ class Drive:
         Carriers in the rig of the run, of a model that follows its surge.
     run : Dataset, optional
         The run, with its rig; that of training without one.
+    zero : Regressors, optional
+        What the regressors depart from.
     """
 
     input_map: InputMap
@@ -206,6 +215,16 @@ class Drive:
     surge: FloatArray | None = None
     banks: tuple[Bank, ...] = ()
     run: xr.Dataset | None = None
+    zero: Regressors | None = None
+
+    def about(self, known: int) -> Drive:
+        """The same as departures from the means over the reference period up to a sample.
+
+        The squared place of a vessel that is followed stays as it is.
+        """
+        first, stop = known + 1 - self.input_map.reference, known + 1
+        zero = self.rows(first, stop).delayed, self.direct(first, stop)
+        return replace(self, zero=Regressors(*(each.mean(axis=0) for each in zero)))
 
     def rows(self, first: int, stop: int) -> Regressors:
         """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
@@ -221,7 +240,7 @@ class Drive:
             values = self.values[low : end + ahead - input_map.lead]
             if input_map.observed is not None:
                 values = input_map.observed.with_delayed(values)
-            return Regressors(values[begin - low : end - low], direct)
+            return Regressors(self._departing(values[begin - low : end - low], 0), direct)
         place, here = input_map.follows.place, self.places(first, stop)
         table = self.table(first, stop)
         delayed = read_table(place, table, np.arange(stop - first), here)
@@ -235,7 +254,8 @@ class Drive:
         _, before, after = self.input_map._around
         begin = max(first - before, self.first)
         values = self.values[begin - self.first : stop + after - self.first]
-        return self.input_map.observed.direct(values)[first - begin : stop - begin]
+        rows = self.input_map.observed.direct(values)[first - begin : stop - begin]
+        return self._departing(rows, 1)
 
     def table(self, first: int, stop: int) -> FloatArray:
         """Delayed regressors of samples at all places, shape (time, place, n)."""
@@ -247,10 +267,13 @@ class Drive:
         out[:] = values[back : back + stop - first, None]
         for bank in self.banks:
             out[:, :, bank.column] = carried(bank.taps, values[:, bank.columns])
-        if input_map.observed is None:
-            return out
-        flat = input_map.observed.with_delayed(out.reshape(-1, out.shape[2]))
-        return flat.reshape(stop - first, count, -1)
+        if input_map.observed is not None:
+            flat = input_map.observed.with_delayed(out.reshape(-1, out.shape[2]))
+            out = flat.reshape(stop - first, count, -1)
+        return self._departing(out, 0)
+
+    def _departing(self, values: FloatArray, group: int) -> FloatArray:
+        return values if self.zero is None else values - self.zero[group]
 
     def waves(self, places: tuple[float, ...], first: int, stop: int) -> FloatArray:
         """Wave at places about the vessel at rest an instant after samples.

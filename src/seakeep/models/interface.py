@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from seakeep.arrays import FloatArray
+from seakeep.errors import RequestError
 from seakeep.models.inputs import InputMap
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.readouts import FittedReadOut
@@ -113,14 +114,25 @@ class Signature:
     @property
     def state_samples(self) -> int:
         """Samples of the states among these: where the vessel was counts for delayed waves too."""
-        follows = self.input_map.follows
-        where = 0 if follows is None else self.input_delays + follows.place.taps.size
-        return max(self.state_delays + 1, where)
+        follows, reference = self.input_map.follows, self.input_map.reference
+        where = 0
+        if follows is not None:
+            where = max(self.input_delays, reference - 1) + follows.place.taps.size
+        return max(self.state_delays + 1, reference, where)
 
     @property
     def lead_samples(self) -> int:
         """Samples of input after the one a step starts from that drive the step."""
         return self.input_map.lead_samples
+
+    def check_fixed(self) -> None:
+        """Refuse a model whose means are those before each start."""
+        if self.input_map.reference:
+            raise RequestError(
+                "the model forecasts departures from the means before each start (centre = 'run'), "
+                "which forecast, compare and forecast_arrays take from what they are given. For "
+                "anything else, fit it with centre = 'pooled'."
+            )
 
 
 @dataclass(frozen=True)

@@ -288,7 +288,8 @@ class Problem:
     def starts(self, run: int, steps: int) -> IntArray:
         """Samples from which windows end to end are forecast in a run that is held out."""
         window = self.data.windows[run]
-        return np.arange(window.first_column, window.last - steps + 1, steps)
+        first = window.first_column + max(self.widest.centre - 1, 0)
+        return np.arange(first, window.last - steps + 1, steps)
 
     def windows(self, run: int, starts: tuple[int, ...], steps: int) -> Windows:
         """What free runs of all candidates from some samples of a run read, read once."""
@@ -327,6 +328,7 @@ class Problem:
         delayed, direct = self.parts(candidate)
         dynamics, coefficients = self.models(candidate, levels, others or rest)
         states = data.signature.state_scale.physical(data.states[run])
+        zeros: dict[int, FloatArray] = {}
         known: dict[int, FloatArray] = {}  # by start: a longer run begins with the shorter one
         every: dict[int, FreeRuns] = {}
         for steps in sorted(horizons, reverse=True):
@@ -343,9 +345,13 @@ class Problem:
                 )
                 (computed,) = model_runs(dynamics, coefficients, [windows])
                 known |= zip(new, computed.swapaxes(0, 1), strict=True)
+                if windows.zero is not None:
+                    zeros |= zip(new, data.zeros[run] - windows.zero, strict=True)
             if starts:
                 predicted = np.stack([known[at][:, :steps] for at in starts], axis=1)
                 measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
+                if zeros:
+                    measured += np.stack([zeros[at] for at in starts])[:, None]
                 every[steps] = FreeRuns(predicted, measured, dynamics.state_scale.std)
         yield from (every[steps] for steps in horizons if steps in every)
 

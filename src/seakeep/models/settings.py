@@ -139,6 +139,10 @@ FOLDS: tuple[Folds, ...] = get_args(Folds)
 """What may be held out at a time; :func:`seakeep.models.selection.groups_of` tells them apart."""
 
 
+CENTRES = {"pooled": 0, "run": "30 T"}
+"""Words of the reference period before a start whose means a model forecasts departures from."""
+
+
 OPENED = ("observables", "alignment", "lead", "memory")
 """Settings that may be left open beside λ, in the order in which they are chosen."""
 
@@ -227,6 +231,7 @@ class HankelSettings:
         "input_delays": 0,
         "lead": 0,
         "memory": 0,
+        "centre": 0,
     }
     """Settings that are lengths, and the least number of samples of each."""
     state_delays: int
@@ -244,6 +249,7 @@ class HankelSettings:
     readouts: ReadOuts = ()
     stable: bool | float = False
     memory: int = 0
+    centre: int = 0
 
     def __post_init__(self) -> None:
         for name in (*self.lengths, "ridge"):
@@ -283,6 +289,8 @@ class HankelSettings:
                 hint = " The paper uses 100; 0 asks for the solution of least norm."
                 check_number(name, value, meant, 0, hint=hint)
             return value
+        if name == "centre":
+            value = CENTRES.get(value, value) if isinstance(value, str) else value
         return as_length(name, value, self.lengths[name], name == "window")
 
     def resolved(self, dt: float, encounter_period: float | None) -> Self:
@@ -424,7 +432,7 @@ class HankelSettings:
             delayed += round(BACK * encounter_period / dt)
         return Needs(
             self.window or 1,
-            max(self.state_reach, delayed, *before),
+            max(self.state_reach, delayed, *before) + max(self.centre - 1, 0),
             self.history == "inside",
             max(after),
         )

@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Progress
+from seakeep.core.embedding import TrainingWindow
 from seakeep.errors import SHOWN, DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
@@ -48,6 +49,7 @@ from seakeep.models.terms import Observable
 from seakeep.models.training import (
     TrainingArrays,
     check_names,
+    departures,
     gather,
     moments,
     until,
@@ -98,11 +100,11 @@ class Choosing(HankelSettings, Generic[Fitted]):
         """These settings with what was chosen for :meth:`central`."""
         raise NotImplementedError
 
-    def _variants(
-        self, settings: Self, runs: dict[str, xr.Dataset], states: list[str], inputs: list[str]
+    def variants(
+        self, runs: dict[str, xr.Dataset], states: list[str], inputs: list[str], *settings: Self
     ) -> list[tuple[Self, str]]:
         """Settings to fit until a model does not grow, each with words on its choice."""
-        return [(settings, "")]
+        return [(each, "") for each in settings]
 
     def _fitted(
         self,
@@ -214,9 +216,9 @@ class Choosing(HankelSettings, Generic[Fitted]):
         if not self.is_open:
             model = choice.settings._fitted(named, states, inputs, choice.readouts)
             return replace(model, selection=choice.describe())
-        for settings, words in self._variants(choice.settings, named, states, inputs):
+        for settings, words in self.variants(named, states, inputs, choice.settings):
             model = settings._fitted(named, states, inputs, choice.readouts)
-            radius = _largest_radius(model) if isinstance(model, HankelDMDcModel) else 0.0
+            radius = largest_radius(model) if isinstance(model, HankelDMDcModel) else 0.0
             if radius < 1.0:
                 return replace(model, selection=words + choice.describe())
         raise DataError(
@@ -285,6 +287,11 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         Longest delay of averages of the states, such as ``"8 T"``: beyond `state_delays` their
         means over blocks of delays that double in length are further regressors. It takes exact
         delay rows.
+    centre : {"pooled", "run"} or length, optional
+        Whether a model is one of departures from the means of all runs, or from those of each run:
+        then a forecast takes the means of states and regressors over 30 encounter periods (or
+        another length) before its start in their place, which is history that it needs. A surge
+        that is followed stays as it is. For runs whose zeros differ; what drifts for long is lost.
     select : Select, optional
         What `fit` chooses by free runs beside λ; a mapping of its keys is taken too.
     parameter : str, optional
@@ -426,23 +433,27 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
     def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[HankelDMDc]:
         return replace(choice, settings=replace(choice.settings, select=None))
 
-    def _variants(
+    def variants(
         self,
-        settings: HankelDMDc,
         runs: dict[str, xr.Dataset],
         states: list[str],
         inputs: list[str],
+        *settings: HankelDMDc,
     ) -> list[tuple[HankelDMDc, str]]:
-        """As stated; with a parameter those that err 5 % less than a pooled one, and that.
+        """As stated; with a parameter those that err 5 % less than the best pooled one, and that.
 
         With three values or more, all runs of an inner value are held out in turn; with two, the
         second half of each run.
         """
         if not self.parameter:
-            return [(settings, "")]
-        pooled = replace(settings, parameter="")
-        parts = SMALLER if isinstance(self.ridge, str) else (1.0,)
-        varying = [replace(settings, ridge=part * float(settings.ridge)) for part in parts]
+            return [(each, "") for each in settings]
+        every = [replace(each, parameter="") for each in settings]
+        parts = SMALLER if isinstance(self.ridge, str) or len(settings) > 1 else (1.0,)
+        varying = [
+            replace(each, ridge=float(f"{part * float(each.ridge):.6g}"))
+            for each in settings
+            for part in parts
+        ]
         values = {name: parameter_of(run, self.parameter, name) for name, run in runs.items()}
         inner = sorted(set(values.values()))[1:-1]
         steps = round(HORIZON * labelled.mean_period(runs, inputs))
@@ -451,7 +462,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
             ({n: runs[n] for n in runs if values[n] != out}, [n for n in runs if values[n] == out])
             for out in inner
         ] or [(halves, list(runs))]
-        errors: dict[HankelDMDc, list[float]] = {each: [] for each in (pooled, *varying)}
+        errors: dict[HankelDMDc, list[float]] = {each: [] for each in (*every, *varying)}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SeakeepWarning)
             for (training, judged), each in itertools.product(folds, errors):
@@ -459,7 +470,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
                 for name in judged:
                     errors[each] += _window_scores(model, runs[name], name, steps, not inner)
         means = {each: float(np.mean(scores)) for each, scores in errors.items()}
-        order = sorted(varying, key=means.__getitem__)
+        pooled, order = min(every, key=means.__getitem__), sorted(varying, key=means.__getitem__)
         better = [each for each in order if means[each] < BETTER * means[pooled]]
         what = "runs of inner values" if inner else "second halves of the runs"
         return [
@@ -504,7 +515,7 @@ def _window_scores(
     return scores_of(runs)[0].tolist()
 
 
-def _largest_radius(model: HankelDMDcModel) -> float:
+def largest_radius(model: HankelDMDcModel) -> float:
     """Spectral radius, the largest over the trained range of a parameter."""
     varies = model.variation
     values = () if varies is None else (varies.low, varies.centre, varies.high)
@@ -559,6 +570,8 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
     dt : float, optional
         Time step the runs must have, s; None takes theirs.
     lead, history, delay_rows, ridge_scale, rank, standardize, observables, stable, memory, select
+        As in :class:`HankelDMDc`.
+    centre
         As in :class:`HankelDMDc`.
     alignment
         As in :class:`HankelDMDc`. What an alignment estimates, it estimates once for all members,
@@ -636,7 +649,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         """The single model at the medians of the priors."""
         return self._single(0.5, dt)
 
-    def centre(self, dt: float) -> Draw | None:
+    def centred_on(self, dt: float) -> Draw | None:
         """The single model of all runs that members are centred on, if they are."""
         if not self.centred:
             return None
@@ -675,7 +688,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             settings=settings,
             origin=spec.to_json(),
             members=draws_of(dataset, settings),
-            centre=spec.centre(dt),
+            centre=spec.centred_on(dt),
             **parts,
         )
 
@@ -799,7 +812,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         input_map = shared.input_map(runs, states, inputs, None)
         samples = [run.sizes["time"] for run in runs.values()]
         spec = self._taught_by(runs.values(), min(samples) * dt)
-        members, centre = draw_members(spec, dt, samples, input_map), spec.centre(dt)
+        members, centre = draw_members(spec, dt, samples, input_map), spec.centred_on(dt)
         every = members if centre is None else [*members, centre]
         reads = [
             (min(draw.first(run, count, input_map) for draw in every), count)
@@ -815,7 +828,11 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         # Direct regressors have no value where they need inputs from before the record; no member
         # reads them there.
         direct = tuple(values[np.isfinite(values).all(axis=1)] for values in arrays.direct)
-        series = (arrays.states, arrays.delayed, direct)
+        series: Any = arrays.states, arrays.delayed, direct
+        if shared.centre:
+            pieces = [each for each in zip(*series, strict=True) if len(each[0])]
+            whole = [TrainingWindow(0, len(each[0]), 0) for each in pieces]
+            series = zip(*departures(pieces, whole, input_map)[0], strict=True)
         arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
         groups = (labels[0], *input_map.regressors(labels[1]))
         scales = [
@@ -828,7 +845,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
             input_labels=labels[1],
             state_delays=max(draw.settings.state_reach for draw in every),
             input_delays=max(draw.settings.input_delays for draw in every),
-            input_map=input_map,
+            input_map=replace(input_map, reference=shared.centre),
             state_scale=scales[0],
             input_scale=scales[1],
             direct_scale=scales[2],

@@ -78,6 +78,8 @@ class TrainingData:
         First and last instant of each window, s.
     inputs : tuple of ndarray, each (time, Q)
         Measured inputs of the windows, physical units.
+    zeros : tuple of ndarray, each (N,)
+        What the states of each run depart from, physical units.
     """
 
     signature: Signature
@@ -88,13 +90,14 @@ class TrainingData:
     windows: tuple[TrainingWindow, ...]
     instants: tuple[tuple[float, float], ...]
     inputs: tuple[FloatArray, ...] = ()
+    zeros: tuple[FloatArray, ...] = ()
 
     def begin(self, run: int) -> float:
         """Instant of the first sample of a run's arrays, s."""
         return self.instants[run][0] - self.windows[run].first * self.signature.dt
 
     def physical(self, run: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """States and both kinds of regressors of a run, physical units."""
+        """States and both kinds of regressors of a run, physical units, less its zeros."""
         own = self.signature
         return (
             own.state_scale.physical(self.states[run]),
@@ -268,6 +271,9 @@ def _standardised(
 ) -> TrainingData:
     """Deviations from the moments of these windows (paper, System identification setup)."""
     names, series, windows, instants = zip(*pieces, strict=True)
+    zeros: tuple[FloatArray, ...] = ()
+    if settings.centre:
+        series, zeros = departures(series, windows, input_map)
     groups = [
         [_lengthened(values, len(own[0])) for values, own in zip(group, series, strict=True)]
         for group in zip(*series, strict=True)
@@ -281,8 +287,27 @@ def _standardised(
         for scale, each in zip(scales, groups, strict=True)
     )
     reach = settings.state_reach, settings.input_delays
+    input_map = replace(input_map, reference=settings.centre)
     signature = Signature(dt, *labels, *reach, input_map, *scales)
-    return TrainingData(signature, names, x, u, w, windows, instants)
+    return TrainingData(signature, names, x, u, w, windows, instants, zeros=zeros)
+
+
+def departures(
+    series: Sequence[Sequence[FloatArray]], windows: Sequence[TrainingWindow], input_map: InputMap
+) -> tuple[tuple[Sequence[FloatArray], ...], tuple[FloatArray, ...]]:
+    """Series of each run less their means over its window, and those of the states.
+
+    A surge that is followed and its slow square stay, since they say where the vessel is.
+    """
+    out, zeros = [], []
+    for each, window in zip(series, windows, strict=True):
+        first = window.first, window.first, max(window.first, window.first_column)
+        means = [x[at : window.last + 1].mean(axis=0) for x, at in zip(each, first, strict=True)]
+        if input_map.follows is not None:
+            means[0][input_map.follows.column] = means[2][-1] = 0.0
+        out.append(tuple(values - mean for values, mean in zip(each, means, strict=True)))
+        zeros.append(means[0])
+    return tuple(out), tuple(zeros)
 
 
 @dataclass(frozen=True, eq=False)
@@ -368,7 +393,7 @@ class TrainingArrays:
 
         The windows end at a sample of the run, None for the end of what is given.
         """
-        input_map, pieces = signature.input_map, []
+        input_map, pieces = replace(signature.input_map, reference=0), []
         for each in range(len(self.names)) if run is None else (run,):
             _, shifted, cut = _place(self._end(each, last), settings, input_map)
             series = self.states[each][cut], self.delayed[each][cut], self.direct[each][cut]

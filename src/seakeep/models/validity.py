@@ -243,7 +243,9 @@ class Coverage:
         if waves is not None:
             reasons &= np.isin(np.arange(len(self.channels)), waves)
         mean, reach, scale = None, np.array([-np.inf, np.inf]), signature.state_scale
-        if surge is not None and "surge" in signature.states and np.isfinite(surge).any():
+        maps = signature.input_map
+        is_place = "surge" in signature.states and (maps.follows or not maps.reference)
+        if surge is not None and is_place and np.isfinite(surge).any():
             at, mean = signature.states.index("surge"), float(np.nanmean(surge))
             reach = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
         units = tuple(label.units for label in signature.input_labels)

@@ -1,0 +1,152 @@
+"""Departures from the means of each run: offsets per run change a forecast by themselves only."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from drifting import INPUTS, STATES, drifting_run
+
+from seakeep import BayesianHankelDMDc, HankelDMDc, RequestError, SlowSquares, Uniform, load_model
+from seakeep.baselines import ARX, Subspace
+from seakeep.hosts.program import exportable
+from seakeep.models.ensemble import HankelEnsemble
+
+DT, PERIOD = 0.1, 240
+A = np.array([[1.6, 0.1], [0.05, 0.7]]), np.array([[-0.9, 0.0], [0.0, 0.1]])
+B = np.array([[0.3, 0.02], [0.1, -0.05]])
+OFFSETS = {"heave": 3.0, "pitch": -0.4, "eta": 0.2, "wind": 8.0}
+SPEC = HankelDMDc(1, 0, 0.0, delay_rows="exact", centre="run")
+
+
+def vessel(seed: int, offset: float = 0.0, periods: int = 5) -> xr.Dataset:
+    """Two states in a steady answer to two inputs of period `PERIOD`, on zeros of their own."""
+    rng = np.random.default_rng(seed)
+    inputs = np.fft.rfft(rng.standard_normal((PERIOD, 2)), axis=0)
+    inputs[0] = inputs[40:] = 0.0
+    z = np.exp(2j * np.pi * np.arange(len(inputs)) / PERIOD)[:, None, None]
+    system = z * np.eye(2) - A[0] - A[1] / z
+    states = np.linalg.solve(system, (inputs @ B.T)[..., None])[..., 0]
+    values = np.fft.irfft(np.concatenate([states, inputs], axis=1), PERIOD, axis=0)
+    values = np.resize(values, (periods * PERIOD, 4)) + offset * np.array([*OFFSETS.values()])
+    return xr.Dataset(
+        {name: ("time", x, {"units": "m"}) for name, x in zip(OFFSETS, values.T, strict=True)},
+        coords={"time": DT * np.arange(len(values))},
+        attrs={"encounter_period": PERIOD * DT / 30},
+    )
+
+
+def runs_of(*offsets: float) -> dict[str, xr.Dataset]:
+    return {f"run{n}": vessel(n, each) for n, each in enumerate(offsets)}
+
+
+CHANNELS = ["heave", "pitch"], ["eta", "wind"]
+
+
+def test_the_system_is_recovered_from_runs_whose_zeros_differ(tmp_path):
+    model = SPEC.fit(runs_of(0.0, 1.0, -3.0), *CHANNELS)
+    assert model.settings.centre == PERIOD
+    scale = model.state_scale.std
+    a = model.A[:2] * scale[:, None] / np.tile(scale, 2)
+    # Exact data, through a Gram matrix.
+    np.testing.assert_allclose(a, np.hstack(A), rtol=0, atol=1e-6)
+    run = vessel(9, 50.0)
+    forecast = model.forecast(run, start=DT * (PERIOD + 20), steps=400)
+    for name in CHANNELS[0]:
+        expected = run[name][PERIOD + 21 : PERIOD + 421]
+        np.testing.assert_allclose(forecast[name], expected, rtol=0, atol=1e-6)
+    again = load_model(model.save(tmp_path / "model.nc"))
+    xr.testing.assert_identical(again.forecast(run, DT * (PERIOD + 20), 400), forecast)
+    arrays = [run[names].to_array().values.T for names in CHANNELS]
+    at = PERIOD + 21
+    values = model.forecast_arrays(arrays[0][:at], arrays[1][:at], arrays[1][at:], 400)
+    np.testing.assert_allclose(values[:, 0], forecast["heave"], rtol=0, atol=1e-9)
+    pooled = replace(SPEC, centre="pooled").fit(runs_of(0.0, 1.0, -3.0), *CHANNELS)
+    assert np.abs(pooled.forecast(run, 30.0, 400)["heave"] - run["heave"][301:701]).max() > 1.0
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        replace(SPEC, ridge=1e-3, state_delays=5, input_delays=9, lead=2),
+        replace(SPEC, ridge=1e-3, observables=[SlowSquares("eta", period=0.8)]),
+        replace(SPEC, ridge="rollout", ridge_scale="per_snapshot", select={"horizon": (10,)}),
+        ARX(3, 4, 1e-3, centre="run"),
+        Subspace(4, 4, order=4, future=5, centre="run"),
+        BayesianHankelDMDc(2, Uniform(2, 6), 1e-3, window=500, n_members=3, delay_rows="exact",
+                           centre="run", centred=True),
+    ],
+    ids=["lead", "squares", "rollout", "arx", "subspace", "ensemble"],
+)  # fmt: skip
+def test_a_zero_moves_the_forecast_and_changes_nothing_else(spec):
+    def moved(run: xr.Dataset, offset: float) -> xr.Dataset:
+        """Squares are of the elevation, whose zero stays."""
+        names = [name for name in OFFSETS if name != "eta"]
+        return run.assign({name: run[name] + offset * OFFSETS[name] for name in names})
+
+    # Not over whole periods, so that means do not vanish.
+    plain = {name: run.isel(time=slice(0, 1100)) for name, run in runs_of(0, 0, 0).items()}
+    there = {name: moved(run, n - 0.5) for n, (name, run) in enumerate(plain.items())}
+    models = [spec.fit(runs, *CHANNELS) for runs in (plain, there)]
+    run = vessel(9)
+    start = DT * (PERIOD + 100)
+    if isinstance(models[0], HankelEnsemble):
+        forecasts = [
+            model.forecast_summary(each, start, 100).sel(statistic="mean")
+            for model, each in zip(models, (run, moved(run, 20.0)), strict=True)
+        ]
+    else:
+        forecasts = [
+            model.forecast(each, start, 100)
+            for model, each in zip(models, (run, moved(run, 20.0)), strict=True)
+        ]
+    for name in CHANNELS[0]:
+        change = forecasts[1][name] - forecasts[0][name]
+        # Differences of numbers of a hundred, through regressions of condition 1e4.
+        np.testing.assert_allclose(change, 20.0 * OFFSETS[name], rtol=0, atol=1e-7)
+    first, second = (getattr(model, "selection", "") for model in models)
+    assert first == second
+
+
+def test_a_surge_that_is_followed_stays_as_it_is():
+    spec = HankelDMDc(
+        10, 30, 1e-4, delay_rows="exact", ridge_scale="per_snapshot", lead=12, centre="run",
+        alignment={"mode": "dispersion", "surge": "predicted"},
+        observables=[SlowSquares("eta_cog", period=1.5, lead=0.75, cutoff=1.0)],
+        readouts={"mooring_bow": "wave"},
+    )  # fmt: skip
+    states = [*STATES, "mooring_bow"]
+    plain = {f"run{n}": drifting_run(n) for n in (1, 2, 3)}
+
+    def moved(run: xr.Dataset, by: float) -> xr.Dataset:
+        return run.assign(heave=run["heave"] + by, mooring_bow=run["mooring_bow"] + 10 * by)
+
+    there = {name: moved(run, n) for n, (name, run) in enumerate(plain.items())}
+    first, second = (spec.fit(runs, states, INPUTS) for runs in (plain, there))
+    run = drifting_run(4)
+    before, after = first.forecast(run, 80.0, 200), second.forecast(moved(run, 5.0), 80.0, 200)
+    for name, change in {"surge": 0.0, "heave": 5.0, "mooring_bow": 50.0}.items():
+        # Loads of 30 N through ridge regressions.
+        np.testing.assert_allclose(after[name] - before[name], change, rtol=0, atol=1e-7)
+    pooled = replace(spec, centre="pooled").fit(plain, states, INPUTS).forecast(run, 80.0, 200)
+    errors = [
+        float(((each["heave"] - run["heave"]) ** 2).mean() ** 0.5) for each in (before, pooled)
+    ]
+    # The runs share their zeros: what is lost is that means of 45 s are not those of the runs.
+    assert errors[0] < 1.5 * errors[1] < 0.1 * run["heave"].std()
+    assert before.attrs["status"] == "ok"
+
+
+def test_words():
+    model = SPEC.fit(runs_of(0.0, 1.0), *CHANNELS)
+    run = vessel(9)
+    for refused in (model.live, model.to_state_space, lambda: exportable(model)):
+        with pytest.raises(RequestError, match=r"\(centre = 'run'\), which forecast"):
+            refused()
+    with pytest.raises(RequestError, match="the model needs 240"):
+        model.forecast(run, start=20.0, steps=10)
+    assert "means of 240 samples up to a start" in model.summary()
+    assert SPEC.resolved(DT, PERIOD * DT / 30).needs(DT).history == model.history_samples
+    assert HankelDMDc(1, 0, 1.0, centre="pooled").centre == 0
+    with pytest.raises(RequestError, match="centre: "):
+        HankelDMDc(1, 0, 1.0, centre="runs")

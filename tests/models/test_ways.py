@@ -1,0 +1,167 @@
+"""Every way to a forecast gives the same numbers, and reads no more than it says."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from drifting import DT, INPUTS, drifting_run
+
+from seakeep import (
+    BayesianHankelDMDc,
+    DataError,
+    Fixed,
+    HankelDMDc,
+    LogUniform,
+    Powers,
+    ProbeAlignment,
+    SlowSquares,
+    load_model,
+)
+
+STATES, START, STEPS = ["surge", "heave", "mooring_bow"], 600, 80
+FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
+OBSERVABLES = (SlowSquares("eta_cog", cutoff=1.0, lead=0.75, lags=(0, 1)), Powers("eta_fwd"))
+VARIANTS = {
+    "regressed rows": {"delay_rows": "ridge"},
+    "absolute ridge, history inside": {"ridge_scale": "absolute", "history": "inside"},
+    "lead": {"lead": 6},
+    "memory": {"memory": 40},
+    "measured surge": {"alignment": ProbeAlignment(mode="effective", surge="measured")},
+    "observables": {"lead": 6, "observables": OBSERVABLES},
+    "following now": {"alignment": FOLLOWED},
+    "following": {
+        "alignment": FOLLOWED,
+        "lead": 12,
+        "observables": OBSERVABLES,
+        "readouts": {"mooring_bow": "wave"},
+    },
+}
+"""Settings beside those of all, which between them go through all that a forecast computes."""
+
+
+def settings(key):
+    # Carriers and observables of an ensemble learn from all of its runs, whatever its windows.
+    learns = {"alignment", "observables"} & VARIANTS[key].keys()
+    shared = {"delay_rows": "exact", "ridge_scale": "per_snapshot"}
+    return {**shared, "window": None if learns else 900, **VARIANTS[key]}
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return [drifting_run(seed, 1200) for seed in (1, 2)]
+
+
+@pytest.fixture(scope="module")
+def run():
+    return drifting_run(7, 900)
+
+
+@pytest.fixture(scope="module", params=VARIANTS)
+def key(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def model(key, runs):
+    return HankelDMDc(4, 12, 1e-3, **settings(key)).fit(runs, STATES, INPUTS, stop=110.0)
+
+
+@pytest.fixture(scope="module")
+def expected(model, run):
+    return model.forecast(run, START * DT, STEPS)
+
+
+def table_of(dataset, names=STATES):
+    return np.stack([dataset[name].values for name in names], axis=-1)
+
+
+def reads_surge(model):
+    """Whether a forecast is conditional on a surge that was measured."""
+    alignment = model.settings.alignment
+    return alignment is not None and alignment.surge == "measured"
+
+
+def test_windows_arrays_and_service_are_the_forecast(model, run, expected):
+    # The same sums in another order, of loads of 30 N.
+    close = {"rtol": 0, "atol": 1e-11}
+    several = model.forecast_windows(run, [START * DT, 50.0], STEPS)
+    np.testing.assert_allclose(table_of(several)[0], table_of(expected), **close)
+    carried = reads_surge(model)
+    x, u = table_of(run), table_of(model.aligned_inputs(run) if carried else run, INPUTS)
+    if carried:  # as a whole record, and not up to the end of the forecast
+        close["atol"] = 1e-6
+    arrays = model.forecast_arrays(x[: START + 1], u[: START + 1], u[START + 1 :], STEPS)
+    np.testing.assert_allclose(arrays, table_of(expected), **close)
+    if not carried:
+        live = model.live(like=run)
+        for at in range(START + 1):
+            live.step(u[at], x[at])
+        served = live.forecast(STEPS, u[START + 1 :]).isel(statistic=0)
+        np.testing.assert_allclose(table_of(served), table_of(expected), **close)
+
+
+def test_members_are_the_models_of_their_settings(key, runs, run, model, expected, tmp_path):
+    spec = BayesianHankelDMDc(
+        encounter_period=1.5,
+        state_delays=Fixed(f"{4 * DT} s"),
+        input_delays=Fixed(f"{12 * DT} s"),
+        ridge=LogUniform(1e-4, 1e-2),
+        n_members=2,
+        **settings(key) | ({"window": Fixed("90 s")} if model.settings.window else {}),
+    )
+    ensemble = spec.fit(runs, STATES, INPUTS, stop=110.0)
+    found = ensemble.forecast(run, START * DT, STEPS)
+    for number, draw in enumerate(ensemble.members):
+        alone = replace(model.settings, ridge=draw.settings.ridge).fit(
+            runs, STATES, INPUTS, stop=110.0
+        )
+        for each in (
+            found.isel(member=number),
+            ensemble.member(number).forecast(run, START * DT, STEPS),
+        ):
+            # One arithmetic in another order.
+            np.testing.assert_allclose(
+                table_of(each), table_of(alone.forecast(run, START * DT, STEPS)), atol=1e-9
+            )
+    again = load_model(ensemble.save(tmp_path / "e.nc"))
+    for same in (again, ensemble.hold()):
+        xr.testing.assert_identical(same.forecast(run, START * DT, STEPS), found)
+
+
+def test_a_forecast_reads_its_history_and_look_ahead_and_nothing_else(model, run, expected):
+    last = START + STEPS + round(expected.attrs["reads_input_until"] / DT)
+    first = START + 1 - model.history_samples
+    poisoned = run.copy(deep=True)
+    for name in ("heave", "mooring_bow") if reads_surge(model) else (*STATES, *INPUTS):
+        poisoned[name].values[(START if name in STATES else last) + 1 :] = np.nan
+        poisoned[name].values[:first] = np.nan
+    xr.testing.assert_identical(model.forecast(poisoned, START * DT, STEPS), expected)
+    gone = run.copy(deep=True)
+    gone[INPUTS[0]].values[last] = np.nan  # which it does read
+    with pytest.raises(DataError, match="missing"):
+        model.forecast(gone, START * DT, STEPS)
+
+
+def test_training_reads_its_window_and_nothing_else(key, runs, model):
+    poisoned = [each.copy(deep=True) for each in runs]
+    settings = model.settings
+    history = 0 if settings.history == "inside" else model.history_samples
+    first = 1100 - settings.window - history if settings.window else 0
+    for each in poisoned:
+        for name in (*STATES, *INPUTS):
+            each[name].values[1101:] = np.nan
+            each[name].values[:first] = np.nan
+    found = model.settings.fit(poisoned, STATES, INPUTS, stop=110.0)
+    # BLAS sums in an order that follows the memory.
+    np.testing.assert_allclose(found.coefficients, model.coefficients, rtol=0, atol=1e-11)
+
+
+def test_files_and_tables_of_settings_hold_it_all(model, run, expected, tmp_path):
+    again = load_model(model.save(tmp_path / "m.nc"))
+    xr.testing.assert_identical(again.forecast(run, START * DT, STEPS), expected)
+    assert again.summary() == model.summary()
+    assert again.settings == model.settings
+    table = json.loads(json.dumps(model.settings.to_json()))
+    assert type(model.settings).from_json(table) == model.settings
