@@ -346,6 +346,9 @@ def test_without_waves_to_come_no_lead_errs_more_than_the_mean(models, run, key)
     assert ratio.max() < 1.2
     assert ratio[-50:].mean() < 1.05
     assert ratio[:3].max() < 0.2
+    claimed = live.forecast(steps)["heave"].sel(statistic="std").values[-20:]
+    # The mean of training errs by the SD there, whatever the run did; its weight is all by then.
+    np.testing.assert_allclose(claimed, model.state_scale.spread[1], rtol=1e-9)
 
 
 def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(models, run):

@@ -710,9 +710,8 @@ class Live:
                 lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0))
                 weight = np.where(foreseen[:, None], 1.0, lasting)
                 table[0] = scale.centre + weight * (table[0] - scale.centre)
-                # What errs more than the mean of training, by as much less as it passes over to it.
-                most = wider * scale.spread**2
-                variance = np.where(variance > most, most + weight * (variance - most), variance)
+                # The error passes over with it, to that of the mean of training.
+                variance = weight * variance + (1.0 - weight) * wider * scale.spread**2
                 spread *= weight
             table[1] = np.sqrt(variance)
             half = _quantile(level, spread, table[1] ** 2, freedom) * table[1]

@@ -653,10 +653,8 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
                                              / {{ (doubted[1] - doubted[0]) | hex }}, 0.0));
             x[step * N + i] = middle + moved[i];
             if (runs > 1 && step > known - {{ lead_samples }}) {
-                double most = spread[i] * spread[i];
                 x[step * N + i] = centre[i] + weight[i] * (middle + moved[i] - centre[i]);
-                if (variance > most)
-                    variance = most + weight[i] * (variance - most);
+                variance = weight[i] * variance + (1.0 - weight[i]) * spread[i] * spread[i];
             }
             if (std)
                 std[step * N + i] = sqrt(variance);
