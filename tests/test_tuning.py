@@ -25,27 +25,28 @@ TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial"
 
 
 @pytest.mark.parametrize(
-    ("folds", "words"),
+    ("folds", "words", "centre"),
     [
-        ("run", "mean NRMSE"),
-        ("sea_state", "the runs of its sea state, of which there are 2"),
-        ("auto", "the runs that repeat its waves; 2 waves differ"),
+        ("run", "mean NRMSE", 0),
+        ("run", "mean NRMSE", 3 * PERIOD),
+        ("sea_state", "the runs of its sea state, of which there are 2", 0),
+        ("auto", "the runs that repeat its waves; 2 waves differ", 0),
     ],
 )
-def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words):
+def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, centre):
     """The third run repeats the waves of the first, a little higher and shorter."""
     first, second, _ = runs().values()
     third = first.isel(time=slice(-40)).map(lambda x: 1.02 * x, keep_attrs=True)
     seas = {"first": (first, "calm"), "second": (second, "rough"), "third": (third, "calm")}
     given = {name: run.assign_attrs(sea_state=sea) for name, (run, sea) in seas.items()}
     powers = seakeep.Powers("eta", (2,))
-    spec = replace(SPEC, lead=4, observables=(powers,))
+    spec = replace(SPEC, lead=4, observables=(powers,), centre=centre)
     result = seakeep.tune(spec, given, STATES, INPUTS, horizon=(15,), folds=folds)
     table = result.table
     assert words in result.describe()
     assert ("held out with each" in result.describe()) == (folds != "run")
     assert set(table["observables"].values.tolist()) == {"none", "powers"}
-    steps, first = 15 * PERIOD, spec.input_delays
+    steps, first = 15 * PERIOD, spec.input_delays + centre
     for trial in range(0, table.sizes["trial"], 4):
         row, found = table.isel(trial=trial), []
         chosen = (powers,) if row["observables"] == "powers" else ()

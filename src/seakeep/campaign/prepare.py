@@ -189,15 +189,13 @@ class Campaign:
         """SHA-256 of all files on which a prepared run depends, through period and clocks too."""
         settings = self.settings
         pooled = settings.instruments.pool_drift and bool(self._run(name).files)
-        names = dict.fromkeys([name, *(self.runs if pooled or self._measures_period else [])])
-        return hashlib.sha256(" ".join(map(self._sum_of, names)).encode()).hexdigest()
-
-    def _sum_of(self, name: str) -> str:
-        """Checksum of a run's files, or a word where one is not there or cannot be read."""
-        try:
-            return self.checksum_of(name)
-        except (MissingFileError, OSError):
-            return "unreadable"
+        sums = []
+        for each in dict.fromkeys([name, *(self.runs if pooled or self._measures_period else [])]):
+            try:
+                sums.append(self.checksum_of(each))
+            except (MissingFileError, OSError):
+                sums.append("unreadable")
+        return hashlib.sha256(" ".join(sums).encode()).hexdigest()
 
     def _run(self, name: str) -> RunSettings:
         runs = self.settings.runs

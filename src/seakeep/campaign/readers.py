@@ -203,24 +203,19 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
         return name, check_order(np.arange(count) / float(rate or 1.0), str(path))
     if name in table.faults:
         raise DataError(table.faults[name])
-    unit = time_unit_of(table, name, options.time_unit)
+    stated, said = options.time_unit, _said_unit(table, name)
+    unit = time_unit_of(table, name, stated)
     factor = conversion(unit, "s", f"the time column '{name}' of {path}")
-    _refuse_other_unit(path, table, name, options.time_unit)
+    if stated and is_unit(said) and si_unit(said) == "s" and not same_unit(said, stated):
+        raise RequestError(
+            f"time_unit: '{stated}' is stated, and {path} says '{said}' for its time column "
+            f"'{name}'. Leave time_unit out where the files say it; or, if the file is wrong, "
+            "correct its header, or leave time and time_unit out and state sampling_rate (Hz) in "
+            "[files]."
+        )
     times = table.values[name] * factor
     _refuse_stuck_clock(path, times, [x for each, x in table.values.items() if each != name])
     return name, check_order(times, str(path))
-
-
-def _refuse_other_unit(path: Path, table: Columns, name: str, stated: str | None) -> None:
-    """Refuse a unit of the times that is stated against the one in the file's header."""
-    said = _said_unit(table, name)
-    if stated is None or not is_unit(said) or si_unit(said) != "s" or same_unit(said, stated):
-        return
-    raise RequestError(
-        f"time_unit: '{stated}' is stated, and {path} says '{said}' for its time column '{name}'. "
-        "Leave time_unit out where the files say it; or, if the file is wrong, correct its header, "
-        "or leave time and time_unit out and state sampling_rate (Hz) in [files]."
-    )
 
 
 def _refuse_stuck_clock(path: Path, times: FloatArray, others: Sequence[FloatArray]) -> None:

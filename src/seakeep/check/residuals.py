@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
     FreeRun,
     Known,
@@ -31,9 +31,7 @@ AGES = 15
 """Encounter periods over which a forecast grows old."""
 
 
-def residuals(
-    model: Model, runs: Mapping[str, xr.Dataset], free: Known | None = None
-) -> xr.Dataset:
+def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dataset:
     r"""Test the errors of one step, and say where and when those of free runs arise.
 
     Parameters

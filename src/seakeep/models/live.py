@@ -172,6 +172,7 @@ class Live:
         noise: Mapping[str, float] | None = None,
         roles: Mapping[str, str] | None = None,
     ) -> None:
+        model.signature.check_fixed()
         if errors is None:
             raise RequestError(
                 "the model holds no errors of its training, from which a live model takes its "
@@ -180,7 +181,6 @@ class Live:
             )
         self.model, self.signature, self.errors = model, model.signature, errors
         signature = self.signature
-        signature.check_fixed()
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
         self._roles = _roles(signature, roles)
@@ -653,10 +653,11 @@ class Live:
             the forecast, it is at least that. ``std`` holds the errors of free runs in training,
             those of the estimate, the spread of the members and that of the waves that are not
             known. Where waves are predicted, the mean tends to that of training as ``std`` comes
-            near the SD there, and ``std`` to that SD, so that no lead errs more than the mean. Where waves or mean surge of
-            late lie outside the training, the errors are raised to those of late and by the square
-            of the height; where the consistency of a state exceeds two, its errors are raised by
-            it, and its lead time shrinks. ``attrs["validity"]`` names what lies outside
+            near the SD there, and ``std`` to that SD, so that no lead errs more than the mean. Where
+            waves or mean surge of late lie outside the training, the errors are raised to those of
+            late and by the square of the height; where the consistency of a state exceeds two, its
+            errors are raised by it, and its lead time shrinks. ``attrs["validity"]`` names what
+            lies outside
             (:class:`seakeep.models.validity.Validity`), beside the numbers and ``trained_`` ones;
             ``attrs["consistency"]`` is the larger one of each state, at least one.
             ``attrs["predictable"]`` is the time for which

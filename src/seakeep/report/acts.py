@@ -190,7 +190,7 @@ def _trend(paper: Evidence, raw: Evidence) -> Judged:
 
 
 def _any_length(paper: Evidence, raw: Evidence) -> Judged:
-    period = float(paper.result.attrs["encounter_period"])
+    period = paper.result.encounter_period
     length = float(paper.result.tests["irregular"]["time"].values[-1])
     return f"{length / period:.0f} T̂ were forecast, as in the paper", None
 
@@ -302,12 +302,11 @@ def _load_band(paper: Evidence, raw: Evidence) -> Judged:
 
 
 def _slow_loads(paper: Evidence, raw: Evidence) -> Judged:
-    test, attrs = raw.result.tests["irregular"].sel(channel=list(LOADS)), raw.result.attrs
-    split = float(raw.result.settings["statistics"]["split_period"])
-    frequency = 1 / (split * float(attrs["encounter_period"]))
+    result, split = raw.result, float(raw.result.settings["statistics"]["split_period"])
+    test = result.tests["irregular"].sel(channel=list(LOADS))
     forecasts = test["mean"].sel(model=ENSEMBLE).values[raw.order]
     measured, forecast = (
-        split_bands(values, float(attrs["dt"]), frequency)[0]
+        split_bands(values, result.dt, 1 / (split * result.encounter_period))[0]
         for values in (test["measured"].values, forecasts)
     )
     errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)

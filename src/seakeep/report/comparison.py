@@ -16,9 +16,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.conventions import displayed
-from seakeep.files import MARK, replacing, write_netcdf
+from seakeep.files import MARK, replacing, write_netcdf, write_text
 from seakeep.models import HankelEnsemble
 from seakeep.models.forecasts import counted
 from seakeep.report.tables import (
@@ -130,7 +130,7 @@ def _note(at: xr.Dataset) -> str:
     return "; ".join(filter(None, said))
 
 
-def model_blocks(tables: Mapping[str, xr.Dataset]) -> Iterator[Table]:
+def model_blocks(tables: Datasets) -> Iterator[Table]:
     """Several models beside each other, a table of averages and one of channels per run."""
     name, first = next(iter(tables.items()))
     heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
@@ -209,7 +209,7 @@ def write_differences(table: xr.Dataset, path: Path) -> Path:
     return _write(pd.concat(both), ["run", "wave_period", "model"], path)
 
 
-def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
+def write_comparison(tables: Datasets, path: Path) -> Path:
     """Write comparison tables as CSV, a row per run and channel, full precision."""
     frames = [
         table.transpose("run", "channel").to_dataframe().reset_index().assign(model=name)
@@ -219,7 +219,7 @@ def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
     return _write(pd.concat(frames, ignore_index=True), front, path)
 
 
-def write_nowcasts(nowcasts: Mapping[str, xr.Dataset], path: Path) -> Path:
+def write_nowcasts(nowcasts: Datasets, path: Path) -> Path:
     """Write all errors as CSV, a row per model, run, channel and lead, full precision."""
     keys = HEADER.split(",")
     frames = [
@@ -242,7 +242,7 @@ def plain_cells(table: pd.DataFrame) -> pd.DataFrame:
     return table.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell)
 
 
-def nowcast_blocks(nowcasts: Mapping[str, xr.Dataset]) -> Iterator[Table]:
+def nowcast_blocks(nowcasts: Datasets) -> Iterator[Table]:
     """Lead times and errors per channel in service, a table per model and run."""
     for model, of_model in nowcasts.items():
         share, lead = float(of_model.attrs["share"]), of_model["lead"].values
@@ -312,15 +312,14 @@ def look_ahead_words(seconds: float) -> str:
 
 def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
     """Write a forecast as NetCDF, or as CSV with a column per channel, full precision."""
-    with replacing(path) as temporary:
-        if path.suffix == ".nc":
+    if path.suffix == ".nc":
+        with replacing(path) as temporary:
             write_netcdf(temporary, forecast.assign_attrs({MARK: "forecast"}))
-        else:
-            # Instants are multiples of a step; nine decimals hide the rounding of the product.
-            time = pd.Index(forecast["time"].values.round(9), name="time [s]")
-            text = pd.DataFrame(_columns(forecast), index=time).to_csv(lineterminator="\n")
-            header, rows = text.split("\n", 1)
-            temporary.write_text(f"{header}\r\n{rows}", encoding="utf-8", newline="")
+        return path
+    # Instants are multiples of a step; nine decimals hide the rounding of the product.
+    time = pd.Index(forecast["time"].values.round(9), name="time [s]")
+    text = pd.DataFrame(_columns(forecast), index=time).to_csv(lineterminator="\n")
+    write_text(path, text.replace("\n", "\r\n", 1))
     return path
 
 

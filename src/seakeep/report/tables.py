@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.files import replacing
+from seakeep.files import replacing, write_text
 
 if TYPE_CHECKING:
     from rich.console import JustifyMethod
@@ -465,8 +465,7 @@ def write_latex(table: Table, path: Path) -> Path:
         lines = [r"\begin{table}", r"\centering\small", caption, label]
         lines += [rf"\begin{{tabular}}{{{form}}}", *head, *body, r"\bottomrule"]
         lines += [r"\end{tabular}", r"\end{table}", ""]
-    with replacing(path) as temporary:
-        temporary.write_text("\n".join(lines), encoding="utf-8")
+    write_text(path, "\n".join(lines))
     return path
 
 

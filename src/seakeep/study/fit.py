@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Progress
+from seakeep.arrays import Datasets, Progress
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, warn
@@ -30,9 +30,7 @@ MAPS = {"alignment", "lead", "observables"}
 """Settings that say how measured inputs drive a model."""
 
 
-def training_runs(
-    prepared: Mapping[str, xr.Dataset], window: int | None = None
-) -> dict[str, xr.Dataset]:
+def training_runs(prepared: Datasets, window: int | None = None) -> dict[str, xr.Dataset]:
     """Parts of prepared runs that train.
 
     Parameters
@@ -189,7 +187,7 @@ def fit_baselines(
     states: Sequence[str],
     inputs: Sequence[str],
     progress: Progress | None = None,
-    prepared: Mapping[str, xr.Dataset] | None = None,
+    prepared: Datasets | None = None,
     *,
     beside: Model | None = None,
 ) -> dict[str, Model]:
@@ -259,7 +257,7 @@ def warn_of_waves(model: Model, run: xr.Dataset, name: str, start: float, steps:
         warn(f"{name}: {text}. Train in such waves too: errors may be large.")
 
 
-def _warn_of_slow_model(model: Model, runs: Mapping[str, xr.Dataset]) -> None:
+def _warn_of_slow_model(model: Model, runs: Datasets) -> None:
     """Warn of slow motions that the training windows of a model hold fewer than five periods of."""
     spans = model.training_spans
     first = runs[next(iter(spans))]
@@ -349,7 +347,7 @@ class Repeat:
 
 
 def find_repeat(
-    inputs: Sequence[str], pieces: Mapping[str, xr.Dataset], name: str, test: xr.Dataset, dt: float
+    inputs: Sequence[str], pieces: Datasets, name: str, test: xr.Dataset, dt: float
 ) -> Repeat | None:
     """Look for the first input of a test part that repeats what the training pieces hold."""
     for channel in inputs:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.report.style import (
     COLOURS,
     DASHED,
@@ -186,7 +186,7 @@ def error_over_time_figure(result: StudyResult) -> Figure:
     grid = figure.subplots(len(tests), len(BAND_WORDS), squeeze=False, sharey="row")
     for row, test in zip(grid, tests, strict=True):
         trend = result.groups["statistics/trend"].sel(test=test)
-        time = trend["time"].values / float(result.attrs["encounter_period"])
+        time = trend["time"].values / result.encounter_period
         tallest = float(trend["error_mean"].sel(model=models).max())
         for axes, (band, words) in zip(row, BAND_WORDS.items(), strict=True):
             for model, line in lines.items():
@@ -260,13 +260,13 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
             "label": model_words(model),
         }
         plane.scatter(values.real, values.imag, **style)
-        frequency = np.angle(values) / (2 * np.pi * float(result.attrs["dt"]))
+        frequency = np.angle(values) / (2 * np.pi * result.dt)
         decay.scatter(frequency, np.abs(values), **style)
     plane.set(aspect="equal", ylim=(0, 1.05), xticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
     plane.set(xlabel="real part", ylabel="imaginary part")
     decay.axhline(1.0, color=PALETTE["slate"], linewidth=0.8)
     decay.set(xlabel="frequency [Hz]", ylabel="modulus", ylim=(LOWEST, 1.01))
-    decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
+    decay.set_xlim(0, 3 / result.encounter_period)
     legend = legend_outside(figure, decay, side="upper right", markerscale=2)
     for handle in filter(None, legend.legend_handles):
         handle.set_alpha(0.9)
@@ -336,7 +336,7 @@ def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Seque
 
 
 @figure_style()
-def nowcast_figure(nowcasts: Mapping[str, xr.Dataset], run: str) -> Figure:
+def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
     """Error, and the model's own estimate of it, against lead time, a panel per channel."""
     first = next(iter(nowcasts.values()))
     names, share = list(map(str, first["channel"].values)), float(first.attrs["share"])

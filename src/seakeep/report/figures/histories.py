@@ -411,7 +411,7 @@ def _draw_channel(
     calibration: xr.Dataset | None = None,
 ) -> None:
     """Draw what was measured and the forecasts of all models but baselines."""
-    level = 100 * float(result.settings["statistics"]["level"])
+    level = 100 * result.level
     at = cell.isel(training=0, window=0).sel(channel=name)
     curves = []
     for model in judged_models(result):
@@ -428,7 +428,7 @@ def _draw_channel(
             wider = wider if np.isfinite(wider).all() else []
         title = f"{words} mean"
         curves.append(Curve(title, line, _standard(at, mean), band, f"{level:g} % band", wider))
-    time = cell["time"].values / float(result.attrs["encounter_period"])
+    time = cell["time"].values / result.encounter_period
     draw_history(axes, time, _standard(at, at["measured"]), curves)
     axes.set_ylabel(short_label(name), rotation=0, ha="right", va="center")
     axes.margins(x=0.005)

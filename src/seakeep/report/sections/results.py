@@ -82,7 +82,7 @@ def summary(result: StudyResult) -> Section:
 
 def _tested(result: StudyResult) -> str:
     """What was tested, in one sentence or two."""
-    period = float(result.attrs["encounter_period"])
+    period = result.encounter_period
     sets = result.groups["training"].sizes["training"]
     seas = [
         f"{result.label_of(test)} ({data.sizes['window']} windows of "
@@ -202,7 +202,7 @@ def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure
 
 def _coverage_findings(result: StudyResult, model: str) -> list[str]:
     first = next(iter(result.tests))
-    level = float(result.settings["statistics"]["level"])
+    level = result.level
     at = {"test": first, "model": model, "against": "measured", "channel": "average"}
     row = result.groups["statistics/coverage"].sel(at)
     inside = float(row["inside"].sel(band="members"))
@@ -286,7 +286,7 @@ def glossary(result: StudyResult) -> Section:
     slap = any("truth" in data for data in result.tests.values())
     left_out = {"λ/L": not regular, "slap": not slap}
     values = {
-        "period": float(result.attrs["encounter_period"]),
+        "period": result.encounter_period,
         "same": same * regular,
         "symbols": explained + ". M is a mooring load, a force in N." * loads,
     }
@@ -421,7 +421,7 @@ def _test_of(result: StudyResult, at: xr.Dataset) -> str:
 def bands(result: StudyResult) -> Section:
     """Return coverage and scores of bands by wave height, horizon and channel."""
     groups, tables = result.groups.get("statistics/bands", xr.Dataset()), []
-    level = short(100 * float(result.settings["statistics"]["level"]))
+    level = short(100 * result.level)
     for model in filter(result.is_ensemble, result.models if groups else ()):
         for at in entries(groups.sel(model=model), "band"):
             at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
@@ -480,7 +480,7 @@ def age(result: StudyResult) -> Section:
         )
         for at in entries(trend, "test", "band", "model")
     ]
-    seconds = split * float(result.attrs["encounter_period"])
+    seconds = split * result.encounter_period
     return section(
         "time",
         drawing("error_over_time", error_over_time_figure, result, split=split),
@@ -510,7 +510,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
             yield beside(*at["inside"], form=two) if true else two(*at["inside"])
             yield two(at["relative_width"].sel(against="measured"))
 
-    level = float(result.settings["statistics"]["level"])
+    level = result.level
     more = _calibrated_words(result, model, level) if calibrated else ""
     if true:
         more += (
