@@ -653,7 +653,7 @@ class Live:
             the forecast, it is at least that. ``std`` holds the errors of free runs in training,
             those of the estimate, the spread of the members and that of the waves that are not
             known. Where waves are predicted, the mean tends to that of training as ``std`` comes
-            near the SD there, and ``std`` to that SD, so that no lead errs more than the mean. Where
+            near the SD there, and ``std`` to that, so that no lead errs more than the mean. Where
             waves or mean surge of late lie outside the training, the errors are raised to those of
             late and by the square of the height; where the consistency of a state exceeds two, its
             errors are raised by it, and its lead time shrinks. ``attrs["validity"]`` names what
