@@ -16,7 +16,7 @@ from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import expanded, sha256_of
-from seakeep.formats import Columns, is_recording_folder, read_columns
+from seakeep.formats import Columns, folder_reader, read_columns
 from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
 from seakeep.signals.time_axis import check_order, instant_text
 
@@ -61,7 +61,7 @@ def expand(file: str, folder: Path) -> Path:
 
 def checksum(path: Path) -> str:
     """SHA-256 of a file, or of the names and contents of the files in a bag's folder."""
-    if not is_recording_folder(path):
+    if folder_reader(path) is None:
         return sha256_of(path)
     digest = hashlib.sha256()
     for part in sorted(each for each in path.iterdir() if each.is_file()):
