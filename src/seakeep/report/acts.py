@@ -21,7 +21,16 @@ from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.results import divergence_table
 from seakeep.report.style import HEADING, model_words
-from seakeep.report.tables import Interval, Number, Table, number, numbers, table, words
+from seakeep.report.tables import (
+    Interval,
+    Number,
+    Table,
+    number,
+    numbers,
+    ratio_of,
+    table,
+    words,
+)
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -36,7 +45,6 @@ from seakeep.study.judge import (
 from seakeep.study.plan import random_stream
 from seakeep.study.reproduce import ACTS, NOTE, SLOW, Act
 
-BOUNDS = ("change", "lower", "upper")
 Results = Mapping[str, StudyResult]
 Statistic = Callable[..., FloatArray]
 Judged = tuple[str, bool | None]
@@ -182,8 +190,7 @@ def _trend(paper: Evidence, raw: Evidence) -> Judged:
     growths = []
     for act in (paper, raw):
         at = act.result.groups["statistics/trend"].sel(test="irregular", band="all")
-        each = np.stack([at[key].sel(model=[SINGLE, ENSEMBLE]) for key in BOUNDS], axis=1)
-        growths.append([Interval(*(1.0 + row)) for row in each])
+        growths.append([ratio_of(at.sel(model=model)) for model in (SINGLE, ENSEMBLE)])
     texts = (" and ".join(each.change() for each in of_act) for of_act in growths)
     within = [v for e in growths[0] for v in (e.below(1 + AGED), opposite(e.below(1 - AGED)))]
     return "{}; act (b): {}".format(*texts), all_of(within)
@@ -547,8 +554,7 @@ def against_filter(results: Results) -> str:
             .groups["statistics/differences"]
             .sel(test=SEA[0], model=SINGLE, other="fir", measure="nrmse", channel="average")
         )
-        ratio = Interval(*(1.0 + float(at[key]) for key in ("change", "lower", "upper")))
-        parts.append(f"{ratio.change()} in {act.letter}")
+        parts.append(f"{ratio_of(at).change()} in {act.letter}")
     return (
         "From the filter with the same data, look-ahead and input map (FIR, its length and λ "
         "chosen by validation) to the single model, the median error there changes by "

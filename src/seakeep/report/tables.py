@@ -307,6 +307,11 @@ class Interval(NamedTuple):
         return self.text(0, " %", 100.0)
 
 
+def ratio_of(at: xr.Dataset, prefix: str = "") -> Interval:
+    """An error over another one, of an entry that holds its ``change`` with bounds."""
+    return Interval(*(1.0 + float(at[f"{prefix}{key}"]) for key in ("change", "lower", "upper")))
+
+
 def uncertain(value: SupportsFloat, uncertainty: SupportsFloat) -> Number:
     """Text of a value ± its uncertainty, which has two digits, and the value as many decimals.
 

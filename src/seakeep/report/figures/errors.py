@@ -27,7 +27,7 @@ from seakeep.report.style import (
     plain_text,
     short_label,
 )
-from seakeep.report.tables import Interval, Number, signed
+from seakeep.report.tables import ratio_of
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
 
@@ -193,7 +193,7 @@ def error_over_time_figure(result: StudyResult) -> Figure:
                 at = trend.sel(band=band, model=model)
                 quartiles = (at[f"{side}_quartile"] for side in ("lower", "upper"))
                 axes.fill_between(time, *quartiles, color=line["color"], alpha=0.15, linewidth=0)
-                label = f"{model_words(model)}, growth {growth_text(at)}"
+                label = f"{model_words(model)}, growth {ratio_of(at).change()}"
                 axes.plot(time, at["error_mean"], label=label, **line)
             axes.set_title(words, loc="left", fontsize=8)
             axes.legend(fontsize=6.5, loc="upper left")
@@ -202,12 +202,6 @@ def error_over_time_figure(result: StudyResult) -> Figure:
     for axes in grid[-1]:
         axes.set_xlabel("time in encounter periods")
     return figure
-
-
-def growth_text(at: xr.Dataset) -> Number:
-    """Change of ε(t) over the window with its interval, where there is one, in percent."""
-    change = Interval(*(float(at[key]) for key in ("change", "lower", "upper")))
-    return change.text(signed, " %", 100.0)
 
 
 @figure_style()

@@ -20,7 +20,6 @@ from seakeep.report.figures.errors import (
     density_figure,
     eigenvalue_figure,
     error_over_time_figure,
-    growth_text,
 )
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Section, drawing, section
@@ -36,6 +35,7 @@ from seakeep.report.tables import (
     number,
     numbers,
     percent,
+    ratio_of,
     row,
     short,
     signed,
@@ -188,7 +188,7 @@ def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure
     at = result.groups["statistics/differences"].sel(
         test=test, model=ensemble, other=single, measure=measure, channel="average"
     )
-    change, *bounds = (100 * float(at[key]) for key in ("change", "lower", "upper"))
+    change, *bounds = (100 * (each - 1) for each in ratio_of(at))
     if not np.isfinite(change):
         return ""
     outcome = "as good" if np.abs(bounds).max() < 0.5 else verdict(*bounds)
@@ -476,7 +476,7 @@ def age(result: StudyResult) -> Section:
             BAND_WORDS[str(at["band"].values)],
             _model_of(at),
             number(at["error_mean"].mean()),
-            growth_text(at),
+            ratio_of(at).change(),
         )
         for at in entries(trend, "test", "band", "model")
     ]
