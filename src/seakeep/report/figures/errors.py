@@ -241,8 +241,8 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
     plane, decay = figure.subplots(1, 2)
     circle = np.exp(1j * np.linspace(0, np.pi, 400))
     plane.plot(circle.real, circle.imag, color=PALETTE["slate"], linewidth=0.8)
-    for model in sorted(judged_models(result), key=lambda model: not result.is_ensemble(model)):
-        data, single = result.groups[f"eigenvalues/{model}"], not result.is_ensemble(model)
+    for model in sorted(judged_models(result), key=lambda model: model not in result.ensembles):
+        data, single = result.groups[f"eigenvalues/{model}"], model not in result.ensembles
         values = (data["real"].values + 1j * data["imag"].values).ravel()
         values = values[np.isfinite(values) & (values.imag >= 0)]
         style = {

@@ -416,7 +416,7 @@ def _draw_channel(
     curves = []
     for model in judged_models(result):
         mean, words, line = at["mean"].sel(model=model), model_words(model), line_of(result, model)
-        if not result.is_ensemble(model):
+        if model not in result.ensembles:
             curves.append(Curve(words, line, _standard(at, mean)))
             continue
         band = [_standard(at, at[side].sel(ensemble=model)) for side in ("lower", "upper")]
