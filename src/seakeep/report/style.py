@@ -98,7 +98,8 @@ _WITH_PREFIX = ("N", "N m", "Pa", "W")
 
 _RC: Any = {
     "font.size": 9,
-    "axes.titlesize": 10,
+    "axes.titlesize": 8,
+    "axes.titlelocation": "left",
     "axes.labelsize": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,

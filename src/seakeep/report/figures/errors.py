@@ -195,7 +195,7 @@ def error_over_time_figure(result: StudyResult) -> Figure:
                 axes.fill_between(time, *quartiles, color=line["color"], alpha=0.15, linewidth=0)
                 label = f"{model_words(model)}, growth {ratio_of(at).change()}"
                 axes.plot(time, at["error_mean"], label=label, **line)
-            axes.set_title(words, loc="left", fontsize=8)
+            axes.set_title(words)
             axes.legend(fontsize=6.5, loc="upper left")
         row[0].set_ylim(0, 1.6 * tallest if tallest > 0 else None)
         row[0].set_ylabel(f"{result.label_of(test)}\nε [measured SD]")
@@ -225,7 +225,7 @@ def density_figure(result: StudyResult, model: str) -> Figure:
             z = (x - centre) / spread
             axes.fill_between(z, lower, upper, color=tint, alpha=0.22, linewidth=0)
             axes.plot(z, mean, color=tint, linestyle=dash, linewidth=1.3, label=words)
-        axes.set_title(short_label(name), loc="left", pad=2)
+        axes.set_title(short_label(name), fontsize=10, pad=2)
         axes.set_yticks([])
         axes.set_ylim(bottom=0)
         axes.set_xlabel("measured SD from the mean", fontsize=7)
@@ -343,7 +343,7 @@ def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
             claimed = {"color": style["color"], "linewidth": 0.7, "alpha": 0.7}
             axes.plot(at["lead"], at["claimed"], **claimed, label=f"{model}: claimed")
         axes.axhline(share, color="0.4", linewidth=0.8, linestyle=":", label=f"{share:g} SD")
-        axes.set_title(short_label(name), loc="left", fontsize=8)
+        axes.set_title(short_label(name))
         axes.set(xlim=(0, float(first["lead"].max())), xlabel="lead time [s]")
         axes.set_ylim(bottom=0)
         if axes.get_subplotspec().is_first_col():

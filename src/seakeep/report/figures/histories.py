@@ -176,9 +176,9 @@ def overlay_figure(comparison: Comparison | Mapping[str, Comparison]) -> Figure:
     for each in axes[-1]:
         each.set_xlabel("time [s]")
     if period is not None:
-        axes[0, 0].set_title("whole forecast, envelopes", loc="left")
+        axes[0, 0].set_title("whole forecast, envelopes", fontsize=10)
         axes[0, 1].set_xlim(time[-1] - ENLARGED * period, time[-1])
-        axes[0, 1].set_title(f"last {ENLARGED} periods", loc="left")
+        axes[0, 1].set_title(f"last {ENLARGED} periods", fontsize=10)
     legend_outside(figure, *axes[0])
     figure.suptitle(_title(compared), x=0.01, ha="left")
     return figure
@@ -399,7 +399,7 @@ def history_figure(
     run, learnt, start = (cell[key].item() for key in ("run", "training", "start"))
     left_out = str(result.groups["training"]["left_out"].values[training])
     title = f"{run}, from {start:.1f} s; trained {'' if left_out else 'on '}{learnt}"
-    axes[0].set_title(title, loc="left", fontsize=8)
+    axes[0].set_title(title)
     return figure
 
 
@@ -451,7 +451,7 @@ def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
         training = int(test["judged"].values[:, 0].argmax())
         for axes, name in zip(row, CHANNELS, strict=True):
             _draw_channel(axes, result, test.isel(training=[training], window=[0]), name)
-            axes.set_title(f"{act.title}: {name}", loc="left", fontsize=8)
+            axes.set_title(f"{act.title}: {name}")
     for axes in grid[-1]:
         axes.set_xlabel("time after the last measured state, in encounter periods")
     legend_outside(figure, grid[0, 0], side="upper right")
