@@ -39,7 +39,7 @@ from seakeep.report.style import (
     shown_unit,
 )
 from seakeep.signals import encounter_period
-from seakeep.signals.time_axis import over_gaps
+from seakeep.signals.time_axis import over_gaps, usual_step
 from seakeep.study import Comparison, StudyResult, comparison_table
 from seakeep.study.judge import band_of
 from seakeep.study.reproduce import ACTS
@@ -233,7 +233,7 @@ def _period_if_long(comparison: Comparison) -> float | None:
     waves = [each for name, each in inputs.data_vars.items() if is_elevation(str(name))]
     series = [*waves, *comparison.measured.data_vars.values()][0]
     time = series["time"].values
-    dt = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    dt = usual_step(time) if time.size > 1 else 0.0
     try:
         period = encounter_period(series.values, dt)
     except DataError:
