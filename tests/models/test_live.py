@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from drifting import INPUTS, STATES, drifting_run
+from ensembles import few
 from scipy import signal, stats
 from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -55,16 +56,7 @@ def models(runs):
 
 @pytest.fixture(scope="module")
 def ensemble(runs):
-    return seakeep.BayesianHankelDMDc(
-        encounter_period=1.6,
-        window=None,
-        state_delays=seakeep.Uniform("0.2 T", "0.6 T"),
-        input_delays=seakeep.Uniform("0.5 T", "1.5 T"),
-        ridge=seakeep.Uniform(1, 10),
-        n_members=4,
-        delay_rows="exact",
-        lead=6,
-    ).fit(runs, STATES, INPUTS)
+    return few(lead=6).fit(runs, STATES, INPUTS)
 
 
 def matrix(run, names):

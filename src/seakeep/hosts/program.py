@@ -36,6 +36,7 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
         If the model is an ensemble or another kind, is driven by waves that are carried to a
         measured surge, or has an observable without terms.
     """
+    model.signature.check_fixed()
     if follows and (is_ensemble(model) or (is_linear(model) and model.errors is None)):
         raise RequestError(
             "an estimator is one model and its errors in training, and an ensemble keeps those of "
@@ -58,7 +59,6 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             f"the model varies with {model.signature.parameter}. Export it at a value: in Python, "
             "model.at(parameter=…)."
         )
-    model.signature.check_fixed()
     input_map = model.signature.input_map
     aligned, observed = input_map.alignment, input_map.observed
     if input_map.follows is None and aligned is not None and aligned.settings.carries:

@@ -18,7 +18,7 @@ import json
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 import scipy
@@ -88,48 +88,19 @@ class Draw:
         return 0 if self.settings.window is None else end - self.needed(input_map)
 
 
-class Drawn(Protocol):
-    """Priors, seed and rules that make the draws; see :class:`seakeep.BayesianHankelDMDc`."""
-
-    @property
-    def n_members(self) -> int:
-        """Number of draws."""
-
-    @property
-    def sampling(self) -> Sampling:
-        """How priors are drawn from."""
-
-    @property
-    def train_on(self) -> TrainOn:
-        """Runs that a member learns from."""
-
-    @property
-    def seed_sequence(self) -> np.random.SeedSequence:
-        """Source of all random numbers."""
-
-    def at(self, name: str, q: float) -> float | None:
-        """Quantile of a prior."""
-
-    def samples(self, name: str, value: float, dt: float) -> int:
-        """A drawn length in samples."""
-
-    def shared(self, dt: float) -> HankelSettings:
-        """Settings that all members have."""
-
-
 def child(seed: np.random.SeedSequence, member: int) -> np.random.Generator:
     """Generator of a member: the child of `seed` with its number, without changing `seed`."""
     key = (*seed.spawn_key, member)
     return np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=key))
 
 
-def draw_members(spec: Drawn, dt: float, samples: Sequence[int], input_map: InputMap) -> list[Draw]:
+def draw_members(spec: Any, dt: float, samples: Sequence[int], input_map: InputMap) -> list[Draw]:
     """Draw the settings of all members.
 
     Parameters
     ----------
     spec : BayesianHankelDMDc
-        Priors, seed and rules.
+        Priors, seed and rules; imports of its room run the other way.
     dt : float
         Time step, s.
     samples : sequence of int
@@ -161,7 +132,7 @@ def draw_members(spec: Drawn, dt: float, samples: Sequence[int], input_map: Inpu
 
 
 def _draw_member(
-    spec: Drawn,
+    spec: Any,
     shared: HankelSettings,
     dt: float,
     samples: Sequence[int],

@@ -118,7 +118,7 @@ class InputMap:
         first = min(span.first - back, span.known - before)
         if self.observed is None and self.follows is None:
             first = span.first + self.lead
-        return Span(first - max(self.reference - 1, 0), span.known, span.stop + ahead)
+        return Span(first - self.reference, span.known, span.stop + ahead)
 
     def history(self, input_delays: int) -> int:
         """Samples of input before the start that a forecast with these delays reads."""

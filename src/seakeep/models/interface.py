@@ -117,7 +117,7 @@ class Signature:
         follows, reference = self.input_map.follows, self.input_map.reference
         where = 0
         if follows is not None:
-            where = max(self.input_delays, reference - 1) + follows.place.taps.size
+            where = max(self.input_delays, reference) + follows.place.taps.size
         return max(self.state_delays + 1, reference, where)
 
     @property

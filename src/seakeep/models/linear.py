@@ -51,7 +51,8 @@ class HankelDMDcModel(Model):
     coverage : Coverage
         Waves that it was trained in.
     learnt : (TrainingData, runs) or LeadErrors, optional
-        What it was fitted to, or its errors there; a member of an ensemble has neither.
+        What it was fitted to, or its errors there; a member of an ensemble has neither, nor has a
+        model of departures from the means before each start.
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
     variation : Variation, optional
@@ -86,7 +87,7 @@ class HankelDMDcModel(Model):
             signature=replace(signature, readouts=readouts),
             training=data.training(solution),
             coverage=Coverage.of(signature.inputs, data.inputs, signature.dt),
-            learnt=(data, runs),
+            learnt=None if signature.input_map.reference else (data, runs),
         )
 
     def __post_init__(self) -> None:

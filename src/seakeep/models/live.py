@@ -172,6 +172,7 @@ class Live:
         noise: Mapping[str, float] | None = None,
         roles: Mapping[str, str] | None = None,
     ) -> None:
+        model.signature.check_fixed()
         if errors is None:
             raise RequestError(
                 "the model holds no errors of its training, from which a live model takes its "
@@ -180,7 +181,6 @@ class Live:
             )
         self.model, self.signature, self.errors = model, model.signature, errors
         signature = self.signature
-        signature.check_fixed()
         self._rig = _rig(signature, like)
         self._noise = _noise(signature, noise)
         self._roles = _roles(signature, roles)

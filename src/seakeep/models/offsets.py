@@ -153,23 +153,17 @@ def _half_wavelengths(model: HankelDMDcModel, part: xr.Dataset) -> tuple[float, 
 
 def _errors(model: HankelDMDcModel, part: xr.Dataset, distance: float) -> FloatArray:
     """Squared error over variance at each instant, mean over the states."""
-    time = part["time"].values
-    start = float(time[model.history_samples - 1])
-    run = part.assign_attrs(probe_offset=float(distance))
+    run, name = part.assign_attrs(probe_offset=float(distance)), labelled.run_name(part, "the run")
+    at = model.history_samples - 1
     # The last step reads the input `lead_samples` after the instant that it starts from.
-    steps = time.size - model.history_samples - max(model.lead_samples - 1, 0)
-    forecast = model.forecast(run, start=start, steps=steps)
-    measured = part.isel(time=slice(model.history_samples, model.history_samples + steps))
-    squares = [
-        (forecast[name].values - measured[name].values) ** 2 / np.var(measured[name].values)
-        for name in model.states
-    ]
-    out: FloatArray = np.mean(squares, axis=0)
+    steps = part.sizes["time"] - model.history_samples - max(model.lead_samples - 1, 0)
+    (predicted,), (measured,) = model.judged_runs(run, name, [at], steps)
+    out: FloatArray = np.mean((predicted - measured) ** 2 / measured.var(axis=0), axis=1)
     if not np.all(np.isfinite(out)):
         raise DataError(
-            f"the forecast of {labelled.run_name(part, 'the run')} from {start:g} s cannot be "
-            f"judged at an offset of {distance:.3g} m ({forecast.attrs['status']}). Look for a "
-            "constant state, or raise ridge."
+            f"the forecast of {name} from {float(part['time'][at]):g} s cannot be judged at an "
+            f"offset of {distance:.3g} m: it diverges, or a state is constant. Look for a constant "
+            "state, or raise ridge."
         )
     return out
 

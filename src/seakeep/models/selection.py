@@ -285,7 +285,7 @@ class Problem:
     def starts(self, run: int, steps: int) -> IntArray:
         """Samples from which windows end to end are forecast in a run that is held out."""
         window = self.data.windows[run]
-        first = window.first_column + max(self.widest.centre - 1, 0)
+        first = window.first_column + self.widest.centre
         return np.arange(first, window.last - steps + 1, steps)
 
     def folds(self) -> list[int]:

@@ -432,7 +432,7 @@ class HankelSettings:
             delayed += round(BACK * encounter_period / dt)
         return Needs(
             self.window or 1,
-            max(self.state_reach, delayed, *before) + max(self.centre - 1, 0),
+            max(self.state_reach, self.centre + max(delayed, *before)),
             self.history == "inside",
             max(after),
         )

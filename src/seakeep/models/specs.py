@@ -208,14 +208,12 @@ class Choosing(HankelSettings, Generic[Fitted]):
             if self.readouts:
                 central = spec.central(labelled.common_step(named))
                 readouts = readouts_for(central, named, states, inputs)
-            choice = Selected(spec, (), STATED if self.observables else "", readouts)
-        elif selected is not None:
+            model = spec._fitted(named, states, inputs, readouts)
+            return replace(model, selection=STATED if self.observables else "")
+        if selected is not None:
             choice = spec._adopt(selected)
         else:
             choice = spec.settled(named, states, inputs, executor=executor, progress=progress)
-        if not self.is_open:
-            model = choice.settings._fitted(named, states, inputs, choice.readouts)
-            return replace(model, selection=choice.describe())
         for settings, words in self.variants(named, states, inputs, choice.settings):
             model = settings._fitted(named, states, inputs, choice.readouts)
             radius = largest_radius(model) if isinstance(model, HankelDMDcModel) else 0.0
