@@ -202,9 +202,9 @@ def signed(value: SupportsFloat) -> Number:
     return Number(f"+{text}") if text != MISSING and float(text) > 0 else text
 
 
-def percent(part: SupportsFloat, digits: int = 0) -> Number:
+def percent(part: SupportsFloat) -> Number:
     """Text of a part of one, in percent and without the sign."""
-    return number(100 * float(part), digits)
+    return number(100 * float(part), 0)
 
 
 def probability(value: SupportsFloat) -> Number:
