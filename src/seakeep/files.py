@@ -278,8 +278,9 @@ def write_netcdf(
         _write_group(file, dataset)
         for name, group in (groups or {}).items():
             _write_group(file.create_group(name, track_order=True), group)
-    content = buffer.getvalue()
-    path.write_bytes(content + _seal_of(content))
+    content = buffer.getbuffer()
+    with path.open("wb") as sealed:
+        sealed.writelines([content, _seal_of(content)])
 
 
 def _write_group(place: h5py.Group, data: xr.Dataset) -> None:
@@ -344,7 +345,7 @@ def _attributes(of: h5py.HLObject) -> dict[str, Any]:
     return {key: plain(of.attrs[key]) for key in of.attrs if key not in OF_HDF5}
 
 
-def _seal_of(content: bytes) -> bytes:
+def _seal_of(content: memoryview) -> bytes:
     return SEAL + hashlib.sha256(content).hexdigest().encode()
 
 
@@ -371,16 +372,16 @@ def read_sealed(path: Path | str) -> io.BytesIO:
     DataError
         If its checksum is missing or another one.
     """
-    file, length = read_bytes(path), len(SEAL) + hashlib.sha256().digest_size * 2
-    is_sealed = file[-length:].startswith(SEAL)
-    content, stated = (file[:-length], file[-length:]) if is_sealed else (file, b"")
-    if _seal_of(content) != stated:
-        why = "its checksum is another one" if stated else "it has no checksum at its end"
+    file = read_bytes(path)
+    stated = file[-len(SEAL) - hashlib.sha256().digest_size * 2 :]
+    is_sealed = stated.startswith(SEAL)
+    if not is_sealed or _seal_of(memoryview(file)[: -len(stated)]) != stated:
+        why = "its checksum is another one" if is_sealed else "it has no checksum at its end"
         raise DataError(
             f"{path} was cut off, altered or damaged, or seakeep did not write it: {why}. Copy it "
             "again, or remove it and make it anew."
         )
-    return io.BytesIO(content)
+    return io.BytesIO(file)
 
 
 def write_sealed(

@@ -172,17 +172,12 @@ def number(value: float | Length) -> float:
     return value
 
 
-def _children(table: BaseModel) -> Iterator[tuple[str, object]]:
-    yield from ((name, getattr(table, name)) for name in type(table).model_fields)
-    yield from (table.model_extra or {}).items()
-
-
 def lengths(value: object, place: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
     """Places of the keys of a table that hold a :class:`Length`."""
     if isinstance(value, Length):
         yield place
     elif isinstance(value, BaseModel | dict):
-        for name, each in _children(value) if isinstance(value, BaseModel) else value.items():
+        for name, each in value if isinstance(value, BaseModel) else value.items():
             yield from lengths(each, (*place, str(name)))
     elif isinstance(value, tuple) and any(isinstance(each, Length) for each in value):
         yield place
@@ -218,7 +213,7 @@ def _resolved(value: Any, period: float, place: tuple[str, ...]) -> Any:
     if isinstance(value, BaseModel):
         update = {
             name: _resolved(each, period, (*place, name))
-            for name, each in _children(value)
+            for name, each in value
             if any(True for _ in lengths(each))
         }
         return value.model_copy(update=update) if update else value

@@ -79,7 +79,7 @@ from seakeep.signals import (
     uniform_step,
 )
 from seakeep.signals.synchronisation import ASSUMED
-from seakeep.signals.time_axis import instant_text, span_text, stretches
+from seakeep.signals.time_axis import instant_text, span_text, stretches, usual_step
 from seakeep.toml import Length, number
 
 Reader = Callable[[Path, Options], Columns]
@@ -108,7 +108,7 @@ class Logger:
     def uniform(self, wanted: str) -> tuple[FloatArray, FloatArray]:
         """Times and values of a column on a uniform axis, gaps bridged: for clocks only."""
         time, values = onto_uniform(self.time, self.column(wanted), str(self.path))
-        return time, bridge(values, float(np.median(np.diff(time))), np.inf).values
+        return time, bridge(values, usual_step(time), np.inf).values
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,7 +300,7 @@ def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings])
     records: slice | BoolArray = slice(None)
     if run.own.record is not None:
         start, end = (number(edge) for edge in run.own.record)
-        step, whole = float(np.median(np.diff(time))), (float(time[0]), float(time[-1]))
+        step, whole = usual_step(time), (float(time[0]), float(time[-1]))
         slack = step * (1 + 1e-6) if logger.name == next(iter(run.loggers)) else np.inf
         place = f"runs.{run.name}.record"
         records = _part(place, (start, end), time, step, whole, slack)
@@ -379,7 +379,7 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
     if not gapped:
         return
     time, first = data["time"].to_numpy(), missing[gapped[0]]
-    step = float(np.median(np.diff(time)))
+    step = usual_step(time)
 
     def said(gap: tuple[int, int]) -> str:
         count, begin = gap[1] - gap[0], instant_text(time[gap[0]], step)
@@ -426,7 +426,7 @@ def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> x
 
 def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Dataset:
     """Fill gaps, so that filters can run, and flag what was filled and what looks wrong."""
-    step = float(np.median(np.diff(data["time"].to_numpy())))
+    step = usual_step(data["time"].to_numpy())
     longest = preparation.longest_gap if preparation.gaps == "bridge" else 0.0
     for name in list(data.data_vars):
         try:
@@ -526,8 +526,7 @@ def _axis(run: Run, dt: float) -> FloatArray:
     if end <= begin:
         times = {name: each["time"].to_numpy() for name, each in run.groups.items()}
         spans = ", ".join(
-            f"{name} {span_text(t[0], t[-1], float(np.median(np.diff(t))))}"
-            for name, t in times.items()
+            f"{name} {span_text(t[0], t[-1], usual_step(t))}" for name, t in times.items()
         )
         raise DataError(
             f"run '{run.name}': its instruments never recorded together ({spans}, on the "
@@ -671,7 +670,7 @@ def cropped(run: Run) -> Run:
     """Step 8: cut the run to its span; spans that lie outside the record are refused."""
     assert run.data is not None
     data, reference = run.data, run.reference_time
-    dt = float(np.median(np.diff(data["time"].to_numpy())))
+    dt = usual_step(data["time"].to_numpy())
     record = float(reference[0]), float(reference[-1])
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
     slack = max(dt, (record[1] - record[0]) / (reference.size - 1)) * (1 + 1e-6)

@@ -25,13 +25,13 @@ from seakeep.campaign.pipeline import (
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Failures, Survey, spare, survey
-from seakeep.campaign.validation import read_settings
+from seakeep.campaign.validation import cross_checks
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import expanded
 from seakeep.quality import as_json, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.signals.waves import noise_floor
-from seakeep.toml import in_seconds, lengths, parse_length
+from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
 
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
@@ -549,6 +549,7 @@ def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:
         every key at fault, the value received, and the remedy.
     """
     path = expanded(path)
-    settings = read_settings(path)
+    content = read_toml(path, "campaign", " Draft one with 'seakeep init FILE…'.")
+    settings = validated(CampaignSettings, content, path, "campaign", cross_checks)
     preparation = settings.preparation.filtered_as(preset or settings.preset)
     return Campaign(path, settings.model_copy(update={"preparation": preparation}))

@@ -16,9 +16,9 @@ from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import expanded, sha256_of
-from seakeep.formats import Columns, is_recording_folder, read_columns
+from seakeep.formats import Columns, folder_reader, read_columns
 from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
-from seakeep.signals.time_axis import check_order, instant_text
+from seakeep.signals.time_axis import check_order, instant_text, usual_step
 
 _TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "sec", "seconds",
           "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
@@ -61,7 +61,7 @@ def expand(file: str, folder: Path) -> Path:
 
 def checksum(path: Path) -> str:
     """SHA-256 of a file, or of the names and contents of the files in a bag's folder."""
-    if not is_recording_folder(path):
+    if folder_reader(path) is None:
         return sha256_of(path)
     digest = hashlib.sha256()
     for part in sorted(each for each in path.iterdir() if each.is_file()):
@@ -169,7 +169,7 @@ def time_step_of(table: Columns, name: str) -> float | None:
     if times is None or times.size < 3:
         return None
     step = float(times[-1] - times[0]) / (times.size - 1)
-    usual = float(np.median(np.diff(times)))
+    usual = usual_step(times)
     step = step if abs(step - usual) < 0.01 * abs(usual) else usual
     step *= conversion(unit, "s", f"the time column '{name}'") if is_unit(unit) else 1.0
     return step if step > 0 else None

@@ -107,7 +107,7 @@ def used_parts(model: Model, runs: Datasets) -> dict[str, Part]:
     parts = {}
     for name, run in runs.items():
         check_step(run, name, model.dt)
-        time = np.asarray(run["time"].values, dtype=float)
+        time = run["time"].values
         states = channel_matrix(run, model.states, name)
         try:
             aligned = model.aligned_inputs(run) if is_linear(model) else run
@@ -258,7 +258,7 @@ def samples_in(
     Before the waves have come to the probes and the vessel among the channels `names`, a constant
     is as good a forecast as any.
     """
-    time = np.asarray(run["time"].values, dtype=float)
+    time = run["time"].values
     last = int(np.searchsorted(time, float(span[1]) + 0.5 * dt)) - 1
     # The last step reads the input `lead` samples after the instant that it starts from.
     last = min(last, time.size - max(lead, 1))
@@ -272,7 +272,7 @@ def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
     """Sample at which waves have come to each probe, and each motion has begun."""
     begins = [0]
     for name in (each for each in names if is_elevation(each) or each in MOTIONS):
-        series = np.asarray(run[name].values, dtype=float)
+        series = run[name].values
         if np.isfinite(series).all() and np.ptp(series):
             begins.append(first_wave(series, name in MOTIONS))
     return max(begins)
@@ -281,7 +281,7 @@ def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
 def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:
     if like is None:
         at, last = window_of(model, run)
-        time = np.asarray(run["time"].values, dtype=float)
+        time = run["time"].values
         measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
         empty = np.full_like(measured, np.nan)
         like = FreeRun(float(time[at]), time[at + 1 : last + 1], empty, measured)

@@ -135,7 +135,7 @@ def _one_step(
 def _aged(model: Model, run: xr.Dataset, name: str, lags: int) -> FloatArray:
     """Squared errors over the time since each of several starts, (window, steps, N)."""
     first, last = window_of(model, run)
-    time = np.asarray(run["time"].values, dtype=float)
+    time = run["time"].values
     count = min(AGES * lags, last - first)
     starts = np.arange(first, last - count + 1, lags)
     forecasts = free_windows(model, run, time[starts], count)

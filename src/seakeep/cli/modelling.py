@@ -309,6 +309,21 @@ def export(
         int | None,
         Option(help="For an ensemble: the member to export, from 0.", min=0),
     ] = None,
+    noise: Annotated[
+        list[str] | None,
+        Option(
+            help="For an estimator: measurement noise of a state, SD in its unit (repeatable).",
+            metavar="STATE=SD",
+        ),
+    ] = None,
+    role: Annotated[
+        list[str] | None,
+        Option(
+            help="For an estimator: an input that is no wave (repeatable): a plan that is known, "
+            "or constant.",
+            metavar="INPUT=known|constant",
+        ),
+    ] = None,
 ) -> None:
     """Write a model for another host: C, FMU, ONNX, MATLAB.
 
@@ -324,7 +339,10 @@ def export(
         (steps, onnx or follows, "--steps belongs to --onnx FILE, or --fmu --estimator"),
         (order, mat, "--order belongs to --mat FILE"),
         (estimator, c or fmu, "--estimator belongs to --c DIR or --fmu FILE"),
+        (noise or role, estimator, "--noise and --role belong to --estimator"),
     )
+    roles = {name: given for name, _, given in (each.partition("=") for each in role or ())}
+    service = _noises(noise or []), roles
     if estimator and order is not None:
         raise RequestError(
             "--order reduces the linear system of --mat; an estimator corrects measured states and "
@@ -341,9 +359,13 @@ def export(
     written: list[Path] = []
     bound = ""
     if c is not None:
-        written += (write_estimator if estimator else write_c)(linear, c, model.stem)
+        written += (
+            write_estimator(linear, c, model.stem, *service)
+            if estimator
+            else write_c(linear, c, model.stem)
+        )
     if fmu is not None:
-        written.append(write_fmu(linear, fmu, (steps or 1) if estimator else None))
+        written.append(write_fmu(linear, fmu, (steps or 1) if estimator else None, *service))
     if onnx is not None:
         written.append(write_onnx(linear, onnx, steps or 1))
     if mat is not None:
@@ -355,10 +377,21 @@ def export(
     say(timing(linear, estimator and not onnx and not mat))
 
 
-def _check_beside(*rules: tuple[object, Path | None, str]) -> None:
-    """Refuse an option that is given without the target that it belongs to."""
+def _noises(given: list[str]) -> dict[str, float]:
+    """Standard deviations by state."""
+    try:
+        return {name: float(value) for name, _, value in (each.partition("=") for each in given)}
+    except ValueError:
+        raise RequestError(
+            f"--noise takes a state, an equals sign and an SD, such as heave=0.002; received "
+            f"{', '.join(given)}."
+        ) from None
+
+
+def _check_beside(*rules: tuple[object, object, str]) -> None:
+    """Refuse an option that is given without the one that it belongs to."""
     for given, target, words in rules:
-        if given and target is None:
+        if given and not target:
             raise RequestError(f"{words}. Leave it out, or give both.")
 
 

@@ -32,6 +32,7 @@ from seakeep.report.tables import (
     number,
     numbers,
     plain_cell,
+    ratio_of,
     row,
     short,
 )
@@ -166,7 +167,7 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
         yield Table("by_run", f"{of} by wave period: ANRMSE", heads, rows, averages=[len(runs)])
     changes: list[tuple[str, ...]] = []
     for at in entries(table, "model"):
-        value, low, high = (1 + float(at[f"all_{key}"]) for key in ("change", "lower", "upper"))
+        value, low, high = ratio_of(at, "all_")
         cells: tuple[str, ...] = ("", "", "")
         if changes:
             known = bool(np.isfinite([low, high]).all())
@@ -187,8 +188,8 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
     name, first = (str(each["model"].values) for each in (best, table.isel(model=0)))
     said = f"Least error: {name}, ANRMSE {number(best['all_anrmse'])}"
     if name != first:
-        low, high = (1 + float(best[f"all_{bound}"]) for bound in ("lower", "upper"))
-        said += f", {change(1 + best['all_change'])} [{change(low, high)}] from {first}"
+        value, low, high = ratio_of(best, "all_")
+        said += f", {change(value)} [{change(low, high)}] from {first}"
         if verdict(low - 1, high - 1) != "better":
             return f"{said}: no model is surely better. Keep {first}."
     if kind := baselines.get(name):

@@ -22,7 +22,7 @@ from seakeep.models.specs import left_open
 from seakeep.models.training import until
 from seakeep.models.validity import warn_of_slow_motions
 from seakeep.signals import find_leakage
-from seakeep.study.plan import between
+from seakeep.study.plan import between, step_of
 from seakeep.study.resolve import can_align, counts_in_periods, mistakes_of, resolve_model
 from seakeep.toml import Length, refusal
 
@@ -111,7 +111,7 @@ def fit_campaign(
     """
     settings = campaign.model(model)
     spec, prepared, runs, stop = read_training(campaign, model, progress)
-    dt = float(next(iter(prepared.values())).attrs["dt"])
+    dt = step_of(prepared)
     channels = list(settings.states), list(settings.inputs)
     how: dict[str, Any] = {"executor": executor, "progress": progress} if left_open(spec) else {}
     identified: Model = spec.fit(runs, *channels, stop=stop, **how)
@@ -166,7 +166,7 @@ def read_training(
         channels=[*settings.states, *settings.inputs],
     )
     runs = training_runs(prepared)
-    dt = float(next(iter(prepared.values())).attrs["dt"])
+    dt = step_of(prepared)
     period = campaign.encounter_period() if counts_in_periods(settings) else None
     aligned = can_align(campaign.settings, settings.inputs)
     spec = resolve_model(settings, period, dt, aligned=aligned).spec
@@ -227,7 +227,7 @@ def fit_baselines(
     if prepared is None:
         prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
     runs = training_runs(prepared)
-    period, dt = campaign.encounter_period(), float(next(iter(runs.values())).attrs["dt"])
+    period, dt = campaign.encounter_period(), step_of(runs)
     models: dict[str, Model] = {}
     for kind in (kind for kind, each in KINDS.items() if each.role == "reference"):
         recommended = getattr(KINDS[kind], "recommended", None)

@@ -95,6 +95,11 @@ def between(run: xr.Dataset, span: tuple[float, float]) -> xr.Dataset:
     return run.sel(time=slice(float(span[0]) - slack, float(span[1]) + slack))
 
 
+def step_of(runs: Datasets) -> float:
+    """Time step that prepared runs share, s."""
+    return float(next(iter(runs.values())).attrs["dt"])
+
+
 def _samples(run: xr.Dataset, span: tuple[float, float]) -> tuple[int, int]:
     """First and last sample of a run inside a span."""
     time, dt = run["time"].values, float(run.attrs["dt"])

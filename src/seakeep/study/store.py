@@ -287,9 +287,10 @@ class StudyResult:
         """Whether bands of ensembles are calibrated."""
         return "calibration" in self.groups
 
-    def is_ensemble(self, model: str) -> bool:
-        """Whether a model is an ensemble."""
-        return bool(self.model_settings[model]["ensemble"])
+    @cached_property
+    def ensembles(self) -> list[str]:
+        """Names of the models that are ensembles."""
+        return [name for name, each in self.model_settings.items() if each["ensemble"]]
 
     def label_of(self, test: str) -> str:
         """Words for a test set."""

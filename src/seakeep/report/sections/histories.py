@@ -80,7 +80,7 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
         {
             "name": model,
             "label": words,
-            "mean": f"{words} mean" if result.is_ensemble(model) else words,
+            "mean": f"{words} mean" if model in result.ensembles else words,
             "colour": line["color"],
             "dash": list(line["linestyle"][1]),
         }
@@ -148,7 +148,7 @@ def _series(result: StudyResult, test: str) -> dict[str, dict[str, FloatArray]]:
     series = {}
     for model in judged_models(result):
         one, keys = result.tests[test].sel(model=model, measure="nrmse"), ["error", "mean"]
-        if result.is_ensemble(model):
+        if model in result.ensembles:
             one, keys = one.sel(ensemble=model), [*keys, "lower", "upper"]
         series[model] = {key: one[key].values for key in keys}
     return series
