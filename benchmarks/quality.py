@@ -22,7 +22,7 @@ import xarray as xr
 from seakeep.campaign.pipeline import flag_samples
 from seakeep.campaign.settings import PreparationSettings
 from seakeep.quality.faults import MISSING, flag_attributes
-from seakeep.quality.findings import Record, Redundant
+from seakeep.quality.findings import Record
 from seakeep.quality.samples import constant, flagged, levels
 from seakeep.quality.sensors import FEWEST_STEPS, LATE, RUN_AWAY, compare_sensors, redundant
 from seakeep.signals import bridge, integrate
@@ -103,7 +103,7 @@ FAULTS: dict[str, tuple[Fault, str, Range, str]] = {
     "saturation": (clipped, "saturated", (0.4, 0.9), "of the range"),
     "drop-outs": (dropped, "missing", (0.02, 0.4), "s, eight of them"),
 }
-PAIRS = (Redundant(("trusted", "heave")),)
+PAIRS = {("trusted", "heave"): None}
 SAME = {"lag grows": "lag", "difference": "lag", "agreement": "lag", "held": "stuck"}
 """Kinds of findings that count as one here."""
 

@@ -8,10 +8,10 @@ import zipfile
 from functools import cache
 from pathlib import Path
 
-import ground
 import numpy as np
 import pytest
 import tomlkit
+import two_loggers
 import xarray as xr
 
 from seakeep import SeakeepError, load_model, read_campaign
@@ -46,8 +46,7 @@ def written(name: str, folder: Path) -> str:
         play(settings.model_copy(update={"runs": {"irregular_1": run}}), folder, kind="nc")
         text = (folder / "campaign.toml").read_text(encoding="utf-8")
         return re.sub("states = .*", 'states = ["surge", "heave", "pitch", "mooring_stern"]', text)
-    shutil.copytree(ground.write(folder), folder, dirs_exist_ok=True)
-    return ground.CAMPAIGN
+    return two_loggers.write(folder).read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")

@@ -100,9 +100,6 @@ def test_a_diverged_forecast_and_a_gap_are_nan_and_not_left_out():
     np.testing.assert_array_equal(np.isnan(over_time), [False, False, True, True])
 
 
-# Members
-
-
 # Datasets
 
 
@@ -138,9 +135,6 @@ def test_channels_are_matched_by_name_and_instants_by_time():
     assert np.isnan(metrics.nrmse(predicted=predicted, measured=measured).heave)
     told = metrics.nrmse(predicted=predicted, measured=measured, training_std=[0.0, 0.0])
     assert np.isfinite(told.heave)
-
-
-# Refused
 
 
 def autoregression(rng, size, phi=0.9):

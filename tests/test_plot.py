@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from ensembles import few
 from moored import moored_run
 
 import seakeep
-from seakeep import BayesianHankelDMDc, HankelDMDc, Uniform
+from seakeep import HankelDMDc
 from seakeep.errors import RequestError
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
@@ -44,12 +45,7 @@ def test_overlay_draws_each_channel_with_units_on_its_axes(run, model):
 
 
 def test_band_takes_members_or_their_statistics(run, model):
-    spec = BayesianHankelDMDc(
-        encounter_period=1.0, window=Uniform("20 T", "30 T"),
-        state_delays=Uniform("0.2 T", "0.4 T"), input_delays=Uniform("0.3 T", "0.6 T"),
-        ridge=Uniform(0.01, 0.1), n_members=4, seed=0,
-    )  # fmt: skip
-    ensemble = spec.fit(run, ["heave"], ["eta"])
+    ensemble = few().fit(run, ["heave"], ["eta"])
     members = ensemble.forecast(run, start=10.0, steps=50)
     for forecast in (members, ensemble.forecast_summary(run, start=10.0, steps=50)):
         figure = seakeep.plot.band(forecast, run)

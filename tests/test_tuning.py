@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from free_runs import loop_score
 
 import seakeep
-from seakeep import HankelDMDc, RequestError, metrics
+from seakeep import HankelDMDc, RequestError
 from seakeep.cli import main
-from seakeep.models.selection import WORST
 from seakeep.tuning import tuned_campaign
 
 sys.path.insert(0, str(Path(__file__).parent / "models"))
 
-from test_selection import DT, INPUTS, PERIOD, SPEC, STATES, runs
+from test_selection import INPUTS, PERIOD, SPEC, STATES, runs
 
 TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial"
 
@@ -55,14 +55,7 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, ce
         for run in given.values():
             key = (lambda r: r.attrs["sea_state"]) if folds != "run" else id
             model = plain.fit([r for r in given.values() if key(r) != key(run)], STATES, INPUTS)
-            scores = []
-            for at in range(first, run.sizes["time"] - model.lead_samples - steps + 1, steps):
-                forecast = model.forecast(run, at * DT, steps)
-                measured = run[STATES].isel(time=slice(at + 1, at + 1 + steps))
-                errors = metrics.nrmse(predicted=forecast, measured=measured)
-                counted = [min(float(errors[state]), WORST) for state in STATES]
-                scores.append(np.mean(counted))
-            found.append(np.mean(scores))
+            found.append(loop_score(model, run, STATES, steps, first))
         # The house rule for results; but powers are bounded by the spread of all runs there, and
         # by that of those that train here.
         tolerance = 1e-3 if chosen else 1e-10

@@ -366,7 +366,8 @@ def chain():
         exec(compile(faults, "measurement_chain.md", "exec"), {"Path": Path})  # the page is ours
         campaign = seakeep.read_campaign("virtual/campaign.toml")
         run = campaign.prepare(["irregular_1"])["irregular_1"]
-        pairs = compared(run, redundant_pairs(campaign.settings, None))
+        period = run.attrs.get("encounter_period", float("nan"))
+        pairs = compared(run, redundant_pairs(campaign.settings, period))
         agreements = {channel: each for (channel, _), each in pairs.items()}
     shown = run[["eta_us_fwd", "heave", "heave_of_acceleration"]].assign_attrs(run.attrs)
     with figure_style():  # all colours, unlike `save`: a palette would take those of single marks

@@ -8,12 +8,15 @@ says what was received and how to correct it.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from seakeep.errors import DataError, RequestError, SeakeepError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -22,6 +25,8 @@ ComplexArray = npt.NDArray[np.complex128]
 
 Progress = Callable[[int, int, str], None]
 """Takes how many steps are done, how many there are, and the name of one."""
+Datasets: TypeAlias = "Mapping[str, xr.Dataset]"
+"""Prepared runs, tables or groups of a result, by name."""
 
 _REMEDIES = {
     "c": "Give its real part or its modulus",

@@ -9,7 +9,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean
-from seakeep.signals.time_axis import check_order, instant_text
+from seakeep.signals.time_axis import check_order, instant_text, usual_step
 
 INSTANT_TOLERANCE = 0.01
 """Part of a step by which an instant of one Dataset may differ from that of another."""
@@ -132,7 +132,7 @@ def _at_instants(data: xr.Dataset, reference: xr.Dataset, side: str, first: str)
     given = check_order(data["time"].values, side)
     if np.array_equal(wanted, given):
         return data
-    step = float(np.median(np.diff(wanted)))
+    step = usual_step(wanted)
     try:
         return data.sel(time=wanted, method="nearest", tolerance=INSTANT_TOLERANCE * step)
     except KeyError as error:

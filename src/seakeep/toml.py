@@ -172,17 +172,12 @@ def number(value: float | Length) -> float:
     return value
 
 
-def _children(table: BaseModel) -> Iterator[tuple[str, object]]:
-    yield from ((name, getattr(table, name)) for name in type(table).model_fields)
-    yield from (table.model_extra or {}).items()
-
-
 def lengths(value: object, place: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
     """Places of the keys of a table that hold a :class:`Length`."""
     if isinstance(value, Length):
         yield place
     elif isinstance(value, BaseModel | dict):
-        for name, each in _children(value) if isinstance(value, BaseModel) else value.items():
+        for name, each in value if isinstance(value, BaseModel) else value.items():
             yield from lengths(each, (*place, str(name)))
     elif isinstance(value, tuple) and any(isinstance(each, Length) for each in value):
         yield place
@@ -218,7 +213,7 @@ def _resolved(value: Any, period: float, place: tuple[str, ...]) -> Any:
     if isinstance(value, BaseModel):
         update = {
             name: _resolved(each, period, (*place, name))
-            for name, each in _children(value)
+            for name, each in value
             if any(True for _ in lengths(each))
         }
         return value.model_copy(update=update) if update else value
@@ -264,46 +259,35 @@ def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
     RequestError
         If the file is missing, cannot be read, is not TOML, or is one of our files of another kind.
     """
-    text = _text_of(path, what, mend)
-    try:
-        table = tomllib.loads(text.replace("\r\n", "\n"))
-    except tomllib.TOMLDecodeError as error:
-        raise RequestError(
-            f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
-            "one 'key = value' per line, and each table and key once." + _if_no_toml(path, what)
-        ) from None
-    for other, keys in KNOWN_BY.items():
-        tables = [f"[{key}]" for key in keys if key in table]
-        if tables and not any(key in table for key in KNOWN_BY[what]):
-            raise RequestError(
-                f"{path} is a {other} file (it has {', '.join(tables)}), and a {what} file is "
-                "expected here. Name the right file."
-            )
-    return table
-
-
-def _text_of(path: Path, what: str, mend: str) -> str:
+    other = ""
+    if path.suffix.lower() != ".toml":
+        other = (
+            f" If it holds measurements: a {what} file is expected here, whose name ends in .toml. "
+            f"Draft a campaign with 'seakeep init {path.name}'."
+        )
     try:
         content = read_bytes(path)
+        table = tomllib.loads(content.decode("utf-8-sig").replace("\r\n", "\n"))
     except MissingFileError as error:
         raise MissingFileError(f"{error} A {what} file is expected here.{mend}") from None
-    try:
-        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
         raise RequestError(
-            f"{path}, line {line}: not UTF-8, which TOML asks for. Save the file as UTF-8."
-            + _if_no_toml(path, what)
+            f"{path}, line {line}: not UTF-8, which TOML asks for. Save the file as UTF-8.{other}"
         ) from None
-
-
-def _if_no_toml(path: Path, what: str) -> str:
-    if path.suffix.lower() == ".toml":
-        return ""
-    return (
-        f" If it holds measurements: a {what} file is expected here, whose name ends in .toml. "
-        f"Draft a campaign with 'seakeep init {path.name}'."
-    )
+    except tomllib.TOMLDecodeError as error:
+        raise RequestError(
+            f"{path} is not valid TOML: {error}. Write texts in quotes, lists in [ ], "
+            f"one 'key = value' per line, and each table and key once.{other}"
+        ) from None
+    for kind, keys in KNOWN_BY.items():
+        tables = [f"[{key}]" for key in keys if key in table]
+        if tables and not any(key in table for key in KNOWN_BY[what]):
+            raise RequestError(
+                f"{path} is a {kind} file (it has {', '.join(tables)}), and a {what} file is "
+                "expected here. Name the right file."
+            )
+    return table
 
 
 def validated(

@@ -2,11 +2,6 @@
 
 import re
 import shutil
-import sqlite3
-import struct
-import zlib
-from contextlib import closing
-from functools import cache
 
 import h5py
 import numpy as np
@@ -90,19 +85,6 @@ READERS = {
 }  # fmt: skip
 
 
-@cache
-def png():
-    """A picture of one pixel, whole and sound."""
-
-    def chunk(kind, data):
-        tail = struct.pack(">I", zlib.crc32(kind + data))
-        return struct.pack(">I", len(data)) + kind + data + tail
-
-    head = chunk(b"IHDR", struct.pack(">2I5B", 1, 1, 8, 0, 0, 0, 0))
-    body = head + chunk(b"IDAT", zlib.compress(b"\x00\x00")) + chunk(b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + body
-
-
 @pytest.fixture(params=list(READERS), ids=list(READERS))
 def path(request, tmp_path):
     """A sound file of each kind."""
@@ -164,52 +146,6 @@ def test_a_sound_file_under_another_name_is_recognised(tmp_path, make, suffix):
     make(path)
     path = path.rename(tmp_path / f"run{suffix}")
     np.testing.assert_array_equal(read_table(path)["heave"], HEAVE)
-
-
-class TestBagFolder:
-    """A ROS 2 bag as it lies on disk: metadata.yaml beside a ``.db3``, either of them bad."""
-
-    @pytest.fixture
-    def folder(self, tmp_path):
-        made = bag(tmp_path / "bag")
-        database = next(made.glob("*.db3"))
-        for path in (made, database):
-            assert read_table(path).sizes["time"] == T.size
-        return made
-
-    @staticmethod
-    def refused(path, message=r"ROS 2: cut off, damaged or of another kind \(.+\)\. Copy it again"):
-        with pytest.raises(DataError, match=rf"{re.escape(str(path))} .*{message}"):
-            read_table(path)
-
-    @pytest.mark.parametrize(
-        ("content", "words"),
-        [(b"", r"is empty \(0 bytes\)\. Export the run again"), (0.15, None), (0.999, None),
-         (png(), "is a PNG"), (b"time,heave\n0,1\n1,2\n", "holds text and starts with"),
-         (bytes(range(256)), "cannot be read as a recording"), ("samples", None)],
-    )  # fmt: skip
-    def test_its_recording(self, folder, content, words):
-        """Empty, cut off, of another kind, or a database of something else."""
-        database = next(folder.glob("*.db3"))
-        whole = database.read_bytes()
-        database.unlink()
-        if content == "samples":
-            with closing(sqlite3.connect(database)) as made:
-                made.execute("create table samples (heave real)")
-        else:
-            part = whole[: int(content * len(whole))] if isinstance(content, float) else content
-            database.write_bytes(part)
-        self.refused(folder)
-        self.refused(database, *filter(None, [words]))
-
-    def test_missing_parts(self, folder):
-        database = next(folder.glob("*.db3"))
-        moved = database.rename(folder.with_name("alone.db3"))
-        self.refused(folder, r"Some database files are missing")
-        assert read_table(moved).sizes["time"] == T.size  # the recording knows its own topics
-        (folder / "metadata.yaml").unlink()
-        with pytest.raises(RequestError, match="is a folder, and only regular files are read"):
-            read_table(folder)
 
 
 class TestUnits:

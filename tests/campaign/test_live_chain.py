@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-import ground
 import numpy as np
 import pytest
+import two_loggers
 import xarray as xr
 
 import seakeep
@@ -84,7 +84,7 @@ def test_a_chain_that_was_saved_goes_on_to_the_last_bit(campaign, rows, tmp_path
         )
     late.resume(late.save(tmp_path / "chain.nc"))  # before the first row
     assert late.push(cut(0, 10)).sizes["time"] > 0
-    rig = seakeep.read_campaign(ground.write(tmp_path) / "campaign.toml")
+    rig = seakeep.read_campaign(two_loggers.write(tmp_path))
     other = rig.live_chain("one", delay=2.0, window=20.0)
     with pytest.raises(RequestError, match="a chain with other loggers, columns or steps"):
         whole.resume(other.save(tmp_path / "other.nc"))
@@ -108,9 +108,9 @@ def test_a_gap_is_masked_and_what_follows_it_is_as_if_there_were_none(campaign, 
 
 
 def test_a_silent_logger_is_named_before_the_rows_of_others_pile_up(tmp_path):
-    place = ground.write(tmp_path)
-    chain = seakeep.read_campaign(place / "campaign.toml").live_chain("one", delay=2.0, window=20.0)
-    rows = {key: read_columns(place / f"one_{key}.csv").values for key in ("probes", "mru")}
+    path = two_loggers.write(tmp_path)
+    chain = seakeep.read_campaign(path).live_chain("one", delay=2.0, window=20.0)
+    rows = {key: read_columns(tmp_path / f"one_{key}.csv").values for key in ("probes", "mru")}
 
     def between(key, first, stop):
         at = np.searchsorted(next(iter(rows[key].values())), [first, stop])

@@ -27,11 +27,14 @@ SPAN = (0.0, 3065.0)  # s, the first 30 % of Data02
 
 @pytest.fixture(scope="module")
 def section(tmp_path_factory):
-    """The campaign; motions try no observables, of which the whole search takes none either."""
+    """The campaign, with the observables that its search of some minutes takes for each model."""
     text = (EXAMPLES / "ntnu_ship_section" / "campaign.toml").read_text(encoding="utf-8")
+    assert text.count("observables = true") == 3
+    text = text.replace("observables = true", "observables = false")
+    powers = 'observables = [{ kind = "powers", of = ["eta_wp1", "eta_wp2", "eta_wp4"] }]'
+    text = text.replace("[models.tensions]", f"[models.tensions]\n{powers}", 1)
     path = tmp_path_factory.mktemp("section") / "campaign.toml"
-    motions = text.replace("observables = true", "observables = false", 2)
-    path.write_text(motions, encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     return seakeep.read_campaign(path)
 
 

@@ -5,6 +5,7 @@ from drifting import INPUTS, STATES, drifting_run
 
 import seakeep
 from seakeep import HankelDMDc, ProbeAlignment, RequestError, cli
+from seakeep.hosts import write_estimator
 from seakeep.hosts.program import exportable, timing
 
 
@@ -37,6 +38,25 @@ def test_a_reduced_order_is_of_the_matrices_alone_and_states_its_error(make_run,
     assert "The system of order 4 errs by" in capsys.readouterr().err
     assert cli.main([*words, "--c", str(tmp_path), "--estimator"]) == 2
     assert "--order reduces the linear system of --mat; an estimator" in capsys.readouterr().err
+
+
+def test_an_estimator_knows_the_noise_and_the_roles_of_the_command(make_run, tmp_path, capsys):
+    model = HankelDMDc(4, 8, 1.0).fit(make_run(), ["heave"], ["eta_fwd"])
+    model.save(tmp_path / "m.nc")
+    words = ["export", str(tmp_path / "m.nc"), "--c", str(tmp_path / "c")]
+    service = ["--estimator", "--noise", "heave=0.25", "--role", "eta_fwd=known"]
+    assert cli.main([*words, *service]) == 0
+    stated = {"noise": {"heave": 0.25}, "roles": {"eta_fwd": "known"}}
+    for path in write_estimator(model, tmp_path / "python", "m", **stated):
+        assert path.read_text() == (tmp_path / "c" / path.name).read_text()
+    capsys.readouterr()
+    for wrong, message in (
+        (service[1:], "--noise and --role belong to --estimator"),
+        ([*service[:2], "heave"], "such as heave=0.002; received heave"),
+        ([*service, "--role", "eta_fwd=plan"], "role of eta_fwd"),
+    ):
+        assert cli.main([*words, *wrong]) == 2
+        assert message in capsys.readouterr().err
 
 
 def test_an_ensemble_is_no_estimator_nor_is_a_member(make_run, tmp_path, capsys):

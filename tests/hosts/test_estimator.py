@@ -133,7 +133,9 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
     # Waves that are not known, or of one probe for a while: the mean tends to that of training.
     part = np.full((199, 2), np.nan)
     part[:20, 0] = u[COUNT - 30 : COUNT - 10, 0]
-    for known in (None, part):
+    first = np.full((199, 2), np.nan)
+    first[:20] = u[COUNT - 30 : COUNT - 10]  # all waves for a while: others go on from there
+    for known in (None, part, first):
         status, forecast = found.forecast(200, known)
         assert status == 0
         # The departures are small differences of runs.

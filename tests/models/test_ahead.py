@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from drifting import INPUTS, STATES, drifting_run
+from ensembles import few
 
 import seakeep
 from seakeep import HankelDMDc, RequestError
@@ -116,17 +117,7 @@ def test_predicted_waves_are_better_than_none(runs, test_run):
 
 
 def test_ensembles_windows_and_arrays_predict_alike(runs, test_run):
-    spec = seakeep.BayesianHankelDMDc(
-        encounter_period=1.6,
-        window=None,
-        state_delays=seakeep.Uniform("0.2 T", "0.4 T"),
-        input_delays=seakeep.Uniform("0.6 T", "1.0 T"),
-        ridge=seakeep.Uniform(1, 2),
-        n_members=3,
-        delay_rows="exact",
-        lead=LEAD,
-    )
-    ensemble = spec.fit(runs, STATES, INPUTS)
+    ensemble = few(n_members=3, lead=LEAD).fit(runs, STATES, INPUTS)
     last = reads_until(ensemble, test_run) - 4
     short = test_run.isel(time=slice(0, last + 1))
     members = ensemble.forecast(short, START, STEPS, ahead="predict")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from ensembles import few
 
 import seakeep
 from seakeep.core.calibration import band_scores, conformal_margin
@@ -10,6 +11,7 @@ from seakeep.errors import RequestError
 from seakeep.models.calibration import held_out, learn_margin
 
 STATES, INPUTS, DT = ["heave", "pitch"], ["eta"], 0.1
+NOISY = {"ridge": seakeep.Uniform(200, 400), "delay_rows": "ridge", "seed": 1}
 
 
 def sea(seed, samples=1600, name="sea"):
@@ -35,15 +37,7 @@ def run():
 
 @pytest.fixture(scope="module")
 def ensemble(run):
-    spec = seakeep.BayesianHankelDMDc(
-        encounter_period=1.6,
-        window=seakeep.Uniform("10 T", "16 T"),
-        state_delays=seakeep.Uniform("0.2 T", "0.6 T"),
-        input_delays=seakeep.Uniform("0.5 T", "1.5 T"),
-        ridge=seakeep.Uniform(200, 400),
-        n_members=8,
-        seed=1,
-    )
+    spec = few(window=seakeep.Uniform("10 T", "16 T"), n_members=8, **NOISY)
     return spec.fit(run, STATES, INPUTS, stop=60.0)
 
 
@@ -179,16 +173,7 @@ def test_a_file_keeps_the_calibration(calibrated, moved, learnt, ensemble, run, 
 
 
 def pooled(train_on, runs, window=None):
-    spec = seakeep.BayesianHankelDMDc(
-        encounter_period=1.6,
-        window=window,
-        state_delays=seakeep.Uniform("0.2 T", "0.6 T"),
-        input_delays=seakeep.Uniform("0.5 T", "1.5 T"),
-        ridge=seakeep.Uniform(200, 400),
-        n_members=6,
-        seed=1,
-        train_on=train_on,
-    )
+    spec = few(window=window, n_members=6, train_on=train_on, **NOISY)
     return spec.fit(runs, STATES, INPUTS)
 
 

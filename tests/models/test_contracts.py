@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from drifting import INPUTS, STATES, drifting_run
+from ensembles import few
 
 import seakeep
 from seakeep import BayesianHankelDMDc, DataError, HankelDMDc, RequestError, SeakeepWarning, Uniform
@@ -42,19 +43,6 @@ def sea(samples=600, seed=0, ahead=0, **attrs):
         coords={"time": DT * np.arange(samples)},
         attrs=attrs,
     )
-
-
-def ensemble(**changes):
-    settings = {
-        "encounter_period": 1.6,
-        "window": None,
-        "state_delays": Uniform("0.2 T", "0.4 T"),
-        "input_delays": Uniform("0.6 T", "1.0 T"),
-        "ridge": Uniform(1, 2),
-        "n_members": 5,
-        "delay_rows": "exact",
-    }
-    return BayesianHankelDMDc(**settings | changes)
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +108,7 @@ class TestObservableOfAnother:
         back = load_model(model.save(tmp_path / "m.nc"))
         xr.testing.assert_identical(back.forecast(run, start=20.0, steps=40), forecast)
         assert "observable    half: 1 column at lags" in back.summary()
-        many = ensemble(observables=(Half(),), n_members=2).fit(run, ["heave"], ["eta"])
+        many = few(observables=(Half(),), n_members=2).fit(run, ["heave"], ["eta"])
         summary = many.forecast_summary(run, start=20.0, steps=40)
         again = load_model(many.save(tmp_path / "e.nc"))
         xr.testing.assert_identical(again.forecast_summary(run, start=20.0, steps=40), summary)
@@ -134,7 +122,7 @@ class TestOneEngine:
     def test_each_probe_is_carried_once_per_run(self, drifting, monkeypatch):
         runs, test = drifting
         measured = replace(PREDICTED, surge="measured")
-        fitted = ensemble(alignment=measured).fit(runs, STATES, INPUTS)
+        fitted = few(alignment=measured).fit(runs, STATES, INPUTS)
         carries = []
         real = alignment.carry_by_dispersion
 
@@ -150,7 +138,7 @@ class TestOneEngine:
         groups = [(places, 20), (places[:1], 30)]
         windows = read_groups(fitted.signature, {"a": test, "b": runs[0]}, groups)
         with member_series(fitted, windows) as found:
-            assert [series.shape for series, _ in found] == [(5, 3, 20, 2), (5, 1, 30, 2)]
+            assert [series.shape for series, _ in found] == [(4, 3, 20, 2), (4, 1, 30, 2)]
         assert len(carries) == 2 * len(INPUTS)
 
     def test_a_forecast_upstream_says_how_far_ahead_it_reads(self, drifting):
@@ -172,7 +160,7 @@ class TestRegistry:
         [
             HankelDMDc(3, np.int64(8), 1.0, lead=2, alignment={"mode": "dispersion"}),
             HankelDMDc.recommended(1.6, 0.1),
-            ensemble(seed=np.random.default_rng(3), lead="0.5 T", ridge=seakeep.Fixed(2.0)),
+            few(seed=np.random.default_rng(3), lead="0.5 T", ridge=seakeep.Fixed(2.0)),
             BayesianHankelDMDc.paper(1.6, n_members=3, seed=np.random.SeedSequence(5).spawn(2)[1]),
         ],
     )
@@ -190,8 +178,8 @@ class TestRegistry:
     def test_needs_of_specs(self):
         single = HankelDMDc(3, 8, 1.0, window=100, lead=2).needs(0.1)
         assert (single.snapshots, single.history, single.inside, single.lead) == (100, 8, False, 2)
-        many = ensemble(window=Uniform("10 T", "20 T"), lead="0.5 T").needs(0.1)
-        assert (many.snapshots, many.history, many.lead) == (320, 16, 8)
+        many = few(window=Uniform("10 T", "20 T"), lead="0.5 T").needs(0.1)
+        assert (many.snapshots, many.history, many.lead) == (320, 24, 8)
 
 
 class TestWaves:
@@ -237,7 +225,7 @@ class TestWaves:
         high = 1.5 * run
         high["surge"].values[high["time"].values > 20.0] = np.nan
         words = "eta: a height of 3, trained up to 2; eta: a steepness in deep water of 0.48, "
-        for spec in (HankelDMDc(2, 8, 1.0), ensemble(window=None)):
+        for spec in (HankelDMDc(2, 8, 1.0), few(window=None)):
             model = spec.fit(run, ["surge"], ["eta"])
             forecasts = [model.forecast(high, 20.0, 600)]
             if spec.is_ensemble:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import side_work
 import xarray as xr
+from ensembles import few
 
 import seakeep
 from seakeep.models import executor as executors
@@ -42,15 +43,7 @@ def ensemble_and_run():
         },
         coords={"time": time},
     )
-    spec = seakeep.BayesianHankelDMDc(
-        encounter_period=1.6,
-        window=seakeep.Uniform("6 T", "12 T"),
-        state_delays=seakeep.Uniform("0.2 T", "0.8 T"),
-        input_delays=seakeep.Uniform("0.3 T", "1.2 T"),
-        ridge=seakeep.LogUniform(0.1, 10),
-        n_members=9,
-        delay_rows="ridge",
-    )
+    spec = few(window=seakeep.Uniform("6 T", "12 T"), n_members=9, delay_rows="ridge")
     return spec.fit(run, ["heave", "pitch"], ["eta"], stop=30.0), run
 
 

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from free_runs import loop_score
 
-from seakeep import HankelDMDc, Select, metrics, tune
+from seakeep import HankelDMDc, Select, tune
 from seakeep.baselines import ARX, FIR, Subspace
 from seakeep.campaign.settings import ModelSettings
-from seakeep.models.selection import WORST
 from seakeep.study.resolve import resolve_model
 from seakeep.tuning import tuned_campaign
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from test_selection import DT, INPUTS, PERIOD, STATES, runs
+from test_selection import INPUTS, PERIOD, STATES, runs
 
 SPEC = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot", lead=3)
 
@@ -52,13 +52,7 @@ def test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts():
         found = []
         for name, run in given.items():
             model = own.fit([r for n, r in given.items() if n != name], STATES, INPUTS)
-            scores = []
-            for at in range(12, run.sizes["time"] - model.lead_samples - steps + 1, steps):
-                forecast = model.forecast(run, at * DT, steps)
-                measured = run[STATES].isel(time=slice(at + 1, at + 1 + steps))
-                errors = metrics.nrmse(predicted=forecast, measured=measured)
-                scores.append(np.mean([min(float(errors[state]), WORST) for state in STATES]))
-            found.append(np.mean(scores))
+            found.append(loop_score(model, run, STATES, steps, 12))
         # Windows side by side are summed in another order than one by one.
         assert float(row["score"]) == pytest.approx(np.mean(found), abs=1e-9)
 

@@ -4,8 +4,8 @@ import tracemalloc
 
 import numpy as np
 import xarray as xr
+from ensembles import few
 
-import seakeep
 from seakeep.models import engine, summaries
 
 STATES = [f"x{k}" for k in range(6)]
@@ -22,15 +22,7 @@ def test_a_summary_does_not_hold_its_members(monkeypatch):
 
     def peak(members):
         """Bytes that a summary of so many members takes at most."""
-        spec = seakeep.BayesianHankelDMDc(
-            encounter_period=1.6,
-            window=seakeep.Uniform("8 T", "12 T"),
-            state_delays=seakeep.Uniform("0.2 T", "0.4 T"),
-            input_delays=seakeep.Uniform("0.2 T", "0.4 T"),
-            ridge=seakeep.Uniform(1, 2),
-            n_members=members,
-        )
-        ensemble = spec.fit(run, STATES, ["eta"], stop=60.0)
+        ensemble = few(n_members=members).fit(run, STATES, ["eta"], stop=60.0)
         tracemalloc.start()
         try:
             ensemble.forecast_summary(run, start=60.0, steps=STEPS)
@@ -39,7 +31,7 @@ def test_a_summary_does_not_hold_its_members(monkeypatch):
             tracemalloc.stop()
 
     peak(10)
-    few, many = peak(10), peak(70)
+    less, more = peak(10), peak(70)
     series = 8 * STEPS * len(STATES)  # bytes of one member
     # A member leaves its status and its place in the last piece; a tenth of its series is ample.
-    assert many - few < 0.1 * 60 * series
+    assert more - less < 0.1 * 60 * series

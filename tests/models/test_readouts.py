@@ -12,8 +12,6 @@ from moored import INPUTS as ETA
 from moored import STATES as MOORED
 
 from seakeep import (
-    BayesianHankelDMDc,
-    Fixed,
     HankelDMDc,
     ProbeAlignment,
     RequestError,
@@ -31,23 +29,6 @@ PLAIN = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot")
 
 def bow(kind: str) -> HankelDMDc:
     return replace(SPEC, readouts={"mooring_bow": kind})
-
-
-def ensemble(**more) -> BayesianHankelDMDc:
-    """Members that are all as SPEC."""
-    settings = {
-        "encounter_period": PERIOD,
-        "window": None,
-        "state_delays": Fixed("1 s"),
-        "input_delays": Fixed("4 s"),
-        "ridge": Fixed(1e-3),
-        "n_members": 1,
-        "delay_rows": "exact",
-        "ridge_scale": "per_snapshot",
-        "alignment": FOLLOWED,
-        "lead": 12,
-    }
-    return BayesianHankelDMDc(**settings | more)
 
 
 @pytest.fixture(scope="module")

@@ -9,13 +9,13 @@ import xarray as xr
 from drifting import INPUTS as PROBES
 from drifting import STATES as DRIFTING
 from drifting import drifting_run
+from free_runs import loop_score
 
 from seakeep import (
     DataError,
     HankelDMDc,
     ProbeAlignment,
     SlowSquares,
-    metrics,
 )
 from seakeep.models.labelled import mean_period
 from seakeep.models.selection import RIDGES, default_observables, groups_of, select
@@ -74,14 +74,7 @@ def test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forec
             others = [run for name, run in given.items() if name != held]
             spec = replace(SPEC, ridge=ridge, ridge_scale="per_snapshot")
             model = spec.fit(others, STATES, INPUTS)
-            for steps in (150, 300):
-                part = []
-                for start in range(12, 700 - steps, steps):
-                    forecast = model.forecast(given[held], start=start * DT, steps=steps)
-                    measured = given[held].isel(time=slice(start + 1, start + 1 + steps))
-                    part += [metrics.nrmse(predicted=forecast, measured=measured)[STATES]]
-                each = xr.concat(part, "window").to_array()
-                errors.append(float(np.minimum(each, 1.0).mean()))  # no worse than the mean
+            errors += [loop_score(model, given[held], STATES, steps, 12) for steps in (150, 300)]
         # Sums in another order; horizons count alike.
         assert scores[ridge] == pytest.approx(np.mean(errors), abs=1e-10)
     # The largest that is as good as the best.

@@ -9,7 +9,7 @@ import xarray as xr
 from seas import sea
 
 from seakeep.errors import SeakeepWarning
-from seakeep.quality import Finding, Record, Redundant, as_json, findings_of, warn_of
+from seakeep.quality import Finding, Record, as_json, findings_of, warn_of
 from seakeep.quality.faults import reading_step
 from seakeep.quality.samples import SamplesKind
 from seakeep.quality.sensors import LATE, RUN_AWAY, compare_sensors, redundant
@@ -29,7 +29,7 @@ def against(series, trusted=None, step=np.nan, window=None):
     channels = {"one": trusted, "two": series}
     run = xr.Dataset({n: ("time", x, {"units": "m"}) for n, x in channels.items()}, {"time": T})
     run["two"].attrs["reading_step"] = step
-    return list(redundant(Record("r", run, redundant=(Redundant(("one", "two"), window),))))
+    return list(redundant(Record("r", run, redundant={("one", "two"): window})))
 
 
 def kinds(*args, **keys):

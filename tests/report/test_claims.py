@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from seakeep.report.acts import CLAIMS, LOADS, REGULAR, Evidence
+from seakeep.report.acts import LOADS, REGULAR, Claims, Evidence
 from seakeep.study import StudyResult
 from seakeep.study.judge import MEASURES
 
@@ -65,7 +65,7 @@ def study(groups=None, **tests):
 
 
 def holds(claim, paper, raw=None):
-    return CLAIMS[claim](Evidence(paper), Evidence(raw or paper))[1]
+    return Claims(paper, Evidence(raw or paper)).judge(claim)[1]
 
 
 @pytest.mark.parametrize(

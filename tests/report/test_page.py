@@ -133,7 +133,7 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result)
     assert f"A training set had {windows.min()}" in page.read_text("utf-8")
     assert "not made for" not in coverage_table(result, "bayesian", calibrated=True).note
     tests = result.settings["tests"]
-    tests["long"] = {**tests["unseen"], "length": 12.0, "label": ""}
+    tests = {**tests, "long": {**tests["unseen"], "length": 12.0, "label": ""}}
     table = result.groups["statistics/coverage"]
     table = xr.concat([table, table.assign_coords(test=["long"])], "test")
     groups = {"statistics/coverage": table, "tests/long": result.groups["tests/unseen"]}

@@ -152,10 +152,10 @@ def test_the_table_of_the_acts_is_made_of_their_cells(results):
 
 
 def test_every_claim_has_a_figure_and_a_verdict(results):
-    from seakeep.report.acts import CLAIMS, claims_table
+    from seakeep.report.acts import claims_table
 
     table = claims_table(results)
-    assert len({row[0] for row in table.rows}) == len(CLAIMS) == 20
+    assert len({row[0] for row in table.rows}) == 20
     assert {row[2] for row in table.rows} <= {"holds", "does not", "cannot tell"}
     assert not [row for row in table.rows if "nan" in row[1] or MISSING in row[1]]
 

@@ -67,7 +67,7 @@ def delivered(tmp_path_factory):
     kept = place / "delivered.pickle"
     with FileLock(place / "delivered.lock"):
         if not kept.exists():
-            found = chain_on_tank.deliver(place / "delivered")
+            found = chain_on_tank.deliver(place / "delivered", kind="nc")
             assert not (place / "delivered" / "truth").exists()
             write_prepared(found.campaign)
             kept.write_bytes(pickle.dumps(found))

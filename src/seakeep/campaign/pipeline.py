@@ -19,14 +19,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray
+from seakeep.arrays import BoolArray, Datasets, FloatArray
 from seakeep.campaign.derivation import derive
 from seakeep.campaign.guesses import is_wave
 from seakeep.campaign.readers import (
@@ -49,6 +48,7 @@ from seakeep.campaign.settings import (
 from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
 from seakeep.conventions import MOTIONS, canonical_channel, conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
+from seakeep.files import version
 from seakeep.formats import Columns, Options
 from seakeep.formats.columns import is_unit, meant_column, same_unit
 from seakeep.quality import Finding, Rate, Record, Redundant, check
@@ -79,7 +79,7 @@ from seakeep.signals import (
     uniform_step,
 )
 from seakeep.signals.synchronisation import ASSUMED
-from seakeep.signals.time_axis import instant_text, span_text, stretches
+from seakeep.signals.time_axis import instant_text, span_text, stretches, usual_step
 from seakeep.toml import Length, number
 
 Reader = Callable[[Path, Options], Columns]
@@ -108,7 +108,7 @@ class Logger:
     def uniform(self, wanted: str) -> tuple[FloatArray, FloatArray]:
         """Times and values of a column on a uniform axis, gaps bridged: for clocks only."""
         time, values = onto_uniform(self.time, self.column(wanted), str(self.path))
-        return time, bridge(values, float(np.median(np.diff(time))), np.inf).values
+        return time, bridge(values, usual_step(time), np.inf).values
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,7 @@ class Run:
     settings: CampaignSettings
     loggers: Mapping[str, Logger]
     clocks: Mapping[str, Clock] = field(default_factory=dict)
-    groups: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    groups: Datasets = field(default_factory=dict)
     late: tuple[str, ...] = ()
     data: xr.Dataset | None = None
     findings: tuple[Finding, ...] = ()
@@ -297,24 +297,19 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
 def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings]) -> xr.Dataset:
     """Channels of one logger, gaps and jitter as they are."""
     time = run.clocks[logger.name].reference(logger.time)
-    records = _recorded(time, run, logger)
+    records: slice | BoolArray = slice(None)
+    if run.own.record is not None:
+        start, end = (number(edge) for edge in run.own.record)
+        step, whole = usual_step(time), (float(time[0]), float(time[-1]))
+        slack = step * (1 + 1e-6) if logger.name == next(iter(run.loggers)) else np.inf
+        place = f"runs.{run.name}.record"
+        records = _part(place, (start, end), time, step, whole, slack)
     variables = {}
     for name, each in channels.items():
         values, attributes = _converted(name, each, run, logger)
         variables[name] = ("time", values[records], attributes)
     coordinate = ("time", time[records], {"units": "s", "long_name": "time"})
     return xr.Dataset(variables, {"time": coordinate})
-
-
-def _recorded(time: FloatArray, run: Run, logger: Logger) -> slice | BoolArray:
-    """Part of a file that `record` asks for."""
-    if run.own.record is None:
-        return slice(None)
-    start, end = (number(edge) for edge in run.own.record)
-    step, whole = float(np.median(np.diff(time))), (float(time[0]), float(time[-1]))
-    is_reference = logger.name == next(iter(run.loggers))
-    slack = step * (1 + 1e-6) if is_reference else np.inf
-    return _part(f"runs.{run.name}.record", (start, end), time, step, whole, slack)
 
 
 def _converted(
@@ -384,7 +379,7 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
     if not gapped:
         return
     time, first = data["time"].to_numpy(), missing[gapped[0]]
-    step = float(np.median(np.diff(time)))
+    step = usual_step(time)
 
     def said(gap: tuple[int, int]) -> str:
         count, begin = gap[1] - gap[0], instant_text(time[gap[0]], step)
@@ -431,7 +426,7 @@ def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> x
 
 def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Dataset:
     """Fill gaps, so that filters can run, and flag what was filled and what looks wrong."""
-    step = float(np.median(np.diff(data["time"].to_numpy())))
+    step = usual_step(data["time"].to_numpy())
     longest = preparation.longest_gap if preparation.gaps == "bridge" else 0.0
     for name in list(data.data_vars):
         try:
@@ -531,8 +526,7 @@ def _axis(run: Run, dt: float) -> FloatArray:
     if end <= begin:
         times = {name: each["time"].to_numpy() for name, each in run.groups.items()}
         spans = ", ".join(
-            f"{name} {span_text(t[0], t[-1], float(np.median(np.diff(t))))}"
-            for name, t in times.items()
+            f"{name} {span_text(t[0], t[-1], usual_step(t))}" for name, t in times.items()
         )
         raise DataError(
             f"run '{run.name}': its instruments never recorded together ({spans}, on the "
@@ -605,15 +599,12 @@ def strays(own: float, samples: int, dt: float) -> bool:
     return bool(abs(own - dt) * samples > 0.05 * dt)
 
 
-def redundant_pairs(settings: CampaignSettings, period: float | None) -> tuple[Redundant, ...]:
-    """Groups of ``[redundant]``, windows in seconds, for an encounter period (s)."""
-    out = []
-    for each in settings.redundant.values():
-        window = each.window
-        if isinstance(window, Length):
-            window = None if period is None else window.at(period)
-        out.append(Redundant(each.channels, window))
-    return tuple(out)
+def redundant_pairs(settings: CampaignSettings, period: float) -> Redundant:
+    """Groups of ``[redundant]`` with their windows in seconds, for an encounter period (s)."""
+    return {
+        each.channels: each.window.at(period) if isinstance(each.window, Length) else each.window
+        for each in settings.redundant.values()
+    }
 
 
 def checked(
@@ -656,7 +647,7 @@ def checked(
         water_depth=settings.rig.water_depth,
         wave_channel=settings.wave_channel,
         period=period,
-        redundant=redundant_pairs(settings, None),
+        redundant=redundant_pairs(settings, np.nan),
         rates=rates,
         assumed_units=units,
         wave_columns=waves,
@@ -679,7 +670,7 @@ def cropped(run: Run) -> Run:
     """Step 8: cut the run to its span; spans that lie outside the record are refused."""
     assert run.data is not None
     data, reference = run.data, run.reference_time
-    dt = float(np.median(np.diff(data["time"].to_numpy())))
+    dt = usual_step(data["time"].to_numpy())
     record = float(reference[0]), float(reference[-1])
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
     slack = max(dt, (record[1] - record[0]) / (reference.size - 1)) * (1 + 1e-6)
@@ -796,11 +787,3 @@ def celerity_of(run: xr.Dataset, dt: float, campaign: CampaignSettings) -> float
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
         return None
     return celerity.celerity
-
-
-def version() -> str:
-    """Version of seakeep, "unknown" where it is not installed."""
-    try:
-        return metadata.version("seakeep")
-    except metadata.PackageNotFoundError:
-        return "unknown"

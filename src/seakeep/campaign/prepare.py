@@ -25,13 +25,13 @@ from seakeep.campaign.pipeline import (
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Failures, Survey, spare, survey
-from seakeep.campaign.validation import read_settings
+from seakeep.campaign.validation import cross_checks
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import expanded
 from seakeep.quality import as_json, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.signals.waves import noise_floor
-from seakeep.toml import in_seconds, lengths, parse_length
+from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
 
 SHOWN_RUNS = 6
 """Runs that a campaign's representation names."""
@@ -189,15 +189,13 @@ class Campaign:
         """SHA-256 of all files on which a prepared run depends, through period and clocks too."""
         settings = self.settings
         pooled = settings.instruments.pool_drift and bool(self._run(name).files)
-        names = dict.fromkeys([name, *(self.runs if pooled or self._measures_period else [])])
-        return hashlib.sha256(" ".join(map(self._sum_of, names)).encode()).hexdigest()
-
-    def _sum_of(self, name: str) -> str:
-        """Checksum of a run's files, or a word where one is not there or cannot be read."""
-        try:
-            return self.checksum_of(name)
-        except (MissingFileError, OSError):
-            return "unreadable"
+        sums = []
+        for each in dict.fromkeys([name, *(self.runs if pooled or self._measures_period else [])]):
+            try:
+                sums.append(self.checksum_of(each))
+            except (MissingFileError, OSError):
+                sums.append("unreadable")
+        return hashlib.sha256(" ".join(sums).encode()).hexdigest()
 
     def _run(self, name: str) -> RunSettings:
         runs = self.settings.runs
@@ -551,6 +549,7 @@ def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:
         every key at fault, the value received, and the remedy.
     """
     path = expanded(path)
-    settings = read_settings(path)
+    content = read_toml(path, "campaign", " Draft one with 'seakeep init FILE…'.")
+    settings = validated(CampaignSettings, content, path, "campaign", cross_checks)
     preparation = settings.preparation.filtered_as(preset or settings.preset)
     return Campaign(path, settings.model_copy(update={"preparation": preparation}))

@@ -16,9 +16,9 @@ from seakeep.campaign.settings import FileSettings
 from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import expanded, sha256_of
-from seakeep.formats import Columns, is_recording_folder, read_columns
+from seakeep.formats import Columns, folder_reader, read_columns
 from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
-from seakeep.signals.time_axis import check_order, instant_text
+from seakeep.signals.time_axis import check_order, instant_text, usual_step
 
 _TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "sec", "seconds",
           "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
@@ -61,7 +61,7 @@ def expand(file: str, folder: Path) -> Path:
 
 def checksum(path: Path) -> str:
     """SHA-256 of a file, or of the names and contents of the files in a bag's folder."""
-    if not is_recording_folder(path):
+    if folder_reader(path) is None:
         return sha256_of(path)
     digest = hashlib.sha256()
     for part in sorted(each for each in path.iterdir() if each.is_file()):
@@ -169,7 +169,7 @@ def time_step_of(table: Columns, name: str) -> float | None:
     if times is None or times.size < 3:
         return None
     step = float(times[-1] - times[0]) / (times.size - 1)
-    usual = float(np.median(np.diff(times)))
+    usual = usual_step(times)
     step = step if abs(step - usual) < 0.01 * abs(usual) else usual
     step *= conversion(unit, "s", f"the time column '{name}'") if is_unit(unit) else 1.0
     return step if step > 0 else None
@@ -203,24 +203,19 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
         return name, check_order(np.arange(count) / float(rate or 1.0), str(path))
     if name in table.faults:
         raise DataError(table.faults[name])
-    unit = time_unit_of(table, name, options.time_unit)
+    stated, said = options.time_unit, _said_unit(table, name)
+    unit = time_unit_of(table, name, stated)
     factor = conversion(unit, "s", f"the time column '{name}' of {path}")
-    _refuse_other_unit(path, table, name, options.time_unit)
+    if stated and is_unit(said) and si_unit(said) == "s" and not same_unit(said, stated):
+        raise RequestError(
+            f"time_unit: '{stated}' is stated, and {path} says '{said}' for its time column "
+            f"'{name}'. Leave time_unit out where the files say it; or, if the file is wrong, "
+            "correct its header, or leave time and time_unit out and state sampling_rate (Hz) in "
+            "[files]."
+        )
     times = table.values[name] * factor
     _refuse_stuck_clock(path, times, [x for each, x in table.values.items() if each != name])
     return name, check_order(times, str(path))
-
-
-def _refuse_other_unit(path: Path, table: Columns, name: str, stated: str | None) -> None:
-    """Refuse a unit of the times that is stated against the one in the file's header."""
-    said = _said_unit(table, name)
-    if stated is None or not is_unit(said) or si_unit(said) != "s" or same_unit(said, stated):
-        return
-    raise RequestError(
-        f"time_unit: '{stated}' is stated, and {path} says '{said}' for its time column '{name}'. "
-        "Leave time_unit out where the files say it; or, if the file is wrong, correct its header, "
-        "or leave time and time_unit out and state sampling_rate (Hz) in [files]."
-    )
 
 
 def _refuse_stuck_clock(path: Path, times: FloatArray, others: Sequence[FloatArray]) -> None:

@@ -8,11 +8,10 @@ from pathlib import Path
 import xarray as xr
 
 from seakeep.arrays import Progress
-from seakeep.campaign.pipeline import version
 from seakeep.campaign.prepare import Campaign
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, warn
-from seakeep.files import check_output, load_sealed, make_folder, write_sealed
+from seakeep.files import check_output, load_sealed, make_folder, version, write_sealed
 from seakeep.quality import warn_of_runs
 
 PREPARED = "prepared run"

@@ -140,8 +140,11 @@ def survey(
     a warning; of the others, `failures` takes the errors, or they are raised. Drifts are pooled
     where the campaign does not say otherwise, and one that is not certain is left out.
     """
-    reader = ReadOnce()
-    clock_runs, period_runs = _surveyed(settings, asked, channel)
+    reader, pools = ReadOnce(), settings.instruments.pool_drift
+    own = [name for name in asked if settings.runs[name].files]
+    others = settings.used_runs if own and pools else ()  # whose drifts are pooled with theirs
+    clock_runs = dict.fromkeys([*own, *filter(lambda name: settings.runs[name].files, others)])
+    period_runs = () if channel is None else settings.period_runs
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks: dict[str, dict[str, Clock]] = {}
     spans: dict[str, tuple[float, float]] = {}
@@ -172,32 +175,13 @@ def survey(
         warn(words)
     kind = ClocksKind.PERIOD
     warn_of([Finding(kind, run, str(channel), *two, "s") for run, two in doubts.items()], set())
-    if settings.instruments.pool_drift:
-        _pool(clocks)
-    for each in clocks.values():
-        each.update({logger: without_doubtful_drift(clock) for logger, clock in each.items()})
+    for logger in {name for each in clocks.values() for name in each}:
+        having = [each for each in clocks.values() if logger in each]
+        known = [each[logger] for each in having]
+        for each, clock in zip(having, pool_drift(known) if pools else known, strict=True):
+            each[logger] = without_doubtful_drift(clock)
     alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}
     return Survey(settings, files_of, reader, alone | clocks, periods, left_out, doubts)
-
-
-def _surveyed(
-    settings: CampaignSettings, asked: Sequence[str], channel: str | None
-) -> tuple[Sequence[str], Sequence[str]]:
-    """Runs of which clocks are needed, and those of which periods are."""
-    runs = dict.fromkeys([*asked, *settings.used_runs])
-    timed = several = [name for name in runs if settings.runs[name].files]
-    if not (settings.instruments.pool_drift and set(asked) & set(several)):
-        timed = [name for name in several if name in asked]
-    return timed, () if channel is None else settings.period_runs
-
-
-def _pool(clocks: Mapping[str, dict[str, Clock]]) -> None:
-    """Give each logger one drift in all runs whose clocks agree."""
-    for logger in {name for each in clocks.values() for name in each}:
-        having = [run for run in clocks if logger in clocks[run]]
-        pooled = pool_drift([clocks[run][logger] for run in having])
-        for run, clock in zip(having, pooled, strict=True):
-            clocks[run][logger] = clock
 
 
 def _left_out(run: str, error: SeakeepError, period: bool, drift: bool) -> str:

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
 
 from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings
 from seakeep.conventions import TURNS, canonical_channel, conversion, si_unit
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.signals.expressions import parse
-from seakeep.toml import Mistake, lengths, read_toml, validated
-
-
-def read_settings(path: Path) -> CampaignSettings:
-    """Read and validate a campaign file."""
-    content = read_toml(path, "campaign", " Draft one with 'seakeep init FILE…'.")
-    return validated(CampaignSettings, content, path, "campaign", _cross_checks)
+from seakeep.toml import Mistake, lengths
 
 
 def derivation_order(
@@ -68,7 +61,8 @@ def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[
     return needed
 
 
-def _cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
+def cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
+    """What tables of a campaign say against one another."""
     yield from _unit_mistakes(settings)
     yield from _derived_mistakes(settings)
     yield from _name_mistakes(settings)

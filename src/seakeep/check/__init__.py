@@ -14,15 +14,14 @@ from typing import Any
 
 import xarray as xr
 
-from seakeep.arrays import Progress
+from seakeep.arrays import Datasets, Progress
 from seakeep.check.coherence import coherence
 from seakeep.check.motion import decay, drift, measured_decay, modes
 from seakeep.check.parts import Known, of_part
 from seakeep.check.peaks import statistics
 from seakeep.check.residuals import residuals
 from seakeep.check.response import measured_response, response, validation
-from seakeep.check.sea import validity
-from seakeep.check.worth import worth
+from seakeep.check.worth import validity, worth
 from seakeep.errors import SeakeepError, SeakeepWarning
 from seakeep.models import Model
 from seakeep.models.labelled import check_channels
@@ -93,7 +92,7 @@ class Checked:
 
 def check_model(
     model: Model,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     progress: Progress | None = None,
     baselines: Mapping[str, Model] | None = None,
 ) -> Checked:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
     FreeRun,
     Known,
@@ -36,7 +36,7 @@ AVERAGES = 10
 
 def coherence(
     model: Model,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     free: Known | None = None,
     baselines: Mapping[str, Model] | None = None,
 ) -> xr.Dataset:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import scipy
 import xarray as xr
 
-from seakeep.arrays import ComplexArray, FloatArray, IntArray
+from seakeep.arrays import ComplexArray, Datasets, FloatArray, IntArray
 from seakeep.check.parts import (
     driven,
     is_regular,
@@ -138,7 +136,7 @@ def decay(model: Model) -> xr.Dataset:
     )
 
 
-def measured_decay(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
     r"""Period and damping of measured decay runs, :math:`\delta = p + q a`.
 
     Parameters
@@ -195,7 +193,7 @@ DIFFERENCES = 4
 """Difference frequencies, besides zero."""
 
 
-def drift(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def drift(model: Model, runs: Datasets) -> xr.Dataset:
     r"""Probe the observables of a model by one and by two waves: mean drift and slow response.
 
     Two waves of frequencies :math:`f` and :math:`f + \Delta` and of the amplitude a pass the
@@ -309,7 +307,7 @@ def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:
 
 def _offsets(
     model: HankelDMDcModel,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     static: ComplexArray,
     still: FloatArray,
 ) -> dict[str, object]:

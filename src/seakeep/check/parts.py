@@ -11,12 +11,12 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray
+from seakeep.arrays import BoolArray, Datasets, FloatArray
 from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
-from seakeep.models import HankelDMDcModel, InputMap, Model, SlowSquares, is_ensemble
+from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
 from seakeep.models.labelled import Span, channel_matrix, check_step
-from seakeep.models.observables import HALF_WIDTH
+from seakeep.models.observables import at_once
 from seakeep.models.registry import is_linear
 from seakeep.signals.time_axis import stretches
 from seakeep.signals.waves import first_wave
@@ -71,7 +71,7 @@ def is_regular(run: xr.Dataset) -> bool:
     return bool(run.attrs.get("waves") == "regular")
 
 
-def irregular(runs: Mapping[str, xr.Dataset], what: str) -> dict[str, xr.Dataset]:
+def irregular(runs: Datasets, what: str) -> dict[str, xr.Dataset]:
     """Runs that are not regular; an error says what cannot be had without them."""
     skipped = {name: run for name, run in runs.items() if not is_regular(run)}
     if not skipped:
@@ -82,7 +82,7 @@ def irregular(runs: Mapping[str, xr.Dataset], what: str) -> dict[str, xr.Dataset
     return skipped
 
 
-def of_part(runs: Mapping[str, xr.Dataset], part: str) -> dict[str, xr.Dataset]:
+def of_part(runs: Datasets, part: str) -> dict[str, xr.Dataset]:
     """Runs with a span that trains ("train") or tests ("test"), and with this span alone.
 
     A run that states neither span tests as a whole.
@@ -96,18 +96,18 @@ def of_part(runs: Mapping[str, xr.Dataset], part: str) -> dict[str, xr.Dataset]:
     return parts
 
 
-def judged(runs: Mapping[str, xr.Dataset]) -> tuple[dict[str, xr.Dataset], str]:
+def judged(runs: Datasets) -> tuple[dict[str, xr.Dataset], str]:
     """Tests, or what trains where there is none, and the word for it."""
     tests = of_part(runs, "test")
     return (tests, "tests") if tests else (of_part(runs, "train"), "training")
 
 
-def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
+def used_parts(model: Model, runs: Datasets) -> dict[str, Part]:
     """Parts of runs that train or test; a run that cannot be used warns."""
     parts = {}
     for name, run in runs.items():
         check_step(run, name, model.dt)
-        time = np.asarray(run["time"].values, dtype=float)
+        time = run["time"].values
         states = channel_matrix(run, model.states, name)
         try:
             aligned = model.aligned_inputs(run) if is_linear(model) else run
@@ -129,7 +129,7 @@ def used_parts(model: Model, runs: Mapping[str, xr.Dataset]) -> dict[str, Part]:
 
 def free_runs(
     model: Model,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     free: Known | None = None,
     label: str = "",
     like: Mapping[str, FreeRun] | None = None,
@@ -210,7 +210,7 @@ def driven(
 
 def beside(
     baselines: Mapping[str, Model] | None,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     own: Mapping[str, FreeRun],
     free: Known | None,
 ) -> dict[str, dict[str, FreeRun]]:
@@ -258,7 +258,7 @@ def samples_in(
     Before the waves have come to the probes and the vessel among the channels `names`, a constant
     is as good a forecast as any.
     """
-    time = np.asarray(run["time"].values, dtype=float)
+    time = run["time"].values
     last = int(np.searchsorted(time, float(span[1]) + 0.5 * dt)) - 1
     # The last step reads the input `lead` samples after the instant that it starts from.
     last = min(last, time.size - max(lead, 1))
@@ -272,7 +272,7 @@ def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
     """Sample at which waves have come to each probe, and each motion has begun."""
     begins = [0]
     for name in (each for each in names if is_elevation(each) or each in MOTIONS):
-        series = np.asarray(run[name].values, dtype=float)
+        series = run[name].values
         if np.isfinite(series).all() and np.ptp(series):
             begins.append(first_wave(series, name in MOTIONS))
     return max(begins)
@@ -281,7 +281,7 @@ def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
 def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:
     if like is None:
         at, last = window_of(model, run)
-        time = np.asarray(run["time"].values, dtype=float)
+        time = run["time"].values
         measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
         empty = np.full_like(measured, np.nan)
         like = FreeRun(float(time[at]), time[at + 1 : last + 1], empty, measured)
@@ -337,13 +337,7 @@ def _at_once(input_map: InputMap) -> InputMap:
     """The map without look-ahead and lags, and without limits of what is above training."""
     follows, observed = input_map.follows, input_map.observed
     if observed is not None:
-        now = [
-            replace(each, lags=(0,), lead=HALF_WIDTH / each.cutoff)  # the middle of its filter
-            if isinstance(each, SlowSquares)
-            else each
-            for each in observed.observables
-        ]
-        observed = replace(observed, observables=tuple(now), tops=())
+        observed = replace(observed, observables=tuple(map(at_once, observed.observables)), tops=())
     if follows is not None:
         follows = replace(follows, lead=0)
     return replace(input_map, lead=0, observed=observed, follows=follows, reference=0)
@@ -373,7 +367,7 @@ def single_model(model: Model) -> HankelDMDcModel:
     return replace(model, signature=signature)
 
 
-def reference_probe(model: Model, runs: Mapping[str, xr.Dataset]) -> int:
+def reference_probe(model: Model, runs: Datasets) -> int:
     """Input that waves are counted from: the elevation that stands farthest downstream.
 
     Raises
@@ -399,7 +393,7 @@ def elevations(model: Model) -> BoolArray:
     return np.array([is_elevation(name) for name in model.inputs], dtype=bool)
 
 
-def positions(model: Model, runs: Mapping[str, xr.Dataset]) -> FloatArray | None:
+def positions(model: Model, runs: Datasets) -> FloatArray | None:
     """Position of each elevation, m (NaN of another input); None where one is not stated."""
     waves = elevations(model)
     for run in runs.values():
@@ -412,7 +406,7 @@ def positions(model: Model, runs: Mapping[str, xr.Dataset]) -> FloatArray | None
 
 
 def wave_turns(
-    model: Model, runs: Mapping[str, xr.Dataset], frequency: FloatArray, reference: int
+    model: Model, runs: Datasets, frequency: FloatArray, reference: int
 ) -> FloatArray | None:
     """Phase of the wave at each input behind that at the reference, rad, by linear dispersion.
 

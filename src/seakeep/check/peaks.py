@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import Known, free_runs, irregular, judged, units_of
 from seakeep.core.density import jensen_shannon, kernel_density
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
@@ -22,7 +20,7 @@ PLACES = 161
 
 def statistics(
     model: Model,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     duration: float | None = None,
     free: Known | None = None,
 ) -> xr.Dataset:

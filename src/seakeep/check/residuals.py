@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
     FreeRun,
     Known,
@@ -31,9 +31,7 @@ AGES = 15
 """Encounter periods over which a forecast grows old."""
 
 
-def residuals(
-    model: Model, runs: Mapping[str, xr.Dataset], free: Known | None = None
-) -> xr.Dataset:
+def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dataset:
     r"""Test the errors of one step, and say where and when those of free runs arise.
 
     Parameters
@@ -137,7 +135,7 @@ def _one_step(
 def _aged(model: Model, run: xr.Dataset, name: str, lags: int) -> FloatArray:
     """Squared errors over the time since each of several starts, (window, steps, N)."""
     first, last = window_of(model, run)
-    time = np.asarray(run["time"].values, dtype=float)
+    time = run["time"].values
     count = min(AGES * lags, last - first)
     starts = np.arange(first, last - count + 1, lags)
     forecasts = free_windows(model, run, time[starts], count)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.interpolate import interp1d
 
-from seakeep.arrays import ComplexArray, FloatArray, as_real
+from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real
 from seakeep.check.parts import (
     Part,
     elevations,
@@ -47,7 +47,7 @@ LEVEL = 0.95
 def response(
     model: Model,
     frequencies: npt.ArrayLike | None = None,
-    runs: Mapping[str, xr.Dataset] | None = None,
+    runs: Datasets | None = None,
 ) -> xr.Dataset:
     r"""Transfer functions of a model from its matrices, per input and for a passing wave.
 
@@ -182,7 +182,7 @@ def _ratio(units: str, per: str) -> str:
     return f"{units or '1'}/{per}" if per and per != "1" else units
 
 
-def measured_response(model: Model, runs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def measured_response(model: Model, runs: Datasets) -> xr.Dataset:
     """Measured response per wave amplitude: points with expanded uncertainty.
 
     Each run in regular waves is one point, by a harmonic fit in windows of whole periods (ITTC
@@ -320,9 +320,7 @@ def _points(
     )
 
 
-def validation(
-    model: Model, runs: Mapping[str, xr.Dataset], measured: xr.Dataset | None = None
-) -> xr.Dataset:
+def validation(model: Model, runs: Datasets, measured: xr.Dataset | None = None) -> xr.Dataset:
     r"""Judge the response by ASME V&V 20: comparison error against validation uncertainty.
 
     :math:`E = S - D` with S the model's and D the measured amplitude;

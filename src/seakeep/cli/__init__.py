@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import platform
 import sys
 import traceback
 from importlib import metadata
@@ -11,14 +12,7 @@ from typing import Annotated
 
 import typer
 
-from seakeep.cli import (
-    campaigns,
-    checking,
-    exporting,
-    modelling,
-    tracking,
-    tuning,
-)
+from seakeep.cli import campaigns, judging, modelling
 from seakeep.cli import study as studying
 from seakeep.cli.console import say, tell_warnings
 from seakeep.errors import SeakeepError
@@ -62,22 +56,43 @@ def _options(
     """Read the options before the verb; ``main`` looks for --debug itself."""
 
 
+_PACKAGES = ("numpy", "scipy", "xarray", "h5netcdf", "h5py", "pandas", "pydantic", "typer", "pint")
+_EXTRAS = ("matplotlib", "control", "numba")
+
+
+def info() -> None:
+    """Print versions and environment, for a bug report.
+
+    Example: seakeep info
+    """
+    typer.echo(f"seakeep {metadata.version('seakeep')}")
+    typer.echo(f"Python {platform.python_version()} on {platform.platform()}")
+    typer.echo(f"cores {os.cpu_count()}")
+    for name in (*_PACKAGES, *_EXTRAS):
+        try:
+            typer.echo(f"{name} {metadata.version(name)}")
+        except metadata.PackageNotFoundError:
+            typer.echo(f"{name} not installed")
+    for name in ("SEAKEEP_DATA_DIR", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        typer.echo(f"{name}={os.environ.get(name, '')}")
+
+
 for _verb in (
     campaigns.tank,
     campaigns.init,
     campaigns.prepare,
-    tuning.tune,
+    modelling.tune,
     modelling.fit,
-    checking.calibrate,
-    modelling.forecast,
-    modelling.compare,
-    exporting.export,
-    checking.check,
+    modelling.calibrate,
+    judging.forecast,
+    judging.compare,
+    modelling.export,
+    judging.check,
     studying.study,
     studying.report,
     studying.reproduce,
-    tracking.track,
-    exporting.info,
+    campaigns.track,
+    info,
 ):
     app.command()(_verb)
 app.add_typer(campaigns.datasets, name="datasets")

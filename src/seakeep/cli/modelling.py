@@ -1,58 +1,128 @@
-"""``seakeep fit``, ``forecast`` and ``compare``."""
+"""``seakeep tune``, ``fit``, ``calibrate`` and ``export``."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import replace
 from importlib.util import find_spec
-from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
-from typer import Argument, Exit, Option
+from typer import Argument, Option
 
 from seakeep.cli.console import (
     DEFAULT_LEVEL,
-    BandKind,
     CampaignFile,
-    Degrees,
-    FullScale,
     Level,
     ModelFile,
     ModelKey,
     Scheduler,
-    Steps,
     Workers,
     member_executor,
     print_table,
     progress_bar,
     read_files,
-    refuse,
     say,
     show,
 )
 from seakeep.errors import RequestError
-from seakeep.files import check_output, check_place, make_folder
+from seakeep.files import check_output, check_place, replacing, write_text
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-    from seakeep.campaign import Campaign
     from seakeep.models import Model
-    from seakeep.study import Comparison
 
-TABLE = "comparison.csv"
-DIFFERENCES = "differences.csv"
-ERRORS, NOWCAST = "errors_by_run", "nowcast_"
-FOR_ENSEMBLES = (
-    "is for ensembles, and {} holds a single model. Leave it out, or fit an ensemble (kind = "
-    "'bayesian_hankel_dmdc' in [model])."
-)
-NO_BAND = "belongs to the band, and --members writes the members without it. Leave one of them out."
-NO_NOWCAST = (
-    "and --nowcast do not go together: forecasts start all over the runs, one after the other, "
-    "with the band of the filter, and their errors are in training SDs. Leave one of them out."
-)
+
+def tune(
+    campaign: CampaignFile,
+    vary: Annotated[
+        list[str] | None,
+        Option(
+            help="What to choose beside the ridge: observables, lead, input_delays, state_delays, "
+            "memory, alignment, readouts, kind (FIR, ARX and subspace models too). Repeat it for "
+            "several. Default: observables, which are chosen too where the file leaves them open.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        Option(
+            "-o", "--out", help="Tuned campaign file, beside CAMPAIGN. Default: NAME_tuned.toml."
+        ),
+    ] = None,
+    model: ModelKey = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Choose settings by free runs on held-out training runs.
+
+    Each candidate is fitted to all training runs but one and judged by free runs on that one.
+    The choice is written into a copy of the campaign file, and all that was tried into a CSV file
+    beside it. After an interruption, the same command continues the search.
+
+    Example: seakeep tune docs/tutorial/campaign.toml --vary input_delays
+    """
+    from seakeep.campaign import read_campaign
+    from seakeep.models import HankelDMDc, Select, labelled
+    from seakeep.report.comparison import plain_cells
+    from seakeep.study.fit import read_training
+    from seakeep.study.resolve import counts_in_periods, preset_of
+    from seakeep.tuning import tune as search
+    from seakeep.tuning import tuned_campaign
+
+    read = read_campaign(campaign)
+    target = out or campaign.with_name(f"{campaign.stem}_tuned.toml")
+    if target.resolve().parent != campaign.resolve().parent:
+        raise RequestError(
+            f"{target} lies in another folder than {campaign}, and paths in the file count from "
+            "its folder. Write it beside the campaign file."
+        )
+    check_place(target, ".toml")
+    picture, tried = target.with_suffix(".png"), target.with_suffix(".csv")
+    for path, kind in ((target, "tuned campaign"), (picture, "figure"), (tried, "table")):
+        check_output(path, kind, read_files(read), "state_delays,input_delays,lead,observables,")
+    settings = read.model(model)
+    if settings.kind != "hankel_dmdc":
+        raise RequestError(
+            f"kind = '{settings.kind}' cannot be tuned: a Hankel model is. Name another model with "
+            "--model, or set kind = 'hankel_dmdc'. An ensemble chooses by itself: preset = "
+            "'recommended'."
+        )
+    with progress_bar("Preparing") as progress:
+        spec, _, runs, stop = read_training(read, model, progress)
+    assert isinstance(spec, HankelDMDc)
+    period = read.encounter_period() if counts_in_periods(settings) else None
+    scores = target.with_suffix(".scores.json")
+    chosen = spec.select or Select(period=period)
+    vary = vary or ["observables"]
+    with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
+        search_result = search(
+            replace(spec, select=chosen),
+            runs,
+            list(settings.states),
+            list(settings.inputs),
+            vary=sorted({*vary}),
+            horizon=chosen.horizon,
+            folds=chosen.folds,
+            stop=stop,
+            executor=executor,
+            progress=progress,
+            resume=scores,
+        )
+    typer.echo(search_result.describe())
+    samples = None if period is None else period / labelled.common_step(runs)
+    before = campaign.read_text(encoding="utf-8")
+    how = {*vary, *chosen.opened}, preset_of(settings), samples
+    write_text(target, tuned_campaign(before, model, search_result.spec, *how))
+    scores.unlink(missing_ok=True)
+    say(f"Wrote {target}. Fit it with: seakeep fit {target} -o model.nc")
+    if not search_result.table.sizes["trial"]:
+        return
+    with replacing(tried) as place:
+        plain_cells(search_result.table.to_dataframe()).to_csv(place, index=False)
+    say(f"Wrote {tried}: all that was tried.")
+    if find_spec("matplotlib"):
+        from seakeep.report.style import save_figure
+
+        say(f"Wrote {save_figure(search_result.figure(), picture)}.")
 
 
 def fit(
@@ -90,378 +160,272 @@ def fit(
     say(f"Wrote {out}. Judge it with: seakeep compare {out} {campaign}")
 
 
-def forecast(
-    model: ModelFile,
+def calibrate(
+    ensemble: Annotated[
+        Path, Argument(help="Ensemble file written by seakeep fit.", metavar="ENSEMBLE.nc")
+    ],
     campaign: CampaignFile,
-    run: Annotated[str, Option(help="Name of the run.")],
-    start: Annotated[
+    steps: Annotated[
         str,
         Option(
-            help="Instant of the last measured state, s or encounter periods such as '20 T'.",
+            help="Length of a window, as long as forecasts will be: a number of instants, or "
+            "encounter periods such as '15 T'.",
         ),
     ],
-    out: Annotated[Path, Option("-o", "--out", help="Result: .nc or .csv.")],
-    steps: Steps = None,
-    level: Level = None,
-    band: BandKind = None,
-    members: Annotated[
-        bool,
-        Option("--members", help="For an ensemble: write each member, and no statistics."),
-    ] = False,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    full_scale: FullScale = False,
-    degrees: Degrees = False,
-    ahead: Annotated[
-        Literal["refuse", "predict"],
-        Option(
-            help="If the waves end before the model's look-ahead: 'refuse', or 'predict' them "
-            "from their record.",
-        ),
-    ] = "refuse",
-) -> None:
-    """Forecast a run from START, driven by measured waves.
-
-    The model runs freely after START and reads no measured state there.
-    For an ensemble, the result is mean, standard deviation and band of its members.
-
-    Example: seakeep forecast model.nc docs/tutorial/campaign.toml --run unseen --start 20
-    --steps 400 -o forecast.csv
-
-    In encounter periods: seakeep forecast model.nc docs/tutorial/campaign.toml --run unseen
-    --start '20 T' --steps '15 T' -o periods.csv
-
-    An ensemble: seakeep forecast ensemble.nc docs/tutorial/campaign.toml --run unseen --start 20
-    --steps 400 --level 0.9 -o band.csv
-    """
-    if out.suffix not in (".nc", ".csv"):
-        raise RequestError(f"{out} ends in '{out.suffix}'; a forecast is written as .nc or .csv.")
-    check_place(out)
-    from seakeep.campaign import load_prepared, read_campaign
-    from seakeep.models import is_ensemble, load_model
-    from seakeep.report.comparison import (
-        forecast_header,
-        forecast_words,
-        look_ahead_words,
-        write_forecast,
-    )
-    from seakeep.signals.time_axis import instant_text
-    from seakeep.study import to_full_scale, with_degrees
-    from seakeep.study.comparison import instant_of, samples_of
-    from seakeep.study.fit import warn_of_waves
-
-    identified = load_model(model)
-    read = read_campaign(campaign)
-    check_output(out, "forecast", read_files(read, model), forecast_header(identified.states))
-    band_options = _band({str(model): identified}, level, band, scheduler, members)
-    channels = [*identified.states, *identified.inputs]
-    prepared = load_prepared(read, names=[run], channels=channels)[run]
-    first = instant_of(start, read, [prepared], "--start")
-    if not isfinite(first):
-        raise RequestError(f"--start: received {start[:20]!r}. Give an instant within the run, s.")
-    count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
-    left = round((float(prepared["time"][-1]) - first) / identified.dt)
-    warn_of_waves(identified, prepared, run, first, left if count is None else count)
-    if is_ensemble(identified):
-        with (
-            member_executor(workers, scheduler) as executor,
-            progress_bar("Forecasting") as progress,
-        ):
-            play = identified.forecast if members else identified.forecast_summary
-            result = play(
-                prepared,
-                first,
-                count,
-                **({} if members else band_options),
-                ahead=ahead,
-                executor=executor,
-                progress=progress,
-            )
-    else:
-        result = identified.forecast(prepared, start=first, steps=count, ahead=ahead)
-    scaled = ""
-    if full_scale:
-        scale = _scale(read)
-        result = to_full_scale(result, scale)
-        scaled = f" Times are at full scale (1:{scale:g}); --start and --steps at model scale."
-    if degrees:
-        result = with_degrees(result)
-    write_forecast(result, out)
-    status = result.attrs["status"]
-    begin = instant_text(float(result.attrs["start"]), identified.dt)
-    reads = look_ahead_words(float(result.attrs.get("reads_input_until", 0.0)))
-    say(
-        f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
-        f"t = {begin} s, status {status}{reads and f'; {reads}'}.{scaled}"
-    )
-    members_left = result.sizes.get("member", 0) - int(result.attrs.get("diverged", 0))
-    usable = members_left > 0 if "member" in result.dims else "diverged_at" not in result.attrs
-    if not usable:
-        raise Exit(1)
-
-
-def compare(
-    model: Annotated[
-        list[Path],
-        Argument(help="Model files written by seakeep fit.", metavar="MODEL.nc..."),
-    ],
-    campaign: CampaignFile,
+    out: Annotated[Path, Option("-o", "--out", help="Ensemble file to write (NetCDF).")],
     run: Annotated[
         list[str] | None,
-        Option(help="Name of a run (repeatable); by default the test runs."),
+        Option(help="Name of a run (repeatable); by default those that train."),
     ] = None,
     start: Annotated[
         str | None,
         Option(
-            help="Instant of the last measured state, s or encounter periods such as '20 T'; by "
-            "default the first possible one in waves.",
+            help="First instant used of each run, s or encounter periods such as '20 T'; by "
+            "default the start of its training span, or of the run.",
         ),
     ] = None,
-    steps: Steps = None,
-    out: Annotated[
-        Path, Option("-o", "--out", help="Folder for the table and the figures.")
-    ] = Path("comparison"),
-    format_: Annotated[
-        Literal["png", "svg", "pdf"], Option("--format", help="Format of the figures.")
-    ] = "png",
-    degrees: Degrees = True,
+    stop: Annotated[
+        str | None,
+        Option(
+            help="Last instant used of each run, s or encounter periods such as '40 T'; by default "
+            "the end of its training span, or of the run.",
+        ),
+    ] = None,
     level: Level = None,
-    band: BandKind = None,
+    scale: Annotated[
+        Literal["constant", "spread", "learnt"],
+        Option(
+            help="Half-width of the band: 'spread', a factor times that of the members with a "
+            "floor, 'constant', the members' band moved outwards by the same amount everywhere, or "
+            "'learnt' from spread, horizon and waves.",
+        ),
+    ] = "spread",
+    folds: Annotated[
+        Literal["run"] | None,
+        Option(
+            help="'run': members trained on the other runs forecast each training run; by default "
+            "only windows that no member has read count.",
+        ),
+    ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    full_scale: FullScale = False,
-    baselines: Annotated[
-        bool,
-        Option(
-            "--baselines",
-            help="Fit hold-last, mean, FIR, ARX and a subspace model to the training runs and "
-            "compare with them.",
-        ),
-    ] = False,
-    nowcast: Annotated[
-        bool,
-        Option(
-            "--nowcast",
-            help="Follow the runs sample by sample, without future waves, and judge the error "
-            "against lead time (--steps: the longest).",
-        ),
-    ] = False,
 ) -> None:
-    """Judge forecasts of test runs against the measurement.
+    """Calibrate the band of an ensemble on measured windows.
 
-    Prints tables per run and writes them as CSV, with an overlay figure per run. Of an ensemble,
-    the mean and the coverage of the band are judged. Several models are judged over the same
-    instants, with the change of the error from the first one, its interval, and a figure of the
-    errors by wave period.
+    The calibrated band holds the stated share of the measurement, in the sea of these runs.
+    The ensemble forecasts windows, end to end, that no member has read; a quantile of its errors
+    there gives the band (split-conformal prediction). Judge the band on other windows.
 
-    Example: seakeep compare model.nc docs/tutorial/campaign.toml -o comparison
-
-    Two models: seakeep compare model.nc ensemble.nc docs/tutorial/campaign.toml --baselines
-
-    In service: seakeep compare model.nc docs/tutorial/campaign.toml --nowcast --steps '2 T' -o now
+    Example: seakeep calibrate ensemble.nc docs/tutorial/campaign.toml --run unseen --stop 60
+    --steps 200 -o calibrated.nc
     """
-    from seakeep.campaign import read_campaign
-    from seakeep.models import load_model
-    from seakeep.report.comparison import (
-        difference_blocks,
-        winner,
-        write_comparison,
-        write_differences,
-    )
-    from seakeep.study import compare_models, comparison_table, difference_table
-    from seakeep.study.nowcast import served
+    check_place(out, ".nc")
+    from seakeep.campaign import load_prepared, read_campaign
+    from seakeep.models import is_ensemble, load_model
+    from seakeep.models.forecasts import counted
+    from seakeep.report.comparison import margins_table
+    from seakeep.signals.time_axis import span_text
+    from seakeep.study.comparison import calibration_parts, samples_of
 
-    make_folder(out)
-    names = _named(model)
-    fitted = {name: load_model(path) for name, path in names.items()}
-    shown = _band(fitted, level, band, scheduler)
-    read = read_campaign(campaign)
-    runs = run or read.test_runs
-    names_of_figures = [f"{NOWCAST}{each}" for each in runs] if nowcast else [*runs, ERRORS]
-    figures = _figures(names_of_figures, out, format_)
-    used = read_files(read, *model)
-    check_output(out / TABLE, "table", used, "run,channel,channel_units,.*")
-    check_output(out / DIFFERENCES, "table", used, "run,wave_period,model,.*")
-    for path in figures.values():
-        check_output(path, "figure", used)
-    if baselines:
-        fitted = _with_baselines(fitted, read)
-    if nowcast:
-        given = {"--start": start, "--band": band, "--workers": workers, "--scheduler": scheduler}
-        stated = {option: value is not None for option, value in given.items()}
-        refuse(stated | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
-        serving = {n: each for n, each in fitted.items() if n in names or served(each)}
-        _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
-        return
-    with member_executor(workers, scheduler) as executor, progress_bar("Comparing") as progress:
-        comparisons = compare_models(
-            fitted,
-            read,
-            run or (),
-            start,
-            steps,
-            progress,
-            members=progress,
-            **shown,
-            executor=executor,
-        )
-    scale = _scale(read) if full_scale else None
-    comparisons = {
-        n: [_displayed(each, scale, degrees) for each in of] for n, of in comparisons.items()
-    }
-    tables = {name: comparison_table(of) for name, of in comparisons.items()}
-    _print_comparison(tables)
-    written = [write_comparison(tables, out / TABLE)]
-    differences = None
-    if len(comparisons) > 1:
-        differences = difference_table(comparisons)
-        for block in difference_blocks(differences):
-            print_table(block)
-        show(winner(differences, {n: each.kind for n, each in fitted.items() if n not in names}))
-        written.append(write_differences(differences, out / DIFFERENCES))
-    written += _draw({name: comparisons[name] for name in names}, figures, differences)
-    say("Wrote " + ", ".join(map(str, written)))
-    if not all(each.complete for name in names for each in comparisons[name]):
-        raise Exit(1)
-
-
-def _displayed(each: Comparison, scale: float | None, degrees: bool) -> Comparison:
-    """A comparison at full scale, where there is a scale, and in degrees, if wanted."""
-    from seakeep.study import at_full_scale, in_degrees
-
-    each = each if scale is None else at_full_scale(each, scale)
-    return in_degrees(each) if degrees else each
-
-
-def _nowcast(
-    models: Mapping[str, Model],
-    campaign: Campaign,
-    runs: list[str],
-    steps: str | None,
-    level: float,
-    out: Path,
-    figures: Mapping[str, Path],
-    used: list[Path],
-) -> None:
-    """Judge models in service: tables on the terminal, a CSV file, a figure per run."""
-    from seakeep.report.comparison import HEADER, nowcast_blocks, write_nowcasts
-    from seakeep.report.figures.errors import nowcast_figure
-    from seakeep.report.style import save_figure
-    from seakeep.study import nowcasts
-
-    table = out / "nowcast.csv"
-    check_output(table, "table", used, HEADER)
-    with progress_bar("Playing") as progress:
-        results = nowcasts(models, campaign, runs, steps, level=level, progress=progress)
-    for block in nowcast_blocks(results):
-        print_table(block)
-    written = [write_nowcasts(results, table)]
-    for name, path in figures.items():
-        written.append(save_figure(nowcast_figure(results, name.removeprefix(NOWCAST)), path))
-    say("Wrote " + ", ".join(map(str, written)))
-
-
-def _named(files: list[Path]) -> dict[str, Path]:
-    """Names of model files: their stems, or their paths where two would be the same."""
-    stems = [path.stem for path in files]
-    return {p.stem if stems.count(p.stem) == 1 else str(p.with_suffix("")): p for p in files}
-
-
-def _figures(names: list[str], out: Path, suffix: str) -> dict[str, Path]:
-    """Files of figures by name, where figures can be drawn."""
-    if find_spec("matplotlib") is None:
-        say(
-            "Note: no figures, because matplotlib is not installed. "
-            "Install it with: pip install 'seakeep[figures]'"
-        )
-        return {}
-    return {name: out / f"{name}.{suffix}" for name in names}
-
-
-def _with_baselines(fitted: Mapping[str, Model], campaign: Campaign) -> dict[str, Model]:
-    """Models and baselines of the same channels, by name."""
-    from seakeep.study import fit_baselines
-    from seakeep.study.comparison import check_alike
-
-    check_alike(fitted)
-    first = next(iter(fitted.values()))
-    channels = max((each.inputs for each in fitted.values()), key=len)
-    with progress_bar("Baselines") as progress:
-        baselines = fit_baselines(campaign, first.states, channels, progress, beside=first)
-    names = {kind: kind if kind not in fitted else f"{kind} (baseline)" for kind in baselines}
-    return {**fitted, **{names[kind]: each for kind, each in baselines.items()}}
-
-
-def _print_comparison(tables: Mapping[str, xr.Dataset]) -> None:
-    from seakeep.report.comparison import band_findings, comparison_blocks, model_blocks
-
-    several = len(tables) > 1
-    blocks = model_blocks(tables) if several else comparison_blocks(*tables.values())
-    for block in blocks:
-        print_table(block)
-    for name, table in tables.items():
-        for text in band_findings(table):
-            show(f"{name}, {text}" if several else text)
-
-
-def _draw(
-    comparisons: Mapping[str, list[Comparison]],
-    figures: Mapping[str, Path],
-    differences: xr.Dataset | None,
-) -> list[Path]:
-    if not figures:
-        return []
-    from seakeep.report.figures.errors import error_figure
-    from seakeep.report.figures.histories import overlay_figure
-    from seakeep.report.style import save_figure
-
-    written = []
-    for of_run in zip(*comparisons.values(), strict=True):
-        figure = overlay_figure(dict(zip(comparisons, of_run, strict=True)))
-        written.append(save_figure(figure, figures[of_run[0].run]))
-    if differences is not None:
-        written.append(save_figure(error_figure(differences), figures[ERRORS]))
-    return written
-
-
-def _scale(campaign: Campaign) -> float:
-    general = campaign.settings.campaign
-    if "scale_factor" not in general.model_fields_set:
+    fitted = load_model(ensemble)
+    if not is_ensemble(fitted):
         raise RequestError(
-            f"--full-scale needs the scale factor, and {campaign.path} states none. Add "
-            "scale_factor (full-scale length over model length) to [campaign]."
+            f"{ensemble} holds a single model, which has no band. Fit an ensemble (kind = "
+            "'bayesian_hankel_dmdc' in [model])."
         )
-    return general.scale_factor
-
-
-def _band(
-    models: Mapping[str, Model],
-    level: float | None,
-    band: str | None,
-    scheduler: str | None = None,
-    members: bool = False,
-) -> dict[str, Any]:
-    """Level and kind of band that were asked for; a calibrated one knows its level."""
-    from seakeep.models import is_ensemble
-
-    ensembles = [each for each in models.values() if is_ensemble(each)]
-    given = {"--level": level is not None, "--band": band is not None, "--members": members}
-    if not ensembles:
-        alone = FOR_ENSEMBLES.format(", ".join(models))
-        refuse(given | {"--scheduler": scheduler is not None}, alone)
-    if members:
-        del given["--members"]
-        refuse(given, NO_BAND)
-    calibrations = [each.calibration for each in ensembles if each.calibration is not None]
-    if calibrations and band is None and not members:
+    read = read_campaign(campaign)
+    check_output(out, "model", read_files(read, ensemble))
+    wanted = run or [name for name in read.training_runs if name in fitted.training_spans]
+    if not wanted:
+        raise RequestError(
+            "the campaign has none of the runs that the ensemble was trained on. Name runs of the "
+            "same sea with --run."
+        )
+    with progress_bar("Preparing") as progress:
+        used = [*fitted.states, *fitted.inputs]
+        prepared = load_prepared(read, names=wanted, progress=progress, channels=used)
+    parts = calibration_parts(read, prepared, fitted.dt, start, stop)
+    count = samples_of(steps, read, prepared.values(), fitted.dt, "--steps")
+    with member_executor(workers, scheduler) as executor, progress_bar("Calibrating") as progress:
+        calibrated = fitted.calibrate(
+            parts,
+            count,
+            DEFAULT_LEVEL if level is None else level,
+            scale=scale,
+            folds=folds,
+            executor=executor,
+            progress=progress,
+        )
+    print_table(margins_table(calibrated))
+    assert calibrated.calibration is not None
+    spans = calibrated.calibration.spans.items()
+    used = [f"{name} {span_text(*span, calibrated.dt)}" for name, span in spans]
+    show(f"Calibrated on {', '.join(used)}: judge it on other instants.")
+    calibrated.save(out)
+    whole = sum(calibrated.calibration.windows.values())
+    if whole / (whole + 1) < calibrated.calibration.conformal.level:
         say(
-            "Note: the ensemble is calibrated, and the band shown is that of its members. "
-            "--band calibrated shows the calibrated one."
+            "Note: errors that last for a whole window are seen only once in each. Counted as "
+            f"such, {counted(whole, 'window')} would support {100 * whole / (whole + 1):.0f} %; "
+            "more windows make the margin surer.",
         )
-    if level is None:
-        level = (
-            calibrations[0].conformal.level
-            if calibrations and band == "calibrated"
-            else DEFAULT_LEVEL
+    say(f"Wrote {out}. Judge it elsewhere with: seakeep compare {out} {campaign} --band calibrated")
+
+
+def export(
+    model: ModelFile,
+    c: Annotated[
+        Path | None,
+        Option(help="Folder for C99 sources: a library of two files.", metavar="DIR"),
+    ] = None,
+    estimator: Annotated[
+        bool,
+        Option("--estimator", help="Of C99 sources and FMU: an estimator beside a vessel."),
+    ] = False,
+    fmu: Annotated[
+        Path | None,
+        Option(help="FMU 2.0 for co-simulation to write.", metavar="FILE.fmu"),
+    ] = None,
+    onnx: Annotated[
+        Path | None,
+        Option(help="ONNX graph to write.", metavar="FILE.onnx"),
+    ] = None,
+    mat: Annotated[
+        Path | None,
+        Option(help="State-space system for MATLAB.", metavar="FILE.mat"),
+    ] = None,
+    order: Annotated[
+        int | None,
+        Option(help="Order of the MATLAB system, by balanced truncation.", min=1),
+    ] = None,
+    steps: Annotated[
+        int | None,
+        Option(
+            help="Instants that an ONNX graph, or an estimator's FMU, forecasts; by default 1.",
+            min=1,
+        ),
+    ] = None,
+    member: Annotated[
+        int | None,
+        Option(help="For an ensemble: the member to export, from 0.", min=0),
+    ] = None,
+    noise: Annotated[
+        list[str] | None,
+        Option(
+            help="For an estimator: measurement noise of a state, SD in its unit (repeatable).",
+            metavar="STATE=SD",
+        ),
+    ] = None,
+    role: Annotated[
+        list[str] | None,
+        Option(
+            help="For an estimator: an input that is no wave (repeatable): a plan that is known, "
+            "or constant.",
+            metavar="INPUT=known|constant",
+        ),
+    ] = None,
+) -> None:
+    """Write a model for another host: C, FMU, ONNX, MATLAB.
+
+    The exported model computes the same as forecast_arrays; the command says which inputs a step
+    takes. The FMU holds its C sources, and a binary for this platform if a C compiler is found.
+
+    Example: seakeep export model.nc --c library --fmu model.fmu
+    """
+    if not any((c, fmu, onnx, mat)):
+        raise RequestError("nothing to write. Give --c DIR, --fmu, --onnx or --mat FILE.")
+    follows = fmu if estimator else None
+    _check_beside(
+        (steps, onnx or follows, "--steps belongs to --onnx FILE, or --fmu --estimator"),
+        (order, mat, "--order belongs to --mat FILE"),
+        (estimator, c or fmu, "--estimator belongs to --c DIR or --fmu FILE"),
+        (noise or role, estimator, "--noise and --role belong to --estimator"),
+    )
+    roles = {name: given for name, _, given in (each.partition("=") for each in role or ())}
+    service = _noises(noise or []), roles
+    if estimator and order is not None:
+        raise RequestError(
+            "--order reduces the linear system of --mat; an estimator corrects measured states and "
+            "their delays, which a reduced system no longer holds. Leave out --order, or "
+            "--estimator."
         )
-    return {"level": level, "band": band or "members"}
+    for path, suffix in ((fmu, ".fmu"), (onnx, ".onnx"), (mat, ".mat")):
+        if path is not None:
+            check_place(path, suffix)
+    from seakeep.hosts import write_c, write_estimator, write_fmu, write_onnx
+    from seakeep.hosts.program import exportable, timing
+
+    linear = exportable(_single(model, member), estimator)
+    written: list[Path] = []
+    bound = ""
+    if c is not None:
+        written += (
+            write_estimator(linear, c, model.stem, *service)
+            if estimator
+            else write_c(linear, c, model.stem)
+        )
+    if fmu is not None:
+        written.append(write_fmu(linear, fmu, (steps or 1) if estimator else None, *service))
+    if onnx is not None:
+        written.append(write_onnx(linear, onnx, steps or 1))
+    if mat is not None:
+        written.append(linear.to_mat(mat, order))
+        bound = _bound(mat) if order else ""
+    say(f"Wrote {', '.join(map(str, written))}.{bound}")
+    if fmu is not None:
+        say(_binary(fmu))
+    say(timing(linear, estimator and not onnx and not mat))
+
+
+def _noises(given: list[str]) -> dict[str, float]:
+    """Standard deviations by state."""
+    try:
+        return {name: float(value) for name, _, value in (each.partition("=") for each in given)}
+    except ValueError:
+        raise RequestError(
+            f"--noise takes a state, an equals sign and an SD, such as heave=0.002; received "
+            f"{', '.join(given)}."
+        ) from None
+
+
+def _check_beside(*rules: tuple[object, object, str]) -> None:
+    """Refuse an option that is given without the one that it belongs to."""
+    for given, target, words in rules:
+        if given and not target:
+            raise RequestError(f"{words}. Leave it out, or give both.")
+
+
+def _single(file: Path, member: int | None) -> Model:
+    """The model of a file, or a member of the ensemble that it holds."""
+    from seakeep.models import is_ensemble, load_model
+
+    loaded = load_model(file)
+    if member is None:
+        return loaded
+    if not is_ensemble(loaded):
+        raise RequestError(
+            f"--member is for ensembles, and {file} holds a single model. Leave it out."
+        )
+    return loaded.member(member)
+
+
+def _binary(fmu: Path) -> str:
+    from seakeep.hosts.fmu import compiler
+
+    if compiler() is not None:
+        return f"{fmu} holds a binary for this platform, and the sources for others."
+    return (
+        f"{fmu} holds sources alone: no C compiler was found (cc, gcc, clang, or CC). Export it "
+        "where there is one, or with a host that compiles the sources."
+    )
+
+
+def _bound(mat: Path) -> str:
+    """How far the reduced system of a file errs, as a sentence after another one."""
+    from scipy.io import loadmat
+
+    content = loadmat(mat, variable_names=["ErrorBound", "A"])
+    return (
+        f" The system of order {len(content['A'])} errs by {content['ErrorBound'].item():.3g} SD "
+        "of its outputs per SD of its inputs, at most, at any frequency."
+    )

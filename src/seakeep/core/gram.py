@@ -39,7 +39,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
+from scipy.linalg import lapack
 
 from seakeep.arrays import FloatArray
 
@@ -297,11 +297,28 @@ def ridge_path(gram: FloatArray, right: FloatArray, ridges: Sequence[float]) -> 
     -------
     ndarray, shape (len(ridges), N, p)
     """
-    path = np.empty((len(ridges), *right.shape))
     least = len(gram) * float(np.finfo(float).eps * gram.diagonal().max())
-    for out, ridge in zip(path, ridges, strict=True):
-        shifted = gram.copy()
-        shifted[np.diag_indices_from(shifted)] += max(ridge, least)
-        factor = linalg.cho_factor(shifted, overwrite_a=True, check_finite=False)
-        out[:] = linalg.cho_solve(factor, right.T, check_finite=False).T
-    return path
+    return np.stack(
+        [solve_rows(factorise(gram.copy(), max(ridge, least)), right.copy()) for ridge in ridges]
+    )
+
+
+def factorise(gram: FloatArray, ridge: float) -> FloatArray:
+    """Lower Cholesky factor, in Fortran order, of the upper triangle `gram` plus λ; in its place.
+
+    The triangle above the factor keeps what stood there.
+    """
+    size = len(gram)
+    gram.reshape(-1)[:: size + 1] += ridge
+    factor, failed = lapack.dpotrf(gram.T, lower=1, overwrite_a=1, clean=0)
+    if failed:
+        raise np.linalg.LinAlgError(
+            f"the Gram matrix of {size} rows with ridge {ridge:g} is not positive "
+            "definite. Raise ridge, or use method='svd'."
+        )
+    return factor
+
+
+def solve_rows(factor: FloatArray, rows: FloatArray) -> FloatArray:
+    """Rows times the inverse of a matrix, by its lower Cholesky factor; in their place."""
+    return lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0].T

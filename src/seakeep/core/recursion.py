@@ -47,6 +47,11 @@ class Place:
         """Places, m."""
         return self.lowest + self.spacing * np.arange(float(self.count))
 
+    @property
+    def highest(self) -> float:
+        """Last place, counted on the grid; a hair before it, so that there is one above it."""
+        return float(np.nextafter(self.count - 1.0, 0.0))
+
     def of(self, surge: FloatArray) -> FloatArray:
         """Places of the samples from the P-th on, of a surge of shape (time,)."""
         position = np.convolve(surge, self.taps, "valid")
@@ -73,13 +78,21 @@ def read_table(
     -------
     ndarray, shape (…, column)
     """
-    on_grid = (places - place.lowest) / place.spacing
-    below = np.minimum(on_grid.astype(np.intp), place.count - 2)
-    part = (on_grid - below)[..., None]
     flat = table.reshape(-1, table.shape[2])
-    rows = samples * place.count + below
-    lower = flat.take(rows, axis=0)
-    return lower + part * (flat.take(rows + 1, axis=0) - lower)
+    on_grid = np.minimum((places - place.lowest) / place.spacing, place.highest)
+    return _between(flat, np.diff(flat, axis=0), samples * place.count, on_grid[..., None])
+
+
+def _between(
+    flat: FloatArray, slopes: FloatArray, firsts: IntArray, on_grid: FloatArray
+) -> FloatArray:
+    """Rows at places that are counted on the grid, shape (…, 1), from the rows of samples on."""
+    below = on_grid.astype(np.intp)
+    rows = firsts + below[..., 0]
+    read = slopes.take(rows, axis=0)
+    read *= on_grid - below
+    read += flat.take(rows, axis=0)
+    return read
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,36 +157,45 @@ def recursion(
         What drove the steps.
     """
     count, windows, steps, N = forcing.shape
-    back, size = histories.shape[1], models.on_states.shape[2]
-    table = np.ascontiguousarray(table)
-    n, width = table.shape[2], models.on_inputs.shape[2]
+    back, n = histories.shape[1], table.shape[2]
+    size, width = models.on_states.shape[2], models.on_inputs.shape[2]
     # Newest first, so that the extended state of each step is a block of one buffer.
     states = np.empty((count, windows, (steps + back) * N))
     states[..., steps * N :] = histories[:, ::-1].reshape(windows, -1)
+    states[..., : steps * N] = forcing[:, :, ::-1].reshape(count, windows, -1)
     inputs = np.empty((count, windows, steps * n + width - n))
     inputs[..., steps * n :] = delayed[:, ::-1].reshape(windows, -1)
-    a = np.ascontiguousarray(models.on_states.transpose(0, 2, 1))
-    b = np.ascontiguousarray(models.on_inputs.transpose(0, 2, 1))
-    parts = (states, inputs, a, b, models.on_square[:, None], forcing)
+    # One column more for the place on the grid, counted in its spacing.
+    wide = max(size, models.column + (len(place.taps) - 1) * N + 1)
+    on_states = np.zeros((count, wide, N + 1))
+    on_states[:, :size, :N] = models.on_states.transpose(0, 2, 1)
+    on_states[:, models.column :: N, N][:, : len(place.taps)] = (
+        models.gain / place.spacing * place.taps
+    )
+    on_inputs = np.ascontiguousarray(models.on_inputs.transpose(0, 2, 1))
+    on_square = place.spacing**2 * models.on_square[:, None]
+    parts = (states, inputs, on_states, on_inputs, on_square)
     # One model alone needs no axis of its own, which saves a third of the time.
-    x, u, a, b, d, v = (each[0] for each in parts) if count == 1 else parts
-    taps, still = models.gain * place.taps, models.offset * place.taps.sum()
-    highest, reach = float(place.grid[-1]), len(taps) * N
+    x, u, a, b, d = (each[0] for each in parts) if count == 1 else parts
+    product = np.dot if count == 1 else np.matmul
+    still = (models.offset * place.taps.sum() - place.lowest) / place.spacing
+    centre = (place.centre - place.lowest) / place.spacing
+    flat = np.ascontiguousarray(table.reshape(-1, n))
+    slopes, highest = np.diff(flat, axis=0), place.highest
+    firsts = starts * place.count
     with np.errstate(over="ignore", invalid="ignore"):
         for step in range(steps):
             at, to = (steps - step) * N, (steps - 1 - step) * n
-            here = x[..., at + models.column : at + models.column + reach : N] @ taps
-            here += still
+            computed = product(x[..., at : at + wide], a)
             # A run that is lost keeps a place; its states stay lost.
-            here = np.fmin(np.fmax(here, place.lowest), highest)
-            u[..., to : to + n] = read_table(place, table, starts + step, here)
-            computed = x[..., at : at + size] @ a
-            computed += u[..., to : to + width] @ b
-            here -= place.centre
+            here = np.fmin(np.fmax(computed[..., N:] + still, 0.0), highest)
+            u[..., to : to + n] = _between(flat, slopes, firsts, here)
+            computed = computed[..., :N] + product(u[..., to : to + width], b)
+            here -= centre
             here *= here
-            computed += d * here[..., None]
-            computed += v[..., step, :]
-            x[..., at - N : at] = computed
+            computed += here * d
+            x[..., at - N : at] += computed
+            firsts += place.count
     out = states[..., : steps * N].reshape(count, windows, steps, N)
     driving = inputs[..., : steps * n].reshape(count, windows, steps, n)
     return out[:, :, ::-1], driving[:, :, ::-1]

@@ -39,7 +39,7 @@ from typing import Literal
 
 import numpy as np
 from scipy import linalg
-from scipy.linalg import blas, lapack
+from scipy.linalg import blas
 
 from seakeep.arrays import FloatArray, as_real
 from seakeep.core.embedding import TrainingWindow, embed
@@ -47,11 +47,13 @@ from seakeep.core.gram import (
     Group,
     Piece,
     PrimalSystem,
+    factorise,
     gram_trace,
     groups_of,
     lagged_sums,
     primal_system,
     snapshot_gram,
+    solve_rows,
 )
 from seakeep.core.response import clip_modes
 from seakeep.errors import DataError, RequestError
@@ -282,17 +284,17 @@ class _Delayed:
     def primal(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
         system = primal_system(self.pieces, self.delays)
-        factor = _factor(system.gram, ridge)
+        factor = factorise(system.gram, ridge)
         if self.all_rows:
             return _all_rows(system, factor, ridge)
-        solution = _solved(factor, system.right)
+        solution = solve_rows(factor, system.right)
         if ridge >= GRAM_LIMIT * self.trace:
             return solution
         # λ is small: residuals of the data correct what the Gram matrix lost.
         regressors, targets = self.matrices()
         for _ in range(CORRECTIONS):
             right = (targets - solution @ regressors) @ regressors.T - ridge * solution
-            solution += _solved(factor, right)
+            solution += solve_rows(factor, right)
         return solution
 
     def dual(self, ridge: float) -> FloatArray:
@@ -304,9 +306,9 @@ class _Delayed:
         """
         targets = np.concatenate([piece.targets for piece in self.pieces])
         N = targets.shape[1]
-        factor = _factor(snapshot_gram(self.pieces, self.delays), ridge)
+        factor = factorise(snapshot_gram(self.pieces, self.delays), ridge)
         if not self.all_rows:
-            weights = _solved(factor, targets.T.copy()).T
+            weights = solve_rows(factor, targets.T.copy()).T
             top, at = np.zeros((N, self.rows)), 0
             for piece in self.pieces:
                 own = weights[at : at + piece.count]
@@ -321,27 +323,6 @@ class _Delayed:
         np.matmul(newest.T, regressors, out=out[:N])
         np.matmul(regressors[:, : len(out) - N].T, regressors, out=out[N:])
         return out
-
-
-def _factor(gram: FloatArray, ridge: float) -> FloatArray:
-    """Lower Cholesky factor, in Fortran order, of the upper triangle `gram` plus λ; in its place.
-
-    The triangle above the factor keeps what stood there.
-    """
-    size = len(gram)
-    gram.reshape(-1)[:: size + 1] += ridge
-    factor, failed = lapack.dpotrf(gram.T, lower=1, overwrite_a=1, clean=0)
-    if failed:
-        raise np.linalg.LinAlgError(
-            f"the Gram matrix of {size} rows with ridge {ridge:g} is not positive "
-            "definite. Raise ridge, or use method='svd'."
-        )
-    return factor
-
-
-def _solved(factor: FloatArray, rows: FloatArray) -> FloatArray:
-    """Rows times the inverse of a matrix, by its lower Cholesky factor; in their place."""
-    return lapack.dpotrs(factor, rows.T, lower=1, overwrite_b=1)[0].T
 
 
 def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution:
@@ -362,8 +343,8 @@ def solve(regressors: FloatArray, targets: FloatArray, ridge: float) -> Solution
     gram = regressors @ regressors.T
     if ridge <= 0 or ridge < GRAM_LIMIT * np.trace(gram):
         return _by_singular_values(regressors, targets, ridge, None)
-    factor = _factor(gram, ridge)
-    solved = _solved(factor, targets @ regressors.T)
+    factor = factorise(gram, ridge)
+    solved = solve_rows(factor, targets @ regressors.T)
     return Solution(solved, "primal", ridge, min(regressors.shape))
 
 
@@ -411,7 +392,7 @@ def _all_rows(system: PrimalSystem, factor: FloatArray, ridge: float) -> FloatAr
         solving[:, group.newest] *= 0.5
         _sum_over_lags(rows[:rank, group.rows], group.channels, tau)
     rows[rank:] = system.right
-    solved = _solved(factor, rows)
+    solved = solve_rows(factor, rows)
     plus, minus = _generators(solved[:rank], system, tau)
     scale = np.sqrt(ridge)
     plus *= scale

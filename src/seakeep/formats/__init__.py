@@ -17,7 +17,7 @@ from seakeep.formats.rosbag import read_recording
 from seakeep.formats.tdms import read_tdms
 from seakeep.formats.text import read_text
 
-__all__ = ["READERS", "Columns", "Options", "Reader", "is_recording_folder", "read_columns"]
+__all__ = ["READERS", "Columns", "Options", "Reader", "folder_reader", "read_columns"]
 
 READERS = [
     Reader("NetCDF", read_netcdf, (b"CDF", b"\x89HDF"), (".nc", ".nc4")),
@@ -74,7 +74,7 @@ def read_columns(path: Path | str, options: Options | None = None) -> Columns:
         If it is empty, damaged or of no kind that is read.
     """
     options = options or Options()
-    if (folder := _folder_reader(Path(path))) is not None:
+    if (folder := folder_reader(Path(path))) is not None:
         return folder.read(Path(path), options)
     with reading(path) as place:
         with place.open("rb") as file:
@@ -84,12 +84,8 @@ def read_columns(path: Path | str, options: Options | None = None) -> Columns:
         return _reader_of(place, head).read(place, options)
 
 
-def is_recording_folder(path: Path) -> bool:
-    """Whether a folder is read as one recording."""
-    return _folder_reader(path) is not None
-
-
-def _folder_reader(path: Path) -> Reader | None:
+def folder_reader(path: Path) -> Reader | None:
+    """Reader of a folder that is one recording; None for any other folder or file."""
     try:
         marked = (r for r in READERS if r.folder_mark and (path / r.folder_mark).is_file())
         return next(marked, None)

@@ -11,6 +11,7 @@ import subprocess
 import tempfile
 import uuid
 import zipfile
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,13 @@ PLATFORMS = {
 """Folder of a binary in an FMU and its suffix, by system and processor."""
 
 
-def write_fmu(model: Model, path: str | Path, ahead: int | None = None) -> Path:
+def write_fmu(
+    model: Model,
+    path: str | Path,
+    ahead: int | None = None,
+    noise: Mapping[str, float] | None = None,
+    roles: Mapping[str, str] | None = None,
+) -> Path:
     """Write a model as an FMU 2.0 for co-simulation.
 
     It holds the sources of :func:`seakeep.hosts.write_c` and, where a C compiler is found, a binary
@@ -49,6 +56,8 @@ def write_fmu(model: Model, path: str | Path, ahead: int | None = None) -> Path:
         :func:`seakeep.hosts.write_estimator` says: inputs ``measured.NAME`` are the states, NaN
         where they were not measured, and outputs their estimates, ``ahead.NAME[1]`` …, and the
         standard deviations ``std.NAME[1]`` …
+    noise, roles : mapping, optional
+        Of an estimator, as for ``model.live``.
 
     Returns
     -------
@@ -64,7 +73,7 @@ def write_fmu(model: Model, path: str | Path, ahead: int | None = None) -> Path:
     target = Path(path)
     check_output(target, KIND)
     linear, name = exportable(model, ahead is not None), identifier(target.stem)
-    files = sources(linear, name, None if ahead is None else linear.live())
+    files = sources(linear, name, None if ahead is None else linear.live(noise=noise, roles=roles))
     digest = hashlib.sha256("".join(files.values()).encode()).digest()
     content: dict[str, Any] = {
         "name": name,

@@ -653,10 +653,11 @@ class Live:
             the forecast, it is at least that. ``std`` holds the errors of free runs in training,
             those of the estimate, the spread of the members and that of the waves that are not
             known. Where waves are predicted, the mean tends to that of training as ``std`` comes
-            near the SD there, so that no lead errs more than the mean. Where waves or mean surge of
-            late lie outside the training, the errors are raised to those of late and by the square
-            of the height; where the consistency of a state exceeds two, its errors are raised by
-            it, and its lead time shrinks. ``attrs["validity"]`` names what lies outside
+            near the SD there, and ``std`` to that, so that no lead errs more than the mean. Where
+            waves or mean surge of late lie outside the training, the errors are raised to those of
+            late and by the square of the height; where the consistency of a state exceeds two, its
+            errors are raised by it, and its lead time shrinks. ``attrs["validity"]`` names what
+            lies outside
             (:class:`seakeep.models.validity.Validity`), beside the numbers and ``trained_`` ones;
             ``attrs["consistency"]`` is the larger one of each state, at least one.
             ``attrs["predictable"]`` is the time for which
@@ -702,6 +703,7 @@ class Live:
             if self._count.partly:
                 own = self.errors.of_forecast(count)
                 errors = np.minimum(own + self._filter.ahead(count), errors)
+            variance = spread + wider * errors
             if len(futures) > 1:
                 foreseen = np.arange(count) <= known - self._ahead  # their waves are known
                 low, high = DOUBTED
@@ -709,7 +711,10 @@ class Live:
                 lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0))
                 weight = np.where(foreseen[:, None], 1.0, lasting)
                 table[0] = scale.centre + weight * (table[0] - scale.centre)
-            table[1] = np.sqrt(spread + wider * errors)
+                # The error passes over with it, to that of the mean of training.
+                variance = weight * variance + (1.0 - weight) * wider * scale.spread**2
+                spread *= weight
+            table[1] = np.sqrt(variance)
             half = _quantile(level, spread, table[1] ** 2, freedom) * table[1]
             table[2:] = table[0] - half, table[0] + half
         variables = label_channels(signature, table, ("statistic", "time"))
@@ -769,7 +774,8 @@ class Live:
             return inputs[None], math.inf, len(given)
         count = int(gaps.any(axis=1).argmax())
         begin, missing = len(record) + count, gaps[count:, waves]
-        rest, foreseen = inputs[begin:], self._foreseen(inputs[:begin], len(missing))
+        last = inputs[max(begin - self._record, 0) : begin]
+        rest, foreseen = inputs[begin:], self._foreseen(last, len(missing))
         rest[:, waves] = np.where(missing, foreseen.expected, rest[:, waves])
         departures = np.zeros((len(waves), *inputs.shape))
         for each, late, of_one in zip(

@@ -166,6 +166,20 @@ class SlowSquares:
         return kernel, reach, round(self.lead * period), [round(lag * period) for lag in self.lags]
 
 
+def counted_in(observable: Observable, period: float | None) -> Observable:
+    """An observable that counts in an encounter period (s) where it states no other."""
+    if isinstance(observable, SlowSquares) and observable.period is None:
+        return replace(observable, period=period)
+    return observable
+
+
+def at_once(observable: Observable) -> Observable:
+    """An observable without lags, the middle of its filter at the instant itself."""
+    if isinstance(observable, SlowSquares):
+        return replace(observable, lags=(0,), lead=HALF_WIDTH / observable.cutoff)
+    return observable
+
+
 @dataclass(frozen=True)
 class Powers:
     r"""Powers of inputs, with the input delays of the model.

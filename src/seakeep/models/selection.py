@@ -23,7 +23,7 @@ from collections.abc import (
     Sequence,
 )
 from concurrent.futures import Executor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar, cast
 
@@ -38,7 +38,7 @@ from seakeep.core.gram import ridge_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
-from seakeep.models.engine import Dynamics, model_runs, read_windows
+from seakeep.models.engine import Dynamics, Windows, model_runs, read_windows
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.executor import in_order
 from seakeep.models.following import LEAD
@@ -205,6 +205,8 @@ class Problem:
         λ that are tried, in ascending order.
     horizons : tuple of int
         Lengths of the windows that are judged, samples.
+    read : dict
+        Windows that were read, by run, starts and length.
     """
 
     runs: Mapping[str, xr.Dataset]
@@ -213,6 +215,7 @@ class Problem:
     widest: HankelSettings
     ridges: tuple[float, ...]
     horizons: tuple[int, ...]
+    read: dict[tuple[int, tuple[int, ...], int], Windows] = field(default_factory=dict)
 
     def ahead(self, candidate: HankelSettings) -> int:
         """Samples that delayed regressors look ahead too far."""
@@ -288,6 +291,15 @@ class Problem:
         first = window.first_column + self.widest.centre
         return np.arange(first, window.last - steps + 1, steps)
 
+    def windows(self, run: int, starts: tuple[int, ...], steps: int) -> Windows:
+        """What free runs of all candidates from some samples of a run read, read once."""
+        key = run, starts, steps
+        if key not in self.read:
+            begin, dt = self.data.begin(run), self.data.signature.dt
+            places = [(self.data.names[run], begin + at * dt) for at in starts]
+            self.read[key] = read_windows(self.reader, self.runs, places, steps)
+        return self.read[key]
+
     def folds(self) -> list[int]:
         """Runs in which a window of some length fits: each is held out once."""
         runs = range(len(self.groups))
@@ -322,9 +334,8 @@ class Problem:
         for steps in sorted(horizons, reverse=True):
             starts = self.starts(run, steps).tolist()
             new = [at for at in starts if at not in known]
-            places = [(data.names[run], data.begin(run) + at * data.signature.dt) for at in new]
             if new:
-                windows = read_windows(self.reader, self.runs, places, steps)
+                windows = self.windows(run, tuple(new), steps)
                 last = windows.delayed.shape[1] - self.ahead(candidate)
                 windows = replace(
                     windows,

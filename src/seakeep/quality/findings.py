@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.conventions import displayed
 from seakeep.errors import warn
 from seakeep.quality.faults import OUTLIER, STUCK
@@ -173,12 +173,8 @@ def warn_of(
         warn(words)
 
 
-@dataclass(frozen=True)
-class Redundant:
-    """Channels that measure one quantity, the trusted one first, and the windows compared (s)."""
-
-    channels: tuple[str, ...]
-    window: float | None = None
+Redundant = Mapping[tuple[str, ...], float | None]
+"""Channels that measure one quantity, the trusted one first: the windows compared, s."""
 
 
 @dataclass(frozen=True)
@@ -215,8 +211,8 @@ class Record:
         Channel on which the encounter period is counted.
     period : (float, float), optional
         Counted period and energy period of the spectrum, s, where they disagree.
-    redundant : tuple of Redundant, optional
-        Sensors that are compared.
+    redundant : mapping of tuple of str to float, optional
+        Sensors that are compared, the trusted one first, and the windows (s).
     rates : mapping of str to Rate, optional
         Stated rates by logger.
     assumed_units : mapping of str to str, optional
@@ -233,14 +229,14 @@ class Record:
 
     run: str
     whole: xr.Dataset
-    groups: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    groups: Datasets = field(default_factory=dict)
     clocks: Mapping[str, Clock] = field(default_factory=dict)
     span: tuple[float, float] = (-np.inf, np.inf)
     waves: str | None = None
     water_depth: float | None = None
     wave_channel: str | None = None
     period: tuple[float, float] | None = None
-    redundant: tuple[Redundant, ...] = ()
+    redundant: Redundant = field(default_factory=dict)
     rates: Mapping[str, Rate] = field(default_factory=dict)
     assumed_units: Mapping[str, str] = field(default_factory=dict)
     wave_columns: Mapping[str, str] = field(default_factory=dict)

@@ -137,19 +137,13 @@ def impossible(record: Record) -> Iterator[Finding]:
     """
     depth = record.water_depth
     for name, channel in channels_of(record.whole).items():
-        x = channel.to_numpy()
-        x = x[np.isfinite(x)]
-        if not x.size:
-            continue
-        vertical = depth is not None and (name == "heave" or is_elevation(name))
-        if name in ("roll", "pitch") and (far := _reached(x)) > np.pi / 2:
-            yield record.finding(SamplesKind.IMPOSSIBLE, name, far, np.pi / 2, "rad")
-        elif vertical and depth is not None and (far := _reached(x - x.mean())) > depth:
-            yield record.finding(SamplesKind.OUT_OF_WATER, name, far, depth, "m")
-
-
-def _reached(x: FloatArray) -> float:
-    return float(np.percentile(np.abs(x), 99))
+        x, turns = channel.to_numpy(), name in ("roll", "pitch")
+        x, limit = x[np.isfinite(x)], np.pi / 2 if turns else depth
+        if x.size and limit is not None and (turns or name == "heave" or is_elevation(name)):
+            reached = float(np.percentile(np.abs(x if turns else x - x.mean()), 99))
+            kind = SamplesKind.IMPOSSIBLE if turns else SamplesKind.OUT_OF_WATER
+            if reached > limit:
+                yield record.finding(kind, name, reached, limit, "rad" if turns else "m")
 
 
 def units(record: Record) -> Iterator[Finding]:

@@ -5,7 +5,7 @@ Agreement of a sensor with another one of the same motion: lag, correlation, sca
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,15 +49,15 @@ class SensorsKind(Kind):
     )
 
 
-def compared(run: xr.Dataset, pairs: Iterable[Redundant]) -> dict[tuple[str, str], Agreement]:
+def compared(run: xr.Dataset, groups: Redundant) -> dict[tuple[str, str], Agreement]:
     """Compare the channels of each group with its first, which is trusted.
 
     Parameters
     ----------
     run : Dataset
         All channels on one axis.
-    pairs : iterable of Redundant
-        Groups of sensors of one quantity.
+    groups : mapping of tuple of str to float
+        Sensors of one quantity, and the windows in which they are compared (s).
 
     Returns
     -------
@@ -66,16 +66,14 @@ def compared(run: xr.Dataset, pairs: Iterable[Redundant]) -> dict[tuple[str, str
     """
     out = {}
     dt = step_of(run)
-    for pair in pairs if run.sizes["time"] >= 16 else ():
-        trusted = filled(run[pair.channels[0]])
-        for name in pair.channels[1:]:
+    for (first, *others), window in groups.items() if run.sizes["time"] >= 16 else ():
+        trusted = filled(run[first])
+        for name in others:
             stuck = None
             if f"{name}_flags" in run.coords:
                 stuck = (run[f"{name}_flags"].to_numpy() & STUCK) > 0
             step = float(run[name].attrs.get("reading_step", np.nan))
-            out[name, pair.channels[0]] = compare_sensors(
-                filled(run[name]), trusted, dt, pair.window, stuck, step
-            )
+            out[name, first] = compare_sensors(filled(run[name]), trusted, dt, window, stuck, step)
     return out
 
 

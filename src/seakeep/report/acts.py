@@ -21,7 +21,16 @@ from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.results import divergence_table
 from seakeep.report.style import HEADING, model_words
-from seakeep.report.tables import Interval, Number, Table, number, numbers, table, words
+from seakeep.report.tables import (
+    Interval,
+    Number,
+    Table,
+    number,
+    numbers,
+    ratio_of,
+    table,
+    words,
+)
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -36,7 +45,6 @@ from seakeep.study.judge import (
 from seakeep.study.plan import random_stream
 from seakeep.study.reproduce import ACTS, NOTE, SLOW, Act
 
-BOUNDS = ("change", "lower", "upper")
 Results = Mapping[str, StudyResult]
 Statistic = Callable[..., FloatArray]
 Judged = tuple[str, bool | None]
@@ -59,10 +67,9 @@ def claims_table(results: Results) -> Table:
     """Each claim, our figure, and whether it holds, in the first act."""
     verdicts = {True: "holds", False: "does not", None: "cannot tell"}
     limits = {"useful": USEFUL, "aged": 100 * AGED, "almost": 100 * ALMOST}
-    acts, rows = [Evidence(results[act]) for act in ("paper", "raw")], []
-    for key, judge in CLAIMS.items():
-        claim, how = words()["claims"][key]
-        figure, holds = judge(*acts)
+    acts, rows = Claims(results["paper"], Evidence(results["raw"])), []
+    for key, (claim, how) in words()["claims"].items():
+        figure, holds = acts.judge(key)
         rows.append((claim, figure, verdicts[holds], how.format(**limits)))
     return table("claims", rows)
 
@@ -171,30 +178,6 @@ def _spread(drawn: FloatArray) -> FloatArray:
     return high - low
 
 
-def _robust(paper: Evidence, raw: Evidence) -> Judged:
-    own, fir = (paper.error(model=model) for model in (ENSEMBLE, "fir"))
-    worst = float(np.nanmax(average_of(paper.cells())))
-    words = f"median ANRMSE {own.text()}, worst cell {worst:.2f}; FIR {fir.text()}"
-    return words, all_of([own.below(USEFUL), worst < 1.0])
-
-
-def _trend(paper: Evidence, raw: Evidence) -> Judged:
-    growths = []
-    for act in (paper, raw):
-        at = act.result.groups["statistics/trend"].sel(test="irregular", band="all")
-        each = np.stack([at[key].sel(model=[SINGLE, ENSEMBLE]) for key in BOUNDS], axis=1)
-        growths.append([Interval(*(1.0 + row)) for row in each])
-    texts = (" and ".join(each.change() for each in of_act) for of_act in growths)
-    within = [v for e in growths[0] for v in (e.below(1 + AGED), opposite(e.below(1 - AGED)))]
-    return "{}; act (b): {}".format(*texts), all_of(within)
-
-
-def _any_length(paper: Evidence, raw: Evidence) -> Judged:
-    period = float(paper.result.attrs["encounter_period"])
-    length = float(paper.result.tests["irregular"]["time"].values[-1])
-    return f"{length / period:.0f} T̂ were forecast, as in the paper", None
-
-
 def _share(act: Evidence, measure: str, channels: Sequence[str]) -> Interval:
     """Fraction of the average error that some channels make."""
     picked = act.columns(channels)
@@ -204,34 +187,6 @@ def _share(act: Evidence, measure: str, channels: Sequence[str]) -> Interval:
         return means[:, picked].sum(axis=1) / np.nansum(means, axis=1)
 
     return act.interval(statistic, act.cells(measure=measure))
-
-
-def _who_errs(paper: Evidence, raw: Evidence) -> Judged:
-    shares = {words: _share(paper, key, LOADS) for key, words in HEADING.items()}
-    listed = ", ".join(f"{each.part()} of {words}" for words, each in shares.items())
-    words = f"loads make {listed}; act (b): surge and loads {_share(raw, 'nrmse', SLOW).part()}"
-    return f"{words} of ANRMSE", all_of(opposite(each.below(0.5)) for each in shares.values())
-
-
-def _load_divergence(paper: Evidence, raw: Evidence) -> Judged:
-    at = paper.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
-    loads, others = (at.sel(channel=[*k]).mean("channel") for k in (LOADS, paper.motions))
-    pairs = (("mean", "mean"), ("lower", "upper"), ("upper", "lower"))
-    ratio = Interval(*(float(loads[a] / others[b]) for a, b in pairs))
-    words = (
-        f"{float(loads['mean']):.4f} against {float(others['mean']):.4f}: a factor of "
-        f"{ratio.value:.0f} [{ratio.lower:.1f}, {ratio.upper:.0f}]"
-    )
-    return words, opposite(ratio.below(10**0.5))
-
-
-def _densities(paper: Evidence, raw: Evidence) -> Judged:
-    at = paper.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
-    within = (at["mean"] <= at["noise_floor_upper"]).sel(channel=paper.motions).values
-    count, total = int(within.sum()), within.size
-    share = Interval(count / total, *binomtest(count, total).proportion_ci())
-    words = f"{count} of {total} motions within the noise of the record: {share.part()}"
-    return words, opposite(share.below(ALMOST))
 
 
 def _ratio(statistic: Statistic) -> Statistic:
@@ -261,22 +216,6 @@ def _changes(ratios: Mapping[str, Interval]) -> str:
     return ", ".join(f"{words} {each.change()}" for words, each in ratios.items())
 
 
-def _better(paper: Evidence, raw: Evidence, statistic: Statistic = _median) -> Judged:
-    differences = _against_single(paper, statistic=statistic)
-    return _changes(differences), all_of(each.below(1.0) for each in differences.values())
-
-
-def _always_better(paper: Evidence, raw: Evidence) -> Judged:
-    differences = [
-        each.below(1.0)
-        for test in paper.result.tests
-        for each in _against_single(paper, (test,)).values()
-    ]
-    better, worse, unknown = map(differences.count, (True, False, None))
-    words = f"better in {better}, worse in {worse}, undecided in {unknown} of {len(differences)}"
-    return words, all_of(differences)
-
-
 def _band(act: Evidence, channels: Sequence[str]) -> list[Interval]:
     """Part of the instants inside the band of irregular waves, and its width in window SDs."""
     test, picked = act.result.tests["irregular"], act.columns(channels)
@@ -289,94 +228,6 @@ def _band(act: Evidence, channels: Sequence[str]) -> list[Interval]:
     return [act.interval(lambda drawn: average_of(_flat(drawn)), each) for each in cells]
 
 
-def _narrow(paper: Evidence, raw: Evidence) -> Judged:
-    inside, width = _band(paper, paper.motions)
-    error = paper.error(SEA, paper.motions).value
-    words = f"motions: {width.text()} SD wide, {inside.part()} of the instants inside 95 %"
-    return f"{words}; median error {error:.2f} SD", width.below(USEFUL)
-
-
-def _load_band(paper: Evidence, raw: Evidence) -> Judged:
-    inside, _ = _band(paper, LOADS)
-    return f"{inside.part()} of the instants of the loads inside 95 %", inside.below(0.9)
-
-
-def _slow_loads(paper: Evidence, raw: Evidence) -> Judged:
-    test, attrs = raw.result.tests["irregular"].sel(channel=list(LOADS)), raw.result.attrs
-    split = float(raw.result.settings["statistics"]["split_period"])
-    frequency = 1 / (split * float(attrs["encounter_period"]))
-    forecasts = test["mean"].sel(model=ENSEMBLE).values[raw.order]
-    measured, forecast = (
-        split_bands(values, float(attrs["dt"]), frequency)[0]
-        for values in (test["measured"].values, forecasts)
-    )
-    errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
-    of_lines = [raw.interval(_median, errors[..., [k]]) for k in range(len(LOADS))]
-    words = ", ".join(
-        f"{name.removeprefix('mooring_')} {each.text()}"
-        for name, each in zip(LOADS, of_lines, strict=True)
-    )
-    return f"act (b): {words}", all_of(each.below(1.0) for each in of_lines)
-
-
-def _peaks(paper: Evidence, raw: Evidence) -> Judged:
-    loads = paper.error(SEA, LOADS, "nammae")
-    return f"median NAMMAE of the loads {loads.text()} SD", loads.below(1.0)
-
-
-def _regular(paper: Evidence, raw: Evidence) -> Judged:
-    both = [[paper.error((test,), k) for test in REGULAR] for k in (paper.motions, LOADS)]
-    motions, loads = (", ".join(each.text() for each in group) for group in both)
-    better = [a.below_other(b) for a, b in zip(*both, strict=True)]
-    holds = all_of([*(each.below(USEFUL) for each in both[0]), *better])
-    return f"λ/L 1.5, 2, 3: motions {motions}; loads {loads}", holds
-
-
-def _against_irregular(paper: Evidence, raw: Evidence) -> Judged:
-    tests = (*SEA, *REGULAR)
-    sizes = [paper.result.tests[test].sizes["window"] for test in tests]
-    regular = np.repeat([0.0, *[1.0] * len(REGULAR)], sizes)
-    labels = np.broadcast_to(regular, (paper.order.size, regular.size))
-
-    def ratio(drawn: FloatArray, label: FloatArray) -> FloatArray:
-        averages, kind = _flat(average_of(drawn)), _flat(label) > 0.5
-        ours, sea = (median_of(np.where(part, averages, np.nan)) for part in (kind, ~kind))
-        return ours / sea
-
-    differences = {
-        words: paper.interval(ratio, paper.cells(tests, (), key), labels, tests=tests)
-        for key, words in HEADING.items()
-    }
-    return _changes(differences), all_of(
-        [opposite(differences["ANRMSE"].below(1.0)), differences["NAMMAE"].below(1.0)]
-    )
-
-
-def _phase(paper: Evidence, raw: Evidence) -> Judged:
-    leads = [np.abs(phase_leads(paper.result.groups, test, ENSEMBLE)) for test in REGULAR]
-    cells = np.concatenate(leads, axis=1)[paper.order]
-    both = [cells[..., paper.columns(names)] for names in (LOADS, paper.motions)]
-    interval = partial(paper.interval, tests=REGULAR)
-    loads, motions = (interval(_middle, each).text(0, "°") for each in both)
-    more = interval(lambda a, b: _middle(a) - _middle(b), *both, signed=True)
-    return f"median |phase|: loads {loads}, motions {motions}", opposite(more.below(0.0))
-
-
-def _stern(paper: Evidence, raw: Evidence) -> Judged:
-    line = "mooring_stern"
-    errors = [paper.error((test,), (line,)) for test in REGULAR]
-    slack = [_slack(raw, test, line) for test in REGULAR]
-    falls = [
-        errors[longer].below_other(errors[shorter])
-        for shorter, longer in pairwise(range(len(REGULAR)))
-        if slack[longer].upper + SLACKER < slack[shorter].lower
-        and np.isfinite([errors[longer].value, errors[shorter].value]).all()
-    ]
-    listed = ", ".join(e.text() if np.isfinite(e.value) else "only noise" for e in errors)
-    parts = ", ".join(each.part() for each in slack)
-    return f"NRMSE {listed}; slack {parts} of the time", all_of(falls) if falls else None
-
-
 def _slack(act: Evidence, test: str, line: str) -> Interval:
     """Part of the time at which a line is slack in the windows of a test set."""
     data = act.result.tests[test].sel(channel=line)
@@ -385,51 +236,188 @@ def _slack(act: Evidence, test: str, line: str) -> Interval:
     return act.interval(lambda drawn: _flat(drawn).mean(axis=1), shares, tests=(test,))
 
 
-def _stable(paper: Evidence, raw: Evidence) -> Judged:
-    radii = paper.variants("radius")
-    ours, none = (paper.interval(_middle, radii[k]) for k in ("ridge", "none"))
-    words = f"spectral radius {ours.text()} with λ, {none.text()} without"
-    return words, all_of([ours.below(1.0), opposite(none.below(1.0))])
+@dataclass(frozen=True, eq=False)
+class Claims(Evidence):
+    """What judges each claim by the first act: a method of the name that it has in ``words.toml``.
 
+    Parameters
+    ----------
+    result : StudyResult
+        The first act.
+    raw : Evidence
+        The second.
+    """
 
-def _cheaper(paper: Evidence, raw: Evidence) -> Judged:
-    seconds = paper.variants("seconds")
-    times = paper.interval(_middle, seconds["truncated"] / seconds["ridge"])
-    return f"the SVD takes {times.text(0)} times as long", opposite(times.below(1.0))
+    raw: Evidence
 
+    def judge(self, claim: str) -> Judged:
+        """Our number, and whether the claim holds."""
+        verdict: Judged = getattr(self, f"_{claim}")()
+        return verdict
 
-def _robust_to_noise(paper: Evidence, raw: Evidence) -> Judged:
-    data = paper.result.groups[f"regularisation/{SINGLE}"]
-    truncated = data["truncated_nrmse"].transpose("training", "window", "channel")
-    cells = paper.cells(model=SINGLE), truncated.values[paper.order]
-    ratio = paper.interval(_ratio(_median), *cells)
-    rank = int(data["rank"].median())
-    return f"ANRMSE {ratio.change()} from {rank} singular values to λ", ratio.below(1.0)
+    def _robust(self) -> Judged:
+        own, fir = (self.error(model=model) for model in (ENSEMBLE, "fir"))
+        worst = float(np.nanmax(average_of(self.cells())))
+        words = f"median ANRMSE {own.text()}, worst cell {worst:.2f}; FIR {fir.text()}"
+        return words, all_of([own.below(USEFUL), worst < 1.0])
 
+    def _trend(self) -> Judged:
+        growths = []
+        for act in (self, self.raw):
+            at = act.result.groups["statistics/trend"].sel(test="irregular", band="all")
+            growths.append([ratio_of(at.sel(model=model)) for model in (SINGLE, ENSEMBLE)])
+        texts = (" and ".join(each.change() for each in of_act) for of_act in growths)
+        within = [v for e in growths[0] for v in (e.below(1 + AGED), opposite(e.below(1 - AGED)))]
+        return "{}; act (b): {}".format(*texts), all_of(within)
 
-CLAIMS: dict[str, Callable[[Evidence, Evidence], Judged]] = {
-    "robust": _robust,
-    "trend": _trend,
-    "any_length": _any_length,
-    "who_errs": _who_errs,
-    "load_divergence": _load_divergence,
-    "densities": _densities,
-    "better": _better,
-    "dispersion": partial(_better, statistic=_spread),
-    "always_better": _always_better,
-    "narrow": _narrow,
-    "load_band": _load_band,
-    "slow_loads": _slow_loads,
-    "peaks": _peaks,
-    "stable": _stable,
-    "cheaper": _cheaper,
-    "robust_to_noise": _robust_to_noise,
-    "regular": _regular,
-    "against_irregular": _against_irregular,
-    "phase": _phase,
-    "stern": _stern,
-}
-"""What judges each claim by the first act and the second; ``words.toml`` has the words."""
+    def _any_length(self) -> Judged:
+        period = self.result.encounter_period
+        length = float(self.result.tests["irregular"]["time"].values[-1])
+        return f"{length / period:.0f} T̂ were forecast, as in the paper", None
+
+    def _who_errs(self) -> Judged:
+        shares = {words: _share(self, key, LOADS) for key, words in HEADING.items()}
+        listed = ", ".join(f"{each.part()} of {words}" for words, each in shares.items())
+        slow = _share(self.raw, "nrmse", SLOW).part()
+        words = f"loads make {listed}; act (b): surge and loads {slow} of ANRMSE"
+        return words, all_of(opposite(each.below(0.5)) for each in shares.values())
+
+    def _load_divergence(self) -> Judged:
+        at = self.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
+        loads, others = (at.sel(channel=[*k]).mean("channel") for k in (LOADS, self.motions))
+        pairs = (("mean", "mean"), ("lower", "upper"), ("upper", "lower"))
+        ratio = Interval(*(float(loads[a] / others[b]) for a, b in pairs))
+        words = (
+            f"{float(loads['mean']):.4f} against {float(others['mean']):.4f}: a factor of "
+            f"{ratio.value:.0f} [{ratio.lower:.1f}, {ratio.upper:.0f}]"
+        )
+        return words, opposite(ratio.below(10**0.5))
+
+    def _densities(self) -> Judged:
+        at = self.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
+        within = (at["mean"] <= at["noise_floor_upper"]).sel(channel=self.motions).values
+        count, total = int(within.sum()), within.size
+        share = Interval(count / total, *binomtest(count, total).proportion_ci())
+        words = f"{count} of {total} motions within the noise of the record: {share.part()}"
+        return words, opposite(share.below(ALMOST))
+
+    def _better(self, statistic: Statistic = _median) -> Judged:
+        differences = _against_single(self, statistic=statistic)
+        return _changes(differences), all_of(each.below(1.0) for each in differences.values())
+
+    def _always_better(self) -> Judged:
+        differences = [
+            each.below(1.0)
+            for test in self.result.tests
+            for each in _against_single(self, (test,)).values()
+        ]
+        better, worse, unknown = map(differences.count, (True, False, None))
+        words = (
+            f"better in {better}, worse in {worse}, undecided in {unknown} of {len(differences)}"
+        )
+        return words, all_of(differences)
+
+    def _narrow(self) -> Judged:
+        inside, width = _band(self, self.motions)
+        error = self.error(SEA, self.motions).value
+        words = f"motions: {width.text()} SD wide, {inside.part()} of the instants inside 95 %"
+        return f"{words}; median error {error:.2f} SD", width.below(USEFUL)
+
+    def _load_band(self) -> Judged:
+        inside, _ = _band(self, LOADS)
+        return f"{inside.part()} of the instants of the loads inside 95 %", inside.below(0.9)
+
+    def _slow_loads(self) -> Judged:
+        result = self.raw.result
+        split = float(result.settings["statistics"]["split_period"])
+        test = result.tests["irregular"].sel(channel=list(LOADS))
+        forecasts = test["mean"].sel(model=ENSEMBLE).values[self.raw.order]
+        measured, forecast = (
+            split_bands(values, result.dt, 1 / (split * result.encounter_period))[0]
+            for values in (test["measured"].values, forecasts)
+        )
+        errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
+        of_lines = [self.raw.interval(_median, errors[..., [k]]) for k in range(len(LOADS))]
+        words = ", ".join(
+            f"{name.removeprefix('mooring_')} {each.text()}"
+            for name, each in zip(LOADS, of_lines, strict=True)
+        )
+        return f"act (b): {words}", all_of(each.below(1.0) for each in of_lines)
+
+    def _peaks(self) -> Judged:
+        loads = self.error(SEA, LOADS, "nammae")
+        return f"median NAMMAE of the loads {loads.text()} SD", loads.below(1.0)
+
+    def _regular(self) -> Judged:
+        both = [[self.error((test,), k) for test in REGULAR] for k in (self.motions, LOADS)]
+        motions, loads = (", ".join(each.text() for each in group) for group in both)
+        better = [a.below_other(b) for a, b in zip(*both, strict=True)]
+        holds = all_of([*(each.below(USEFUL) for each in both[0]), *better])
+        return f"λ/L 1.5, 2, 3: motions {motions}; loads {loads}", holds
+
+    def _against_irregular(self) -> Judged:
+        tests = (*SEA, *REGULAR)
+        sizes = [self.result.tests[test].sizes["window"] for test in tests]
+        regular = np.repeat([0.0, *[1.0] * len(REGULAR)], sizes)
+        labels = np.broadcast_to(regular, (self.order.size, regular.size))
+
+        def ratio(drawn: FloatArray, label: FloatArray) -> FloatArray:
+            averages, kind = _flat(average_of(drawn)), _flat(label) > 0.5
+            ours, sea = (median_of(np.where(part, averages, np.nan)) for part in (kind, ~kind))
+            return ours / sea
+
+        differences = {
+            words: self.interval(ratio, self.cells(tests, (), key), labels, tests=tests)
+            for key, words in HEADING.items()
+        }
+        return _changes(differences), all_of(
+            [opposite(differences["ANRMSE"].below(1.0)), differences["NAMMAE"].below(1.0)]
+        )
+
+    def _phase(self) -> Judged:
+        leads = [np.abs(phase_leads(self.result.groups, test, ENSEMBLE)) for test in REGULAR]
+        cells = np.concatenate(leads, axis=1)[self.order]
+        both = [cells[..., self.columns(names)] for names in (LOADS, self.motions)]
+        interval = partial(self.interval, tests=REGULAR)
+        loads, motions = (interval(_middle, each).text(0, "°") for each in both)
+        more = interval(lambda a, b: _middle(a) - _middle(b), *both, signed=True)
+        return f"median |phase|: loads {loads}, motions {motions}", opposite(more.below(0.0))
+
+    def _stern(self) -> Judged:
+        line = "mooring_stern"
+        errors = [self.error((test,), (line,)) for test in REGULAR]
+        slack = [_slack(self.raw, test, line) for test in REGULAR]
+        falls = [
+            errors[longer].below_other(errors[shorter])
+            for shorter, longer in pairwise(range(len(REGULAR)))
+            if slack[longer].upper + SLACKER < slack[shorter].lower
+            and np.isfinite([errors[longer].value, errors[shorter].value]).all()
+        ]
+        listed = ", ".join(e.text() if np.isfinite(e.value) else "only noise" for e in errors)
+        parts = ", ".join(each.part() for each in slack)
+        return f"NRMSE {listed}; slack {parts} of the time", all_of(falls) if falls else None
+
+    def _stable(self) -> Judged:
+        radii = self.variants("radius")
+        ours, none = (self.interval(_middle, radii[k]) for k in ("ridge", "none"))
+        words = f"spectral radius {ours.text()} with λ, {none.text()} without"
+        return words, all_of([ours.below(1.0), opposite(none.below(1.0))])
+
+    def _cheaper(self) -> Judged:
+        seconds = self.variants("seconds")
+        times = self.interval(_middle, seconds["truncated"] / seconds["ridge"])
+        return f"the SVD takes {times.text(0)} times as long", opposite(times.below(1.0))
+
+    def _robust_to_noise(self) -> Judged:
+        data = self.result.groups[f"regularisation/{SINGLE}"]
+        truncated = data["truncated_nrmse"].transpose("training", "window", "channel")
+        cells = self.cells(model=SINGLE), truncated.values[self.order]
+        ratio = self.interval(_ratio(_median), *cells)
+        rank = int(data["rank"].median())
+        return f"ANRMSE {ratio.change()} from {rank} singular values to λ", ratio.below(1.0)
+
+    def _dispersion(self) -> Judged:
+        return self._better(_spread)
 
 
 def write_reproduction(folder: Path, results: Results, progress: Progress | None = None) -> Path:
@@ -548,8 +536,7 @@ def against_filter(results: Results) -> str:
             .groups["statistics/differences"]
             .sel(test=SEA[0], model=SINGLE, other="fir", measure="nrmse", channel="average")
         )
-        ratio = Interval(*(1.0 + float(at[key]) for key in ("change", "lower", "upper")))
-        parts.append(f"{ratio.change()} in {act.letter}")
+        parts.append(f"{ratio_of(at).change()} in {act.letter}")
     return (
         "From the filter with the same data, look-ahead and input map (FIR, its length and λ "
         "chosen by validation) to the single model, the median error there changes by "

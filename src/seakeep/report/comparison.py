@@ -16,9 +16,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.conventions import displayed
-from seakeep.files import MARK, replacing, write_netcdf
+from seakeep.files import MARK, replacing, write_netcdf, write_text
 from seakeep.models import HankelEnsemble
 from seakeep.models.forecasts import counted
 from seakeep.report.tables import (
@@ -32,6 +32,7 @@ from seakeep.report.tables import (
     number,
     numbers,
     plain_cell,
+    ratio_of,
     row,
     short,
 )
@@ -130,7 +131,7 @@ def _note(at: xr.Dataset) -> str:
     return "; ".join(filter(None, said))
 
 
-def model_blocks(tables: Mapping[str, xr.Dataset]) -> Iterator[Table]:
+def model_blocks(tables: Datasets) -> Iterator[Table]:
     """Several models beside each other, a table of averages and one of channels per run."""
     name, first = next(iter(tables.items()))
     heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
@@ -166,7 +167,7 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
         yield Table("by_run", f"{of} by wave period: ANRMSE", heads, rows, averages=[len(runs)])
     changes: list[tuple[str, ...]] = []
     for at in entries(table, "model"):
-        value, low, high = (1 + float(at[f"all_{key}"]) for key in ("change", "lower", "upper"))
+        value, low, high = ratio_of(at, "all_")
         cells: tuple[str, ...] = ("", "", "")
         if changes:
             known = bool(np.isfinite([low, high]).all())
@@ -187,8 +188,8 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
     name, first = (str(each["model"].values) for each in (best, table.isel(model=0)))
     said = f"Least error: {name}, ANRMSE {number(best['all_anrmse'])}"
     if name != first:
-        low, high = (1 + float(best[f"all_{bound}"]) for bound in ("lower", "upper"))
-        said += f", {change(1 + best['all_change'])} [{change(low, high)}] from {first}"
+        value, low, high = ratio_of(best, "all_")
+        said += f", {change(value)} [{change(low, high)}] from {first}"
         if verdict(low - 1, high - 1) != "better":
             return f"{said}: no model is surely better. Keep {first}."
     if kind := baselines.get(name):
@@ -209,7 +210,7 @@ def write_differences(table: xr.Dataset, path: Path) -> Path:
     return _write(pd.concat(both), ["run", "wave_period", "model"], path)
 
 
-def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
+def write_comparison(tables: Datasets, path: Path) -> Path:
     """Write comparison tables as CSV, a row per run and channel, full precision."""
     frames = [
         table.transpose("run", "channel").to_dataframe().reset_index().assign(model=name)
@@ -219,7 +220,7 @@ def write_comparison(tables: Mapping[str, xr.Dataset], path: Path) -> Path:
     return _write(pd.concat(frames, ignore_index=True), front, path)
 
 
-def write_nowcasts(nowcasts: Mapping[str, xr.Dataset], path: Path) -> Path:
+def write_nowcasts(nowcasts: Datasets, path: Path) -> Path:
     """Write all errors as CSV, a row per model, run, channel and lead, full precision."""
     keys = HEADER.split(",")
     frames = [
@@ -242,7 +243,7 @@ def plain_cells(table: pd.DataFrame) -> pd.DataFrame:
     return table.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell)
 
 
-def nowcast_blocks(nowcasts: Mapping[str, xr.Dataset]) -> Iterator[Table]:
+def nowcast_blocks(nowcasts: Datasets) -> Iterator[Table]:
     """Lead times and errors per channel in service, a table per model and run."""
     for model, of_model in nowcasts.items():
         share, lead = float(of_model.attrs["share"]), of_model["lead"].values
@@ -312,15 +313,14 @@ def look_ahead_words(seconds: float) -> str:
 
 def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
     """Write a forecast as NetCDF, or as CSV with a column per channel, full precision."""
-    with replacing(path) as temporary:
-        if path.suffix == ".nc":
+    if path.suffix == ".nc":
+        with replacing(path) as temporary:
             write_netcdf(temporary, forecast.assign_attrs({MARK: "forecast"}))
-        else:
-            # Instants are multiples of a step; nine decimals hide the rounding of the product.
-            time = pd.Index(forecast["time"].values.round(9), name="time [s]")
-            text = pd.DataFrame(_columns(forecast), index=time).to_csv(lineterminator="\n")
-            header, rows = text.split("\n", 1)
-            temporary.write_text(f"{header}\r\n{rows}", encoding="utf-8", newline="")
+        return path
+    # Instants are multiples of a step; nine decimals hide the rounding of the product.
+    time = pd.Index(forecast["time"].values.round(9), name="time [s]")
+    text = pd.DataFrame(_columns(forecast), index=time).to_csv(lineterminator="\n")
+    write_text(path, text.replace("\n", "\r\n", 1))
     return path
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup, escape
 
 from seakeep.arrays import Progress
-from seakeep.files import MARK, check_output, replacing
+from seakeep.files import MARK, check_output, write_text
 from seakeep.report.style import figure_style, save_figure
 from seakeep.report.tables import Table, shade, words, write_csv, write_latex
 from seakeep.study.store import storing
@@ -165,7 +165,7 @@ def write_page(
     drawn: dict[str, Markup] = {}
     with storing(folder), figure_style():
         if not page.exists():  # figures of an interrupted report are known as ours
-            _write(page, UNFINISHED)
+            write_text(page, UNFINISHED)
         for each in ("figures", "tables"):
             (folder / each).mkdir(exist_ok=True)
         for table in (each for section in sections for each in section.tables):
@@ -175,7 +175,7 @@ def write_page(
             tell(number, len(drawings), f"drawing {drawing.name.replace('_', ' ')}")
             drawn[drawing.name] = _drawn(drawing, folder / "figures")
         content = {"stamp": stamp, "sections": sections, "drawn": drawn, "files": True}
-        _write(page, rendered("report.html", kind="report", title=title, **content))
+        write_text(page, rendered("report.html", kind="report", title=title, **content))
     tell(len(drawings), len(drawings), "report written")
     return page
 
@@ -220,7 +220,7 @@ def _drawn(drawing: Drawing, folder: Path) -> Markup:
         figure.set_layout_engine(None)
     save_figure(figure, folder / f"{drawing.name}.png", figure.dpi)
     text = _svg_text(figure, drawing.name)
-    _write(folder / f"{drawing.name}.svg", text)
+    write_text(folder / f"{drawing.name}.svg", text)
     return _inline_svg(text, drawing)
 
 
@@ -243,8 +243,3 @@ def _inline_svg(text: str, drawing: Drawing) -> Markup:
     text = re.sub(r'(\bid="|href="#|url\(#)', rf"\1{name}-", text)
     words = f'<title id="{label}">{escape(drawing.caption)}</title>'
     return Markup(text.replace(">", f' role="img" aria-labelledby="{label}">{words}', 1))
-
-
-def _write(path: Path, text: str) -> None:
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from seakeep.arrays import Datasets
 from seakeep.campaign.pipeline import redundant_pairs
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.conventions import displayed
-from seakeep.files import MARK, replacing
+from seakeep.files import MARK, replacing, write_text
 from seakeep.quality import compared, findings_of
 from seakeep.quality.faults import FLAGS
 from seakeep.report.figures.histories import quality_figure
@@ -74,7 +75,7 @@ def clock_rows(run: xr.Dataset) -> list[tuple[str, str, str, str]]:
 
 
 def write_quality_sheet(
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     settings: CampaignSettings,
     title: str,
     folder: Path,
@@ -87,8 +88,8 @@ def write_quality_sheet(
     pictures = {name: folder / f"quality_{name}.png" for name in runs}
     for name, path in pictures.items():
         if not is_newer(path, folder / f"{name}.nc"):
-            run = runs[name]
-            pairs = compared(run, redundant_pairs(settings, run.attrs.get("encounter_period")))
+            run, period = runs[name], runs[name].attrs.get("encounter_period", np.nan)
+            pairs = compared(run, redundant_pairs(settings, period))
             agreements = {channel: each for (channel, _), each in pairs.items()}
             figure = quality_figure(run, agreements)
             with figure_style(), replacing(path) as temporary:  # all colours: marks are small
@@ -103,12 +104,10 @@ def write_quality_sheet(
         path.stem: inline_picture(path.read_bytes(), f"channels of {name}")
         for name, path in pictures.items()
     }
-    page = folder / "quality.html"
-    with replacing(page) as temporary:
-        stamp = {"description": "", "finished": ""}
-        content = {"stamp": stamp, "sections": sections, "drawn": drawn, "files": False}
-        text = rendered("report.html", kind=SHEET, title=f"Data quality: {title}", **content)
-        temporary.write_text(text, encoding="utf-8")
+    page, stamp = folder / "quality.html", {"description": "", "finished": ""}
+    content = {"stamp": stamp, "sections": sections, "drawn": drawn, "files": False}
+    title = f"Data quality: {title}"
+    write_text(page, rendered("report.html", kind=SHEET, title=title, **content))
     return [page, *pictures.values()]
 
 

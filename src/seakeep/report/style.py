@@ -98,7 +98,8 @@ _WITH_PREFIX = ("N", "N m", "Pa", "W")
 
 _RC: Any = {
     "font.size": 9,
-    "axes.titlesize": 10,
+    "axes.titlesize": 8,
+    "axes.titlelocation": "left",
     "axes.labelsize": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -201,7 +202,7 @@ def judged_models(result: StudyResult) -> list[str]:
 
 def line_of(result: StudyResult, model: str) -> dict[str, Any]:
     """Line of a model: that of a forecast or an ensemble, in its own colour beyond the first."""
-    kinds = {name: "ensemble" if result.is_ensemble(name) else "forecast" for name in result.models}
+    kinds = {name: "ensemble" if name in result.ensembles else "forecast" for name in result.models}
     line = LINES[kinds[model]]
     first = [name for kind in LINES for name in [n for n in kinds if kinds[n] == kind][:1]]
     if model in first:

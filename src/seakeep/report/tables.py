@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.files import replacing
+from seakeep.files import replacing, write_text
 
 if TYPE_CHECKING:
     from rich.console import JustifyMethod
@@ -202,9 +202,9 @@ def signed(value: SupportsFloat) -> Number:
     return Number(f"+{text}") if text != MISSING and float(text) > 0 else text
 
 
-def percent(part: SupportsFloat, digits: int = 0) -> Number:
+def percent(part: SupportsFloat) -> Number:
     """Text of a part of one, in percent and without the sign."""
-    return number(100 * float(part), digits)
+    return number(100 * float(part), 0)
 
 
 def probability(value: SupportsFloat) -> Number:
@@ -305,6 +305,11 @@ class Interval(NamedTuple):
     def part(self) -> Number:
         """Text of a share."""
         return self.text(0, " %", 100.0)
+
+
+def ratio_of(at: xr.Dataset, prefix: str = "") -> Interval:
+    """An error over another one, of an entry that holds its ``change`` with bounds."""
+    return Interval(*(1.0 + float(at[f"{prefix}{key}"]) for key in ("change", "lower", "upper")))
 
 
 def uncertain(value: SupportsFloat, uncertainty: SupportsFloat) -> Number:
@@ -465,8 +470,7 @@ def write_latex(table: Table, path: Path) -> Path:
         lines = [r"\begin{table}", r"\centering\small", caption, label]
         lines += [rf"\begin{{tabular}}{{{form}}}", *head, *body, r"\bottomrule"]
         lines += [r"\end{tabular}", r"\end{table}", ""]
-    with replacing(path) as temporary:
-        temporary.write_text("\n".join(lines), encoding="utf-8")
+    write_text(path, "\n".join(lines))
     return path
 
 

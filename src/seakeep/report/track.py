@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 
 from seakeep.conventions import conversion, displayed
-from seakeep.files import MARK, replacing, write_netcdf
+from seakeep.files import MARK, replacing, write_netcdf, write_text
 from seakeep.signals import MotionAgreement, Track, compare_motion
 from seakeep.signals.tracking import FLAGS, LABELS
 
@@ -39,18 +39,17 @@ def track_text(track: Track) -> str:
 
 def write_track(track: Track, path: Path) -> None:
     """Write a track by the suffix of its file: NetCDF in SI units, or :func:`track_text`."""
+    if path.suffix != ".nc":
+        write_text(path, track_text(track))
+        return
+    data = {
+        name: ("time", values, dict(zip(("units", "long_name"), LABELS[name], strict=True)))
+        for name, values in track.channels.items()
+    }
+    time = ("time", track.time, {"units": "s", "long_name": "time"})
+    out = xr.Dataset(data, {"time": time}, {**track.attributes, MARK: TRACK})
+    out["flag"].attrs |= {"flag_values": list(FLAGS.values()), "flag_meanings": " ".join(FLAGS)}
     with replacing(path) as temporary:
-        if path.suffix != ".nc":
-            temporary.write_text(track_text(track), encoding="utf-8", newline="\n")
-            return
-        data = {
-            name: ("time", values, dict(zip(("units", "long_name"), LABELS[name], strict=True)))
-            for name, values in track.channels.items()
-        }
-        time = ("time", track.time, {"units": "s", "long_name": "time"})
-        out = xr.Dataset(data, {"time": time}, {**track.attributes, MARK: TRACK})
-        meanings = {"flag_values": list(FLAGS.values()), "flag_meanings": " ".join(FLAGS)}
-        out["flag"].attrs |= meanings
         write_netcdf(temporary, out)
 
 

@@ -11,7 +11,7 @@ import scipy
 
 from seakeep.arrays import FloatArray, IntArray, as_pair, positive, time_step
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.time_axis import record
+from seakeep.signals.time_axis import record, usual_step
 
 
 @dataclass(frozen=True)
@@ -318,7 +318,7 @@ def compare_motion(
     def correlation(lag: float) -> float:
         return float(np.corrcoef(y1, spline(t1 - lag))[0, 1])
 
-    step = min(float(np.median(np.diff(t1))), float(np.median(np.diff(t2))))
+    step = min(usual_step(t1), usual_step(t2))
     lags = np.linspace(-reach, reach, 2 * int(np.ceil(reach / step)) + 1)
     values = np.array([correlation(lag) for lag in lags])
     best = int(np.argmax(values))

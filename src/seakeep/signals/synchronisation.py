@@ -17,7 +17,7 @@ import scipy
 from seakeep.arrays import FloatArray, IntArray, as_real
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import windowed_lags
-from seakeep.signals.time_axis import record, stretches, uniform_step
+from seakeep.signals.time_axis import record, stretches, uniform_step, usual_step
 
 LARGEST_DRIFT = 1e-3
 """Drift allowed for when pulses are matched and lags are searched: a thousand ppm."""
@@ -498,7 +498,7 @@ def pulse_template(
     trigger: FloatArray, time: FloatArray, width: float, centres: FloatArray
 ) -> scipy.interpolate.CubicSpline:
     """Mean pulse of a record over the time from its centre, 1.5 widths to each side."""
-    step = float(np.median(np.diff(time)))
+    step = usual_step(time)
     count = int(np.ceil(1.5 * width / step)) + 2
     away = step * np.arange(-count, count + 1)
     x = np.where(np.isfinite(trigger), trigger, np.nanmedian(trigger))

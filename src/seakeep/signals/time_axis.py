@@ -89,6 +89,11 @@ def record(series: npt.ArrayLike, time: npt.ArrayLike, owner: str) -> tuple[Floa
     return x, t
 
 
+def usual_step(time: npt.ArrayLike) -> float:
+    """Median step of instants, s."""
+    return float(np.median(np.diff(time)))
+
+
 def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     """Time step of a uniformly sampled axis.
 
@@ -238,7 +243,7 @@ def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
 
 def _grid(t: FloatArray) -> tuple[npt.NDArray[np.int64], float, float]:
     """Whole number of steps from the first instant to each, the step, and the grid's start."""
-    usual = float(np.median(np.diff(t)))
+    usual = usual_step(t)
     place = np.concatenate([[0], np.cumsum(np.maximum(np.rint(np.diff(t) / usual), 1))])
     for _ in range(2):  # a usual step that is off by rounding adds up over a long gap
         step, begin = np.polyfit(place, t, 1)

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep import metrics, statistics
-from seakeep.arrays import Progress, whole_number
+from seakeep.arrays import Datasets, Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.check.parts import samples_in
 from seakeep.conventions import displayed, froude_factor, is_elevation
@@ -605,7 +605,7 @@ def _state_again(forecast: xr.Dataset) -> None:
 
 def calibration_parts(
     campaign: Campaign,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     dt: float,
     start: str | None = None,
     stop: str | None = None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Progress
+from seakeep.arrays import Datasets, Progress
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.store import prepared_folder
 from seakeep.errors import RequestError, SeakeepError, warn
@@ -22,7 +22,7 @@ from seakeep.models.specs import left_open
 from seakeep.models.training import until
 from seakeep.models.validity import warn_of_slow_motions
 from seakeep.signals import find_leakage
-from seakeep.study.plan import between
+from seakeep.study.plan import between, step_of
 from seakeep.study.resolve import can_align, counts_in_periods, mistakes_of, resolve_model
 from seakeep.toml import Length, refusal
 
@@ -30,9 +30,7 @@ MAPS = {"alignment", "lead", "observables"}
 """Settings that say how measured inputs drive a model."""
 
 
-def training_runs(
-    prepared: Mapping[str, xr.Dataset], window: int | None = None
-) -> dict[str, xr.Dataset]:
+def training_runs(prepared: Datasets, window: int | None = None) -> dict[str, xr.Dataset]:
     """Parts of prepared runs that train.
 
     Parameters
@@ -113,7 +111,7 @@ def fit_campaign(
     """
     settings = campaign.model(model)
     spec, prepared, runs, stop = read_training(campaign, model, progress)
-    dt = float(next(iter(prepared.values())).attrs["dt"])
+    dt = step_of(prepared)
     channels = list(settings.states), list(settings.inputs)
     how: dict[str, Any] = {"executor": executor, "progress": progress} if left_open(spec) else {}
     identified: Model = spec.fit(runs, *channels, stop=stop, **how)
@@ -168,7 +166,7 @@ def read_training(
         channels=[*settings.states, *settings.inputs],
     )
     runs = training_runs(prepared)
-    dt = float(next(iter(prepared.values())).attrs["dt"])
+    dt = step_of(prepared)
     period = campaign.encounter_period() if counts_in_periods(settings) else None
     aligned = can_align(campaign.settings, settings.inputs)
     spec = resolve_model(settings, period, dt, aligned=aligned).spec
@@ -189,7 +187,7 @@ def fit_baselines(
     states: Sequence[str],
     inputs: Sequence[str],
     progress: Progress | None = None,
-    prepared: Mapping[str, xr.Dataset] | None = None,
+    prepared: Datasets | None = None,
     *,
     beside: Model | None = None,
 ) -> dict[str, Model]:
@@ -229,7 +227,7 @@ def fit_baselines(
     if prepared is None:
         prepared = load_prepared(campaign, names=campaign.training_runs, progress=progress)
     runs = training_runs(prepared)
-    period, dt = campaign.encounter_period(), float(next(iter(runs.values())).attrs["dt"])
+    period, dt = campaign.encounter_period(), step_of(runs)
     models: dict[str, Model] = {}
     for kind in (kind for kind, each in KINDS.items() if each.role == "reference"):
         recommended = getattr(KINDS[kind], "recommended", None)
@@ -259,7 +257,7 @@ def warn_of_waves(model: Model, run: xr.Dataset, name: str, start: float, steps:
         warn(f"{name}: {text}. Train in such waves too: errors may be large.")
 
 
-def _warn_of_slow_model(model: Model, runs: Mapping[str, xr.Dataset]) -> None:
+def _warn_of_slow_model(model: Model, runs: Datasets) -> None:
     """Warn of slow motions that the training windows of a model hold fewer than five periods of."""
     spans = model.training_spans
     first = runs[next(iter(spans))]
@@ -349,7 +347,7 @@ class Repeat:
 
 
 def find_repeat(
-    inputs: Sequence[str], pieces: Mapping[str, xr.Dataset], name: str, test: xr.Dataset, dt: float
+    inputs: Sequence[str], pieces: Datasets, name: str, test: xr.Dataset, dt: float
 ) -> Repeat | None:
     """Look for the first input of a test part that repeats what the training pieces hold."""
     for channel in inputs:

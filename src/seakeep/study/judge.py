@@ -20,7 +20,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep import metrics, statistics
-from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.arrays import ComplexArray, Datasets, FloatArray
 from seakeep.core.bands import split_bands
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.metrics import over_channels, paired, root_mean_square
@@ -99,7 +99,7 @@ def judge_windows(*, dt: float, frequency: float, **pair: Any) -> xr.Dataset:
 
 
 def judge(
-    groups: Mapping[str, xr.Dataset],
+    groups: Datasets,
     settings: StudySettings,
     channels: Sequence[str],
     executor: Executor | None = None,
@@ -131,7 +131,7 @@ def judge(
     return {f"statistics/{key}": each for key, each in out.items()}
 
 
-def lost_forecasts(groups: Mapping[str, xr.Dataset], tests: Iterable[str]) -> xr.Dataset | None:
+def lost_forecasts(groups: Datasets, tests: Iterable[str]) -> xr.Dataset | None:
     """Cells without a whole forecast, which are left out; of ensembles, all members were lost."""
     rows = []
     for name in tests:
@@ -522,12 +522,12 @@ def _channel_densities(
     return np.array(table), np.stack(curves)
 
 
-def is_regular(groups: Mapping[str, xr.Dataset], test: str) -> bool:
+def is_regular(groups: Datasets, test: str) -> bool:
     """Whether all windows of a test set lie in runs of regular waves of known frequency."""
     return bool(np.isfinite(_frequencies(groups, test)).all())
 
 
-def _frequencies(groups: Mapping[str, xr.Dataset], test: str) -> FloatArray:
+def _frequencies(groups: Datasets, test: str) -> FloatArray:
     """Frequency of the regular wave in each window, Hz; NaN in other waves."""
     runs = groups[f"tests/{test}"]["run"].values.astype(str)
     return groups["runs"]["wave_frequency"].sel(run=runs).values
@@ -536,7 +536,7 @@ def _frequencies(groups: Mapping[str, xr.Dataset], test: str) -> FloatArray:
 RESPONSE = ("error_offset", "error_wave", "error_rest", "amplitude_ratio", "phase_lead")
 
 
-def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
+def regular_response(groups: Datasets, test: str) -> xr.Dataset:
     """Take the error of a test set in regular waves apart.
 
     ``error_offset``, ``error_wave`` and ``error_rest`` are root mean squares over cells in measured
@@ -555,7 +555,7 @@ def regular_response(groups: Mapping[str, xr.Dataset], test: str) -> xr.Dataset:
     return numbered([*errors, ratio, phase], ("number", "model", "channel"), RESPONSE, coords)
 
 
-def _responses(groups: Mapping[str, xr.Dataset], test: str) -> tuple[FloatArray, ComplexArray]:
+def _responses(groups: Datasets, test: str) -> tuple[FloatArray, ComplexArray]:
     """Squared error by parts, and forecast over measurement in the wave.
 
     Returns
@@ -583,7 +583,7 @@ def _responses(groups: Mapping[str, xr.Dataset], test: str) -> tuple[FloatArray,
     return squares, answer
 
 
-def phase_leads(groups: Mapping[str, xr.Dataset], test: str, model: str) -> FloatArray:
+def phase_leads(groups: Datasets, test: str, model: str) -> FloatArray:
     """Phase of the forecast before the measurement, degrees, over (training, window, channel).
 
     NaN where a cell or a channel is not judged.

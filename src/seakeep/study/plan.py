@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Progress
+from seakeep.arrays import Datasets, Progress
 from seakeep.campaign import load_prepared
 from seakeep.check.parts import whole_span
 from seakeep.errors import DataError, RequestError
@@ -23,7 +23,6 @@ from seakeep.models.validity import warn_of_slow_motions
 from seakeep.study.resolve import ResolvedModel, can_align, resolve_model
 from seakeep.study.settings import Study, StudySettings, TestSetSettings, TrainingSettings
 
-Runs = Mapping[str, xr.Dataset]
 Span = tuple[str, float, float]
 """Run, first and last instant, s."""
 
@@ -96,6 +95,11 @@ def between(run: xr.Dataset, span: tuple[float, float]) -> xr.Dataset:
     return run.sel(time=slice(float(span[0]) - slack, float(span[1]) + slack))
 
 
+def step_of(runs: Datasets) -> float:
+    """Time step that prepared runs share, s."""
+    return float(next(iter(runs.values())).attrs["dt"])
+
+
 def _samples(run: xr.Dataset, span: tuple[float, float]) -> tuple[int, int]:
     """First and last sample of a run inside a span."""
     time, dt = run["time"].values, float(run.attrs["dt"])
@@ -104,7 +108,7 @@ def _samples(run: xr.Dataset, span: tuple[float, float]) -> tuple[int, int]:
     return first, last
 
 
-def parts_of(runs: Runs, spans: Iterable[Span]) -> dict[str, xr.Dataset]:
+def parts_of(runs: Datasets, spans: Iterable[Span]) -> dict[str, xr.Dataset]:
     """Part of each run from the start of its first to the end of its last span."""
     edges: dict[str, list[float]] = {}
     for name, *ends in spans:
@@ -114,7 +118,7 @@ def parts_of(runs: Runs, spans: Iterable[Span]) -> dict[str, xr.Dataset]:
 
 def choose_training(
     settings: StudySettings,
-    runs: Runs,
+    runs: Datasets,
     names: Sequence[str],
     needs: Needs,
     inputs: Sequence[str],
@@ -204,7 +208,7 @@ def _places(
 def choose_tests(
     name: str,
     test: TestSetSettings,
-    runs: Runs,
+    runs: Datasets,
     names: Sequence[str],
     *,
     steps: int,

@@ -20,7 +20,7 @@ import xarray as xr
 from seakeep.arrays import Progress
 from seakeep.campaign import read_campaign, write_prepared
 from seakeep.errors import RequestError
-from seakeep.files import MARK, check_output, check_report, is_there, replacing
+from seakeep.files import MARK, check_output, check_report, is_there, write_text
 from seakeep.models.executor import on_this_machine, submitting
 from seakeep.study.plan import named
 from seakeep.study.run import run_study
@@ -229,8 +229,8 @@ def read_reproduction(out: Path | str) -> dict[str, StudyResult]:
 
 def _write(path: Path, text: str, kind: str) -> None:
     check_output(path, kind)
-    with storing(path.parent), replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    with storing(path.parent):
+        write_text(path, text)
 
 
 def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:

@@ -16,7 +16,7 @@ from seakeep.campaign.settings import CampaignSettings
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
 from seakeep.models.checks import check_keys
-from seakeep.models.observables import SlowSquares, observables_of
+from seakeep.models.observables import SlowSquares, counted_in, observables_of
 from seakeep.models.settings import Folds
 from seakeep.models.specs import left_open
 from seakeep.toml import Length, Mistake, lengths
@@ -162,12 +162,8 @@ def resolve_model(
     if "select" in stated:
         stated["select"] = {"period": encounter_period, **_counted(stated["select"])}
     if "observables" in stated:
-        stated["observables"] = tuple(
-            replace(each, period=encounter_period)
-            if isinstance(each, SlowSquares) and each.period is None
-            else each
-            for each in observables_of([_counted(table) for table in stated["observables"]])
-        )
+        observables = observables_of(map(_counted, stated["observables"]))
+        stated["observables"] = tuple(counted_in(each, encounter_period) for each in observables)
     from_study: dict[str, Any] = (
         {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
     )

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, Progress
+from seakeep.arrays import Datasets, FloatArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import embed, metrics
 from seakeep.errors import DataError, SeakeepError, warn
@@ -73,7 +73,7 @@ def run_study(
     *,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    extra: Mapping[str, xr.Dataset] | None = None,
+    extra: Datasets | None = None,
     notes: Mapping[str, str] | None = None,
     finished: Callable[[StudyResult], None] | None = None,
 ) -> StudyResult:

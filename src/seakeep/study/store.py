@@ -16,6 +16,7 @@ from typing import Any
 import xarray as xr
 from filelock import FileLock, Timeout
 
+from seakeep.arrays import Datasets
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.files import (
     check_report,
@@ -25,6 +26,7 @@ from seakeep.files import (
     read_bytes,
     replacing,
     write_netcdf,
+    write_text,
 )
 
 RESULT = "study.nc"
@@ -62,12 +64,10 @@ def storing(folder: Path) -> Iterator[None]:
         ) from error
 
 
-def write_groups(
-    path: Path, kind: str, attrs: Mapping[str, Any], groups: Mapping[str, xr.Dataset]
-) -> None:
+def write_groups(path: Path, kind: str, attrs: Mapping[str, Any], groups: Datasets) -> None:
     """Write groups into one sealed file, renamed into place; errors as :func:`storing`."""
     with storing(path.parent), replacing(path) as temporary:
-        write_netcdf(temporary, xr.Dataset(attrs={**head_of(kind), **attrs}), groups, packed=True)
+        write_netcdf(temporary, xr.Dataset(attrs={**head_of(kind), **attrs}), groups)
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,8 @@ class UnitFolder:
         """Make the folder this study's, or see that it belongs to it; errors as :meth:`check`."""
         self.check()
         header = {"study": name, "digest": self.digest, "versions": versions()}
-        with storing(self.folder), replacing(self.folder / HEADER) as temporary:
-            temporary.write_text(json.dumps(header, indent=1) + "\n", encoding="utf-8")
+        with storing(self.folder):
+            write_text(self.folder / HEADER, json.dumps(header, indent=1) + "\n")
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -226,10 +226,25 @@ class StudyResult:
     attrs: dict[str, Any]
     groups: Groups
 
-    @property
+    @cached_property
     def settings(self) -> dict[str, Any]:
         """Settings of the study as plain data."""
         return json.loads(self.attrs["settings"])
+
+    @property
+    def encounter_period(self) -> float:
+        """Mean encounter period, s."""
+        return float(self.attrs["encounter_period"])
+
+    @property
+    def dt(self) -> float:
+        """Time step, s."""
+        return float(self.attrs["dt"])
+
+    @property
+    def level(self) -> float:
+        """Probability of the bands."""
+        return float(self.settings["statistics"]["level"])
 
     @cached_property
     def model_settings(self) -> dict[str, Any]:
@@ -272,9 +287,10 @@ class StudyResult:
         """Whether bands of ensembles are calibrated."""
         return "calibration" in self.groups
 
-    def is_ensemble(self, model: str) -> bool:
-        """Whether a model is an ensemble."""
-        return bool(self.model_settings[model]["ensemble"])
+    @cached_property
+    def ensembles(self) -> list[str]:
+        """Names of the models that are ensembles."""
+        return [name for name, each in self.model_settings.items() if each["ensemble"]]
 
     def label_of(self, test: str) -> str:
         """Words for a test set."""
@@ -288,7 +304,7 @@ class StudyResult:
 def write_result(
     folder: Path,
     attrs: Mapping[str, Any],
-    groups: Mapping[str, xr.Dataset],
+    groups: Datasets,
     finished: Callable[[StudyResult], None] | None = None,
 ) -> StudyResult:
     """Write a result into its folder, once it was handed to `finished`; errors as there."""

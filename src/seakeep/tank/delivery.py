@@ -21,7 +21,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import SeakeepError
-from seakeep.files import MARK, replacing, write_netcdf
+from seakeep.files import MARK, replacing, write_netcdf, write_text
 from seakeep.signals.panel import opencv
 from seakeep.tank.instruments import Played, clock_instants, trigger
 from seakeep.tank.settings import RunPlan, TankSettings
@@ -61,12 +61,6 @@ def _header(name: str, unit: str) -> str:
     return f"{name} [{unit}]"
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file under a temporary name, then rename it."""
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-
-
 def write_record(record: xr.Dataset, path: Path) -> Path:
     """Write one logger's record to a folder that exists, by its suffix as ``.csv`` or ``.nc``.
 
@@ -98,7 +92,7 @@ def _decimals(column: xr.DataArray) -> int:
 def write_dataset(data: xr.Dataset, path: Path) -> None:
     """Write a Dataset to NetCDF, compressed, under a temporary name, then rename it."""
     with replacing(path) as temporary:
-        write_netcdf(temporary, data, packed=True)
+        write_netcdf(temporary, data)
 
 
 def _filtered(settings: TankSettings) -> dict[str, str]:

@@ -13,7 +13,7 @@ import xarray as xr
 from seakeep.arrays import Progress
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.files import MARK, check_output, is_there, make_folder
+from seakeep.files import MARK, check_output, is_there, make_folder, write_text
 from seakeep.signals.panel import opencv
 from seakeep.tank.delivery import (
     CAMPAIGN,
@@ -25,7 +25,6 @@ from seakeep.tank.delivery import (
     render_side_view,
     write_dataset,
     write_record,
-    write_text,
 )
 from seakeep.tank.dynamics import Rig, assemble_rig, simulate
 from seakeep.tank.hydrodynamics import excitation_at

@@ -57,9 +57,10 @@ enum { BANDS = {{ coverage.shares.shape[1] }} };
 
 #define P(i, j) e->covariance[(i) * M + (j)]
 
-static const double *input(const {{ name }}_estimator *e, int back)
+/* Inputs so many samples before the newest of the record, or after it. */
+static double *input({{ name }}_estimator *e, int back)
 {
-    return e->inputs + (RECORD - 1 - back) * Q;
+    return (e->is_planned ? e->planned : e->inputs) + (RECORD - 1 - back) * Q;
 }
 
 /* One step in time; without a prediction the newest sample is independent of those before. */
@@ -249,7 +250,7 @@ static double continued({{ name }}_estimator *e, int q, double *past, double inn
 /* Predict rows of inputs, FORE at most. */
 static void expect({{ name }}_estimator *e, int rows)
 {
-    double *out = e->inputs + RECORD * Q;
+    double *out = input(e, -1);
     for (int q = 0; q < Q; q++) {
 {% if foresight %}
         int place = 0;
@@ -426,7 +427,7 @@ int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *
 }
 
 /* Power of a tapered input at each frequency, into `power`; the taper ends `beyond` the record. */
-static void spectrum(const {{ name }}_estimator *e, int q, double mean, int beyond, double *power)
+static void spectrum({{ name }}_estimator *e, int q, double mean, int beyond, double *power)
 {
     const double pi = 3.14159265358979323846;
     int size = e->filled;
@@ -515,15 +516,44 @@ static int is_given(const double *future, int at, int q)
     return !waves[q] || (future && !isnan(future[at * Q + q]));
 }
 
+/* Rows of the future, `most` of them, before the first in which a wave is not given. */
+static int given_rows(const double *future, int most)
+{
+    for (int known = 0; known < most; known++)
+        for (int q = 0; q < Q; q++)
+            if (!is_given(future, known, q))
+                return known;
+    return most;
+}
+
+/* Put rows that are given behind the record, which waves after them are predicted from. */
+static void plan({{ name }}_estimator *e, const double *future, int known)
+{
+    for (int row = 0; row < RECORD; row++) {
+        int at = row + known - RECORD;
+        double *out = e->planned + row * Q;
+        for (int q = 0; q < Q; q++) {
+            double last = row > 0 && at > 0 ? out[q - Q] : e->inputs[(RECORD - 1) * Q + q];
+            if (at < 0)
+                out[q] = e->inputs[(row + known) * Q + q];
+            else
+                out[q] = isnan(future[at * Q + q]) ? last : future[at * Q + q];
+        }
+    }
+    e->filled = e->filled + known < RECORD ? e->filled + known : RECORD;
+    e->is_planned = 1;
+}
+
 /* From the inputs of an instant those of the next one, which is so many after the first to come,
  * and what one innovation of each wave, where it is first not known, adds to them. */
-static void coming({{ name }}_estimator *e, const double *future, int at, double *u, double *apart)
+static void coming({{ name }}_estimator *e, const double *future, int known, int at, double *u,
+                   double *apart)
 {
     for (int q = 0; q < Q; q++) {
         apart[q] = 0.0;
-        if (waves[q]) {
-            u[q] = at < FORE ? e->inputs[(RECORD + at) * Q + q]
-                             : e->mean[q] + continued(e, q, e->past[q], 0.0);
+        if (waves[q] && at >= known) {
+            u[q] = at < known + FORE ? input(e, known - 1 - at)[q]
+                                     : e->mean[q] + continued(e, q, e->past[q], 0.0);
             if (e->departs[q] || !is_given(future, at, q)) {
                 double away = continued(e, q, e->apart[q], e->departs[q] ? 0.0 : e->innovation_of[q]);
                 e->departs[q] = 1;
@@ -568,21 +598,12 @@ static void reach_on(double *reach)
     }
 }
 
-int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x, double *std)
+static int run_on({{ name }}_estimator *e, int n, const double *future, int known, double *x, double *std)
 {
     double u[Q + 1], apart[Q + 1] = { 0.0 }, row[Q + 1], moved[N] = { 0.0 }, spreads[N] = { 0.0 };
     double weight[N], *reach = e->cross;
-    int begins = {{ upper }}_U_ROWS - {{ lead_samples }}, known = 0, runs = 1;
-    if (e->taken < BEGINS)
-        return 1;
-    for (int all = 1; known < n - 1 + {{ lead_samples }}; known++) {
-        for (int q = 0; q < Q; q++)
-            all = all && is_given(future, known, q);
-        if (!all) {
-            runs = RUNS;
-            break;
-        }
-    }
+    int begins = {{ upper }}_U_ROWS - {{ lead_samples }};
+    int runs = known < n - 1 + {{ lead_samples }} ? RUNS : 1;
     expect(e, FORE);
 {% if foresight %}
     for (int p = 0; p < PLACED; p++)
@@ -590,11 +611,11 @@ int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, do
 {% endif %}
     memset(e->apart, 0, sizeof e->apart);
     memset(e->departs, 0, sizeof e->departs);
-    memcpy(e->u_history, input(e, begins), begins * Q * sizeof(double));
-    memcpy(u, input(e, 0), Q * sizeof(double));
+    memcpy(e->u_history, e->inputs + (RECORD - 1 - begins) * Q, begins * Q * sizeof(double));
+    memcpy(u, e->inputs + (RECORD - 1) * Q, Q * sizeof(double));
     for (int at = 0; at < {{ lead_samples }}; at++) {
         if (at > 0)
-            coming(e, future, at - 1, u, apart);
+            coming(e, future, known, at - 1, u, apart);
         memcpy(e->first + at * Q, u, Q * sizeof(double));
         memcpy(e->first_apart + at * Q, apart, Q * sizeof(double));
     }
@@ -611,7 +632,7 @@ int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, do
         const double *own = errors + (step < LEADS ? step : LEADS - 1) * N;
         const double *bound = errors + (step + e->since < LEADS ? step + e->since : LEADS - 1) * N;
         if (step + {{ lead_samples }} > 0)
-            coming(e, future, step + {{ lead_samples }} - 1, u, apart);
+            coming(e, future, known, step + {{ lead_samples }} - 1, u, apart);
         for (int run = 0; run < runs; run++) {
             depart(u, apart, run, row);
             if ({{ name }}_step(&e->models[run], row))
@@ -631,8 +652,10 @@ int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, do
             weight[i] = fmin(weight[i], fmax(({{ doubted[1] | hex }} - variance / (spread[i] * spread[i]))
                                              / {{ (doubted[1] - doubted[0]) | hex }}, 0.0));
             x[step * N + i] = middle + moved[i];
-            if (runs > 1 && step > known - {{ lead_samples }})
+            if (runs > 1 && step > known - {{ lead_samples }}) {
                 x[step * N + i] = centre[i] + weight[i] * (middle + moved[i] - centre[i]);
+                variance = weight[i] * variance + (1.0 - weight[i]) * spread[i] * spread[i];
+            }
             if (std)
                 std[step * N + i] = sqrt(variance);
         }
@@ -640,4 +663,17 @@ int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, do
             reach_on(reach);
     }
     return 0;
+}
+
+int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x, double *std)
+{
+    int known = given_rows(future, n - 1 + {{ lead_samples }}), filled = e->filled, status;
+    if (e->taken < BEGINS)
+        return 1;
+    if (future && known > 0)
+        plan(e, future, known);
+    status = run_on(e, n, future, known, x, std);
+    e->filled = filled;
+    e->is_planned = 0;
+    return status;
 }

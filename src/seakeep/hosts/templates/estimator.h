@@ -52,6 +52,8 @@ typedef struct {
     double apart[{{ [Q, 1] | max }}][{{ upper }}_ORDER], innovation_of[{{ [Q, 1] | max }}];
     int order[{{ [Q, 1] | max }}], departs[{{ [Q, 1] | max }}];
     double u_history[{{ [u_rows * Q, 1] | max }}];
+    double planned[({{ upper }}_RECORD + {{ fore }}) * {{ [Q, 1] | max }}];
+    int is_planned;
     double first[{{ [lead_samples * Q, 1] | max }}], first_apart[{{ [lead_samples * Q, 1] | max }}];
     {{ name }}_model models[{{ 1 + 2 * waves | length }}];
 } {{ name }}_estimator;

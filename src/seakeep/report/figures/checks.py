@@ -264,11 +264,11 @@ def residuals(
     end = 1.5 * _end(result["measured_spectrum"])
 
     def draw(own: xr.Dataset, white: Any, past: Any, spectrum: Any, age: Any) -> None:
-        limit, title = float(own["limit"]), {"loc": "left", "fontsize": 8}
+        limit = float(own["limit"])
         white.axhspan(-limit, limit, **SHADE)
         white.plot(own["lag"][1:], own["autocorrelation"][1:], **LINES["measured"])
         white.set(xlabel="lag [s]", ylabel="autocorrelation [1]")
-        white.set_title(f"{short_label(str(own['state'].values))}: errors of one step", **title)
+        white.set_title(f"{short_label(str(own['state'].values))}: errors of one step")
         dashes = ("-", DASHED, ":") * 9
         for each, dash in zip(own.get("input_correlation", ()), dashes, strict=False):
             wide = float(own["input_limit"].sel(input=each["input"]))
@@ -276,7 +276,7 @@ def residuals(
             line = {"color": COLOURS["measured"], "linewidth": 1.0, "linestyle": dash}
             past.plot(own["lag"], each, **line, label=str(each["input"].values))
         past.set(xlabel="lag of the input [s]", ylabel="correlation [1]")
-        past.set_title("with past inputs", **title)
+        past.set_title("with past inputs")
         frequency, power = own["frequency"][1:], own["measured_spectrum"].values
         top = power.max() if power.max() > 0 else 1.0
         grey = {"color": PALETTE["pale"], "linewidth": 0.8, "label": "measured"}
@@ -285,7 +285,7 @@ def residuals(
         spectrum.semilogy(frequency, error, **LINES["forecast"], label="error")
         spectrum.set(xlim=(0, end), xlabel="frequency [Hz]", ylabel="power over peak [1]")
         spectrum.set_ylim(bottom=1e-6)
-        spectrum.set_title("free runs", **title)
+        spectrum.set_title("free runs")
         age.plot(own["age"], own["age_nrmse"], **LINES["forecast"])
         age.set_ylim(bottom=0)
         age.set(xlabel="age of the forecast [s]", ylabel="error [SD]")

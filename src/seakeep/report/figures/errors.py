@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.report.style import (
     COLOURS,
     DASHED,
@@ -27,7 +27,7 @@ from seakeep.report.style import (
     plain_text,
     short_label,
 )
-from seakeep.report.tables import Interval, Number, signed
+from seakeep.report.tables import ratio_of
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
 
@@ -186,28 +186,22 @@ def error_over_time_figure(result: StudyResult) -> Figure:
     grid = figure.subplots(len(tests), len(BAND_WORDS), squeeze=False, sharey="row")
     for row, test in zip(grid, tests, strict=True):
         trend = result.groups["statistics/trend"].sel(test=test)
-        time = trend["time"].values / float(result.attrs["encounter_period"])
+        time = trend["time"].values / result.encounter_period
         tallest = float(trend["error_mean"].sel(model=models).max())
         for axes, (band, words) in zip(row, BAND_WORDS.items(), strict=True):
             for model, line in lines.items():
                 at = trend.sel(band=band, model=model)
                 quartiles = (at[f"{side}_quartile"] for side in ("lower", "upper"))
                 axes.fill_between(time, *quartiles, color=line["color"], alpha=0.15, linewidth=0)
-                label = f"{model_words(model)}, growth {growth_text(at)}"
+                label = f"{model_words(model)}, growth {ratio_of(at).change()}"
                 axes.plot(time, at["error_mean"], label=label, **line)
-            axes.set_title(words, loc="left", fontsize=8)
+            axes.set_title(words)
             axes.legend(fontsize=6.5, loc="upper left")
         row[0].set_ylim(0, 1.6 * tallest if tallest > 0 else None)
         row[0].set_ylabel(f"{result.label_of(test)}\nε [measured SD]")
     for axes in grid[-1]:
         axes.set_xlabel("time in encounter periods")
     return figure
-
-
-def growth_text(at: xr.Dataset) -> Number:
-    """Change of ε(t) over the window with its interval, where there is one, in percent."""
-    change = Interval(*(float(at[key]) for key in ("change", "lower", "upper")))
-    return change.text(signed, " %", 100.0)
 
 
 @figure_style()
@@ -231,7 +225,7 @@ def density_figure(result: StudyResult, model: str) -> Figure:
             z = (x - centre) / spread
             axes.fill_between(z, lower, upper, color=tint, alpha=0.22, linewidth=0)
             axes.plot(z, mean, color=tint, linestyle=dash, linewidth=1.3, label=words)
-        axes.set_title(short_label(name), loc="left", pad=2)
+        axes.set_title(short_label(name), fontsize=10, pad=2)
         axes.set_yticks([])
         axes.set_ylim(bottom=0)
         axes.set_xlabel("measured SD from the mean", fontsize=7)
@@ -247,8 +241,8 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
     plane, decay = figure.subplots(1, 2)
     circle = np.exp(1j * np.linspace(0, np.pi, 400))
     plane.plot(circle.real, circle.imag, color=PALETTE["slate"], linewidth=0.8)
-    for model in sorted(judged_models(result), key=lambda model: not result.is_ensemble(model)):
-        data, single = result.groups[f"eigenvalues/{model}"], not result.is_ensemble(model)
+    for model in sorted(judged_models(result), key=lambda model: model not in result.ensembles):
+        data, single = result.groups[f"eigenvalues/{model}"], model not in result.ensembles
         values = (data["real"].values + 1j * data["imag"].values).ravel()
         values = values[np.isfinite(values) & (values.imag >= 0)]
         style = {
@@ -260,13 +254,13 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
             "label": model_words(model),
         }
         plane.scatter(values.real, values.imag, **style)
-        frequency = np.angle(values) / (2 * np.pi * float(result.attrs["dt"]))
+        frequency = np.angle(values) / (2 * np.pi * result.dt)
         decay.scatter(frequency, np.abs(values), **style)
     plane.set(aspect="equal", ylim=(0, 1.05), xticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
     plane.set(xlabel="real part", ylabel="imaginary part")
     decay.axhline(1.0, color=PALETTE["slate"], linewidth=0.8)
     decay.set(xlabel="frequency [Hz]", ylabel="modulus", ylim=(LOWEST, 1.01))
-    decay.set_xlim(0, 3 / float(result.attrs["encounter_period"]))
+    decay.set_xlim(0, 3 / result.encounter_period)
     legend = legend_outside(figure, decay, side="upper right", markerscale=2)
     for handle in filter(None, legend.legend_handles):
         handle.set_alpha(0.9)
@@ -336,7 +330,7 @@ def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Seque
 
 
 @figure_style()
-def nowcast_figure(nowcasts: Mapping[str, xr.Dataset], run: str) -> Figure:
+def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
     """Error, and the model's own estimate of it, against lead time, a panel per channel."""
     first = next(iter(nowcasts.values()))
     names, share = list(map(str, first["channel"].values)), float(first.attrs["share"])
@@ -349,7 +343,7 @@ def nowcast_figure(nowcasts: Mapping[str, xr.Dataset], run: str) -> Figure:
             claimed = {"color": style["color"], "linewidth": 0.7, "alpha": 0.7}
             axes.plot(at["lead"], at["claimed"], **claimed, label=f"{model}: claimed")
         axes.axhline(share, color="0.4", linewidth=0.8, linestyle=":", label=f"{share:g} SD")
-        axes.set_title(short_label(name), loc="left", fontsize=8)
+        axes.set_title(short_label(name))
         axes.set(xlim=(0, float(first["lead"].max())), xlabel="lead time [s]")
         axes.set_ylim(bottom=0)
         if axes.get_subplotspec().is_first_col():

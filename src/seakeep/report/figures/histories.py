@@ -39,7 +39,7 @@ from seakeep.report.style import (
     shown_unit,
 )
 from seakeep.signals import encounter_period
-from seakeep.signals.time_axis import over_gaps
+from seakeep.signals.time_axis import over_gaps, usual_step
 from seakeep.study import Comparison, StudyResult, comparison_table
 from seakeep.study.judge import band_of
 from seakeep.study.reproduce import ACTS
@@ -176,9 +176,9 @@ def overlay_figure(comparison: Comparison | Mapping[str, Comparison]) -> Figure:
     for each in axes[-1]:
         each.set_xlabel("time [s]")
     if period is not None:
-        axes[0, 0].set_title("whole forecast, envelopes", loc="left")
+        axes[0, 0].set_title("whole forecast, envelopes", fontsize=10)
         axes[0, 1].set_xlim(time[-1] - ENLARGED * period, time[-1])
-        axes[0, 1].set_title(f"last {ENLARGED} periods", loc="left")
+        axes[0, 1].set_title(f"last {ENLARGED} periods", fontsize=10)
     legend_outside(figure, *axes[0])
     figure.suptitle(_title(compared), x=0.01, ha="left")
     return figure
@@ -233,7 +233,7 @@ def _period_if_long(comparison: Comparison) -> float | None:
     waves = [each for name, each in inputs.data_vars.items() if is_elevation(str(name))]
     series = [*waves, *comparison.measured.data_vars.values()][0]
     time = series["time"].values
-    dt = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    dt = usual_step(time) if time.size > 1 else 0.0
     try:
         period = encounter_period(series.values, dt)
     except DataError:
@@ -399,7 +399,7 @@ def history_figure(
     run, learnt, start = (cell[key].item() for key in ("run", "training", "start"))
     left_out = str(result.groups["training"]["left_out"].values[training])
     title = f"{run}, from {start:.1f} s; trained {'' if left_out else 'on '}{learnt}"
-    axes[0].set_title(title, loc="left", fontsize=8)
+    axes[0].set_title(title)
     return figure
 
 
@@ -411,12 +411,12 @@ def _draw_channel(
     calibration: xr.Dataset | None = None,
 ) -> None:
     """Draw what was measured and the forecasts of all models but baselines."""
-    level = 100 * float(result.settings["statistics"]["level"])
+    level = 100 * result.level
     at = cell.isel(training=0, window=0).sel(channel=name)
     curves = []
     for model in judged_models(result):
         mean, words, line = at["mean"].sel(model=model), model_words(model), line_of(result, model)
-        if not result.is_ensemble(model):
+        if model not in result.ensembles:
             curves.append(Curve(words, line, _standard(at, mean)))
             continue
         band = [_standard(at, at[side].sel(ensemble=model)) for side in ("lower", "upper")]
@@ -428,7 +428,7 @@ def _draw_channel(
             wider = wider if np.isfinite(wider).all() else []
         title = f"{words} mean"
         curves.append(Curve(title, line, _standard(at, mean), band, f"{level:g} % band", wider))
-    time = cell["time"].values / float(result.attrs["encounter_period"])
+    time = cell["time"].values / result.encounter_period
     draw_history(axes, time, _standard(at, at["measured"]), curves)
     axes.set_ylabel(short_label(name), rotation=0, ha="right", va="center")
     axes.margins(x=0.005)
@@ -451,7 +451,7 @@ def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
         training = int(test["judged"].values[:, 0].argmax())
         for axes, name in zip(row, CHANNELS, strict=True):
             _draw_channel(axes, result, test.isel(training=[training], window=[0]), name)
-            axes.set_title(f"{act.title}: {name}", loc="left", fontsize=8)
+            axes.set_title(f"{act.title}: {name}")
     for axes in grid[-1]:
         axes.set_xlabel("time after the last measured state, in encounter periods")
     legend_outside(figure, grid[0, 0], side="upper right")

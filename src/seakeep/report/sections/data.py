@@ -177,7 +177,7 @@ def _prior_text(prior: dict[str, Any], unit: str) -> str:
 
 def _data_settings(result: StudyResult) -> Iterator[tuple[str, str]]:
     """Period, time step and filters of the data."""
-    period, dt = float(result.attrs["encounter_period"]), float(result.attrs["dt"])
+    period, dt = result.encounter_period, result.dt
     preparation, filters = json.loads(result.attrs["preparation"]), []
     origin = "stated" if result.settings["study"].get("encounter_period") else "measured"
     if preparation["low_pass"]:
@@ -255,12 +255,12 @@ def whole_readers(result: StudyResult) -> list[str]:
 def unequal_training(result: StudyResult) -> str:
     """Sentence on models that learn from different lengths of data; empty where none do."""
     lengths, whole = _trained_on(result), ", ".join(map(model_words, whole_readers(result)))
-    period, parts = float(result.attrs["encounter_period"]), []
+    period, parts = result.encounter_period, []
     for model, length in lengths.items():
         if isinstance(length, dict):
             parts.append(f"{model_words(model)} from a part ({_prior_text(length, ' samples')})")
         elif length is not None:
-            periods = length * float(result.attrs["dt"]) / period
+            periods = length * result.dt / period
             parts.append(f"{model_words(model)} from a part ({periods:.3g} T̂)")
     if not (whole and parts):
         return ""

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from seakeep.arrays import FloatArray
 from seakeep.conventions import displayed, is_elevation
-from seakeep.files import replacing
+from seakeep.files import write_text
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.style import judged_models, line_of, model_words, shown_unit
@@ -28,7 +30,7 @@ def explorer(result: StudyResult) -> Section:
 def histories(result: StudyResult) -> Section:
     """Return figures of the cells that are shown."""
     words = {
-        "level": 100 * float(result.settings["statistics"]["level"]),
+        "level": 100 * result.level,
         "edges": ", and that band calibrated (dotted)" if result.is_calibrated else "",
     }
     figures = []
@@ -78,7 +80,7 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
         {
             "name": model,
             "label": words,
-            "mean": f"{words} mean" if result.is_ensemble(model) else words,
+            "mean": f"{words} mean" if model in result.ensembles else words,
             "colour": line["color"],
             "dash": list(line["linestyle"][1]),
         }
@@ -100,7 +102,7 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
         for name, data in result.tests.items()
     ]
     return {
-        "step": float(result.attrs["dt"]),
+        "step": result.dt,
         "channels": channels,
         "waves": waves,
         "models": models,
@@ -110,7 +112,7 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
             "training": training,
             "window": window,
             "channel": result.channels.index("heave") if "heave" in result.channels else 0,
-            "cell": _cell(result, test, training, window),
+            "cell": _cell(result, test, _series(result, test), training, window),
         },
     }
 
@@ -120,12 +122,13 @@ def write_histories(result: StudyResult) -> None:
     folder = result.folder / "histories"
     folder.mkdir(exist_ok=True)
     for test, data in result.tests.items():
+        series = _series(result, test)
         for training, judged in enumerate(data["judged"].values):
             windows = np.flatnonzero(judged).tolist()
-            cells = {window: _cell(result, test, training, window) for window in windows}
+            cells = {window: _cell(result, test, series, training, window) for window in windows}
             text = json.dumps(cells, separators=(",", ":"))
-            with replacing(folder / f"{test}-{training}.js") as temporary:
-                temporary.write_text(f'seakeepCells["{test}-{training}"]={text};\n', "utf-8")
+            name = f"{test}-{training}"
+            write_text(folder / f"{name}.js", f'seakeepCells["{name}"]={text};\n')
 
 
 def _elevations(result: StudyResult) -> list[str]:
@@ -140,7 +143,24 @@ def _shown(result: StudyResult) -> dict[str, tuple[float, str]]:
     return dict(zip(units["name"].values, map(displayed, units.values), strict=True))
 
 
-def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[str, Any]:
+def _series(result: StudyResult, test: str) -> dict[str, dict[str, FloatArray]]:
+    """Forecasts, bands and errors of each model over (training, window, …)."""
+    series = {}
+    for model in judged_models(result):
+        one, keys = result.tests[test].sel(model=model, measure="nrmse"), ["error", "mean"]
+        if model in result.ensembles:
+            one, keys = one.sel(ensemble=model), [*keys, "lower", "upper"]
+        series[model] = {key: one[key].values for key in keys}
+    return series
+
+
+def _cell(
+    result: StudyResult,
+    test: str,
+    series: Mapping[str, Mapping[str, FloatArray]],
+    training: int,
+    window: int,
+) -> dict[str, Any]:
     """Waves, measurement, forecasts and errors of a cell, packed."""
     data, models = result.tests[test], {}
     factors = [_shown(result)[name][0] for name in result.channels]
@@ -149,14 +169,10 @@ def _cell(result: StudyResult, test: str, training: int, window: int) -> dict[st
         """Values (…, channel) in the units that are shown, packed channel by channel."""
         return [pack(factor * values[..., k]) for k, factor in enumerate(factors)]
 
-    for model in judged_models(result):
-        one = data.sel(model=model, measure="nrmse")
-        keys = ["mean"]
-        if result.is_ensemble(model):
-            one, keys = one.sel(ensemble=model), ["mean", "lower", "upper"]
-        entry: dict[str, Any] = {key: packed(one[key].values[training, window]) for key in keys}
-        errors = one["error"].values[training, window]
-        models[model] = entry | {"nrmse": [round(float(e), 3) if e == e else None for e in errors]}
+    for model, own in series.items():
+        errors, *parts = ((key, values[training, window]) for key, values in own.items())
+        nrmse = [round(float(e), 3) if e == e else None for e in errors[1]]
+        models[model] = {**{key: packed(values) for key, values in parts}, "nrmse": nrmse}
     return {
         "measured": packed(data["measured"].values[window]),
         "waves": _waves(result, data, window),

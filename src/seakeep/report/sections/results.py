@@ -20,7 +20,6 @@ from seakeep.report.figures.errors import (
     density_figure,
     eigenvalue_figure,
     error_over_time_figure,
-    growth_text,
 )
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Section, drawing, section
@@ -36,6 +35,7 @@ from seakeep.report.tables import (
     number,
     numbers,
     percent,
+    ratio_of,
     row,
     short,
     signed,
@@ -82,7 +82,7 @@ def summary(result: StudyResult) -> Section:
 
 def _tested(result: StudyResult) -> str:
     """What was tested, in one sentence or two."""
-    period = float(result.attrs["encounter_period"])
+    period = result.encounter_period
     sets = result.groups["training"].sizes["training"]
     seas = [
         f"{result.label_of(test)} ({data.sizes['window']} windows of "
@@ -163,8 +163,8 @@ def conditional(result: StudyResult) -> str:
 def findings(result: StudyResult) -> list[str]:
     """Results, one sentence each."""
     said = []
-    singles = [m for m in result.models if not result.is_ensemble(m)]
-    ensembles = [m for m in result.models if result.is_ensemble(m)]
+    ensembles = result.ensembles
+    singles = [model for model in result.models if model not in ensembles]
     for test in result.tests:
         median = result.groups["statistics/boxes"]["median"].sel(test=test, channel="average")
         parts = []
@@ -188,7 +188,7 @@ def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure
     at = result.groups["statistics/differences"].sel(
         test=test, model=ensemble, other=single, measure=measure, channel="average"
     )
-    change, *bounds = (100 * float(at[key]) for key in ("change", "lower", "upper"))
+    change, *bounds = (100 * (each - 1) for each in ratio_of(at))
     if not np.isfinite(change):
         return ""
     outcome = "as good" if np.abs(bounds).max() < 0.5 else verdict(*bounds)
@@ -202,7 +202,7 @@ def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure
 
 def _coverage_findings(result: StudyResult, model: str) -> list[str]:
     first = next(iter(result.tests))
-    level = float(result.settings["statistics"]["level"])
+    level = result.level
     at = {"test": first, "model": model, "against": "measured", "channel": "average"}
     row = result.groups["statistics/coverage"].sel(at)
     inside = float(row["inside"].sel(band="members"))
@@ -286,7 +286,7 @@ def glossary(result: StudyResult) -> Section:
     slap = any("truth" in data for data in result.tests.values())
     left_out = {"λ/L": not regular, "slap": not slap}
     values = {
-        "period": float(result.attrs["encounter_period"]),
+        "period": result.encounter_period,
         "same": same * regular,
         "symbols": explained + ". M is a mooring load, a force in N." * loads,
     }
@@ -421,8 +421,8 @@ def _test_of(result: StudyResult, at: xr.Dataset) -> str:
 def bands(result: StudyResult) -> Section:
     """Return coverage and scores of bands by wave height, horizon and channel."""
     groups, tables = result.groups.get("statistics/bands", xr.Dataset()), []
-    level = short(100 * float(result.settings["statistics"]["level"]))
-    for model in filter(result.is_ensemble, result.models if groups else ()):
+    level = short(100 * result.level)
+    for model in result.ensembles if groups else ():
         for at in entries(groups.sel(model=model), "band"):
             at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
             band = str(at["band"].values)
@@ -476,11 +476,11 @@ def age(result: StudyResult) -> Section:
             BAND_WORDS[str(at["band"].values)],
             _model_of(at),
             number(at["error_mean"].mean()),
-            growth_text(at),
+            ratio_of(at).change(),
         )
         for at in entries(trend, "test", "band", "model")
     ]
-    seconds = split * float(result.attrs["encounter_period"])
+    seconds = split * result.encounter_period
     return section(
         "time",
         drawing("error_over_time", error_over_time_figure, result, split=split),
@@ -491,9 +491,8 @@ def age(result: StudyResult) -> Section:
 def coverage(result: StudyResult) -> Section:
     """Return coverage and width of the bands of ensembles."""
     kinds = (False, True) if result.is_calibrated else (False,)
-    ensembles = filter(result.is_ensemble, result.models)
     return section(
-        "coverage", *(coverage_table(result, m, kind) for m in ensembles for kind in kinds)
+        "coverage", *(coverage_table(result, m, kind) for m in result.ensembles for kind in kinds)
     )
 
 
@@ -510,7 +509,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool = False) ->
             yield beside(*at["inside"], form=two) if true else two(*at["inside"])
             yield two(at["relative_width"].sel(against="measured"))
 
-    level = float(result.settings["statistics"]["level"])
+    level = result.level
     more = _calibrated_words(result, model, level) if calibrated else ""
     if true:
         more += (
@@ -568,12 +567,11 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
 
 def densities(result: StudyResult) -> Section:
     """Return densities of measurement and forecasts, and their divergence."""
-    ensembles = [model for model in result.models if result.is_ensemble(model)]
     figures = []
-    for model in ensembles or result.models[:1]:
+    for model in result.ensembles or result.models[:1]:
         words = {"name": f"densities_{model}", "model": model_words(model)}
         figures.append(drawing("densities", density_figure, result, model, **words))
-    order = sorted(judged_models(result), key=lambda model: model not in ensembles)
+    order = sorted(judged_models(result), key=lambda model: model not in result.ensembles)
     tables = (divergence_table(result, m, variant) for m in order for variant in VARIANTS)
     return section("densities", *figures, *tables)
 
@@ -583,7 +581,7 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     data = result.groups["statistics/divergence"]
     at = data.sel(model=model, variant=variant)
     keys = ("mean", "lower", "upper", "uncertainty", "noise_floor")
-    comparable = result.is_ensemble(model) and result.shows_paper
+    comparable = model in result.ensembles and result.shows_paper
 
     def cells(name: str) -> Iterator[str]:
         of_all = name == "average"
@@ -608,7 +606,7 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
         test=str(data.attrs["test"]),
         name=f"jsd_{model}_{variant}",
         elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
-        folded=not result.is_ensemble(model) and any(map(result.is_ensemble, result.models)),
+        folded=bool(result.ensembles) and model not in result.ensembles,
         model=model_words(model),
         variant=variant,
         how=how,

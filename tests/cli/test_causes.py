@@ -1,4 +1,4 @@
-"""What the attack found, cause by cause, where no case of it shows the cause."""
+"""What the system refuses, what a killed run left, threads and encodings of a command."""
 
 import os
 import subprocess

@@ -1,19 +1,14 @@
-"""What is attacked: a small campaign of two loggers, a study, tank settings, and models of it."""
+"""A small campaign of two loggers, and models of it."""
 
 from __future__ import annotations
 
-import contextlib
-import io
-import shutil
-import tomllib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 CAMPAIGN = """
 [campaign]
-name = "Attacked"
+name = "Two loggers"
 scale_factor = 50.0
 period_channel = "eta_fwd"
 
@@ -144,59 +139,6 @@ states = ["heave", "pitch"]
 inputs = ["eta_fwd"]
 """
 
-STUDY = """
-[study]
-campaign = "campaign.toml"
-name = "Attacked"
-preset = "recommended"
-seed = 3
-states = ["heave", "pitch"]
-inputs = ["eta_fwd"]
-
-[training]
-scheme = "halves"
-windows = 1
-
-[models.one]
-ridge = 0.15
-state_delays = 2
-input_delays = 4
-observables = []
-readouts = {}
-
-[models.several]
-kind = "bayesian_hankel_dmdc"
-n_members = 2
-ridge = { log_uniform = [0.05, 0.5] }
-observables = []
-readouts = {}
-window = { uniform = ["10 T", "20 T"] }
-
-[tests.same]
-windows = 2
-length = 3.0
-
-[statistics]
-n_series = 8
-level = 0.9
-
-[output]
-shown_windows = 1
-"""
-
-TANK = """
-seed = 1
-
-[runs.one]
-duration = 12.0
-startup = 8.0
-
-[runs.one.spectrum]
-height = 0.1
-peak_period = 1.6
-components = 20
-"""
-
 
 def _write_raw(folder: Path, run: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -221,46 +163,9 @@ def _write_raw(folder: Path, run: str, seed: int) -> None:
          pulses(t))  # fmt: skip
 
 
-def read(what: str) -> dict[str, Any]:
-    """Settings as TOML gives them: campaign, study or tank."""
-    return tomllib.loads({"campaign": CAMPAIGN, "study": STUDY, "tank": TANK}[what])
-
-
 def write(folder: Path) -> Path:
-    """Write settings and raw files into a folder of its own."""
-    place = folder / "ground"
-    place.mkdir()
-    for name, text in (("campaign", CAMPAIGN), ("study", STUDY), ("tank", TANK)):
-        (place / f"{name}.toml").write_text(text, encoding="utf-8")
-    _write_raw(place, "one", 1)
-    return place
-
-
-def prepare(folder: Path) -> Path:
-    """Write it into a folder with models and a study of it, and import what the commands import."""
-    import seakeep.cli.console
-    import seakeep.report.comparison
-    import seakeep.report.sections
-    import seakeep.study
-    import seakeep.tuning  # noqa: F401
-    from seakeep.cli import main
-
-    place = write(folder)
-    said = io.StringIO()
-    with (
-        contextlib.chdir(place),
-        contextlib.redirect_stdout(said),
-        contextlib.redirect_stderr(said),
-    ):
-        for arguments in (
-            ("prepare", "campaign.toml"),
-            ("fit", "campaign.toml", "-o", "model.nc"),
-            ("fit", "campaign.toml", "--model", "ensemble", "-o", "ensemble.nc"),
-            ("fit", "campaign.toml", "--model", "arx", "-o", "arx.nc"),
-            ("study", "study.toml", "-o", "results", "--workers", "1"),
-        ):
-            if main(list(arguments)):
-                raise RuntimeError(f"{arguments}: {said.getvalue()[-2000:]}")
-    for each in ("figures", "tables", "histories"):
-        shutil.rmtree(place / "results" / each, ignore_errors=True)
-    return place
+    """Write settings and raw files into a folder; gives the campaign file."""
+    path = folder / "campaign.toml"
+    path.write_text(CAMPAIGN, encoding="utf-8")
+    _write_raw(folder, "one", 1)
+    return path
