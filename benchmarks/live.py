@@ -128,7 +128,8 @@ def bands(campaign, kind="plain", starts=60):
     print("lead, T:", *LEADS)
     for words, each in found.items():
         error, inside = np.mean(each, axis=0)
-        print(f"{words}: error, training SD:", *(f"{error[lead]:.2f}" for lead in leads))
+        of_leads = " ".join(f"{error[lead]:.2f}" for lead in leads)
+        print(f"{words}: error, training SD: {of_leads}; largest {error.max():.2f}")
         covered = " ".join(f"{100 * inside[lead]:.1f}" for lead in leads)
         apart = ", ".join(f"{100 * run[1].mean():.1f}" for run in each)
         print(f"  in the band, %: {covered}; all {100 * inside.mean():.1f}, of runs {apart}")

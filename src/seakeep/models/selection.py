@@ -206,7 +206,7 @@ class Problem:
     horizons : tuple of int
         Lengths of the windows that are judged, samples.
     read : dict
-        Windows that were read, by run, starts and length.
+        Windows that were read last, by run, starts and length.
     """
 
     runs: Mapping[str, xr.Dataset]
@@ -292,9 +292,11 @@ class Problem:
         return np.arange(first, window.last - steps + 1, steps)
 
     def windows(self, run: int, starts: tuple[int, ...], steps: int) -> Windows:
-        """What free runs of all candidates from some samples of a run read, read once."""
+        """What free runs of all candidates from some samples of a run read."""
         key = run, starts, steps
         if key not in self.read:
+            if any(other != run for other, *_ in self.read):
+                self.read.clear()  # candidates are judged on one run after the other
             begin, dt = self.data.begin(run), self.data.signature.dt
             places = [(self.data.names[run], begin + at * dt) for at in starts]
             self.read[key] = read_windows(self.reader, self.runs, places, steps)
@@ -449,7 +451,7 @@ def _judge(
         if progress is not None:
             progress(before + done, before + total + after, what)
 
-    keys = {unit: _key(*unit) for unit in itertools.product(new, folds)}
+    keys = {unit: _key(*unit) for unit in ((each, fold) for fold in folds for each in new)}
     units = [unit for unit, key in keys.items() if key not in known]
     outcomes = in_order(_unit, problems, units, executor, tell, "candidate and fold")
     for unit, outcome in zip(units, outcomes, strict=True):
