@@ -132,12 +132,11 @@ def _envelope(axes: Any, time: Any, bounds: Sequence[Values], period: float, **s
 
 
 @figure_style()
-def overlay_figure(comparison: Comparison | Mapping[str, Comparison]) -> Figure:
+def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
     """Time histories of every state, forecasts over measurement, with the inputs below.
 
-    Several comparisons are those of one run by several models, by the models' names.
+    The comparisons are those of one run by one model or several, by the models' names.
     """
-    several = comparison if isinstance(comparison, Mapping) else {"": comparison}
     compared = list(several.values())
     tables = [comparison_table([each], intervals=False).isel(run=0) for each in compared]
     first = compared[0]
