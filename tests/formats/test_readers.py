@@ -6,10 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from seakeep import files
 from seakeep.campaign import read_campaign, read_table
 from seakeep.errors import MissingFileError
-from seakeep.formats import Columns, Reader
+from seakeep.formats import Columns
 
 
 def test_each_file_is_parsed_once_in_a_preparation(tmp_path, monkeypatch):
@@ -52,21 +51,3 @@ class TestPaths:
     def test_a_pipe(self, tmp_path):
         os.mkfifo(tmp_path / "pipe.csv")
         self.refused(tmp_path / "pipe.csv", r"pipe\.csv is a pipe or a device, and only regular")
-
-    def test_a_disk_that_fails(self, tmp_path, monkeypatch):
-        path = tmp_path / "run.csv"
-        path.write_text("t,h\n0,1\n1,2\n")
-
-        def fails(*_):
-            raise OSError(5, "Input/output error")
-
-        monkeypatch.setattr("seakeep.formats.TEXT", Reader("text", fails))
-        self.refused(path, r"cannot be read: Input/output error\. Correct the path")
-
-    def test_a_file_that_may_not_be_read(self, tmp_path, monkeypatch):
-        def refuses(*_, **__):
-            raise PermissionError(13, "Permission denied")
-
-        monkeypatch.setattr(files.Path, "stat", refuses)
-        with pytest.raises(MissingFileError, match=r"Permission denied\. Change its permissions"):
-            files.existing_file(tmp_path / "run.csv")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
@@ -246,25 +246,31 @@ def _driven(
             for run in runs
             if signature.parameter
         ),
-        **_series(signature, [run.history(signature, span) for run, span in pairs], drives, spans),
+        **_series(signature, (run.history(signature, span) for run, span in pairs), drives, spans),
     )
 
 
 def _series(
     signature: Signature,
-    histories: Sequence[FloatArray],
+    histories: Iterable[FloatArray],
     drives: Sequence[Drive],
     spans: Sequence[Span],
 ) -> dict[str, Any]:
     """What windows of one length start from, and what drives each, from its run's drive."""
-    states, zero = np.stack(histories), None
-    if reference := signature.input_map.reference:
-        zero = states[:, -reference:].mean(axis=1)
-        if (follows := signature.input_map.follows) is not None:
-            zero[:, follows.column] = 0.0  # it is a place
-        states -= zero[:, None]
-        drives = [drive.about(span.known) for drive, span in zip(drives, spans, strict=True)]
-    return {"histories": states, "zero": zero, **_regressors(signature, drives, spans)}
+    reference, follows = signature.input_map.reference, signature.input_map.follows
+    if not reference:
+        return {"histories": np.stack([*histories]), **_regressors(signature, drives, spans)}
+    rows = max(signature.state_delays + 1, signature.history_samples - reference)
+    states, zeros = [], []
+    for each in histories:
+        zero = each[-reference:].mean(axis=0)
+        if follows is not None:
+            zero[follows.column] = 0.0  # it is a place
+        zeros.append(zero)
+        states.append(each[-rows:] - zero)
+    drives = [drive.about(span.known) for drive, span in zip(drives, spans, strict=True)]
+    out = {"histories": np.stack(states), "zero": np.stack(zeros)}
+    return out | _regressors(signature, drives, spans)
 
 
 def _regressors(
@@ -505,7 +511,7 @@ def array_windows(
         places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
         time=(time,) * len(histories),
-        **_series(signature, [*histories], drives, [span] * len(drives)),
+        **_series(signature, iter(histories), drives, [span] * len(drives)),
     )
 
 
