@@ -1,5 +1,7 @@
 """Steps of the chain through a campaign file, against bodies, tones and clocks that are known."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from small_tank import tank_columns, write_csv
@@ -10,7 +12,7 @@ from seakeep.signals import rotation_matrix
 
 G = 9.81
 DT = 0.01
-T = DT * np.arange(3000)
+T = DT * np.arange(1500)
 ARM = np.array([-1.2, 0.3, -0.1])  # from the centre of gravity to the bow, in the body's axes
 
 
@@ -48,6 +50,12 @@ def angular_velocity(t):
     return np.column_stack([by[:, 2, 1], by[:, 0, 2], by[:, 1, 0]])
 
 
+@cache
+def turning():
+    """Angular velocity and acceleration at the instants of the run."""
+    return angular_velocity(T), rate(angular_velocity, 1)(T)
+
+
 def written(folder, columns, text):
     write_csv(folder / "run.csv", {"time [s]": T, **columns})
     path = folder / "campaign.toml"
@@ -57,7 +65,7 @@ def written(folder, columns, text):
 
 def gyroscope():
     """Columns of angles, angular velocities and accelerations, and their channels."""
-    omega, alpha = angular_velocity(T), rate(angular_velocity, 1)(T)
+    omega, alpha = turning()
     columns, text = {}, ""
     for i, name in enumerate(("roll", "pitch", "yaw")):
         for kind, values, unit in (
