@@ -277,7 +277,7 @@ def overlays(campaign_file, model, runs, folder, prefix=""):
     campaign = seakeep.read_campaign(campaign_file)
     identified = fit_campaign(campaign, model)
     for each in compare(identified, campaign, runs):
-        save(overlay_figure(in_degrees(each)), folder / f"{prefix}{each.run}.png")
+        save(overlay_figure({"": in_degrees(each)}), folder / f"{prefix}{each.run}.png")
 
 
 def tutorial():
@@ -287,7 +287,7 @@ def tutorial():
     campaign = seakeep.read_campaign(file)
     ensemble = fit_campaign(campaign, "ensemble")
     (around,) = compare(ensemble, campaign, start=60.0, steps=200)
-    save(overlay_figure(in_degrees(around)), HERE / "band.png")
+    save(overlay_figure({"": in_degrees(around)}), HERE / "band.png")
 
 
 def study():

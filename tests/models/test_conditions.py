@@ -61,6 +61,7 @@ def test_a_run_of_another_condition_is_named_with_what_sets_it_apart(last, reaso
     # Estimated from a minute of free runs, by a model of noisy data.
     np.testing.assert_allclose(each.value, value, rtol=0.1)
     assert "odd disagrees with the other runs: " in each.describe()
+    assert ("set centre = 'run' in [model]" in each.describe()) == (reason == "offset")
     # These runs state no water depth.
     assert "of a probe explains it" not in each.describe()
     assert ("water_depth in [rig]" in each.describe()) == (reason == "dynamics")

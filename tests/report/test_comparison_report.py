@@ -190,7 +190,7 @@ def overlay_figure(compared):
     pytest.importorskip("matplotlib")
     from seakeep.report.figures.histories import overlay_figure as draw
 
-    return draw(compared)
+    return draw({"": compared})
 
 
 def words_of(legend):

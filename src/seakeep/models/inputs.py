@@ -222,9 +222,8 @@ class Drive:
 
         The squared place of a vessel that is followed stays as it is.
         """
-        first, stop = known + 1 - self.input_map.reference, known + 1
-        zero = self.rows(first, stop).delayed, self.direct(first, stop)
-        return replace(self, zero=Regressors(*(each.mean(axis=0) for each in zero)))
+        rows = self.rows(known + 1 - self.input_map.reference, known + 1)
+        return replace(self, zero=Regressors(*(each.mean(axis=0) for each in rows)))
 
     def rows(self, first: int, stop: int) -> Regressors:
         """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
@@ -273,7 +272,7 @@ class Drive:
         return self._departing(out, 0)
 
     def _departing(self, values: FloatArray, group: int) -> FloatArray:
-        return values if self.zero is None else values - self.zero[group]
+        return values if self.zero is None else values - self.zero[group][: values.shape[-1]]
 
     def waves(self, places: tuple[float, ...], first: int, stop: int) -> FloatArray:
         """Wave at places about the vessel at rest an instant after samples.

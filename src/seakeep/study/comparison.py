@@ -29,7 +29,7 @@ from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_text
 from seakeep.signals import encounter_period
-from seakeep.signals.time_axis import instant_text, span_text
+from seakeep.signals.time_axis import instant_text, span_text, usual_step
 from seakeep.study.fit import warn_of_repeats, warn_of_waves
 from seakeep.study.plan import between, named
 from seakeep.toml import parse_length
@@ -391,19 +391,20 @@ def difference_table(compared: Mapping[str, Sequence[Comparison]]) -> xr.Dataset
         INTERVAL,
     )
     runs = [each.run for each in first]
-    periods = [_wave_period(each.inputs) for each in first]
+    periods = [wave_period(each.inputs) for each in first]
     return out.assign(wave_period=("run", periods, {"units": "s"})).assign_coords(
         model=list(compared), run=runs
     )
 
 
-def _wave_period(inputs: xr.Dataset) -> float:
-    """Mean period of the first wave elevation among the inputs, s; NaN where there is none."""
-    waves = [each for name, each in inputs.data_vars.items() if is_elevation(str(name))]
-    if not waves or waves[0].size < 3:
+def wave_period(inputs: xr.Dataset, otherwise: xr.DataArray | None = None) -> float:
+    """Mean period of the first wave elevation among inputs, or of another series, s; else NaN."""
+    waves = (each for name, each in inputs.data_vars.items() if is_elevation(str(name)))
+    series = next(waves, otherwise)
+    if series is None or series.size < 3:
         return np.nan
     try:
-        return encounter_period(waves[0].values, float(np.diff(waves[0]["time"].values[:2])[0]))
+        return encounter_period(series.values, usual_step(series["time"].values))
     except DataError:
         return np.nan
 

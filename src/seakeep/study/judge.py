@@ -233,11 +233,14 @@ def with_average(cells: FloatArray) -> FloatArray:
 
 def blocks_of(tests: Sequence[xr.Dataset], training: xr.Dataset) -> tuple[int, int]:
     """How many neighbours overlap: training sets, and windows of test sets one after the other."""
-    spans: list[tuple[str, float, float]] = []
-    for test in tests:
-        ends = test["start"].values + float(test["time"].values[-1])
-        spans += zip(test["run"].values.astype(str), test["start"].values, ends, strict=True)
+    spans = [span for test in tests for span in window_spans(test)]
     return training_order(training)[1], statistics.overlap_block(spans)
+
+
+def window_spans(test: xr.Dataset) -> list[tuple[str, float, float]]:
+    """Run, start and end (s) of each window of a test set."""
+    runs, starts = test["run"].values.astype(str), test["start"].values
+    return list(zip(runs, starts, starts + float(test["time"].values[-1]), strict=True))
 
 
 def training_order(training: xr.Dataset) -> tuple[npt.NDArray[np.intp], int]:

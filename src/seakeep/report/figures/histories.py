@@ -11,7 +11,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.conventions import is_elevation
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import RequestError
 from seakeep.models import summarize
 from seakeep.quality import findings_of
 from seakeep.quality.faults import FLAGS
@@ -38,9 +38,9 @@ from seakeep.report.style import (
     shown,
     shown_unit,
 )
-from seakeep.signals import encounter_period
-from seakeep.signals.time_axis import over_gaps, usual_step
+from seakeep.signals.time_axis import over_gaps
 from seakeep.study import Comparison, StudyResult, comparison_table
+from seakeep.study.comparison import wave_period
 from seakeep.study.judge import band_of
 from seakeep.study.reproduce import ACTS
 
@@ -132,12 +132,11 @@ def _envelope(axes: Any, time: Any, bounds: Sequence[Values], period: float, **s
 
 
 @figure_style()
-def overlay_figure(comparison: Comparison | Mapping[str, Comparison]) -> Figure:
+def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
     """Time histories of every state, forecasts over measurement, with the inputs below.
 
-    Several comparisons are those of one run by several models, by the models' names.
+    The comparisons are those of one run by one model or several, by the models' names.
     """
-    several = comparison if isinstance(comparison, Mapping) else {"": comparison}
     compared = list(several.values())
     tables = [comparison_table([each], intervals=False).isel(run=0) for each in compared]
     first = compared[0]
@@ -225,19 +224,9 @@ def _title(comparisons: Sequence[Comparison]) -> str:
 
 
 def _period_if_long(comparison: Comparison) -> float | None:
-    """Mean period of a record that is too long for lines, s; counted in an elevation if there is.
-
-    A state may be a slow motion.
-    """
-    inputs = comparison.inputs
-    waves = [each for name, each in inputs.data_vars.items() if is_elevation(str(name))]
-    series = [*waves, *comparison.measured.data_vars.values()][0]
-    time = series["time"].values
-    dt = usual_step(time) if time.size > 1 else 0.0
-    try:
-        period = encounter_period(series.values, dt)
-    except DataError:
-        return None
+    """Mean period of a record that is too long for lines, s; of its first state without waves."""
+    first = next(iter(comparison.measured.data_vars.values()))
+    period, time = wave_period(comparison.inputs, first), first["time"].values
     return period if (time[-1] - time[0]) / period >= LONG else None
 
 

@@ -16,6 +16,7 @@ from seakeep.report.quality_sheet import clock_rows, other_findings, run_row
 from seakeep.report.style import model_words, shown_unit
 from seakeep.report.tables import Table, entries, number, percent, row, table
 from seakeep.study import StudyResult
+from seakeep.study.judge import window_spans
 from seakeep.study.plan import windows_overlap
 from seakeep.waves import phase_speed
 
@@ -210,7 +211,7 @@ def _windows_table(result: StudyResult) -> Table:
     rows += [
         ("test", result.label_of(test), f"{run}, {begin:.2f} to {end:.2f} s", "")
         for test in result.tests
-        for run, begin, end in _test_spans(result, test)
+        for run, begin, end in window_spans(result.tests[test])
     ]
     whole = f" (all of it: {every})" if every else ""
     reads = float(result.attrs["longest_training"])
@@ -228,13 +229,6 @@ def training_spans(result: StudyResult) -> list[Spans]:
         [(run, b, e) for run, b, e in zip(runs, *edges, strict=True) if np.isfinite(b)]
         for edges in zip(training["begin"].values, training["end"].values, strict=True)
     ]
-
-
-def _test_spans(result: StudyResult, test: str) -> Spans:
-    """Run, start and end (s) of each window of a test set."""
-    data = result.tests[test]
-    length, runs = float(data["time"].values[-1]), data["run"].values.astype(str)
-    return [(run, s, s + length) for run, s in zip(runs, data["start"].values, strict=True)]
 
 
 def _trained_on(result: StudyResult) -> dict[str, Any]:
@@ -308,7 +302,7 @@ def training_overlap(result: StudyResult) -> tuple[bool, str]:
 
 def test_overlap(result: StudyResult) -> str:
     """Sentence on test windows that overlap; empty where no two do."""
-    shares = {test: windows_overlap(_test_spans(result, test)) for test in result.tests}
+    shares = {test: windows_overlap(window_spans(result.tests[test])) for test in result.tests}
     said = [
         f"{result.label_of(test)} {percent(share)} %"
         for test, share in shares.items()
