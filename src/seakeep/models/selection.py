@@ -50,7 +50,7 @@ from seakeep.models.settings import Folds, HankelSettings, Select
 from seakeep.models.terms import Observable
 from seakeep.models.training import TrainingData, gather, scales_of, system_of
 from seakeep.signals import encounter_period, repeated_waves
-from seakeep.signals.waves import is_regular
+from seakeep.signals.waves import analytic, is_regular
 
 RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-10, -1))
 """λ per snapshot pair that are tried, half a decade apart.
@@ -1230,7 +1230,7 @@ def regular_periods(runs: Mapping[str, xr.Dataset], inputs: Sequence[str]) -> di
         wave = labelled.wave_channel(run, inputs, name)
         series = np.full(1, np.nan) if wave is None else run[wave].to_numpy()
         stated = run.attrs.get("waves") == "regular"
-        if not np.isfinite(series).all() or not (stated or is_regular(series)):
+        if not np.isfinite(series).all() or not (stated or is_regular(analytic(series))):
             return {}
         periods[name] = encounter_period(series, step, HYSTERESIS)
     return periods
