@@ -128,16 +128,16 @@ def test_each_mistake_has_its_message_and_its_exit_status(folder, spoil, status,
     assert "Traceback" not in told
 
 
-def filling(room, write):
-    """A function that writes, on a disk on which so many files still have room."""
+def filling(room, opened=Path.open):
+    """Opening a file on a disk on which so many binary files still have room."""
     left = iter(range(room))
 
-    def writes(*arguments, **keywords):
-        if next(left, None) is None:
+    def opens(path, mode="r", *arguments, **keywords):
+        if mode == "wb" and next(left, None) is None:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        return write(*arguments, **keywords)
+        return opened(path, mode, *arguments, **keywords)
 
-    return writes
+    return opens
 
 
 @pytest.fixture(scope="module")
@@ -149,7 +149,7 @@ def undisturbed(tmp_path_factory):
 
 def test_a_disk_that_fills_up_loses_no_finished_unit(folder, undisturbed, monkeypatch, capfd):
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "write_bytes", filling(3, Path.write_bytes))
+        patch.setattr(Path, "open", filling(3))
         assert study(folder) == 1
     told = " ".join(capfd.readouterr().err.split())
     assert "No space left on device. What was finished is kept." in told
@@ -158,7 +158,7 @@ def test_a_disk_that_fills_up_loses_no_finished_unit(folder, undisturbed, monkey
     assert len(before) == 3
     # Then there is room for the units of two training windows and two models, and no result.
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "write_bytes", filling(1, Path.write_bytes))
+        patch.setattr(Path, "open", filling(1))
         assert study(folder) == 1
     assert not (folder / "out" / "study.nc").exists()
     after = {path.name: path.stat().st_mtime_ns for path in units_in(folder)}
