@@ -52,7 +52,8 @@ def test_an_estimator_knows_the_noise_and_the_roles_of_the_command(make_run, tmp
     capsys.readouterr()
     for wrong, message in (
         (service[1:], "--noise and --role belong to --estimator"),
-        ([*service[:2], "heave"], "such as heave=0.002; received heave"),
+        ([*service[:2], "heave"], "--noise takes STATE=SD, such as heave=0.002"),
+        ([*service, "--role", "eta_fwd"], "received heave=0.25, eta_fwd=known, eta_fwd."),
         ([*service, "--role", "eta_fwd=plan"], "role of eta_fwd"),
     ):
         assert cli.main([*words, *wrong]) == 2

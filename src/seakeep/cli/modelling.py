@@ -341,8 +341,7 @@ def export(
         (estimator, c or fmu, "--estimator belongs to --c DIR or --fmu FILE"),
         (noise or role, estimator, "--noise and --role belong to --estimator"),
     )
-    roles = {name: given for name, _, given in (each.partition("=") for each in role or ())}
-    service = _noises(noise or []), roles
+    service = _service(noise or [], role or [])
     if estimator and order is not None:
         raise RequestError(
             "--order reduces the linear system of --mat; an estimator corrects measured states and "
@@ -377,14 +376,15 @@ def export(
     say(timing(linear, estimator and not onnx and not mat))
 
 
-def _noises(given: list[str]) -> dict[str, float]:
-    """Standard deviations by state."""
+def _service(noise: list[str], role: list[str]) -> tuple[dict[str, float], dict[str, str]]:
+    """Noises and roles of an estimator."""
     try:
-        return {name: float(value) for name, _, value in (each.partition("=") for each in given)}
+        noises, roles = (dict(each.split("=") for each in given) for given in (noise, role))
+        return {name: float(sd) for name, sd in noises.items()}, roles
     except ValueError:
         raise RequestError(
-            f"--noise takes a state, an equals sign and an SD, such as heave=0.002; received "
-            f"{', '.join(given)}."
+            "--noise takes STATE=SD, such as heave=0.002, and --role INPUT=known or "
+            f"INPUT=constant; received {', '.join(noise + role)}."
         ) from None
 
 
