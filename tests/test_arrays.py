@@ -137,7 +137,7 @@ def test_what_is_taken_as_it_is():
         (lambda: number([1.0, 2.0], "x"), RequestError, "x must be a number"),
         (lambda: positive(0.0, "dt", "s"), RequestError, r"dt must be positive \(s\)"),
         (lambda: fraction(1.0, "level"), RequestError, "level must lie between 0 and 1"),
-        (lambda: whole_number(2.0, "n"), RequestError, "n must be a whole number of at least 1"),
+        (lambda: whole_number(2.0, "n"), RequestError, "n must be an integer of at least 1"),
     ],
 )
 def test_single_numbers_and_shapes(call, error, message):

@@ -133,7 +133,7 @@ def redrawn(length, segments=None):
         (lambda: redrawn(101), RequestError, "of 101 samples does not fit into the series of 100"),
         (lambda: block_length(NOISE, segments=[50, 60]), RequestError, "add up to 110 samples and"),
         (lambda: redrawn(40, [70, 30]), RequestError, "not fit into the shortest segment of 30"),
-        (lambda: redrawn(2.5), RequestError, "block_length must be a whole number of at least 1"),
+        (lambda: redrawn(2.5), RequestError, "block_length must be an integer of at least 1"),
     ],
 )
 def test_what_is_refused(call, error, message):

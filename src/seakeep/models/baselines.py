@@ -13,11 +13,11 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, whole_number
 from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
-from seakeep.models.checks import Json, check_integer, check_keys
+from seakeep.models.checks import Json, check_keys
 from seakeep.models.engine import Windows, cut_lost
 from seakeep.models.forecasts import Model, counted
 from seakeep.models.interface import Needs, Role, Signature
@@ -315,8 +315,9 @@ class Subspace(Plain):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_integer("order", self.order, 1, optional=True)
-        check_integer("future", self.future, 1, optional=True)
+        for name, value in (("order", self.order), ("future", self.future)):
+            if value is not None:
+                whole_number(value, name)
         if self.alignment is not None and self.alignment.surge == "predicted":
             raise RequestError(
                 "a subspace model cannot be aligned to the surge that it predicts itself. Use "

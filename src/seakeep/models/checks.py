@@ -42,18 +42,6 @@ def check_choice(name: str, value: object, choices: Sequence[str]) -> None:
         )
 
 
-def check_integer(name: str, value: object, least: int, optional: bool = False) -> None:
-    """Refuse a setting that is not an integer of at least `least` (or None, if `optional`)."""
-    if optional and value is None:
-        return
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < least:
-        hint = " Round it to an integer." if isinstance(value, float) else ""
-        raise RequestError(
-            f"{name} must be an integer of at least {least}{' or None' if optional else ''}; "
-            f"received {value!r:.{SHOWN}}.{hint}"
-        )
-
-
 def check_number(
     name: str, value: Any, meant: str, low: float, high: float = np.inf, hint: str = ""
 ) -> None:

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, Self, get_args
 
 import xarray as xr
 
+from seakeep.arrays import whole_number
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
 from seakeep.models import labelled
@@ -20,7 +21,6 @@ from seakeep.models.checks import (
     Json,
     check_choice,
     check_flag,
-    check_integer,
     check_keys,
     check_number,
     plain,
@@ -125,8 +125,7 @@ def as_length(name: str, value: Any, least: int = 0, optional: bool = False) -> 
                 f"{name} must be a length that is not negative, such as '1 T'; received '{value}'."
             )
         return value
-    check_integer(name, value, least, optional)
-    return None if value is None else int(value)
+    return None if optional and value is None else whole_number(value, name, least)
 
 
 STABLE_RADIUS = 0.999
@@ -254,7 +253,8 @@ class HankelSettings:
     def __post_init__(self) -> None:
         for name in (*self.lengths, "ridge"):
             object.__setattr__(self, name, self._read(name))
-        check_integer("rank", self.rank, 1, optional=True)
+        if self.rank is not None:
+            whole_number(self.rank, "rank")
         check_choice("history", self.history, ("before", "inside"))
         check_choice("delay_rows", self.delay_rows, ("ridge", "exact"))
         check_choice("ridge_scale", self.ridge_scale, ("absolute", "per_snapshot"))

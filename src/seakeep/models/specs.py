@@ -12,13 +12,13 @@ from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Progress
+from seakeep.arrays import Progress, whole_number
 from seakeep.core.embedding import TrainingWindow
 from seakeep.errors import SHOWN, DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.baselines import FIR
-from seakeep.models.checks import Json, check_choice, check_flag, check_integer
+from seakeep.models.checks import Json, check_choice, check_flag
 from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members, draws_of
 from seakeep.models.engine import parameter_of
 from seakeep.models.ensemble import PARTS, HankelEnsemble, spectral_radius
@@ -605,7 +605,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_integer("n_members", self.n_members, 1)
+        whole_number(self.n_members, "n_members")
         if (period := self.encounter_period) is not None:
             # Without dt any step shorter than the period will do; the runs' own is checked at fit.
             periods_to_samples(1, period, self.dt or 0.5 * period)
