@@ -243,9 +243,7 @@ def fraction(value: object, name: str) -> float:
 def whole_number(value: object, name: str, least: int = 1) -> int:
     """Return a whole number of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise RequestError(
-            f"{name} must be an integer of at least {least}; received {value!r}."
-        )
+        raise RequestError(f"{name} must be an integer of at least {least}; received {value!r}.")
     return int(value)
 
 
