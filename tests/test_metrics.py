@@ -172,7 +172,7 @@ def test_bounds_take_the_place_of_the_value():
     assert metrics.nammae(**of_sets, interval=0.9).sel(bound="upper") == 0.0  # a perfect forecast
     with pytest.raises(RequestError, match="a value at each instant, and no interval over time"):
         metrics.error_over_time(**pair, interval=0.9)
-    with pytest.raises(RequestError, match="interval must lie between 0 and 1"):
+    with pytest.raises(RequestError, match="interval must be between 0 and 1"):
         metrics.nrmse(**pair, interval=95)
     with pytest.raises(RequestError, match="is_slack says yes or no, and has no interval"):
         metrics.is_slack(**pair, interval=0.9)

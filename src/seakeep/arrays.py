@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.errors import DataError, RequestError, SeakeepError
+from seakeep.errors import SHOWN, DataError, RequestError, SeakeepError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +25,8 @@ ComplexArray = npt.NDArray[np.complex128]
 
 Progress = Callable[[int, int, str], None]
 """Takes how many steps are done, how many there are, and the name of one."""
+TINY = float(np.finfo(float).tiny)
+"""Least number above zero."""
 Datasets: TypeAlias = "Mapping[str, xr.Dataset]"
 """Prepared runs, tables or groups of a result, by name."""
 
@@ -210,21 +212,26 @@ def finite(array: FloatArray, name: str) -> FloatArray:
     return array
 
 
-def number(value: Any, name: str) -> float:
-    """Return a real number as a float; refuse text, dates, NaN and what is masked."""
+def number(
+    value: Any,
+    name: str,
+    meant: str = "a number",
+    low: float = -np.inf,
+    high: float = np.inf,
+    hint: str = "",
+) -> float:
+    """Return a finite number from `low` on and below `high` as a float; refuse text and dates."""
     one = hasattr(value, "item") and value is not np.ma.masked and np.size(value) == 1
     plain = value.item() if one else value
-    if isinstance(plain, bool) or not isinstance(plain, int | float) or plain != plain:
-        raise RequestError(f"{name} must be a number; received {value!r}.")
+    real = isinstance(plain, int | float) and not isinstance(plain, bool)
+    if not real or not np.isfinite(plain) or not low <= plain < high:
+        raise RequestError(f"{name} must be {meant}; received {value!r:.{SHOWN}}.{hint}")
     return float(plain)
 
 
 def positive(value: object, name: str, unit: str) -> float:
     """Return a finite, positive number as a float."""
-    result = number(value, name)
-    if not np.isfinite(result) or result <= 0:
-        raise RequestError(f"{name} must be positive ({unit}); received {value!r}.")
-    return result
+    return number(value, name, f"positive ({unit})", TINY)
 
 
 def time_step(value: object) -> float:
@@ -234,10 +241,7 @@ def time_step(value: object) -> float:
 
 def fraction(value: object, name: str) -> float:
     """Return a number between 0 and 1, both excluded."""
-    result = number(value, name)
-    if not 0 < result < 1:
-        raise RequestError(f"{name} must lie between 0 and 1; received {value!r}.")
-    return result
+    return number(value, name, "between 0 and 1", TINY, 1.0)
 
 
 def whole_number(value: object, name: str, least: int = 1) -> int:

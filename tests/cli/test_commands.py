@@ -287,7 +287,7 @@ MISTAKES = [
         f"forecast ensemble.nc {FROM_20} --workers 2 --scheduler tcp://h:1 -o f.nc",
         r"--workers 2 counts processes on this machine, and --scheduler tcp://h:1 hands all",
     ),
-    (f"forecast ensemble.nc {FROM_20} --level 95 -o f.nc", r"level must lie between 0 and 1"),
+    (f"forecast ensemble.nc {FROM_20} --level 95 -o f.nc", r"level must be between 0 and 1"),
     (
         f"forecast model.nc {CAMPAIGN} --run unseen --start soon -o f.nc",
         r"--start: received 'soon'\. Give seconds such as 20, or encounter periods such as",

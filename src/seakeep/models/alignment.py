@@ -19,15 +19,13 @@ from typing import Literal, NamedTuple, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import TINY, FloatArray, number
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
 from seakeep.models.checks import (
-    TINY,
     check_choice,
     check_flag,
-    check_number,
     names_of,
     settings_of,
 )
@@ -104,11 +102,11 @@ class ProbeAlignment:
                 "alignment: surge = 'predicted' carries waves by their dispersion; received mode = "
                 f"'{self.mode}'. Write mode = 'dispersion', or take surge = 'measured'."
             )
-        check_number("alignment: offset", self.offset, "a number (m, positive downstream)", -np.inf)
+        number(self.offset, "alignment: offset", "a number (m, positive downstream)")
         if self.celerity is not None:
             if self.celerity != "common":
                 meant = "a positive number, 'common' or None (m/s)"
-                check_number("alignment: celerity", self.celerity, meant, TINY)
+                number(self.celerity, "alignment: celerity", meant, TINY)
             if self.mode != "effective":
                 raise RequestError(
                     f"alignment: celerity = {self.celerity!r} belongs to mode = 'effective'; "

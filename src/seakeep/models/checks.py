@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from typing import Any, TypeVar
@@ -13,8 +12,6 @@ from seakeep.errors import SHOWN, RequestError, did_you_mean
 
 Json = dict[str, Any]
 """Settings as JSON values."""
-TINY = float(np.finfo(float).tiny)
-"""Least number above zero."""
 Settings = TypeVar("Settings")
 
 
@@ -40,15 +37,6 @@ def check_choice(name: str, value: object, choices: Sequence[str]) -> None:
         raise RequestError(
             f"{name} must be {', '.join(first)} or {last}; received {value!r:.{SHOWN}}."
         )
-
-
-def check_number(
-    name: str, value: Any, meant: str, low: float, high: float = np.inf, hint: str = ""
-) -> None:
-    """Refuse a setting that is not a finite number from `low` on and below `high`."""
-    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-    if not real or not np.isfinite(value) or not low <= value < high:
-        raise RequestError(f"{name} must be {meant}; received {value!r:.{SHOWN}}.{hint}")
 
 
 def check_flag(name: str, value: object) -> None:

@@ -15,11 +15,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import TINY, FloatArray, number
 from seakeep.core.observables import slow_kernel
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.checks import TINY, check_choice, check_keys, check_number, names_of
+from seakeep.models.checks import check_choice, check_keys, names_of
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.terms import Bound, Formula, Observable, Power, SlowSquare
 from seakeep.signals import expressions
@@ -53,8 +53,8 @@ def _numbers(
     """Numbers in a list, each once and within bounds; one number is a list of it."""
     given = value if isinstance(value, Iterable) else (value,)
     numbers = tuple(each.item() if isinstance(each, np.generic) else each for each in given)
-    for number in numbers:
-        check_number(what, number, meant, low, high)
+    for each in numbers:
+        number(each, what, meant, low, high)
     if not numbers or len(set(numbers)) < len(numbers):
         raise RequestError(f"{what} must be {meant}, each once; received {value!r:.{SHOWN}}.")
     if not whole:
@@ -122,10 +122,10 @@ class SlowSquares:
         ):
             object.__setattr__(self, name, value)
         meant = "per encounter period, above 0 and at most 1"
-        check_number("slow_squares: cutoff", self.cutoff, meant, TINY, math.nextafter(1, 2))
-        check_number("slow_squares: lead", self.lead, "encounter periods from 0", 0)
+        number(self.cutoff, "slow_squares: cutoff", meant, TINY, math.nextafter(1, 2))
+        number(self.lead, "slow_squares: lead", "encounter periods from 0", 0)
         if self.period is not None:
-            check_number("slow_squares: period", self.period, "seconds above 0", TINY)
+            number(self.period, "slow_squares: period", "seconds above 0", TINY)
 
     def bind(self, inputs: Sequence[ChannelLabel], period: float | None, dt: float) -> Bound:
         """Columns for these inputs; see :class:`Observable`."""

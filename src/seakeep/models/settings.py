@@ -11,18 +11,16 @@ from typing import Any, ClassVar, Literal, Self, get_args
 
 import xarray as xr
 
-from seakeep.arrays import whole_number
+from seakeep.arrays import TINY, number, whole_number
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
 from seakeep.models import labelled
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.checks import (
-    TINY,
     Json,
     check_choice,
     check_flag,
     check_keys,
-    check_number,
     plain,
     settings_of,
 )
@@ -64,7 +62,7 @@ def periods_to_samples(periods: float, encounter_period: float, dt: float) -> in
         If period or step are not positive, or the step is as long as the period.
     """
     for name, value in (("encounter_period", encounter_period), ("dt", dt)):
-        check_number(name, value, "a positive number of seconds", TINY)
+        number(value, name, "a positive number of seconds", TINY)
     if dt >= encounter_period:
         raise RequestError(
             f"the time step dt = {dt:g} s is no shorter than the encounter period of "
@@ -189,7 +187,7 @@ class Select:
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
             what = "select: horizon (encounter periods) and period (s)"
-            check_number(what, value, "between 1e-6 and 1e6", 1e-6, 1e6)
+            number(value, what, "between 1e-6 and 1e6", 1e-6, 1e6)
         if not given:
             raise RequestError("select: horizon is empty. Write horizon=(15, 45).")
         object.__setattr__(self, "horizon", tuple(float(each) for each in given))
@@ -262,7 +260,7 @@ class HankelSettings:
         if not isinstance(self.stable, bool):
             meant = "True, False or a radius above 0 and below 1, to which eigenvalues are clipped"
             hint = f" True is {STABLE_RADIUS:g}."
-            check_number("stable", self.stable, meant, TINY, 1.0, hint)
+            number(self.stable, "stable", meant, TINY, 1.0, hint)
         object.__setattr__(self, "alignment", ProbeAlignment.of(self.alignment))
         object.__setattr__(self, "observables", observables_of(self.observables))
         object.__setattr__(self, "readouts", readouts_of(self.readouts))
@@ -287,7 +285,7 @@ class HankelSettings:
             if not (self.may_choose and isinstance(value, str) and value == "rollout"):
                 meant = "a number, zero or positive" + ", or the word rollout" * self.may_choose
                 hint = " The paper uses 100; 0 asks for the solution of least norm."
-                check_number(name, value, meant, 0, hint=hint)
+                number(value, name, meant, 0, hint=hint)
             return value
         if name == "centre":
             value = CENTRES.get(value, value) if isinstance(value, str) else value
