@@ -278,8 +278,7 @@ def write_netcdf(
         _write_group(file, dataset)
         for name, group in (groups or {}).items():
             _write_group(file.create_group(name, track_order=True), group)
-    content = buffer.getbuffer()
-    with path.open("wb") as sealed:
+    with buffer.getbuffer() as content, path.open("wb") as sealed:
         sealed.writelines([content, _seal_of(content)])
 
 
