@@ -135,12 +135,6 @@ def channels() -> dict[str, list[str]]:
 
 
 @pytest.fixture
-def patient_cluster(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A scheduler on a busy machine has minutes to answer, not the seconds that a user waits."""
-    monkeypatch.setattr("seakeep.models.executor.PATIENCE", 300.0)
-
-
-@pytest.fixture
 def empty_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sheets with empty pictures: tests/report looks at these, and each takes a second or two."""
     pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")

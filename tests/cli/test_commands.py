@@ -75,7 +75,7 @@ def _empty_figures(request, monkeypatch):
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_the_example_of_each_help_runs(verb, run, place, monkeypatch):
-    """What --help shows works as it stands (fetching aside: it needs the network)."""
+    """What --help shows runs; fetching needs the network, and playing the tank takes minutes."""
     if verb == "tank":
         pytest.importorskip("numba")
         monkeypatch.setattr("seakeep.tank.play.play", lambda *_, **__: {})  # as tests/tank does

@@ -138,6 +138,8 @@ class TestFloor:
         xr.testing.assert_identical(load["mooring_bow"], linear["mooring_bow"])
         taut = spec.fit(moored_runs(slack=False), MOORED, ETA)
         assert not any(each.acts for each in taut.signature.readouts)
+        unknown = replace(spec, centre="run").fit(moored_runs(), MOORED, ETA)
+        assert not any(each.acts for each in unknown.signature.readouts)  # on which zero?
 
     def test_a_line_that_is_seldom_slack_rests_on_its_floor_too(self):
         low = -8.5  # N, of 2 % of the samples

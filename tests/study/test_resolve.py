@@ -5,7 +5,7 @@ import json
 import pytest
 
 from seakeep.campaign import ModelSettings
-from seakeep.study.resolve import resolve_model
+from seakeep.study.resolve import counts_in_periods, resolve_model
 
 ENSEMBLE = "bayesian_hankel_dmdc"
 NORMAL = {"distribution": "norm", "parameters": {"loc": 15, "scale": 1}, "unit": "T"}
@@ -103,3 +103,10 @@ def test_each_key_has_its_value_and_its_source(stated, how, expected):
     settings = told["settings"]
     assert {key: (settings[key]["value"], settings[key]["source"]) for key in expected} == expected
     assert told["n_members"] == stated.get("n_members", 100 if told["ensemble"] else 1)
+
+
+@pytest.mark.parametrize(("centre", "counts"), [("run", True), ("pooled", False), ("2 T", True)])
+def test_the_reference_period_of_each_run_counts_in_encounter_periods(centre, counts):
+    own = {"state_delays": 4, "input_delays": 8, "ridge": 1.0, "centre": centre}
+    table = {"states": ("heave",), "inputs": ("eta_fwd",), **own}
+    assert counts_in_periods(ModelSettings.model_validate(table)) is counts

@@ -254,7 +254,8 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
         model,
         {"run": name, "kind": "regular", "frequency": frequency, "wave_amplitude": amplitude},
         *(estimated.ratio, estimated.amplitude, estimated.phase),
-        offset=mean.ratio.real,
+        # Where a model departs from the means of each run, its mean state is that of the run.
+        offset=np.where(model.signature.input_map.reference > 0, np.nan, mean.ratio.real),
         offset_uncertainty=mean.amplitude,
     )
 

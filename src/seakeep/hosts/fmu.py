@@ -71,6 +71,8 @@ def write_fmu(
         compiler fails.
     """
     target = Path(path)
+    if ahead is None and (noise or roles):
+        raise RequestError("noise and roles are those of an estimator: give ahead, or neither.")
     check_output(target, KIND)
     linear, name = exportable(model, ahead is not None), identifier(target.stem)
     files = sources(linear, name, None if ahead is None else linear.live(noise=noise, roles=roles))

@@ -657,11 +657,10 @@ class Live:
             waves or mean surge of late lie outside the training, the errors are raised to those of
             late and by the square of the height; where the consistency of a state exceeds two, its
             errors are raised by it, and its lead time shrinks. ``attrs["validity"]`` names what
-            lies outside
-            (:class:`seakeep.models.validity.Validity`), beside the numbers and ``trained_`` ones;
-            ``attrs["consistency"]`` is the larger one of each state, at least one.
-            ``attrs["predictable"]`` is the time for which
-            the waves at the probe farthest down-wave are known from the one farthest up-wave, s
+            lies outside (:class:`seakeep.models.validity.Validity`), beside the numbers and
+            ``trained_`` ones; ``attrs["consistency"]`` is the larger one of each state, at least
+            one. ``attrs["predictable"]`` is the time for which the waves at the probe farthest
+            down-wave are known from the one farthest up-wave, s
             (:func:`seakeep.signals.prediction.predictable_time`); 0 without positions and depth.
 
         Raises

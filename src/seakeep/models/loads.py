@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -89,10 +90,9 @@ def fit_readouts(
     for channel, asked in readouts.items():
         column = signature.states.index(channel)
         columns = motions_of(signature.state_labels, channel)
-        floor, units = (
-            floor_of(seen, seen[:, column], columns),
-            signature.state_labels[column].units,
-        )
+        units, floor = signature.state_labels[column].units, -math.inf
+        if not signature.input_map.reference:  # departures from each run's means have none
+            floor = floor_of(seen, seen[:, column], columns)
         kind: ReadOutKind = "none" if asked == "auto" else asked
         scores: dict[str, float] = {}
         load = None

@@ -206,7 +206,8 @@ class Problem:
     horizons : tuple of int
         Lengths of the windows that are judged, samples.
     read : dict
-        Windows that were read last, by run, starts and length.
+        Run, starts and windows that were read last, by their length: candidates are judged on one
+        run after the other.
     """
 
     runs: Mapping[str, xr.Dataset]
@@ -215,7 +216,9 @@ class Problem:
     widest: HankelSettings
     ridges: tuple[float, ...]
     horizons: tuple[int, ...]
-    read: dict[tuple[int, tuple[int, ...], int], Windows] = field(default_factory=dict)
+    read: dict[int, tuple[int, list[int], Windows]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def ahead(self, candidate: HankelSettings) -> int:
         """Samples that delayed regressors look ahead too far."""
@@ -291,16 +294,15 @@ class Problem:
         first = window.first_column + self.widest.centre
         return np.arange(first, window.last - steps + 1, steps)
 
-    def windows(self, run: int, starts: tuple[int, ...], steps: int) -> Windows:
+    def windows(self, run: int, starts: list[int], steps: int) -> Windows:
         """What free runs of all candidates from some samples of a run read."""
-        key = run, starts, steps
-        if key not in self.read:
-            if any(other != run for other, *_ in self.read):
-                self.read.clear()  # candidates are judged on one run after the other
+        read = self.read.get(steps)
+        if read is None or read[:2] != (run, starts):
             begin, dt = self.data.begin(run), self.data.signature.dt
             places = [(self.data.names[run], begin + at * dt) for at in starts]
-            self.read[key] = read_windows(self.reader, self.runs, places, steps)
-        return self.read[key]
+            windows = read_windows(self.reader, self.runs, places, steps)
+            read = self.read[steps] = run, starts, windows
+        return read[2]
 
     def folds(self) -> list[int]:
         """Runs in which a window of some length fits: each is held out once."""
@@ -337,7 +339,7 @@ class Problem:
             starts = self.starts(run, steps).tolist()
             new = [at for at in starts if at not in known]
             if new:
-                windows = self.windows(run, tuple(new), steps)
+                windows = self.windows(run, new, steps)
                 last = windows.delayed.shape[1] - self.ahead(candidate)
                 windows = replace(
                     windows,

@@ -93,7 +93,7 @@ def counts_in_periods(settings: ModelSettings) -> bool:
     stated = settings.arguments()
     squares = any(each.get("kind") == SlowSquares.kind for each in stated.get("observables", ()))
     named = preset_of(settings) is not None or "select" in stated
-    return named or by_kind or squares or any(lengths(settings))
+    return named or by_kind or squares or any(lengths(settings)) or stated.get("centre") == "run"
 
 
 def can_align(campaign: CampaignSettings, inputs: Sequence[str]) -> bool:

@@ -90,7 +90,7 @@ def _decimals(column: xr.DataArray) -> int:
 
 
 def write_dataset(data: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to NetCDF, compressed, under a temporary name, then rename it."""
+    """Write a Dataset to NetCDF under a temporary name, then rename it."""
     with replacing(path) as temporary:
         write_netcdf(temporary, data)
 

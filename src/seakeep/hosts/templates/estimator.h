@@ -75,9 +75,10 @@ int {{ name }}_validity({{ name }}_estimator *e);
 
 /* Forecast n instants after the last sample into x, a row for each. `future` holds the inputs of
  * the n - 1 + {{ upper }}_LEAD instants after it, or is NULL. Waves that are NaN there are
- * predicted from the samples up to now; other inputs stay at their last value. Where the standard
- * deviation of the errors comes near that of the training, x tends to the mean there. `std` takes
- * these deviations, as x, or is NULL; they are those in data like the training.
+ * predicted from the samples up to now, and from the first rows in which all waves are given;
+ * other inputs stay at their last value. Where the standard deviation of the errors comes near
+ * that of the training, x tends to the mean there. `std` takes these deviations, as x, or is NULL;
+ * they are those in data like the training.
  * Returns 0; 1 if there are fewer than {{ begins }} samples; 2 if a run is lost, as a step is. */
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x, double *std);
 
