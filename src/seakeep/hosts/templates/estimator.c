@@ -604,11 +604,13 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
     double weight[N], *reach = e->cross;
     int begins = {{ upper }}_U_ROWS - {{ lead_samples }};
     int runs = known < n - 1 + {{ lead_samples }} ? RUNS : 1;
-    expect(e, FORE);
+    if (runs > 1) {
+        expect(e, FORE);
 {% if foresight %}
-    for (int p = 0; p < PLACED; p++)
-        identify(e, placed[p], FORE);
+        for (int p = 0; p < PLACED; p++)
+            identify(e, placed[p], FORE);
 {% endif %}
+    }
     memset(e->apart, 0, sizeof e->apart);
     memset(e->departs, 0, sizeof e->departs);
     memcpy(e->u_history, e->inputs + (RECORD - 1 - begins) * Q, begins * Q * sizeof(double));
@@ -667,10 +669,10 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
 
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x, double *std)
 {
-    int known = given_rows(future, n - 1 + {{ lead_samples }}), filled = e->filled, status;
+    int most = n - 1 + {{ lead_samples }}, known = given_rows(future, most), filled = e->filled, status;
     if (e->taken < BEGINS)
         return 1;
-    if (future && known > 0)
+    if (future && known > 0 && known < most)
         plan(e, future, known);
     status = run_on(e, n, future, known, x, std);
     e->filled = filled;
