@@ -30,7 +30,7 @@ from typing import Any, Generic, NamedTuple, TypeVar, cast
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
+from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.embedding import spread_means
@@ -50,7 +50,7 @@ from seakeep.models.settings import Folds, HankelSettings, Select
 from seakeep.models.terms import Observable
 from seakeep.models.training import TrainingData, gather, scales_of, system_of
 from seakeep.signals import encounter_period, repeated_waves
-from seakeep.signals.waves import analytic, is_regular
+from seakeep.signals.waves import is_regular
 
 RIDGES = tuple(float(f"{10 ** (exponent / 2):.3g}") for exponent in range(-10, -1))
 """λ per snapshot pair that are tried, half a decade apart.
@@ -210,7 +210,7 @@ class Problem:
         run after the other.
     """
 
-    runs: Mapping[str, xr.Dataset]
+    runs: Datasets
     groups: tuple[str, ...]
     data: TrainingData
     widest: HankelSettings
@@ -523,7 +523,7 @@ class Selected(Generic[Chosen]):
 
 def settle(
     settings: Settings,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     states: Sequence[str],
     inputs: Sequence[str],
     **how: Any,
@@ -578,7 +578,7 @@ def settle(
 
 def select(
     settings: Settings,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     states: Sequence[str],
     inputs: Sequence[str],
     *,
@@ -1095,7 +1095,7 @@ def _learnt(
 
 def readouts_for(
     settings: HankelSettings,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     states: Sequence[str],
     inputs: Sequence[str],
 ) -> tuple[FittedReadOut, ...]:
@@ -1197,9 +1197,7 @@ def _alignments(
     return sorted(alignments, key=lambda each: each != first)
 
 
-def groups_of(
-    runs: Mapping[str, xr.Dataset], folds: Folds, inputs: Sequence[str]
-) -> dict[str, str]:
+def groups_of(runs: Datasets, folds: Folds, inputs: Sequence[str]) -> dict[str, str]:
     """Name, by run, of the group of runs that are held out together.
 
     With "sea_state", runs that state the same; with "auto", runs whose waves are the same, as the
@@ -1225,14 +1223,14 @@ def groups_of(
     }
 
 
-def regular_periods(runs: Mapping[str, xr.Dataset], inputs: Sequence[str]) -> dict[str, float]:
+def regular_periods(runs: Datasets, inputs: Sequence[str]) -> dict[str, float]:
     """Wave period of each run, s, where all are of regular waves; else empty."""
     periods, step = {}, labelled.common_step(runs)
     for name, run in runs.items():
         wave = labelled.wave_channel(run, inputs, name)
         series = np.full(1, np.nan) if wave is None else run[wave].to_numpy()
         stated = run.attrs.get("waves") == "regular"
-        if not np.isfinite(series).all() or not (stated or is_regular(analytic(series))):
+        if not np.isfinite(series).all() or not (stated or is_regular(series)):
             return {}
         periods[name] = encounter_period(series, step, HYSTERESIS)
     return periods

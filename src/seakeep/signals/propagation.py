@@ -31,7 +31,7 @@ from seakeep.arrays import (
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.calculus import predicted_extension
 from seakeep.signals.lags import correlation_peak, parabola_peak
-from seakeep.signals.waves import analytic, encounter_period, is_regular
+from seakeep.signals.waves import encounter_period, is_regular
 from seakeep.waves import group_speed, phase_speed, wavenumber
 
 EARLIEST = 1e-3
@@ -364,7 +364,7 @@ def _telling(series: FloatArray) -> bool:
     if series.size < 64 or np.ptp(series) == 0:
         return False
     rises = np.diff(np.sign(series - series.mean())) > 0
-    return int(rises.sum()) >= LEAST_WAVES and not is_regular(analytic(series))
+    return int(rises.sum()) >= LEAST_WAVES and not is_regular(series)
 
 
 def probe_separation(

@@ -719,15 +719,15 @@ def find_leakage(
         return None
     part = waves_part(record, step)
     record = record[part]
-    waves = analytic(record)
+    waves = _analytic(record)
     length = round(STRETCH * encounter_period(record, step) / step)
     length = min(max(length, 1), record.size)
-    if is_regular(waves):
+    if _even(waves):
         return None
     found: list[Leakage] = []
     repeated = np.zeros(record.size, dtype=bool)
     pool = [as_series(each, minimum=8) for each in training]
-    ready = [(index, analytic(each)) for index, each in enumerate(pool) if each.size >= length]
+    ready = [(index, _analytic(each)) for index, each in enumerate(pool) if each.size >= length]
     starts = {*range(0, record.size - length + 1, max(length // 2, 1)), record.size - length}
     for start in sorted(starts):
         piece = waves[start : start + length]
@@ -743,15 +743,18 @@ def find_leakage(
     return best and replace(best, share=float(repeated.mean()))
 
 
-def analytic(series: FloatArray) -> ComplexArray:
-    """Analytic signal of a series, its mean removed."""
+def _analytic(series: FloatArray) -> ComplexArray:
     centred = series - series.mean()
     out = scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))
     return out[: centred.size]
 
 
-def is_regular(waves: ComplexArray) -> bool:
-    """Whether the envelope of an analytic signal is as even as that of regular waves."""
+def is_regular(series: npt.ArrayLike) -> bool:
+    """Whether a record's envelope is as even as that of regular waves."""
+    return _even(_analytic(as_series(series, minimum=8)))
+
+
+def _even(waves: ComplexArray) -> bool:
     margin = waves.size // 20  # the envelope of a cut record is bent at its ends
     envelope = np.abs(waves[margin : waves.size - margin])
     return bool(envelope.std() < REGULAR * envelope.mean())
