@@ -15,7 +15,7 @@ import xarray as xr
 
 from seakeep.arrays import Progress
 from seakeep.errors import RequestError
-from seakeep.files import read_bytes, replacing
+from seakeep.files import read_bytes, write_text
 from seakeep.models import HankelDMDc
 from seakeep.models.baselines import RIVALS
 from seakeep.models.labelled import Runs, Stop, as_runs, channel_matrix
@@ -243,8 +243,7 @@ class _Scores(dict[str, Any]):
 
     def __setitem__(self, key: str, value: Any) -> None:
         super().__setitem__(key, value)
-        with replacing(self.path) as place:
-            place.write_text(json.dumps({"digest": self.digest, "scores": self}), encoding="utf-8")
+        write_text(self.path, json.dumps({"digest": self.digest, "scores": self}))
 
 
 def tuned_campaign(

@@ -17,7 +17,7 @@ from seakeep.arrays import FloatArray
 from seakeep.conventions import is_elevation
 from seakeep.core.bands import PER_OCTAVE
 from seakeep.core.readouts import SOFT
-from seakeep.files import MARK, check_output, make_folder, replacing
+from seakeep.files import MARK, check_output, make_folder, write_text
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
@@ -102,8 +102,7 @@ def _written(texts: Mapping[str, str], folder: str | Path) -> list[Path]:
     for target in targets:
         check_output(target, KIND)
     for target, text in targets.items():
-        with replacing(target) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        write_text(target, text)
     return list(targets)
 
 

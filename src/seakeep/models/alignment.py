@@ -11,7 +11,7 @@ positive downstream, so that one linear model holds wherever the vessel has drif
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Literal, NamedTuple, Self
@@ -19,7 +19,7 @@ from typing import Literal, NamedTuple, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import TINY, FloatArray, number
+from seakeep.arrays import TINY, Datasets, FloatArray, number
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
@@ -125,7 +125,7 @@ class ProbeAlignment:
 
     def fit(
         self,
-        runs: Mapping[str, xr.Dataset],
+        runs: Datasets,
         states: Sequence[str],
         inputs: Sequence[str],
         window: int | None,
@@ -197,9 +197,7 @@ class ProbeAlignment:
             highest_frequency=limit,
         )
 
-    def missing(
-        self, runs: Mapping[str, xr.Dataset], states: Sequence[str], inputs: Sequence[str]
-    ) -> str:
+    def missing(self, runs: Datasets, states: Sequence[str], inputs: Sequence[str]) -> str:
         """What an optional alignment goes without, in words.
 
         Parameters
@@ -428,14 +426,12 @@ def _position(run: xr.Dataset, channel: str) -> float | None:
     return None if value is None else float(value)
 
 
-def _common_depth(runs: Mapping[str, xr.Dataset]) -> float | None:
+def _common_depth(runs: Datasets) -> float | None:
     stated = [run.attrs["water_depth"] for run in runs.values() if "water_depth" in run.attrs]
     return float(stated[0]) if stated else None
 
 
-def _celerity(
-    runs: Mapping[str, xr.Dataset], elevations: Sequence[str], depth: float | None
-) -> float:
+def _celerity(runs: Datasets, elevations: Sequence[str], depth: float | None) -> float:
     """Celerity from the mean slowness over the runs."""
     slowness = []
     for name, run in runs.items():

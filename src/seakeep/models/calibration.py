@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, Protocol, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, Progress, fraction, whole_number
+from seakeep.arrays import Datasets, FloatArray, Progress, fraction, whole_number
 from seakeep.core.calibration import (
     ConformalMargin,
     band_scale,
@@ -220,7 +220,7 @@ def learn_margin(
 
 def held_out(
     ensembles: Mapping[str, Ensemble],
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     steps: int,
     level: float,
     executor: Executor | None = None,

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled
 from seakeep.models.alignment import ProbeAlignment
@@ -106,7 +106,7 @@ class Disagreement:
 
 
 def disagreements(
-    spec: HankelDMDc, runs: Mapping[str, xr.Dataset], states: Sequence[str], inputs: Sequence[str]
+    spec: HankelDMDc, runs: Datasets, states: Sequence[str], inputs: Sequence[str]
 ) -> list[Disagreement]:
     """Compare a model of all runs with one per run, on data that neither learnt from.
 

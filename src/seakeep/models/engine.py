@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress, whole_number
+from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress, whole_number
 from seakeep.core.recursion import Recursion, read_table, recursion
 from seakeep.core.rollout import rollouts
 from seakeep.errors import RequestError
@@ -178,7 +178,7 @@ Place = tuple[str, float]
 
 def read_windows(
     signature: Signature,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     places: Sequence[Place],
     steps: int | None,
     ahead: str = "refuse",
@@ -189,7 +189,7 @@ def read_windows(
 
 def read_groups(
     signature: Signature,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     groups: Sequence[tuple[Sequence[Place], int | None]],
     ahead: str = "refuse",
 ) -> list[Windows]:
@@ -511,7 +511,7 @@ def array_windows(
         places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
         time=(time,) * len(histories),
-        **_series(signature, iter(histories), drives, [span] * len(drives)),
+        **_series(signature, histories, drives, [span] * len(drives)),
     )
 
 

@@ -8,7 +8,7 @@ ones in training and before a start, predicted ones after it (:mod:`seakeep.core
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Self
@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray
+from seakeep.arrays import Datasets, FloatArray, IntArray
 from seakeep.core.recursion import Place
 from seakeep.errors import DataError, RequestError
 from seakeep.models import labelled
@@ -82,7 +82,7 @@ class Following:
     def fit(
         cls,
         alignment: FittedAlignment,
-        runs: Mapping[str, xr.Dataset],
+        runs: Datasets,
         states: Sequence[str],
         window: int | None,
         look_ahead: int,

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray, Progress, as_real, whole_number
+from seakeep.arrays import Datasets, FloatArray, IntArray, Progress, as_real, whole_number
 from seakeep.errors import RequestError, warn
 from seakeep.files import write_sealed
 from seakeep.models import engine, store
@@ -104,7 +104,7 @@ class Model:
 
     def read_windows(
         self,
-        runs: Mapping[str, xr.Dataset],
+        runs: Datasets,
         places: Sequence[tuple[str, float]],
         steps: int | None,
         ahead: str = "refuse",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.optimize import isotonic_regression
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_windows
 from seakeep.models.interface import Signature
 from seakeep.models.readouts import FittedReadOut
@@ -183,7 +183,7 @@ def training_errors(
     dynamics: Dynamics,
     data: TrainingData,
     signature: Signature,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
 ) -> LeadErrors:
     """Errors of a single model in the runs that it was fitted to."""
     stretches = []

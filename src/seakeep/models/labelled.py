@@ -10,7 +10,7 @@ from typing import NamedTuple, cast
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.signals import uniform_step
@@ -239,7 +239,7 @@ def channel_labels(run: xr.Dataset, names: Sequence[str]) -> tuple[ChannelLabel,
     )
 
 
-def common_step(runs: Mapping[str, xr.Dataset]) -> float:
+def common_step(runs: Datasets) -> float:
     """Time step that all runs have, s."""
     first_name, first_run = next(iter(runs.items()))
     dt = run_step(first_run, first_name)
@@ -249,7 +249,7 @@ def common_step(runs: Mapping[str, xr.Dataset]) -> float:
     return dt
 
 
-def common_labels(runs: Mapping[str, xr.Dataset], names: Sequence[str]) -> tuple[ChannelLabel, ...]:
+def common_labels(runs: Datasets, names: Sequence[str]) -> tuple[ChannelLabel, ...]:
     """Labels of channels, with the unit that all runs which state one agree on.
 
     Warns
@@ -362,7 +362,7 @@ def wave_channel(run: xr.Dataset, inputs: Sequence[str], name: str) -> str | Non
     return next(iter([*filter(is_elevation, inputs), *lengths]), None)
 
 
-def mean_period(runs: Mapping[str, xr.Dataset], inputs: Sequence[str]) -> float:
+def mean_period(runs: Datasets, inputs: Sequence[str]) -> float:
     """Mean encounter period of some runs, samples: as they state it, or counted.
 
     It is counted in the :func:`wave_channel` of each run; runs without waves do not count.

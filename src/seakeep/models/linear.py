@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import ComplexArray, FloatArray, as_real
+from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine, export, labelled, store
@@ -76,7 +76,7 @@ class HankelDMDcModel(Model):
         settings: Any,
         data: TrainingData,
         solution: Solution,
-        runs: Mapping[str, xr.Dataset],
+        runs: Datasets,
         readouts: tuple[FittedReadOut, ...] = (),
     ) -> Self:
         """The model that a regression on data of these runs found."""

@@ -562,7 +562,7 @@ class Live:
         place, (first, table) = self._follows.place, self._table
         surge = self._rows("x", at + 1 - place.taps.size, at + 1)[:, self._follows.column]
         here = place.of(surge)
-        read = read_table(place, table, np.array([at - first]), here)
+        read = read_table(place, table[[at - first]], np.zeros(1, int), here)
         self._rows("delayed", at, at + 1)[:] = read
         self._rows("direct", at, at + 1)[0, -1] = (here[0] - place.centre) ** 2
 

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray
+from seakeep.arrays import Datasets, FloatArray, IntArray
 from seakeep.core import metrics
 from seakeep.core.readouts import KNOTS, MARGIN, LoadMap, best_place, floor_of, sums, weights_of
 from seakeep.errors import RequestError
@@ -54,7 +53,7 @@ class Held:
 def fit_readouts(
     readouts: Mapping[str, Asked],
     data: TrainingData,
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     judged: Sequence[Held],
 ) -> tuple[FittedReadOut, ...]:
     """Fit read-outs.
@@ -113,9 +112,7 @@ def fit_readouts(
     return tuple(out)
 
 
-def _waves(
-    data: TrainingData, runs: Mapping[str, xr.Dataset], number: int, places: FloatArray
-) -> FloatArray:
+def _waves(data: TrainingData, runs: Datasets, number: int, places: FloatArray) -> FloatArray:
     """Elevation and rate at places about the vessel at the training samples of a run.
 
     Shape (time, place, 2); NaN where the record does not tell them.

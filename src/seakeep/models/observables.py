@@ -13,9 +13,8 @@ from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
-import xarray as xr
 
-from seakeep.arrays import TINY, FloatArray, number
+from seakeep.arrays import TINY, Datasets, FloatArray, number
 from seakeep.core.observables import slow_kernel
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
@@ -363,7 +362,7 @@ class Observed:
     def fit(
         cls,
         observables: tuple[Observable, ...],
-        runs: Mapping[str, xr.Dataset],
+        runs: Datasets,
         inputs: Sequence[str],
         window: int | None,
     ) -> Self:

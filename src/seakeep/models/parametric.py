@@ -8,14 +8,13 @@ regression on the regressors and q times the regressors; its Gram matrix is a su
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.core.embedding import spread_means
 from seakeep.core.gram import ridge_path
 from seakeep.core.solve import Solution
@@ -152,8 +151,8 @@ def regress_varying(
 
 
 def nearest_data(
-    data: TrainingData, runs: Mapping[str, xr.Dataset], parameter: str, value: float
-) -> tuple[TrainingData, Mapping[str, xr.Dataset]]:
+    data: TrainingData, runs: Datasets, parameter: str, value: float
+) -> tuple[TrainingData, Datasets]:
     """Training data of the runs at the value nearest to one."""
     off = {name: abs(parameter_of(runs[name], parameter, name) - value) for name in data.names}
     near = [n for n, name in enumerate(data.names) if off[name] == min(off.values())]

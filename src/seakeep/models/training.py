@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self, cast
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray
+from seakeep.arrays import BoolArray, Datasets, FloatArray
 from seakeep.core import gram
 from seakeep.core.embedding import (
     History,
@@ -175,7 +175,7 @@ def system_of(
 
 
 def gather(
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     states: Sequence[str],
     inputs: Sequence[str],
     stop: Stop,
@@ -337,7 +337,7 @@ class TrainingArrays:
     @classmethod
     def read(
         cls,
-        runs: Mapping[str, xr.Dataset],
+        runs: Datasets,
         states: Sequence[str],
         inputs: Sequence[str],
         samples: Sequence[tuple[int, int]],
@@ -435,7 +435,7 @@ def _lengthened(values: FloatArray, length: int) -> FloatArray:
     return np.concatenate([values, values[-1:]]) if missing > 0 else values
 
 
-def until(runs: Mapping[str, xr.Dataset], stop: Stop) -> dict[str, xr.Dataset]:
+def until(runs: Datasets, stop: Stop) -> dict[str, xr.Dataset]:
     """Cut runs at the last instants of their training windows.
 
     Parameters

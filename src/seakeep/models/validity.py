@@ -5,7 +5,7 @@ Slow motions of which a training window holds too few cycles to estimate mean an
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from scipy import fft
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray
+from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray
 from seakeep.conventions import is_elevation
 from seakeep.core.bands import PER_OCTAVE, band_edges, band_energy, split_bands
 from seakeep.errors import warn
@@ -344,7 +344,7 @@ class SlowMotion:
 
 
 def slow_motions(
-    runs: Mapping[str, xr.Dataset], states: Sequence[str], trained: float, encounter_period: float
+    runs: Datasets, states: Sequence[str], trained: float, encounter_period: float
 ) -> list[SlowMotion]:
     """Find the states that a slow motion governs, and its period.
 
@@ -389,7 +389,7 @@ def slow_motions(
 
 
 def warn_of_slow_motions(
-    runs: Mapping[str, xr.Dataset],
+    runs: Datasets,
     states: Sequence[str],
     trained: float,
     encounter_period: float,
