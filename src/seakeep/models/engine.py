@@ -289,17 +289,17 @@ def _regressors(
     tables, starts, first = [], {}, 0
     for drive in dict.fromkeys(drives):
         mine = [span for each, span in pairs if each is drive]
-        begin, end = min(span.known for span in mine), max(span.stop for span in mine)
+        begin, end = min(span.first for span in mine), max(span.stop for span in mine)
         starts[drive] = first - begin
         tables.append(drive.table(begin, end))
         first += end - begin
     table, steps = np.concatenate(tables), spans[0].stop - spans[0].known
     at = np.array([starts[drive] + span.known for drive, span in pairs])
-    here = np.array([drive.places(span.known, span.known + 1) for drive, span in pairs])
-    measured = read_table(place, table, at[:, None] + np.arange(steps), here.repeat(steps, axis=1))
-    before = np.stack([drive.rows(span.first, span.known).delayed for drive, span in pairs])
+    here = np.stack([drive.places(span.first, span.known + 1) for drive, span in pairs])
+    here = np.concatenate([here, here[:, -1:].repeat(steps - 1, axis=1)], axis=1)
+    delayed = read_table(place, table, at[:, None] + np.arange(-z, steps), here)
     direct = np.stack([drive.direct(span.known, span.stop) for drive, span in pairs])
-    out = {"delayed": np.concatenate([before, measured], axis=1), "direct": direct}
+    out = {"delayed": delayed, "direct": direct}
     lines = tuple(each.load.place for each in signature.readouts if each.load is not None)
     if lines:
         waves = [drive.waves(lines, span.known, span.stop) for drive, span in pairs]
