@@ -66,6 +66,8 @@ DOUBTED = 0.5, 0.9
 """Squares of errors, claimed, over the variance of training between which a forecast from waves
 that are predicted passes over to the mean: on the virtual tank its best weight is 0.7 to 0.9 at
 0.55, 0.2 to 0.5 at 0.75 and 0 to 0.1 at 0.95, by one probe and by two."""
+LATE = 16
+"""Complete samples that are judged together: each alone would cost three times as much."""
 SMALL = 0.5
 """Part of the training SD below which an error stays over the lead time."""
 RIG = ("water_depth", "celerity", "probe_offset")
@@ -225,7 +227,7 @@ class Live:
         self._first, room = 0, 2 * self._record
         self._recent = {name: np.full((room, width), np.nan) for name, width in widths.items()}
         self._count = _Counts()
-        self._updates: deque[_Update] = deque(maxlen=self._ahead + 2)
+        self._updates: deque[_Update] = deque(maxlen=self._ahead + LATE + 2)
         self._history = np.tile(signature.state_scale.centre, (s + 1, 1))
         self._innovation = np.full(count, np.nan)
         # Of squares that fade: sums, and weights; of each state, and of each in free runs.
@@ -268,6 +270,7 @@ class Live:
         It belongs to the last instant whose prediction reads no wave that is still to come: the
         last sample, or with a look-ahead of l samples that of l − 1 samples before.
         """
+        self._finish()
         return self._innovation.copy()
 
     @property
@@ -290,6 +293,7 @@ class Live:
         that is always the same, as in waves outside the training, shows in the second row long
         before the first. NaN where there is none yet.
         """
+        self._finish()
         with np.errstate(invalid="ignore"):  # 0/0 before the first
             means: FloatArray = self._squares[0] / self._squares[1]
         return means
@@ -511,12 +515,8 @@ class Live:
             self._advance(self._history, at, at)
             count.final = at
             return
-        final = at - max(self._ahead - 1, 0)
-        if final > count.final:
-            self._find_rows(final, self._known_inputs())
-            self._advance(self._history, count.final + 1, final, is_final=True)
-            count.final = final
-        if all(each is self._as_it_is for each in self._pending()):
+        self._finish(LATE)
+        if self._is_exact():
             if count.final < at:
                 self._rows("x", at, at + 1)[:] = self._rows("y", at, at + 1)
             return
@@ -526,19 +526,42 @@ class Live:
         self._find_rows(at, known)
         self._advance(self._history.copy(), count.final + 1, at)
 
+    def _finish(self, late: int = 0) -> None:
+        """Judge samples whose estimates no wave to come moves; up to `late` complete ones wait."""
+        count, is_exact = self._count, self._is_exact()
+        final = count.taken - 1 - max(self._ahead - 1, 0)
+        if count.taken > self._begins and final > count.final + is_exact * late:
+            self._find_rows(final, self._known_inputs())
+            self._advance(self._history, count.final + 1, final, moves=not is_exact, is_final=True)
+            count.final = final
+
+    def _is_exact(self) -> bool:
+        """Whether all samples whose estimates are not final are taken as they are."""
+        return all(each is self._as_it_is for each in self._pending())
+
     def _update_of(self, at: int) -> _Update:
         return self._updates[at - self._count.taken]
 
     def _advance(
-        self, history: FloatArray, first: int, last: int, *, is_final: bool = False
+        self,
+        history: FloatArray,
+        first: int,
+        last: int,
+        *,
+        moves: bool = True,
+        is_final: bool = False,
     ) -> None:
-        """Run the mean through samples, with the gains that were found for them."""
+        """Run the mean through samples, with the gains that were found for them.
+
+        The vessel `moves` where estimates are not what rows were read at.
+        """
         s = self.signature.state_delays
         for at in range(first, last + 1):
             update, measured = self._update_of(at), self._rows("y", at, at + 1)[0]
             predicted = self.signature.state_scale.centre
             if at >= self._begins:
-                self._place(at - 1)
+                if moves:
+                    self._place(at - 1)
                 predicted = self._predicted(history, at - 1)
             innovation = measured - predicted
             history[:-1] = history[1:]
@@ -615,6 +638,7 @@ class Live:
             self._table = (first, table)
             delayed[:] = read_table(self._follows.place, table, np.arange(stop - first), places)
             direct[:, :-1] = drive.direct(first, stop)
+            direct[:, -1] = (places - self._follows.place.centre) ** 2
             return
         # Direct regressors are wanted from the first prediction on.
         span = Span(first, max(first, begins - 1), stop)
@@ -832,7 +856,7 @@ class Live:
         taken, signature = self._count.taken, self.signature
         taps = 0 if self._follows is None else self._follows.place.taps.size
         longest = max(signature.state_delays, signature.input_delays, taps)
-        tail = max(taken - (self._ahead + longest + 4), 0)
+        tail = max(taken - (self._ahead + LATE + longest + 4), 0)
         rows = [self._rows(each, tail, taken) for each in self._recent if each != "u"]
         updates = [update for update in self._pending() if update is not self._as_it_is]
         state = [self._history, self._free, self._innovation, self._squares]
