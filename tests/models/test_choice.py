@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from seakeep import HankelDMDc, ProbeAlignment, Select, SlowSquares, tune
+from seakeep.models import selection
 from seakeep.models.selection import Trial, groups_of, select, simplest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -82,6 +83,20 @@ def test_a_group_that_repeats_counts_once():
     assert not other.is_as_good_as(one)
     pair = np.array([0, 0, 1, 1, 1, 1])
     assert replace(other, groups=pair).is_as_good_as(replace(one, groups=pair))
+
+
+def test_every_ridge_of_what_is_taken_is_tried(monkeypatch):
+    monkeypatch.setattr(selection, "NEAR", 0.0)
+    given = {name: run.drop_vars("drift") for name, run in runs().items()}
+    found = select(replace(SPEC, select=None), given, ["heave"], INPUTS, opened=("observables",))
+    assert found.settings.observables == ()
+    levels = {}
+    for row in found.rows:
+        levels.setdefault(row["observables"], []).append(row["ridge"])
+    # First all of the richest, and every fourth of the others; at last all of what is taken.
+    every = list(selection.RIDGES)
+    assert levels["slow_squares, powers"] == levels["none"] == every
+    assert levels["powers"] == levels["slow_squares"] == every[::4]
 
 
 def test_what_brings_nothing_is_not_recommended():

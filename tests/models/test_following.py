@@ -163,3 +163,11 @@ def test_models_and_windows_side_by_side_are_each_alone():
                 x.append(following)
             np.testing.assert_allclose(found[model, window], x[6:], rtol=1e-10, atol=1e-12)
             np.testing.assert_allclose(used[model, window], u[z:], rtol=1e-10, atol=1e-12)
+            # One window of one model runs by numbers, not by arrays.
+            of, at = slice(model, model + 1), slice(window, window + 1)
+            alone = Recursion(a[of], b[of], d[of, :, 0], 0.7, 0.2, 1)
+            (one,), (driven,) = recursion(
+                alone, place, histories[at], delayed[at], table, starts[at], forcing[of, at]
+            )
+            np.testing.assert_allclose(one[0], x[6:], rtol=1e-10, atol=1e-12)
+            np.testing.assert_allclose(driven[0], u[z:], rtol=1e-10, atol=1e-12)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 from collections.abc import (
     Callable,
     Collection,
@@ -34,7 +35,7 @@ from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.embedding import spread_means
-from seakeep.core.gram import ridge_path
+from seakeep.core.gram import PrimalSystem, ridge_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
@@ -70,7 +71,11 @@ Step = Callable[[Any], list[Any]]
 Scores = tuple[FloatArray, FloatArray]
 """Scores, shape (level, window), and weights of the windows, which sum to one in a fold."""
 Known = MutableMapping[str, list[list[Any]]]
-"""Scores and weights by candidate and fold, as JSON values."""
+"""Scores and weights by candidate, fold and limit, as JSON values."""
+COARSE = 4
+"""Every so-many-th λ is tried first."""
+NEAR = 1.5
+"""Error, in parts of the best on what is held out, above which a candidate's other λ are left."""
 ALIKE = 0.03
 """Part of the lowest error by which the chosen λ may be worse.
 
@@ -115,7 +120,8 @@ class Trial:
     levels : tuple of float
         λ.
     scores : ndarray, shape (level, window)
-        NRMSE averaged over the channels, by window of all folds and horizons.
+        NRMSE averaged over the channels, by window of all folds and horizons; NaN where a λ was
+        not tried.
     weights : ndarray, shape (window,)
         They sum to one; folds count alike, and the horizons of a fold.
     groups : ndarray of int, shape (window,)
@@ -129,13 +135,19 @@ class Trial:
 
     @property
     def means(self) -> FloatArray:
-        """Score at each level."""
+        """Score at each level, NaN where that was not tried."""
         return self.scores @ self.weights
 
     @property
     def best(self) -> float:
         """Score at the best level."""
-        return float(self.means.min())
+        return float(np.nanmin(self.means))
+
+    def of_group(self, group: int) -> float:
+        """Score in a group at the level that is best there."""
+        own = self.groups == group
+        total = max(float(self.weights[own].sum()), np.finfo(float).tiny)
+        return float(np.nanmin(self.scores[:, own] @ self.weights[own])) / total
 
     def level(self, alike: float, stated: float | None = None) -> float:
         """The largest λ that is as good as the best, or the stated one if that is."""
@@ -157,7 +169,7 @@ class Trial:
 
     def _by_group(self) -> tuple[FloatArray, FloatArray]:
         """Scores at the best level in each group, and the weights of the groups."""
-        best = self.scores[np.argmin(self.means)]
+        best = self.scores[np.nanargmin(self.means)]
         sums, total = (
             np.bincount(self.groups, self.weights * each).astype(float)
             for each in (best, np.ones(best.size))
@@ -208,6 +220,9 @@ class Problem:
     read : dict
         Run, starts and windows that were read last, by their length: candidates are judged on one
         run after the other.
+    taught : dict
+        By the runs that teach, the normal equations of all columns that were made last, which
+        candidates share.
     """
 
     runs: Datasets
@@ -217,6 +232,9 @@ class Problem:
     ridges: tuple[float, ...]
     horizons: tuple[int, ...]
     read: dict[int, tuple[int, list[int], Windows]] = field(
+        default_factory=dict, init=False, repr=False
+    )
+    taught: dict[tuple[int, ...], tuple[Any, list[Scale], PrimalSystem]] = field(
         default_factory=dict, init=False, repr=False
     )
 
@@ -249,34 +267,53 @@ class Problem:
         self, candidate: HankelSettings, levels: Sequence[float], runs: Sequence[int]
     ) -> tuple[Dynamics, FloatArray]:
         """Models of some runs: the first of them, and coefficients, shape (level, N, p)."""
-        data, parts = self.data, (slice(None), *self.parts(candidate))
-        chain, labels = data.signature.input_map, data.signature.state_labels
-        windows = [data.windows[run] for run in runs]
-        groups_of = labels, *chain.regressors(data.signature.input_labels)
-        names = [[label.name for label in group] for group in groups_of]
-        series = [list(group) for group in zip(*map(data.physical, runs), strict=True)]
-        scales = [
-            Scale(*(getattr(scale, each.name)[part] for each in fields(scale)))
-            for scale, part in zip(
-                scales_of(series, windows, names, True, chain.stretch), parts, strict=True
-            )
-        ]
-        # Later by the samples that a row looks ahead too far.
-        series[1] = [np.roll(each, self.ahead(candidate), axis=0) for each in series[1]]
-        groups = [
-            [scale.deviations(each[:, part]) for each in group]
-            for group, scale, part in zip(series, scales, parts, strict=True)
-        ]
-        system = system_of(groups, windows, candidate)
-        pairs = sum(window.columns for window in windows)
+        data, (delayed, direct) = self.data, self.parts(candidate)
+        count, blocks = len(data.signature.states), candidate.blocks
+        scales, system = self._system(candidate, runs)
+        own = 0 if candidate.is_filter else count * (candidate.state_delays + 1)
+        later = np.tile(delayed, candidate.input_delays + 1)
+        means = np.ones(count * len(blocks), bool)
+        kept = np.concatenate([np.ones(own, bool), later, direct, means])
+        pairs = sum(data.windows[run].columns for run in runs)
         factor = pairs if candidate.ridge_scale == "per_snapshot" else 1
-        path = ridge_path(system.gram, system.right, [factor * level for level in levels])
-        path = spread_means(path, len(labels), candidate.state_delays, candidate.blocks)
-        reach = candidate.state_reach, candidate.input_delays
-        x, u, w = scales
+        gram, right = system.gram[np.ix_(kept, kept)], system.right[:, kept]
+        path = ridge_path(gram, right, [factor * level for level in levels])
+        path = spread_means(path, count, candidate.state_delays, blocks)
         if candidate.is_filter:
-            path = np.pad(path, ((0, 0), (0, 0), (len(x.mean), 0)))
-        return Dynamics(path[0], *reach, x, u, w, chain.follows), path
+            path = np.pad(path, ((0, 0), (0, 0), (count, 0)))
+        x, u, w = (
+            Scale(*(getattr(scale, each.name)[part] for each in fields(scale)))
+            for scale, part in zip(scales, (slice(None), delayed, direct), strict=True)
+        )
+        reach = candidate.state_reach, candidate.input_delays
+        return Dynamics(path[0], *reach, x, u, w, data.signature.input_map.follows), path
+
+    def _system(
+        self, candidate: HankelSettings, runs: Sequence[int]
+    ) -> tuple[list[Scale], PrimalSystem]:
+        """Moments and normal equations of all columns of some runs, with a candidate's delays."""
+        ahead, names = (
+            self.ahead(candidate),
+            ("state_delays", "input_delays", "memory", "is_filter"),
+        )
+        key, of = (ahead, *(getattr(candidate, each) for each in names)), tuple(runs)
+        made = self.taught.get(of)
+        if made is not None and made[0] == key:
+            return made[1:]
+        data, chain = self.data, self.data.signature.input_map
+        windows = [data.windows[run] for run in runs]
+        groups_of = data.signature.state_labels, *chain.regressors(data.signature.input_labels)
+        labels = [[label.name for label in group] for group in groups_of]
+        series = [list(group) for group in zip(*map(data.physical, runs), strict=True)]
+        scales = list(scales_of(series, windows, labels, True, chain.stretch))
+        # Later by the samples that a row looks ahead too far.
+        series[1] = [np.roll(each, ahead, axis=0) for each in series[1]]
+        groups = [
+            [scale.deviations(each) for each in group]
+            for group, scale in zip(series, scales, strict=True)
+        ]
+        made = self.taught[of] = key, scales, system_of(groups, windows, candidate)
+        return made[1:]
 
     def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
         """λ that are tried of a candidate."""
@@ -359,9 +396,22 @@ class Problem:
                 every[steps] = FreeRuns(predicted, measured, dynamics.state_scale.std)
         yield from (every[steps] for steps in horizons if steps in every)
 
-    def judge(self, candidate: HankelSettings, fold: int) -> Scores:
-        """Judge free runs on a run that is held out, over all horizons that fit."""
+    def judge(self, candidate: HankelSettings, fold: int, limit: float) -> Scores:
+        """Judge free runs on a run that is held out, over all horizons that fit.
+
+        Where every ``COARSE``-th λ errs more than the limit, no other is tried.
+        """
         levels = self.levels(candidate)
+        first = np.arange(len(levels)) % (COARSE if math.isfinite(limit) else 1) == 0
+        scores, weights = self._judged(candidate, [*itertools.compress(levels, first)], fold)
+        every = np.full((len(levels), weights.size), np.nan)
+        every[first] = scores
+        if not first.all() and (scores @ weights).min() <= limit:
+            left = [*itertools.compress(levels, ~first)]
+            every[~first], _ = self._judged(candidate, left, fold)
+        return every, weights
+
+    def _judged(self, candidate: HankelSettings, levels: Sequence[float], fold: int) -> Scores:
         every = self.free_runs(candidate, levels, fold, self.horizons)
         scores = [each for each in map(scores_of, every) if each.size]
         counts = [each.shape[1] for each in scores]
@@ -443,37 +493,61 @@ def _judge(
     progress: Progress | None,
     later: int = 0,
 ) -> None:
-    """Add trials of candidates that are not among them; `later` more are to come at most."""
+    """Add trials of candidates that are not among them; `later` more are to come at most.
+
+    The richest comes first: of those that err much more, few λ are tried.
+    """
     problem = next(iter(problems.values()))
     folds, firsts = problem.folds(), list(dict.fromkeys(problem.groups))
+    places = [firsts.index(each) for each in problem.groups]
     new = [each for each in dict.fromkeys(candidates) if each not in trials]
-    before, after = len(trials) * len(folds), later * len(folds)
+    count = len(folds) * (len(trials) + len(new) + later)
+    made: dict[Settings, Trial] = {}
 
     def tell(done: int, total: int, what: str) -> None:
         if progress is not None:
-            progress(before + done, before + total + after, what)
+            progress(len(folds) * (len(trials) + len(made)) + done, count, what)
 
-    keys = {unit: _key(*unit) for unit in ((each, fold) for fold in folds for each in new)}
-    units = [unit for unit, key in keys.items() if key not in known]
-    outcomes = in_order(_unit, problems, units, executor, tell, "candidate and fold")
-    for unit, outcome in zip(units, outcomes, strict=True):
-        known[keys[unit]] = [part.tolist() for part in outcome]
-    for candidate in new:
-        parts = [map(np.array, known[keys[candidate, fold]]) for fold in folds]
-        scores, weights = zip(*parts, strict=True)
-        joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
-        places = [firsts.index(problem.groups[fold]) for fold in folds]
-        groups = np.repeat(places, [len(each) for each in weights])
-        every = np.concatenate(scores, axis=1)
-        levels = problem.levels(candidate)
-        trials[candidate] = Trial(levels, every, joined / joined.sum(), groups)
+    richest = sorted(new, key=_parts_of)[-1:]
+    for some in (richest, [each for each in new if each not in richest]):
+        best = min((*trials.values(), *made.values()), key=lambda each: each.best, default=None)
+        limits = {
+            fold: math.inf if best is None else round(NEAR * best.of_group(places[fold]), 6)
+            for fold in folds
+        }
+        keys = {
+            unit: _key(*unit)
+            for unit in ((each, fold, limits[fold]) for fold in folds for each in some)
+        }
+        units = [unit for unit, key in keys.items() if key not in known]
+        outcomes = in_order(_unit, problems, units, executor, tell, "candidate and fold")
+        for unit, outcome in zip(units, outcomes, strict=True):
+            known[keys[unit]] = [part.tolist() for part in outcome]
+        for candidate in some:
+            parts = [map(np.array, known[keys[candidate, fold, limits[fold]]]) for fold in folds]
+            scores, weights = zip(*parts, strict=True)
+            joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
+            groups = np.repeat([places[fold] for fold in folds], [len(each) for each in weights])
+            every, levels = np.concatenate(scores, axis=1), problem.levels(candidate)
+            made[candidate] = Trial(levels, every, joined / joined.sum(), groups)
+    trials |= {each: made[each] for each in new}
 
 
-def _key(candidate: HankelSettings, fold: int) -> str:
-    return json.dumps([candidate.to_json(), fold], sort_keys=True)
+def _complete(
+    problems: Mapping[Columns, Problem], trials: dict[Settings, Trial], taken: Settings, *work: Any
+) -> None:
+    """Try all λ of a candidate of which few were tried."""
+    if np.isnan(trials[taken].means).any():
+        alone: dict[Settings, Trial] = {}
+        _judge(problems, alone, [taken], *work)
+        trials |= alone
 
 
-def _unit(problems: Mapping[Columns, Problem], item: tuple[HankelSettings, int]) -> Scores:
+def _key(candidate: HankelSettings, fold: int, limit: float) -> str:
+    return json.dumps([candidate.to_json(), fold, limit], sort_keys=True)
+
+
+def _unit(problems: Mapping[Columns, Problem], item: tuple[HankelSettings, int, float]) -> Scores:
     problem = _problem_of(problems, item[0])
     assert problem is not None
     return problem.judge(*item)
@@ -695,17 +769,17 @@ def select(
         for step_of in steps:
             tried = step_of(best)
             later -= len(tried) - 1
-            sound = [each for each in tried if _problem_of(problems, each)]
+            sound = [each for each in (best, *tried) if _problem_of(problems, each)]
             _judge(problems, trials, sound, *work, later)
             best = min(trials, key=lambda each: trials[each].best)
         return best
 
-    _judge(problems, trials, [base], *work, later)
-    best = searched(base, left)
+    best = searched(base, left or [lambda alone: [alone]])
     alike = 0.0 if by_sea else ALIKE
     start = simplest(trials, best, alike) if left else base
     best = searched(start, varied)
     taken = start if trials[start].is_as_good_as(trials[best]) else best
+    _complete(problems, trials, taken, *work)
     level = trials[taken].level(alike, stated if taken == start else None)
     taken, level = _stable(problems, trials, taken, level)
     worth = _worth(problems, trials, taken, *work)
@@ -954,6 +1028,7 @@ def _stable(
         (float(score), candidate, ridge)
         for candidate, trial in trials.items()
         for score, ridge in zip(trial.means, trial.levels, strict=True)
+        if np.isfinite(score)
     ]
     wanted = [(taken, level), *(each[1:] for each in sorted(every, key=lambda each: each[0]))]
     for candidate, ridge in wanted:
@@ -1021,7 +1096,7 @@ def _note(
     periods: Mapping[str, float],
 ) -> str:
     """How the choice was made, in words."""
-    count = sum(len(trial.levels) for trial in trials.values())
+    count = sum(np.isfinite(trial.means).sum() for trial in trials.values())
     note = (
         f"{taken.ridge_text(level)}: out of {count} settings (below, the best λ of each kind) "
         f"in free runs on {len(problem.folds())} parts held out in turn, mean NRMSE "
@@ -1248,7 +1323,8 @@ def _rows_of(
         totals = (trial.scores[:, drawn] * weights).sum(axis=2) / weights.sum(axis=1)
         aligned = candidate.alignment
         bounds = np.quantile(totals, [0.025, 0.975], axis=1)
-        for own, score, low, high in zip(trial.levels, trial.means, *bounds, strict=True):
+        tried = zip(trial.levels, trial.means, *bounds, strict=True)
+        for own, score, low, high in (each for each in tried if np.isfinite(each[1])):
             yield {
                 "state_delays": candidate.state_delays,
                 "input_delays": candidate.input_delays,
