@@ -124,8 +124,8 @@ def sums(values: FloatArray, load: FloatArray, knots: FloatArray) -> FloatArray:
     knots : ndarray, shape (knot,)
         Where the load bends with the surge.
     """
-    columns = np.stack([np.ones(len(load)), *features([*values.T], knots), load], axis=1)
-    return columns.T @ columns
+    rows = np.stack([np.ones(len(load)), *features([*values.T], knots), load])
+    return rows @ rows.T
 
 
 def weights_of(products: FloatArray) -> FloatArray:

@@ -55,7 +55,8 @@ class Place:
     def of(self, surge: FloatArray) -> FloatArray:
         """Places of the samples from the P-th on, of a surge of shape (time,)."""
         position = np.convolve(surge, self.taps, "valid")
-        return np.clip(position, self.lowest, self.grid[-1])
+        highest = self.lowest + self.spacing * (self.count - 1)
+        return np.minimum(np.maximum(position, self.lowest), highest)
 
 
 def read_table(

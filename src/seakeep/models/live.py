@@ -584,10 +584,12 @@ class Live:
             return
         place, (first, table) = self._follows.place, self._table
         surge = self._rows("x", at + 1 - place.taps.size, at + 1)[:, self._follows.column]
-        here = place.of(surge)
-        read = read_table(place, table[[at - first]], np.zeros(1, int), here)
-        self._rows("delayed", at, at + 1)[:] = read
-        self._rows("direct", at, at + 1)[0, -1] = (here[0] - place.centre) ** 2
+        (here,) = place.of(surge).tolist()
+        on_grid = min((here - place.lowest) / place.spacing, place.highest)
+        below, part = int(on_grid), on_grid % 1.0
+        low, high = table[at - first, below : below + 2]
+        self._rows("delayed", at, at + 1)[:] = low + part * (high - low)
+        self._rows("direct", at, at + 1)[0, -1] = (here - place.centre) ** 2
 
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""

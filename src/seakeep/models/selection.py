@@ -1070,14 +1070,18 @@ def _rivalled(
     own = {"ridge"} if "kind" in search.vary else {"ridge", "observables"}
     plain = {key: v for key, v in vars(search.at_rest(chosen[0])).items() if key not in own}
     rivals: list[Any] = [each.having(**plain) for each in kinds if search.given[2]]
-    others: dict[Any, Trial] = {}
-    _judge(problems, others, filter(partial(_problem_of, problems), rivals), *work)
-    words = ""
+    both, words = dict[Any, Trial](trials), ""
+    _judge(problems, both, filter(partial(_problem_of, problems), rivals), *work)
+    others = {each: both[each] for each in both if each not in trials}
     for other, its in sorted(others.items(), key=lambda each: each[1].best):
-        problem, level = _problem_of(problems, other), its.level(alike)
+        if trials[chosen[0]].is_as_good_as(its):
+            continue
+        _complete(problems, others, other, *work)
+        problem, level = _problem_of(problems, other), others[other].level(alike)
         assert problem is not None
-        if not trials[chosen[0]].is_as_good_as(its) and not problem.grows(other, level):
-            words = f"; kind = '{other.kind}' errs {its.at(level):.3f}, less by more than the noise"
+        if not problem.grows(other, level):
+            score = others[other].at(level)
+            words = f"; kind = '{other.kind}' errs {score:.3f}, less by more than the noise"
             chosen = (other, level) if "kind" in search.vary else chosen
             break
     if "kind" in search.vary:

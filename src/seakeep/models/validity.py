@@ -304,8 +304,9 @@ def _heights(inputs: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
     The fourth moment tells irregular waves, four SDs high, from regular ones of 2√2 SDs.
     """
     deviations = inputs - inputs.mean(axis=0)
-    square = np.maximum(np.mean(deviations**2, axis=0), np.finfo(float).tiny)
-    height = 4 * np.sqrt(np.mean(deviations**4, axis=0) / (3 * square))
+    squares = deviations**2
+    variance = np.maximum(squares.mean(axis=0), np.finfo(float).tiny)
+    height = 4 * np.sqrt(np.mean(squares**2, axis=0) / (3 * variance))
     power = np.abs(fft.rfft(np.hanning(len(inputs))[:, None] * deviations, axis=0)) ** 2
     total = np.maximum(power.sum(axis=0), np.finfo(float).tiny)
     frequency = fft.rfftfreq(len(inputs), dt) @ power / total

@@ -144,12 +144,12 @@ def carried(taps: FloatArray, record: FloatArray) -> FloatArray:
     ndarray, shape (time − taps + 1, place)
         The first row belongs to the instant of sample `back`.
     """
-    length = taps.shape[2]
-    out = np.zeros((max(len(record) - length + 1, 0), len(taps)))
-    for probe, column in enumerate(record.T if len(out) else ()):
-        windows = np.lib.stride_tricks.sliding_window_view(column, length)
-        out += np.ascontiguousarray(windows) @ taps[:, probe].T
-    return out
+    places, _, length = taps.shape
+    if len(record) < length:
+        return np.zeros((0, places))
+    windows = np.lib.stride_tricks.sliding_window_view(record, length, axis=0)
+    carried_to: FloatArray = windows.reshape(len(windows), -1) @ taps.reshape(places, -1).T
+    return carried_to
 
 
 def slow_position(surge: FloatArray, period: float) -> FloatArray:
