@@ -100,7 +100,7 @@ CHANGES = (
     ("core/observables.py", "(series[2:] - series[:-2]) / (2.0 * dt)", "(series[2:] - series[:-2]) / dt", "models/test_observables.py::test_slow_squares_are_the_sums_that_they_stand_for"),
     ("core/readouts.py", "(SOFT * std)", "(SOFT / std)", "core/test_readouts.py::test_a_load_gives_way_to_its_state_outside_training"),
     ("core/recursion.py", "(here - centre) ** 2", "here**2", "models/test_following.py::test_models_and_windows_side_by_side_are_each_alone"),
-    ("core/recursion.py", "weights[0] = 1.0 - part", "weights[0] = part", "models/test_following.py::test_models_and_windows_side_by_side_are_each_alone"),
+    ("core/recursion.py", "np.array((1.0 - part, part))", "np.array((part, 1.0 - part))", "models/test_following.py::test_models_and_windows_side_by_side_are_each_alone"),
     ("core/recursion.py", "read *= on_grid - below", "read *= on_grid", "models/test_following.py::test_the_wave_is_read_where_the_vessel_goes"),
     ("core/response.py", "back = turn[:, None] ** -np.arange(input_delays + 1)", "back = turn[:, None] ** np.arange(input_delays + 1)", "check/test_response.py::test_the_response_is_that_of_python_control"),
     ("core/response.py", "np.hypot(real, imag) > radius", "abs(real) > radius", "core/test_clipping.py::test_the_clipped_channel_has_the_polynomial_with_the_clipped_roots"),

@@ -84,6 +84,17 @@ def read_table(
     return _between(flat, samples * place.count, on_grid[..., None])
 
 
+def read_row(flat: FloatArray, first: int, on_grid: float, out: FloatArray) -> None:
+    """Read the row at a place that is counted on the grid, of the sample whose rows start so.
+
+    A tenth of the time of :func:`read_table`, which does the same for many.
+    """
+    row = int(on_grid)
+    part = on_grid - row
+    row += first
+    np.array((1.0 - part, part)).dot(flat[row : row + 2], out)
+
+
 def _between(flat: FloatArray, firsts: IntArray, on_grid: FloatArray) -> FloatArray:
     """Rows at places that are counted on the grid, shape (…, 1), from the rows of samples on."""
     below = on_grid.astype(np.intp)
@@ -189,7 +200,7 @@ def recursion(
     still = (models.offset * place.taps.sum() - place.lowest) / place.spacing
     centre = (place.centre - place.lowest) / place.spacing
     flat, highest = np.ascontiguousarray(table.reshape(-1, n)), place.highest
-    firsts, first, weights = starts * place.count, int(starts[0]) * place.count, np.empty(2)
+    firsts, first = starts * place.count, int(starts[0]) * place.count
     with np.errstate(over="ignore", invalid="ignore"):
         for step in range(steps):
             at, to = (steps - step) * N, (steps - 1 - step) * n + 1
@@ -197,11 +208,7 @@ def recursion(
             # A run that is lost keeps a place; its states stay lost.
             if is_alone:
                 alone = min(max(0.0, float(computed[N]) + still), highest)
-                row = int(alone)
-                weights[1] = part = alone - row
-                weights[0] = 1.0 - part
-                row += first + step * place.count
-                weights.dot(flat[row : row + 2], u[to : to + n])
+                read_row(flat, first + step * place.count, alone, u[to : to + n])
                 u[to - 1] = (alone - centre) ** 2
             else:
                 here = np.fmin(np.fmax(computed[..., N:] + still, 0.0), highest)

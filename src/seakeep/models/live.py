@@ -32,7 +32,7 @@ from seakeep.arrays import (
     whole_number,
 )
 from seakeep.core.kalman import DelayFilter, process_noise
-from seakeep.core.recursion import read_table
+from seakeep.core.recursion import read_row, read_table
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
@@ -586,9 +586,7 @@ class Live:
         surge = self._rows("x", at + 1 - place.taps.size, at + 1)[:, self._follows.column]
         (here,) = place.of(surge).tolist()
         on_grid = min((here - place.lowest) / place.spacing, place.highest)
-        below, part = int(on_grid), on_grid % 1.0
-        low, high = table[at - first, below : below + 2]
-        self._rows("delayed", at, at + 1)[:] = low + part * (high - low)
+        read_row(table[at - first], 0, on_grid, self._rows("delayed", at, at + 1)[0])
         self._rows("direct", at, at + 1)[0, -1] = (here - place.centre) ** 2
 
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
