@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
 
@@ -23,7 +24,7 @@ from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix, run_name
 from seakeep.models.training import Training
 from seakeep.models.validity import outside_training
-from seakeep.signals.prediction import predict_waves
+from seakeep.signals.prediction import foresee
 from seakeep.signals.time_axis import instant_text, span_text
 
 
@@ -519,11 +520,15 @@ def check_arrays(
     meaning = "steps − 1 + lead_samples" if signature.lead_samples else "steps − 1"
     least = needed if ahead == "refuse" else 0
     after = _finite("u_future", rows_by_name("u_future", future, least, inputs, meaning)[:needed])
-    driving = np.concatenate([u, after])
+    futures, first = after[None, :0], -1
     if missing := needed - len(after):
-        known = np.concatenate([_finite("u_history", past), after])
-        driving = np.concatenate([driving, predict_waves(known, missing)])
-    return engine.array_windows(signature, x[None], driving[None], count)
+        futures = foresee(np.concatenate([_finite("u_history", past), after]), missing).futures
+        first = max(len(after) - signature.lead_samples + 1, 0)
+    windows, *departures = (
+        engine.array_windows(signature, x[None], np.concatenate([u, after, each])[None], count)
+        for each in futures
+    )
+    return replace(windows, departures=tuple(departures), predicted=(first,))
 
 
 def rows_by_name(

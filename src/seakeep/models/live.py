@@ -41,7 +41,7 @@ from seakeep.models.checks import check_choice
 from seakeep.models.engine import Dynamics, Runs
 from seakeep.models.executor import one_blas_thread
 from seakeep.models.forecasts import label_channels, rows_by_name
-from seakeep.models.growth import WINDOWS, LeadErrors
+from seakeep.models.growth import WINDOWS, LeadErrors, weighed
 from seakeep.models.inputs import Drive
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import Span
@@ -62,10 +62,6 @@ SPIKE = 100.0
 """What a single sample adds to the consistency at most: a spike tells of a sensor, for a while."""
 ALARM = 2.0
 """Consistency of a state above which errors of late are no longer those of training."""
-DOUBTED = 0.5, 0.9
-"""Squares of errors, claimed, over the variance of training between which a forecast from waves
-that are predicted passes over to the mean: on the virtual tank its best weight is 0.7 to 0.9 at
-0.55, 0.2 to 0.5 at 0.75 and 0 to 0.1 at 0.95, by one probe and by two."""
 LATE = 16
 """Complete samples that are judged together: each alone would cost three times as much."""
 SMALL = 0.5
@@ -720,24 +716,17 @@ class Live:
             wider = np.fmax(np.fmax(wider, free), conditions.beyond**2)
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(complete):
-            table[0], spread = _moments(complete)
             # Errors of the model and of the estimate, never above those of the open loop.
             errors = self.errors.of_forecast(count, self._count.since)
             if self._count.partly:
                 own = self.errors.of_forecast(count)
                 errors = np.minimum(own + self._filter.ahead(count), errors)
-            variance = spread + wider * errors
-            if len(futures) > 1:
-                foreseen = np.arange(count) <= known - self._ahead  # their waves are known
-                low, high = DOUBTED
-                trust = (high - (spread + errors) / scale.spread**2) / (high - low)
-                lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0))
-                weight = np.where(foreseen[:, None], 1.0, lasting)
-                table[0] = scale.centre + weight * (table[0] - scale.centre)
-                # The error passes over with it, to that of the mean of training.
-                variance = weight * variance + (1.0 - weight) * wider * scale.spread**2
-                spread *= weight
-            table[1] = np.sqrt(variance)
+            foreseen = np.arange(count) <= known - self._ahead
+            table[0], spread, weight = weighed(complete, errors, scale, foreseen)
+            # The error passes over with the mean, to that of the mean of training.
+            variance = weight * (spread + wider * errors)
+            table[1] = np.sqrt(variance + (1.0 - weight) * wider * scale.spread**2)
+            spread *= weight
             half = _quantile(level, spread, table[1] ** 2, freedom) * table[1]
             table[2:] = table[0] - half, table[0] + half
         variables = label_channels(signature, table, ("statistic", "time"))
@@ -936,23 +925,6 @@ def held_samples(inside: BoolArray) -> npt.NDArray[np.intp]:
     """Leads that are all `inside` from the first on: how many of (steps, N), shape (N,)."""
     ended = np.concatenate([inside, np.zeros((1, inside.shape[1]), bool)])
     return np.argmin(ended, axis=0)
-
-
-def _moments(runs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean and variance over members and waves of runs (member, 1 + 2 departures, steps, N).
-
-    First come runs of the inputs that are expected, then of departures from them and of their
-    opposites. Innovations of later samples do the same later, so that effects add up over the
-    leads: what squares of waves move the mean by, and the variance. Inputs may depart by the same
-    waves, so that effects of one innovation of each count with one sign.
-    """
-    middle, (plus, minus) = runs[:, 0], np.split(runs[:, 1:], 2, axis=1)
-    apart = 0.5 * np.abs(plus - minus).sum(axis=1)
-    moved = (0.5 * (plus + minus) - middle[:, None]).sum(axis=1)
-    spread: FloatArray = np.cumsum(np.mean(apart**2, axis=0), axis=0)
-    if len(middle) > 1:
-        spread += middle.var(axis=0, ddof=1)
-    return middle.mean(axis=0) + np.cumsum(moved.mean(axis=0), axis=0), spread
 
 
 def _quantile(level: float, spread: FloatArray, variance: FloatArray, freedom: float) -> FloatArray:

@@ -66,9 +66,7 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     """
     array = as_series(series, minimum=4, channels=True)
     table = array.reshape(len(array), -1)
-    nowhere = np.full(table.shape[1], np.nan)
-    found = foresee(table, count, dt=1.0, positions=nowhere, depth=np.inf)
-    return found.expected.reshape(-1, *array.shape[1:])
+    return foresee(table, count).expected.reshape(-1, *array.shape[1:])
 
 
 class Foreseen(NamedTuple):
@@ -89,9 +87,23 @@ class Foreseen(NamedTuple):
     departures: FloatArray
     freedom: float
 
+    @property
+    def futures(self) -> FloatArray:
+        """What is expected, then departures from it and their opposites.
+
+        Shape (1 + 2 channels, count, channel).
+        """
+        middle, away = self.expected[None], self.departures
+        return np.concatenate([middle, middle + away, middle - away])
+
 
 def foresee(
-    series: npt.ArrayLike, count: int, *, dt: float, positions: npt.ArrayLike, depth: float
+    series: npt.ArrayLike,
+    count: int,
+    *,
+    dt: float = 1.0,
+    positions: npt.ArrayLike = math.nan,
+    depth: float = math.inf,
 ) -> Foreseen:
     r"""Continue elevations at probes that see the same waves, and say how they may depart from it.
 
@@ -108,7 +120,8 @@ def foresee(
     dt : float
         Time step, s.
     positions : array_like, shape (channel,)
-        Of the probes, m, positive downstream; NaN for a channel with a record of its own.
+        Of the probes, m, positive downstream; NaN, as all by default, for a channel with a record
+        of its own.
     depth : float
         Water depth, m; ``numpy.inf`` for deep water.
 
@@ -144,7 +157,7 @@ def foresee(
         expected[:, column] = values.mean() + continued(deviations, whitening, number)
         departures[column, :, column] = scipy.signal.lfilter([1.0], whitening, first)
 
-    places = np.asarray(positions, dtype=float)
+    places = np.broadcast_to(np.asarray(positions, dtype=float), channels)
     order = [int(each) for each in np.argsort(places) if np.isfinite(places[each])]
     for column in set(range(channels)) - set(order[1:]):
         follow(column, array[:, column])
