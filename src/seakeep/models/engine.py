@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -32,7 +33,7 @@ from seakeep.models.inputs import Drive
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.readouts import FittedReadOut, read_out
-from seakeep.signals.prediction import foresee
+from seakeep.signals.prediction import Foreseen, fill_future, foresee
 from seakeep.signals.time_axis import instant_text
 
 GROWTH = 10.0
@@ -411,15 +412,9 @@ class _Opened:
         start = max(span.known for span in spans)
         values = self.read(signature.inputs, 0, stop)
         values = np.pad(values, ((0, stop - len(values)), (0, 0)), constant_values=np.nan)
-        futures, ends = np.stack([values] * (1 + 2 * values.shape[1])), []
+        gaps = np.flatnonzero(~np.isfinite(values).all(axis=1))
         # Only the future is predicted: missing samples before a start are refused.
-        for at, column in enumerate(values.T):
-            if start < (end := (stretch := _last_stretch(column)).stop) < stop:
-                found = foresee(column[stretch, None], stop - end)
-                futures[:, end:, at] = found.expected[:, 0]
-                futures[1 + at :: values.shape[1], end:, at] = found.futures[1:, :, 0]
-                ends.append(end)
-        if not ends:
+        if gaps.max(initial=0) <= start or np.any((gaps > start - 4) & (gaps <= start)):
             return [self]
         if signature.input_map.reads_surge:
             raise RequestError(
@@ -433,11 +428,12 @@ class _Opened:
         beyond = self.time[-1] + signature.dt * np.arange(1, more + 1)
         run = run.pad(time=(0, more), keep_attrs=True)
         run = run.assign_coords(time=np.concatenate([self.time[:stop], beyond]))
+        futures, first, _ = fill_future(values, start + 1, foresight(signature, self.run))
         out = []
         for future in futures:
             columns = zip(signature.inputs, future.T, strict=True)
             own = run.assign({name: run[name].copy(data=each) for name, each in columns})
-            out.append(replace(self, run=own, known=min(ends) - 1))
+            out.append(replace(self, run=own, known=first - 1))
         return out
 
     def first_predicted(self, signature: Signature, span: Span) -> int:
@@ -482,12 +478,22 @@ class _Opened:
         return xr.Variable(("time",), np.concatenate([inside, beyond]), attrs)
 
 
-def _last_stretch(values: FloatArray) -> slice:
-    """The last samples in a row that are finite."""
-    sound = np.isfinite(values)
-    end = int(np.flatnonzero(sound)[-1]) + 1 if sound.any() else 0
-    gaps = np.flatnonzero(~sound[:end])
-    return slice(int(gaps[-1]) + 1 if gaps.size else 0, end)
+def foresight(signature: Signature, run: xr.Dataset | None = None) -> partial[Foreseen]:
+    """:func:`seakeep.signals.prediction.foresee` with what is known of the probes in a run.
+
+    Positions are NaN where none is known. Without a run they are those of training, if the model
+    takes raw probes.
+    """
+    alignment, positions, depth = signature.input_map.alignment, np.array(math.nan), math.nan
+    if alignment is not None and (run is not None or signature.input_map.follows is not None):
+        _, places, depth = alignment.rig(run)
+        positions = np.array(places, dtype=float)  # None becomes NaN
+    elif run is not None and alignment is None:
+        places = tuple(run[name].attrs.get("x_position") for name in signature.inputs)
+        positions, depth = np.array(places, dtype=float), run.attrs.get("water_depth", depth)
+    if math.isnan(depth):
+        positions = np.full(len(signature.inputs), math.nan)
+    return partial(foresee, dt=signature.dt, positions=positions, depth=depth)
 
 
 def array_windows(
@@ -726,6 +732,8 @@ def member_series(
         If the temporary folder has no room.
     """
     count, channels = model.n_members, len(model.signature.states)
+    if any(each.departures for each in groups):
+        getattr(model, "errors", None)  # found once, and handed to all workers
     with ExitStack() as stack:
         runs: list[Series] = [
             (

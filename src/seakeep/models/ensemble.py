@@ -671,8 +671,10 @@ class HankelEnsemble(Model):
         return [self.dynamics(number) for number in range(first, len(self._taught))]
 
     @cached_property
-    def errors(self) -> LeadErrors:
-        """Errors of the members' mean on what they learnt from."""
+    def errors(self) -> LeadErrors | None:
+        """Errors of the members' mean on what they learnt from; none of departures from means."""
+        if self.signature.input_map.reference:
+            return None
         signature, arrays, members = self.signature, self.arrays, self._means
         stretches = [
             Stretch(x, u, v, signature.history_samples - 1, min(len(x) - 1, len(u)))

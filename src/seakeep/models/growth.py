@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -205,31 +205,13 @@ def training_errors(
     return lead_errors([dynamics], stretches, signature.readouts)
 
 
-class Weighed(NamedTuple):
-    """A forecast from waves that are predicted, shape (…, steps, N) each, physical units.
-
-    Parameters
-    ----------
-    mean : ndarray
-        What is expected; it tends to the mean of training.
-    spread : ndarray
-        Variance over members and waves, before it is weighed.
-    weight : ndarray
-        Of the forecast against the mean of training: one where the waves are known.
-    """
-
-    mean: FloatArray
-    spread: FloatArray
-    weight: FloatArray
-
-
 def weighed(
     runs: FloatArray,
     errors: FloatArray | float,
     scale: Scale,
     foreseen: BoolArray,
     zero: FloatArray | float = 0.0,
-) -> Weighed:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean of runs that passes over to that of training as the claimed error nears the SD there.
 
     Parameters
@@ -247,6 +229,12 @@ def weighed(
         Whether the waves that a step reads are known: nothing changes there.
     zero : ndarray, shape (…, 1, N), optional
         What the mean of training is added to.
+
+    Returns
+    -------
+    mean, spread, weight : ndarray, shape (…, steps, N)
+        The mean; the variance over members and waves, before it is weighed; and the weight of the
+        forecast against the mean of training.
     """
     middle, (plus, minus) = runs[:, 0], np.split(runs[:, 1:], 2, axis=1)
     apart = 0.5 * np.abs(plus - minus).sum(axis=1)
@@ -254,47 +242,30 @@ def weighed(
     spread: FloatArray = np.cumsum(np.mean(apart**2, axis=0), axis=-2)
     if len(middle) > 1:
         spread += middle.var(axis=0, ddof=1)
-    expected = middle.mean(axis=0)
     low, high = DOUBTED
     trust = (high - (spread + errors) / scale.spread**2) / (high - low)
     lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)
-    known, centre = foreseen[..., None], scale.centre + zero
-    away = expected + np.cumsum(moved.mean(axis=0), axis=-2) - centre
-    return Weighed(
-        np.where(known, expected, centre + lasting * away), spread, np.where(known, 1.0, lasting)
-    )
-
-
-class Weighable(Protocol):
-    """A model whose free runs are weighed."""
-
-    @property
-    def signature(self) -> Signature:
-        """Channels, and moments of training."""
-        ...
-
-    @property
-    def errors(self) -> LeadErrors | None:
-        """Its errors in training, where they are known."""
-        ...
+    known, mean, centre = foreseen[..., None], middle.mean(axis=0), scale.centre + zero
+    shrunk = centre + lasting * (mean + np.cumsum(moved.mean(axis=0), axis=-2) - centre)
+    return np.where(known, mean, shrunk), spread, np.where(known, 1.0, lasting)
 
 
 def weighed_runs(
-    model: Weighable,
-    run: Callable[[Sequence[Windows]], list[FloatArray]],
-    groups: Sequence[Windows],
+    model: Any, run: Callable[[Sequence[Windows]], list[FloatArray]], groups: Sequence[Windows]
 ) -> list[FloatArray]:
     """Free runs that `run` makes over groups of windows, weighed where inputs are predicted.
 
-    Each is of shape (member, window, steps, N), and members are weighed one by one.
+    Each is of shape (member, window, steps, N), and members are weighed one by one, by the errors
+    in training of the `model`, where it holds them.
     """
     runs = run(groups)
     for values, windows in zip(runs, groups, strict=True):
         if windows.departures:
             every = np.stack([values, *run(windows.departures)])[None]
-            errors = 0.0 if model.errors is None else model.errors.of_forecast(windows.steps)
+            learnt = getattr(model, "errors", None)
+            errors = learnt.of_forecast(windows.steps) if learnt else 0.0
             first = np.array(windows.predicted)[:, None]
             foreseen = (np.arange(windows.steps) < first) | (first < 0)
             zero = 0.0 if windows.zero is None else windows.zero[:, None]
-            values[:] = weighed(every, errors, model.signature.state_scale, foreseen, zero).mean
+            values[:] = weighed(every, errors, model.signature.state_scale, foreseen, zero)[0]
     return runs

@@ -102,7 +102,7 @@ class HankelDMDcModel(Model):
 
     @cached_property
     def errors(self) -> LeadErrors | None:
-        """Its errors in training, computed on first use, which :meth:`live` weighs."""
+        """Its errors in training, computed on first use, which weigh forecasts and their bands."""
         if not isinstance(self.learnt, tuple):
             return self.learnt
         return training_errors(self.dynamics, self.learnt[0], self.signature, self.learnt[1])
@@ -326,9 +326,10 @@ class HankelDMDcModel(Model):
         steps : int
             Number of instants.
         ahead : {"refuse", "predict"}, optional
-            What to do if `u_future` ends before the look-ahead: refuse, or continue it by
-            linear prediction (:func:`seakeep.signals.predict_waves`) from all rows of `u_history`
-            and `u_future`; tens of wave periods of history are best.
+            What to do if `u_future` ends before the look-ahead: refuse, or predict it as
+            :meth:`forecast` does, from all rows of `u_history` and `u_future`; tens of wave periods
+            of history are best. Probes stand where they stood in training if the model carries
+            them itself; other inputs are continued each from its own record.
 
         Returns
         -------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -86,15 +87,6 @@ class Foreseen(NamedTuple):
     expected: FloatArray
     departures: FloatArray
     freedom: float
-
-    @property
-    def futures(self) -> FloatArray:
-        """What is expected, then departures from it and their opposites.
-
-        Shape (1 + 2 channels, count, channel).
-        """
-        middle, away = self.expected[None], self.departures
-        return np.concatenate([middle, middle + away, middle - away])
 
 
 def foresee(
@@ -181,6 +173,55 @@ def foresee(
                 continue
         follow(here, left)
     return Foreseen(expected, departures, size / max(orders, default=1.0))
+
+
+def fill_future(
+    series: FloatArray,
+    known: int,
+    foreseen: Callable[[FloatArray, int], Foreseen],
+    most: int | None = None,
+) -> tuple[FloatArray, int, float]:
+    """Fill what is missing of records from a sample on, and say how it may depart from that.
+
+    Parameters
+    ----------
+    series : ndarray, shape (time, channel)
+        Elevations, not finite where they are missing.
+    known : int
+        Sample from which on they are filled; one at least is missing.
+    foreseen : callable
+        :func:`foresee` with the positions of the probes: called with a record and a count.
+    most : int, optional
+        Samples before the first missing one that are read, at most.
+
+    Returns
+    -------
+    futures : ndarray, shape (1 + 2 channels, time, channel)
+        First what is expected, then departures from it by an innovation of each channel where it
+        is first missing, then their opposites.
+    first : int
+        First sample of which one is missing.
+    freedom : float
+        As in :class:`Foreseen`.
+    """
+    gaps = ~np.isfinite(series)
+    lacking = np.flatnonzero(gaps.any(axis=1))
+    at = int(np.searchsorted(lacking, known))
+    first, begin = int(lacking[at]), int(lacking[at - 1]) + 1 if at else 0
+    missing, count = gaps[first:], len(series) - first
+    record = series[begin:first] if most is None else series[begin:first][-most:]
+    found, departures = foreseen(record, count), np.zeros((gaps.shape[1], *series.shape))
+    for column, late in enumerate(missing.argmax(axis=0)):
+        if missing[:, column].any():
+            away = found.departures[column, : count - late]
+            departures[column, first + late :] = away * missing[late:]
+    filled = series.copy()
+    filled[first:][missing] = found.expected[missing]
+    return (
+        np.concatenate([filled[None], filled + departures, filled - departures]),
+        first,
+        found.freedom,
+    )
 
 
 def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: float) -> float:
