@@ -484,15 +484,15 @@ def foresight(signature: Signature, run: xr.Dataset | None = None) -> partial[Fo
     Positions are NaN where none is known. Without a run they are those of training, if the model
     takes raw probes.
     """
-    alignment, positions, depth = signature.input_map.alignment, np.array(math.nan), math.nan
-    if alignment is not None and (run is not None or signature.input_map.follows is not None):
-        _, places, depth = alignment.rig(run)
-        positions = np.array(places, dtype=float)  # None becomes NaN
-    elif run is not None and alignment is None:
+    places, depth = tuple[float | None, ...]([None]), math.nan
+    if (alignment := signature.input_map.alignment) is not None:
+        if run is not None or signature.input_map.follows is not None:
+            _, places, depth = alignment.rig(run)
+    elif run is not None:
         places = tuple(run[name].attrs.get("x_position") for name in signature.inputs)
-        positions, depth = np.array(places, dtype=float), run.attrs.get("water_depth", depth)
-    if math.isnan(depth):
-        positions = np.full(len(signature.inputs), math.nan)
+        depth = run.attrs.get("water_depth", depth)
+    stated = np.array(places, dtype=float)  # None becomes NaN
+    positions = np.where(math.isnan(depth), math.nan, stated)
     return partial(foresee, dt=signature.dt, positions=positions, depth=depth)
 
 

@@ -527,8 +527,8 @@ def check_arrays(
     if missing := needed - len(after):
         _finite("u_history", past)
         whole = np.pad(whole, ((0, missing), (0, 0)), constant_values=np.nan)
-        futures, at, _ = fill_future(whole, len(past), engine.foresight(signature))
-        first = max(at - len(past) - signature.lead_samples + 1, 0)
+        futures = fill_future(whole, len(past), engine.foresight(signature))[0]
+        first = max(len(after) - signature.lead_samples + 1, 0)
     windows, *departures = (
         engine.array_windows(signature, x[None], each[None, -z - 1 - needed :], count)
         for each in futures

@@ -780,7 +780,9 @@ class Live:
         inputs, begin = np.concatenate([record, given]), len(record)
         if not np.isnan(given).any():
             return inputs[None], math.inf, len(given)
-        filled, first, freedom = fill_future(inputs[:, waves], begin, self._foreseen, self._record)
+        filled, first, freedom = fill_future(
+            inputs[:, waves], begin, lambda of, steps: self._foreseen(of[-self._record :], steps)
+        )
         futures = np.repeat(inputs[None], len(filled), axis=0)
         futures[:, :, waves] = filled
         return futures, freedom, first - begin

@@ -176,10 +176,7 @@ def foresee(
 
 
 def fill_future(
-    series: FloatArray,
-    known: int,
-    foreseen: Callable[[FloatArray, int], Foreseen],
-    most: int | None = None,
+    series: FloatArray, known: int, foreseen: Callable[[FloatArray, int], Foreseen]
 ) -> tuple[FloatArray, int, float]:
     """Fill what is missing of records from a sample on, and say how it may depart from that.
 
@@ -191,8 +188,6 @@ def fill_future(
         Sample from which on they are filled; one at least is missing.
     foreseen : callable
         :func:`foresee` with the positions of the probes: called with a record and a count.
-    most : int, optional
-        Samples before the first missing one that are read, at most.
 
     Returns
     -------
@@ -208,20 +203,15 @@ def fill_future(
     lacking = np.flatnonzero(gaps.any(axis=1))
     at = int(np.searchsorted(lacking, known))
     first, begin = int(lacking[at]), int(lacking[at - 1]) + 1 if at else 0
-    missing, count = gaps[first:], len(series) - first
-    record = series[begin:first] if most is None else series[begin:first][-most:]
-    found, departures = foreseen(record, count), np.zeros((gaps.shape[1], *series.shape))
+    missing, found = gaps[first:], foreseen(series[begin:first], len(series) - first)
+    departures, filled = np.zeros((gaps.shape[1], *series.shape)), series.copy()
     for column, late in enumerate(missing.argmax(axis=0)):
         if missing[:, column].any():
-            away = found.departures[column, : count - late]
+            away = found.departures[column, : len(missing) - late]
             departures[column, first + late :] = away * missing[late:]
-    filled = series.copy()
     filled[first:][missing] = found.expected[missing]
-    return (
-        np.concatenate([filled[None], filled + departures, filled - departures]),
-        first,
-        found.freedom,
-    )
+    futures = np.concatenate([filled[None], filled + departures, filled - departures])
+    return futures, first, found.freedom
 
 
 def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: float) -> float:
