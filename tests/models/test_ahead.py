@@ -8,6 +8,7 @@ from ensembles import few
 
 import seakeep
 from seakeep import HankelDMDc, RequestError
+from seakeep.models.growth import weighed
 from seakeep.signals.prediction import foresee
 
 PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
@@ -174,3 +175,11 @@ def test_no_lead_errs_more_than_the_mean(runs, test_run, positions):
     assert ratio.max() < 1.01
     assert ratio[:3].max() < 0.2
     np.testing.assert_allclose(found.heave.values[-20:], mean, atol=1e-12)
+
+
+def test_where_waves_are_known_nothing_is_weighed(model):
+    scale, runs = model.state_scale, 9.0 * np.random.default_rng(0).standard_normal((1, 5, 4, 2))
+    known = np.array([True, True, False, False])
+    mean, _, weight = weighed(runs, 0.0, scale, known)
+    np.testing.assert_array_equal(mean, np.where(known[:, None], runs[0, 0], scale.centre))
+    np.testing.assert_array_equal(weight, np.repeat(known[:, None], 2, axis=1))
