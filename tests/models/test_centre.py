@@ -96,22 +96,21 @@ def test_a_zero_moves_the_forecast_and_changes_nothing_else(spec):
     plain = {name: run.isel(time=slice(0, 1100)) for name, run in runs_of(0, 0, 0).items()}
     there = {name: moved(run, n - 0.5) for n, (name, run) in enumerate(plain.items())}
     models = [spec.fit(runs, *CHANNELS) for runs in (plain, there)]
-    run = vessel(9)
     start = DT * (PERIOD + 100)
-    if isinstance(models[0], HankelEnsemble):
-        forecasts = [
-            model.forecast_summary(each, start, 100).sel(statistic="mean")
-            for model, each in zip(models, (run, moved(run, 20.0)), strict=True)
-        ]
-    else:
-        forecasts = [
-            model.forecast(each, start, 100)
-            for model, each in zip(models, (run, moved(run, 20.0)), strict=True)
-        ]
-    for name in CHANNELS[0]:
-        change = forecasts[1][name] - forecasts[0][name]
-        # Differences of numbers of a hundred, through regressions of condition 1e4.
-        np.testing.assert_allclose(change, 20.0 * OFFSETS[name], rtol=0, atol=1e-7)
+    for known in (None, PERIOD + 110):  # samples of inputs that are not predicted
+        run = vessel(9).isel(time=slice(0, known))
+        pairs = zip(models, (run, moved(run, 20.0)), strict=True)
+        if isinstance(models[0], HankelEnsemble):
+            forecasts = [
+                model.forecast_summary(each, start, 100, ahead="predict").sel(statistic="mean")
+                for model, each in pairs
+            ]
+        else:
+            forecasts = [model.forecast(each, start, 100, ahead="predict") for model, each in pairs]
+        for name in CHANNELS[0]:
+            change = forecasts[1][name] - forecasts[0][name]
+            # Differences of numbers of a hundred, through regressions of condition 1e4.
+            np.testing.assert_allclose(change, 20.0 * OFFSETS[name], rtol=0, atol=1e-7)
     first, second = (getattr(model, "selection", "") for model in models)
     assert first == second
 

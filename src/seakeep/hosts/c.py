@@ -21,7 +21,8 @@ from seakeep.files import MARK, check_output, make_folder, write_text
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
-from seakeep.models.live import DOUBTED, Live
+from seakeep.models.growth import DOUBTED
+from seakeep.models.live import Live
 from seakeep.models.terms import SlowSquare, Term
 from seakeep.models.validity import CYCLES, TRAINED
 from seakeep.signals.expressions import Text

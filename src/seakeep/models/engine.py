@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -32,7 +33,7 @@ from seakeep.models.inputs import Drive
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.readouts import FittedReadOut, read_out
-from seakeep.signals.prediction import predict_waves
+from seakeep.signals.prediction import Foreseen, fill_future, foresee
 from seakeep.signals.time_axis import instant_text
 
 GROWTH = 10.0
@@ -85,6 +86,9 @@ class Windows:
         Parameter of the run of each window, where the model varies with one.
     zero : ndarray, shape (window, N), optional
         What the states of each window depart from: it is to be added to free runs.
+    departures : tuple of Windows
+        The same with an innovation of one SD where each input is first predicted, and with the
+        opposites.
     """
 
     places: tuple[tuple[str, float], ...]
@@ -101,6 +105,7 @@ class Windows:
     waves: FloatArray | None = None
     parameters: tuple[float, ...] = ()
     zero: FloatArray | None = None
+    departures: tuple[Windows, ...] = ()
 
     def __len__(self) -> int:
         return len(self.histories)
@@ -214,18 +219,26 @@ def read_groups(
             span = opened[name].span(signature, start, steps, predicts)
             spans[-1].append(span)
             wanted[name].append(span)
-    if predicts:
-        opened = {name: each.continued(signature, wanted[name]) for name, each in opened.items()}
-    drives = {name: each.drive(signature, wanted[name]) for name, each in opened.items()}
-    return [
-        _driven(
-            signature,
-            [drives[name] for name, _ in places],
-            mine,
-            [opened[name] for name, _ in places],
+    futures = {
+        name: each.continued(signature, wanted[name]) if predicts else [each]
+        for name, each in opened.items()
+    }
+    made = []
+    for number in range(max(map(len, futures.values()), default=0)):
+        opened = {name: each[number % len(each)] for name, each in futures.items()}
+        drives = {name: each.drive(signature, wanted[name]) for name, each in opened.items()}
+        made.append(
+            [
+                _driven(
+                    signature,
+                    [drives[name] for name, _ in places],
+                    mine,
+                    [opened[name] for name, _ in places],
+                )
+                for (places, _), mine in zip(groups, spans, strict=True)
+            ]
         )
-        for (places, _), mine in zip(groups, spans, strict=True)
-    ]
+    return [replace(each, departures=tuple(others)) for each, *others in zip(*made, strict=True)]
 
 
 def _driven(
@@ -390,18 +403,19 @@ class _Opened:
             )
         return Span(at - signature.input_delays, at, at + count)
 
-    def continued(self, signature: Signature, spans: Sequence[Span]) -> _Opened:
-        """The run up to the last sample that is wanted, with inputs predicted that are missing."""
+    def continued(self, signature: Signature, spans: Sequence[Span]) -> list[_Opened]:
+        """The run up to the last sample that is wanted, with inputs predicted that are missing.
+
+        Then departures from these, of each input, and their opposites.
+        """
         stop = max(signature.input_map.reads(span).stop for span in spans)
         start = max(span.known for span in spans)
         values = self.read(signature.inputs, 0, stop)
+        values = np.pad(values, ((0, stop - len(values)), (0, 0)), constant_values=np.nan)
+        gaps = np.flatnonzero(~np.isfinite(values).all(axis=1))
         # Only the future is predicted: missing samples before a start are refused.
-        sound = {}
-        for name, column in zip(signature.inputs, values.T, strict=True):
-            if start < (stretch := _last_stretch(column)).stop < stop:
-                sound[name] = column[stretch], stretch.stop
-        if not sound:
-            return self
+        if gaps.max(initial=0) <= start or np.any((gaps > start - 4) & (gaps <= start)):
+            return [self]
         if signature.input_map.reads_surge:
             raise RequestError(
                 f"ahead = 'predict' continues inputs, and those of {self.name} are carried to the "
@@ -414,9 +428,13 @@ class _Opened:
         beyond = self.time[-1] + signature.dt * np.arange(1, more + 1)
         run = run.pad(time=(0, more), keep_attrs=True)
         run = run.assign_coords(time=np.concatenate([self.time[:stop], beyond]))
-        for name, (known, end) in sound.items():
-            run[name].values[end:] = predict_waves(known, stop - end)
-        return replace(self, run=run, known=min(end for _, end in sound.values()) - 1)
+        futures, first, _ = fill_future(values, start + 1, foresight(signature, self.run))
+        out = []
+        for future in futures:
+            columns = zip(signature.inputs, future.T, strict=True)
+            own = run.assign({name: run[name].copy(data=each) for name, each in columns})
+            out.append(replace(self, run=own, known=first - 1))
+        return out
 
     def first_predicted(self, signature: Signature, span: Span) -> int:
         """First step that reads predicted input, or −1."""
@@ -460,12 +478,22 @@ class _Opened:
         return xr.Variable(("time",), np.concatenate([inside, beyond]), attrs)
 
 
-def _last_stretch(values: FloatArray) -> slice:
-    """The last samples in a row that are finite."""
-    sound = np.isfinite(values)
-    end = int(np.flatnonzero(sound)[-1]) + 1 if sound.any() else 0
-    gaps = np.flatnonzero(~sound[:end])
-    return slice(int(gaps[-1]) + 1 if gaps.size else 0, end)
+def foresight(signature: Signature, run: xr.Dataset | None = None) -> partial[Foreseen]:
+    """:func:`seakeep.signals.prediction.foresee` with what is known of the probes in a run.
+
+    Positions are NaN where none is known. Without a run they are those of training, if the model
+    takes raw probes.
+    """
+    places, depth = tuple[float | None, ...]([None]), math.nan
+    if (alignment := signature.input_map.alignment) is not None:
+        if run is not None or signature.input_map.follows is not None:
+            _, places, depth = alignment.rig(run)
+    elif run is not None:
+        places = tuple(run[name].attrs.get("x_position") for name in signature.inputs)
+        depth = run.attrs.get("water_depth", depth)
+    stated = np.array(places, dtype=float)  # None becomes NaN
+    positions = np.where(math.isnan(depth), math.nan, stated)
+    return partial(foresee, dt=signature.dt, positions=positions, depth=depth)
 
 
 def array_windows(
@@ -704,6 +732,8 @@ def member_series(
         If the temporary folder has no room.
     """
     count, channels = model.n_members, len(model.signature.states)
+    if any(each.departures for each in groups):
+        getattr(model, "errors", None)  # found once, and handed to all workers
     with ExitStack() as stack:
         runs: list[Series] = [
             (

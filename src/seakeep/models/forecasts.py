@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
 
@@ -23,7 +24,7 @@ from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix, run_name
 from seakeep.models.training import Training
 from seakeep.models.validity import outside_training
-from seakeep.signals.prediction import predict_waves
+from seakeep.signals.prediction import fill_future
 from seakeep.signals.time_axis import instant_text, span_text
 
 
@@ -219,10 +220,12 @@ class Model:
         steps : int, optional
             Number of instants forecast; by default to the end of the run.
         ahead : {"refuse", "predict"}, optional
-            What to do if the input ends before the look-ahead: refuse, or continue each
-            input from its own record by linear prediction
-            (:func:`seakeep.signals.predict_waves`). Samples missing at the end count as not
-            recorded.
+            What to do if the input ends before the look-ahead: refuse, or predict it as
+            ``live().forecast`` does, from its record by linear prediction
+            (:func:`seakeep.signals.predict_waves`), and from what probes up-wave have seen where
+            positions and depth are known. Samples missing at the end count as not recorded. As
+            the error that is expected comes near the SD of training, the forecast tends to the
+            mean there, so that no lead errs more than the mean.
 
         Returns
         -------
@@ -512,18 +515,25 @@ def check_arrays(
     if not inputs:
         return engine.array_windows(signature, x[None], np.zeros((1, z + count, 0)), count)
     past = rows_by_name("u_history", u_history, z + 1, inputs, "z + 1")
-    u = _finite("u_history", past[-z - 1 :])
+    _finite("u_history", past[-z - 1 :])
     is_empty = as_real(u_future, "u_future").size == 0
     future = np.zeros((0, len(inputs))) if is_empty else u_future
     needed = count - 1 + signature.lead_samples
     meaning = "steps − 1 + lead_samples" if signature.lead_samples else "steps − 1"
     least = needed if ahead == "refuse" else 0
     after = _finite("u_future", rows_by_name("u_future", future, least, inputs, meaning)[:needed])
-    driving = np.concatenate([u, after])
+    whole, first = np.concatenate([past, after]), -1
+    futures = whole[None]
     if missing := needed - len(after):
-        known = np.concatenate([_finite("u_history", past), after])
-        driving = np.concatenate([driving, predict_waves(known, missing)])
-    return engine.array_windows(signature, x[None], driving[None], count)
+        _finite("u_history", past)
+        whole = np.pad(whole, ((0, missing), (0, 0)), constant_values=np.nan)
+        futures = fill_future(whole, len(past), engine.foresight(signature))[0]
+        first = max(len(after) - signature.lead_samples + 1, 0)
+    windows, *departures = (
+        engine.array_windows(signature, x[None], each[None, -z - 1 - needed :], count)
+        for each in futures
+    )
+    return replace(windows, departures=tuple(departures), predicted=(first,))
 
 
 def rows_by_name(

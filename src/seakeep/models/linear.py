@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -19,7 +19,7 @@ from seakeep.models import engine, export, labelled, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
 from seakeep.models.forecasts import Model, check_arrays, counted, one_run, rows_by_name
-from seakeep.models.growth import LeadErrors, training_errors
+from seakeep.models.growth import LeadErrors, training_errors, weighed_runs
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.live import Live
@@ -102,7 +102,7 @@ class HankelDMDcModel(Model):
 
     @cached_property
     def errors(self) -> LeadErrors | None:
-        """Its errors in training, computed on first use, which :meth:`live` weighs."""
+        """Its errors in training, computed on first use, which weigh forecasts and their bands."""
         if not isinstance(self.learnt, tuple):
             return self.learnt
         return training_errors(self.dynamics, self.learnt[0], self.signature, self.learnt[1])
@@ -201,7 +201,8 @@ class HankelDMDcModel(Model):
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
         if self.variation is None or not all(each.parameters for each in groups):
-            return linear_runs([self.dynamics], groups, self.signature.readouts)
+            run = partial(linear_runs, [self.dynamics], readouts=self.signature.readouts)
+            return weighed_runs(self, run, groups)
         runs = [np.empty((1, len(each), each.steps, len(self.states))) for each in groups]
         for value in sorted({value for each in groups for value in each.parameters}):
             there = [np.array(each.parameters) == value for each in groups]
@@ -325,9 +326,10 @@ class HankelDMDcModel(Model):
         steps : int
             Number of instants.
         ahead : {"refuse", "predict"}, optional
-            What to do if `u_future` ends before the look-ahead: refuse, or continue it by
-            linear prediction (:func:`seakeep.signals.predict_waves`) from all rows of `u_history`
-            and `u_future`; tens of wave periods of history are best.
+            What to do if `u_future` ends before the look-ahead: refuse, or predict it as
+            :meth:`forecast` does, from all rows of `u_history` and `u_future`; tens of wave periods
+            of history are best. Probes stand where they stood in training if the model carries
+            them itself; other inputs are continued each from its own record.
 
         Returns
         -------

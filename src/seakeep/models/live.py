@@ -13,7 +13,7 @@ import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -36,18 +36,17 @@ from seakeep.core.recursion import read_row, read_table
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
-from seakeep.models.alignment import FittedAlignment
 from seakeep.models.checks import check_choice
 from seakeep.models.engine import Dynamics, Runs
 from seakeep.models.executor import one_blas_thread
 from seakeep.models.forecasts import label_channels, rows_by_name
-from seakeep.models.growth import WINDOWS, LeadErrors
+from seakeep.models.growth import WINDOWS, LeadErrors, weighed
 from seakeep.models.inputs import Drive
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.models.validity import Conditions, Coverage, Validity
-from seakeep.signals.prediction import Foreseen, foresee, predict_waves, predictable_time
+from seakeep.signals.prediction import fill_future, predict_waves, predictable_time
 
 STATE = "live state"
 """Kind of the files of :meth:`Live.save`."""
@@ -62,10 +61,6 @@ SPIKE = 100.0
 """What a single sample adds to the consistency at most: a spike tells of a sensor, for a while."""
 ALARM = 2.0
 """Consistency of a state above which errors of late are no longer those of training."""
-DOUBTED = 0.5, 0.9
-"""Squares of errors, claimed, over the variance of training between which a forecast from waves
-that are predicted passes over to the mean: on the virtual tank its best weight is 0.7 to 0.9 at
-0.55, 0.2 to 0.5 at 0.75 and 0 to 0.1 at 0.95, by one probe and by two."""
 LATE = 16
 """Complete samples that are judged together: each alone would cost three times as much."""
 SMALL = 0.5
@@ -195,8 +190,10 @@ class Live:
                 "there in service. Fit it with alignment mode = 'dispersion', surge = 'predicted', "
                 "which carries them in each step, or without alignment."
             )
-        self._places, self._depth = _places(signature, aligned, self._rig)
-        self._places[[name in self._roles for name in signature.inputs]] = math.nan
+        foresight = engine.foresight(signature, self._rig)
+        self._places = foresight.keywords["positions"][self._waves]
+        self._depth = foresight.keywords["depth"]
+        self._foreseen = partial(foresight, positions=self._places)
         self._offset, self._a, self._b, self._d = _mean_predictor(members, signature)
         count, s = len(signature.states), signature.state_delays
         size, variances = count * (s + 1), self._noise**2
@@ -446,8 +443,8 @@ class Live:
             )
         known = self._known_inputs()
         if self._follows is None and self.ready and np.isfinite(self._places).sum() >= 2:
-            expected = known[-1].copy()
-            expected[self._waves] = self._foreseen(known, 1).expected[0]
+            expected, waves = known[-1].copy(), self._waves
+            expected[waves] = self._foreseen(known[:, waves], 1).expected[0]
         else:
             expected = self._expected(known, 1)[0]
         return np.where(lost, expected, inputs)
@@ -464,11 +461,6 @@ class Live:
         if waves:
             out[:, waves] = predict_waves(known[:, waves], count)
         return out
-
-    def _foreseen(self, known: FloatArray, count: int) -> Foreseen:
-        """Waves to come after samples of the inputs, and how they may depart from it."""
-        places, dt = self._places[self._waves], self.signature.dt
-        return foresee(known[:, self._waves], count, dt=dt, positions=places, depth=self._depth)
 
     def _known_inputs(self) -> FloatArray:
         """Inputs that waves are predicted from: the last ones, always as many once there are."""
@@ -720,24 +712,17 @@ class Live:
             wider = np.fmax(np.fmax(wider, free), conditions.beyond**2)
         table = np.full((4, count, len(signature.states)), np.nan)
         if len(complete):
-            table[0], spread = _moments(complete)
             # Errors of the model and of the estimate, never above those of the open loop.
             errors = self.errors.of_forecast(count, self._count.since)
             if self._count.partly:
                 own = self.errors.of_forecast(count)
                 errors = np.minimum(own + self._filter.ahead(count), errors)
-            variance = spread + wider * errors
-            if len(futures) > 1:
-                foreseen = np.arange(count) <= known - self._ahead  # their waves are known
-                low, high = DOUBTED
-                trust = (high - (spread + errors) / scale.spread**2) / (high - low)
-                lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0))
-                weight = np.where(foreseen[:, None], 1.0, lasting)
-                table[0] = scale.centre + weight * (table[0] - scale.centre)
-                # The error passes over with it, to that of the mean of training.
-                variance = weight * variance + (1.0 - weight) * wider * scale.spread**2
-                spread *= weight
-            table[1] = np.sqrt(variance)
+            foreseen = np.arange(count) <= known - self._ahead
+            table[0], spread, weight = weighed(complete, errors, scale, foreseen)
+            # The error passes over with the mean, to that of the mean of training.
+            variance = weight * (spread + wider * errors)
+            table[1] = np.sqrt(variance + (1.0 - weight) * wider * scale.spread**2)
+            spread *= weight
             half = _quantile(level, spread, table[1] ** 2, freedom) * table[1]
             table[2:] = table[0] - half, table[0] + half
         variables = label_channels(signature, table, ("statistic", "time"))
@@ -766,7 +751,7 @@ class Live:
         placed = np.flatnonzero(np.isfinite(self._places))
         if not placed.size:
             return 0.0
-        record = self._known_inputs()[:, placed[self._places[placed].argmin()]]
+        record = self._known_inputs()[:, self._waves[placed[self._places[placed].argmin()]]]
         if not np.ptp(record) > 0:
             return 0.0
         apart = float(np.ptp(self._places[placed]))
@@ -792,23 +777,15 @@ class Live:
             whole = np.append(record[-1, column], given[:, column])
             at = np.where(np.isfinite(whole), np.arange(whole.size), 0)
             given[:, column] = whole[np.maximum.accumulate(at)][1:]
-        gaps, inputs = np.isnan(given), np.concatenate([record, given])
-        if not gaps.any():
+        inputs, begin = np.concatenate([record, given]), len(record)
+        if not np.isnan(given).any():
             return inputs[None], math.inf, len(given)
-        count = int(gaps.any(axis=1).argmax())
-        begin, missing = len(record) + count, gaps[count:, waves]
-        last = inputs[max(begin - self._record, 0) : begin]
-        rest, foreseen = inputs[begin:], self._foreseen(last, len(missing))
-        rest[:, waves] = np.where(missing, foreseen.expected, rest[:, waves])
-        departures = np.zeros((len(waves), *inputs.shape))
-        for each, late, of_one in zip(
-            departures, missing.argmax(axis=0), foreseen.departures, strict=True
-        ):
-            each[begin + late :, waves] = of_one[: len(rest) - late]
-        departures[:, begin:, waves] *= missing
-        departures *= missing.max(axis=0)[:, None, None]
-        futures = np.concatenate([inputs[None], inputs + departures, inputs - departures])
-        return futures, foreseen.freedom, count
+        filled, first, freedom = fill_future(
+            inputs[:, waves], begin, lambda of, steps: self._foreseen(of[-self._record :], steps)
+        )
+        futures = np.repeat(inputs[None], len(filled), axis=0)
+        futures[:, :, waves] = filled
+        return futures, freedom, first - begin
 
     def save(self, path: str | Path) -> Path:
         """Write all that the object needs to go on (NetCDF), to a temporary name first.
@@ -938,23 +915,6 @@ def held_samples(inside: BoolArray) -> npt.NDArray[np.intp]:
     return np.argmin(ended, axis=0)
 
 
-def _moments(runs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean and variance over members and waves of runs (member, 1 + 2 departures, steps, N).
-
-    First come runs of the inputs that are expected, then of departures from them and of their
-    opposites. Innovations of later samples do the same later, so that effects add up over the
-    leads: what squares of waves move the mean by, and the variance. Inputs may depart by the same
-    waves, so that effects of one innovation of each count with one sign.
-    """
-    middle, (plus, minus) = runs[:, 0], np.split(runs[:, 1:], 2, axis=1)
-    apart = 0.5 * np.abs(plus - minus).sum(axis=1)
-    moved = (0.5 * (plus + minus) - middle[:, None]).sum(axis=1)
-    spread: FloatArray = np.cumsum(np.mean(apart**2, axis=0), axis=0)
-    if len(middle) > 1:
-        spread += middle.var(axis=0, ddof=1)
-    return middle.mean(axis=0) + np.cumsum(moved.mean(axis=0), axis=0), spread
-
-
 def _quantile(level: float, spread: FloatArray, variance: FloatArray, freedom: float) -> FloatArray:
     """Half-width of the band in standard deviations: Student's quantile.
 
@@ -1005,19 +965,6 @@ def _rig(signature: Signature, like: xr.Dataset | None) -> xr.Dataset:
         if name in like and "x_position" in like[name].attrs:
             rig[name].attrs["x_position"] = float(like[name].attrs["x_position"])
     return rig
-
-
-def _places(
-    signature: Signature, alignment: FittedAlignment | None, rig: xr.Dataset
-) -> tuple[FloatArray, float]:
-    """Positions of the inputs that are elevations, NaN where none is known, and the depth."""
-    depth = rig.attrs.get("water_depth", None if alignment is None else alignment.water_depth)
-    if depth is None:
-        return np.full(len(signature.inputs), math.nan), math.nan
-    if alignment is not None:
-        return np.array(alignment.rig(rig).positions, dtype=float), depth
-    places = [rig[name].attrs.get("x_position") for name in signature.inputs]
-    return np.array(places, dtype=float), depth  # None becomes NaN
 
 
 def _named(what: str, given: object, names: Sequence[str]) -> Iterator[tuple[int, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -66,9 +67,7 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     """
     array = as_series(series, minimum=4, channels=True)
     table = array.reshape(len(array), -1)
-    nowhere = np.full(table.shape[1], np.nan)
-    found = foresee(table, count, dt=1.0, positions=nowhere, depth=np.inf)
-    return found.expected.reshape(-1, *array.shape[1:])
+    return foresee(table, count).expected.reshape(-1, *array.shape[1:])
 
 
 class Foreseen(NamedTuple):
@@ -91,7 +90,12 @@ class Foreseen(NamedTuple):
 
 
 def foresee(
-    series: npt.ArrayLike, count: int, *, dt: float, positions: npt.ArrayLike, depth: float
+    series: npt.ArrayLike,
+    count: int,
+    *,
+    dt: float = 1.0,
+    positions: npt.ArrayLike = math.nan,
+    depth: float = math.inf,
 ) -> Foreseen:
     r"""Continue elevations at probes that see the same waves, and say how they may depart from it.
 
@@ -108,7 +112,8 @@ def foresee(
     dt : float
         Time step, s.
     positions : array_like, shape (channel,)
-        Of the probes, m, positive downstream; NaN for a channel with a record of its own.
+        Of the probes, m, positive downstream; NaN, as all by default, for a channel with a record
+        of its own.
     depth : float
         Water depth, m; ``numpy.inf`` for deep water.
 
@@ -144,7 +149,7 @@ def foresee(
         expected[:, column] = values.mean() + continued(deviations, whitening, number)
         departures[column, :, column] = scipy.signal.lfilter([1.0], whitening, first)
 
-    places = np.asarray(positions, dtype=float)
+    places = np.broadcast_to(np.asarray(positions, dtype=float), channels)
     order = [int(each) for each in np.argsort(places) if np.isfinite(places[each])]
     for column in set(range(channels)) - set(order[1:]):
         follow(column, array[:, column])
@@ -168,6 +173,45 @@ def foresee(
                 continue
         follow(here, left)
     return Foreseen(expected, departures, size / max(orders, default=1.0))
+
+
+def fill_future(
+    series: FloatArray, known: int, foreseen: Callable[[FloatArray, int], Foreseen]
+) -> tuple[FloatArray, int, float]:
+    """Fill what is missing of records from a sample on, and say how it may depart from that.
+
+    Parameters
+    ----------
+    series : ndarray, shape (time, channel)
+        Elevations, not finite where they are missing.
+    known : int
+        Sample from which on they are filled; one at least is missing.
+    foreseen : callable
+        :func:`foresee` with the positions of the probes: called with a record and a count.
+
+    Returns
+    -------
+    futures : ndarray, shape (1 + 2 channels, time, channel)
+        First what is expected, then departures from it by an innovation of each channel where it
+        is first missing, then their opposites.
+    first : int
+        First sample of which one is missing.
+    freedom : float
+        As in :class:`Foreseen`.
+    """
+    gaps = ~np.isfinite(series)
+    lacking = np.flatnonzero(gaps.any(axis=1))
+    at = int(np.searchsorted(lacking, known))
+    first, begin = int(lacking[at]), int(lacking[at - 1]) + 1 if at else 0
+    missing, found = gaps[first:], foreseen(series[begin:first], len(series) - first)
+    departures, filled = np.zeros((gaps.shape[1], *series.shape)), series.copy()
+    for column, late in enumerate(missing.argmax(axis=0)):
+        if missing[:, column].any():
+            away = found.departures[column, : len(missing) - late]
+            departures[column, first + late :] = away * missing[late:]
+    filled[first:][missing] = found.expected[missing]
+    futures = np.concatenate([filled[None], filled + departures, filled - departures])
+    return futures, first, found.freedom
 
 
 def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: float) -> float:
