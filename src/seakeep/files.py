@@ -364,9 +364,11 @@ def read_sealed(path: Path | str) -> io.BytesIO:
     stated = file[-len(SEAL) - 8 :]
     is_sealed = stated.startswith(SEAL)
     if not is_sealed or _seal_of(memoryview(file)[: -len(stated)]) != stated:
-        why = "its checksum is another one" if is_sealed else "it has no checksum at its end"
+        why = (
+            "its checksum is another one" if is_sealed else "it ends in no checksum of this version"
+        )
         raise DataError(
-            f"{path} was cut off, altered or damaged, or seakeep did not write it: {why}. Copy it "
+            f"{path} was cut off, altered or damaged, or another seakeep wrote it: {why}. Copy it "
             "again, or remove it and make it anew."
         )
     return io.BytesIO(file)
