@@ -49,9 +49,8 @@ class GeneralSettings(Table):
         "the wave channel whose zero-up-crossings define the encounter period"
     )
     period_hysteresis: Annotated[float, Field(ge=0, lt=1)] = optional(
-        "fraction of its standard deviation by which a wave must pass its mean "
-        "either way "
-        "to count; 0, the paper's, counts all. Still water around the waves never counts",
+        "fraction of its standard deviation by which a wave must pass its mean either way to "
+        "count; 0, the paper's, counts all. Still water around the waves never counts",
         0.0,
     )
 

@@ -309,10 +309,9 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
         most = np.abs(result["displacement"].values).max(axis=1)
         # None swings farther than it was moved in still water.
         points = [
-            f"{motion}: after its release the model swings to {reach:.2g} times the offset, "
-            "where a vessel in still water swings back by less than it was moved. Read no period "
-            "and no damping off it: the state of this model follows the waves, or its delays fit "
-            "noise."
+            f"{motion}: after its release the model swings to {reach:.2g} times the offset, where "
+            "a vessel in still water swings back by less than it was moved. Read no period and no "
+            "damping off it: the state of this model follows the waves, or its delays fit noise."
             for motion, reach in zip(result["motion"].values, most, strict=True)
             if reach > OVERSHOOT
         ]

@@ -278,9 +278,8 @@ def band_findings(table: xr.Dataset) -> list[str]:
             continue
         words = band_verdict(inside / 100, float(at["level"]))
         said.append(
-            f"{run}: the {_band_words(at)} of {members - lost:.0f} members holds "
-            f"{inside:.0f} % of the measured instants, {words}. {_CARRIES[str(at['band'].values)]}"
-            f"{left_out}."
+            f"{run}: the {_band_words(at)} of {members - lost:.0f} members holds {inside:.0f} % of "
+            f"the measured instants, {words}. {_CARRIES[str(at['band'].values)]}{left_out}."
         )
     return said
 
