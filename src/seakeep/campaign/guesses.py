@@ -282,7 +282,7 @@ def _free(stem: str, taken: Counter[str]) -> str:
 
 def guess_channels(files: Sequence[File]) -> list[Guess]:
     """Guess a channel for each column of the first file of each logger."""
-    out: list[Guess] = []
+    out = []
     taken: Counter[str] = Counter()
     for logger in dict.fromkeys(file.logger for file in files):
         same = [file for file in files if file.logger == logger]

@@ -231,7 +231,7 @@ class LiveChain:
         ends = [each["time"].to_numpy()[[0, -1]] for each in run.groups.values()]
         low = int(np.ceil((max(each[0] for each in ends) - origin) / dt - 1e-9))
         high = int(np.floor((min(each[1] for each in ends) - origin) / dt + 1e-9))
-        axis: FloatArray = origin + dt * np.arange(low, high + 1, dtype=float)
+        axis = origin + dt * np.arange(low, high + 1, dtype=float)
         data = resampled(run, dt, axis).data
         assert data is not None
         names = list(run.settings.channel_names)

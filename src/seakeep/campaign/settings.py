@@ -354,7 +354,7 @@ class PreparationSettings(Table):
     def _with_preset(cls, received: Any) -> Any:
         preset = received.get("preset") if isinstance(received, dict) else None
         if isinstance(preset, str) and preset in _FILTERS:
-            chain: dict[str, Any] = dict(_FILTERS[preset])
+            chain = dict(_FILTERS[preset])
             if not {"sampling_rate", "dt", "steps_per_period"} & set(received):
                 chain["steps_per_period"] = 32
             return {**chain, **received}

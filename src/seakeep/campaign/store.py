@@ -55,7 +55,7 @@ def write_prepared(
     RequestError, DataError
         As :meth:`Campaign.prepare`.
     """
-    failed: Failures = {} if failures is None else failures
+    failed = {} if failures is None else failures
     folder = prepared_folder(campaign, out_dir)
     wanted = list(campaign.runs if names is None else names)
     files = {name: folder / f"{name}.nc" for name in wanted}

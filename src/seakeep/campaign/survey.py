@@ -146,9 +146,9 @@ def survey(
     clock_runs = dict.fromkeys([*own, *filter(lambda name: settings.runs[name].files, others)])
     period_runs = () if channel is None else settings.period_runs
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
-    clocks: dict[str, dict[str, Clock]] = {}
-    spans: dict[str, tuple[float, float]] = {}
-    bad: Failures = {}
+    clocks = {}
+    spans = {}
+    bad = {}
     for count, name in enumerate(runs, 1):
         if progress is not None:
             progress(0, len(runs), f"clocks and waves of {name} ({count} of {len(runs)})")

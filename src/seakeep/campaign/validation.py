@@ -50,7 +50,7 @@ def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) 
 
 def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[str]:
     """Names of channels and of all that they are derived from."""
-    needed: set[str] = set()
+    needed = set()
     ahead = list(wanted)
     while ahead:
         name = ahead.pop()

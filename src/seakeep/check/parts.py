@@ -180,7 +180,7 @@ def gathered(
 
 def ratio(values: FloatArray, per: FloatArray) -> FloatArray:
     """Quotient; NaN where nothing is divided by."""
-    out: FloatArray = np.full(values.shape, np.nan)
+    out = np.full(values.shape, np.nan)
     np.divide(values, per, out=out, where=per > 0)
     return out
 

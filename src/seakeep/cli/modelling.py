@@ -355,7 +355,7 @@ def export(
     from seakeep.hosts.program import exportable, timing
 
     linear = exportable(_single(model, member), estimator)
-    written: list[Path] = []
+    written = []
     bound = ""
     if c is not None:
         written += (

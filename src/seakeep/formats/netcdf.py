@@ -27,8 +27,8 @@ def read_netcdf(path: Path, options: Options) -> Columns:
     ``NAME_n``. `group` may be left out where one group alone holds channels.
     """
     dataset = opened_netcdf(path, options.group)
-    flat: dict[str, xr.DataArray] = {}
-    faults: dict[str, str] = {}
+    flat = {}
+    faults = {}
     for name, variable in dataset.variables.items():
         array = dataset[name] if name in dataset else xr.DataArray(variable)
         if array.dtype.kind not in "fiub" or array.ndim == 0 or array.size < 2:

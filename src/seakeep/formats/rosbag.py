@@ -106,7 +106,7 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> _Rows:
 
 def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
     """The one topic whose messages hold numbers; an error that lists them if there are more."""
-    types: dict[str, str] = {}
+    types = {}
     for connection in connections:
         first = next(iter(reader.messages([connection])), None)
         if first is None:

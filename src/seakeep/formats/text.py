@@ -286,7 +286,7 @@ def _frame(path: Path, lines: list[str], layout: _Layout) -> pd.DataFrame:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # columns of several kinds: each cell is looked at here
-            frame: pd.DataFrame = pd.read_csv(  # type: ignore[call-overload]
+            frame = pd.read_csv(  # type: ignore[call-overload]
                 io.StringIO(body),
                 sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
                 decimal=layout.decimal,

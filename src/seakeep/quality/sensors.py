@@ -333,5 +333,5 @@ def _windows(
 
 def _together(lags: Lags) -> BoolArray:
     """Windows in which the two go together: elsewhere a lag says nothing."""
-    alike: BoolArray = lags.correlation >= 0.6
+    alike = lags.correlation >= 0.6
     return alike if alike.sum() > 3 else np.ones(alike.size, dtype=bool)

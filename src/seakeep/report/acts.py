@@ -252,7 +252,7 @@ class Claims(Evidence):
 
     def judge(self, claim: str) -> Judged:
         """Our number, and whether the claim holds."""
-        verdict: Judged = getattr(self, f"_{claim}")()
+        verdict = getattr(self, f"_{claim}")()
         return verdict
 
     def _robust(self) -> Judged:

@@ -109,7 +109,7 @@ def _by_channel(
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
     shown = {name: heading for name, heading in _IN_UNITS.items() if name in at}
-    forms: dict[str, Form] = dict.fromkeys(shown, short)
+    forms = dict.fromkeys(shown, short)
     cells = partial(row, **forms)
     heads = ("unit", *shown.values())
     return _by_channel(at, "extremes", title, heads, lambda one: cells(one, "channel_units"))
@@ -168,7 +168,7 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
     changes: list[tuple[str, ...]] = []
     for at in entries(table, "model"):
         value, low, high = ratio_of(at, "all_")
-        cells: tuple[str, ...] = ("", "", "")
+        cells = ("", "", "")
         if changes:
             known = bool(np.isfinite([low, high]).all())
             bounds = (change(low, high), verdict(low - 1, high - 1)) if known else ("", "")

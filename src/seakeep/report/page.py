@@ -162,7 +162,7 @@ def write_page(
     page = folder / "report.html"
     check_output(page, "report")
     drawings = [each for section in sections for each in section.figures]
-    drawn: dict[str, Markup] = {}
+    drawn = {}
     with storing(folder), figure_style():
         if not page.exists():  # figures of an interrupted report are known as ours
             write_text(page, UNFINISHED)

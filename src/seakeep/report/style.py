@@ -150,7 +150,7 @@ def panels(
         for spare in every[count:]:
             spare.remove()
         return figure, every[:count]
-    given: list[Any] = list(np.ravel(np.array(axes, dtype=object)))
+    given = list(np.ravel(np.array(axes, dtype=object)))
     if len(given) != count:
         raise RequestError(
             f"axes holds {len(given)} Axes and the figure draws {count} panels. Give as many, or "

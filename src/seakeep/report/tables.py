@@ -480,7 +480,7 @@ def _latex_line(cells: Iterable[str]) -> str:
 
 def _latex_columns(table: Table) -> str:
     """Columns of numbers to the right, of text to the left, of long text in lines that break."""
-    columns: Sequence[Sequence[str]] = list(zip(table.columns, *table.rows, strict=True))
+    columns = list(zip(table.columns, *table.rows, strict=True))
     longest = [max(map(len, column)) for column in columns]
     wide = [length for length in longest if length > WIDE]
     room = 1.0 - sum(length + 2 for length in longest if length <= WIDE) / LINE

@@ -635,7 +635,7 @@ def calibration_parts(
         If an instant lies in none of the runs, or the start at or after the stop.
     """
     spans = {name: (float(each["time"][0]), float(each["time"][-1])) for name, each in runs.items()}
-    edges: dict[str, float] = {}
+    edges = {}
     for option, stated in (("--start", start), ("--stop", stop)):
         if stated is None:
             continue

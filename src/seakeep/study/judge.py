@@ -153,7 +153,7 @@ def side_by_side(
     grid: Sequence[Sequence[xr.Dataset]], names: Mapping[str, Any], fill: Any = np.nan
 ) -> xr.Dataset:
     """Datasets over two new dimensions, first that of the rows."""
-    how: Any = {"join": "outer", "combine_attrs": "override", "fill_value": fill}
+    how = {"join": "outer", "combine_attrs": "override", "fill_value": fill}
     out = xr.combine_nested(grid, list(names), **how).assign_coords(names)
     return out.transpose(*names, ...)
 
@@ -199,7 +199,7 @@ def difference_table(
     def ratio(drawn: FloatArray) -> FloatArray:
         middle = median_of(drawn.reshape(len(drawn), -1, *drawn.shape[3:]))
         with np.errstate(divide="ignore", invalid="ignore"):
-            out: FloatArray = middle[:, :, None] / middle[:, None]
+            out = middle[:, :, None] / middle[:, None]
         return out
 
     bounds = statistics.two_way_interval(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES)
@@ -222,7 +222,7 @@ def average_of(cells: FloatArray) -> FloatArray:
     """Average of cells (…, channel) over the judged channels; NaN where a forecast diverged."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, as wanted
-        out: FloatArray = np.nanmean(cells, axis=-1)
+        out = np.nanmean(cells, axis=-1)
     return out
 
 
@@ -408,7 +408,7 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
 
     def change(level: FloatArray, growth: FloatArray) -> FloatArray:
         with np.errstate(invalid="ignore"):
-            out: FloatArray = np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
+            out = np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
         return out
 
     blocks = blocks_of([test], training)[1], 1

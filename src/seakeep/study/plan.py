@@ -192,7 +192,7 @@ def _places(
     """Feasible last samples in random order; with 'apart' no two within `width` samples."""
     drawn = asked.placement == "random"
     step = 1 if drawn else max(width, 1)
-    every: list[tuple[str, int]] = []
+    every = []
     for name, (first, last) in spans.items():
         stops = range(last, first + needed - 2, -step)
         every += [(name, stop) for stop in (reversed(stops) if drawn else stops)]

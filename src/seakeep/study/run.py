@@ -372,7 +372,7 @@ def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcMode
         Over ``variant``: ``radius``, the spectral radius, and ``seconds`` of processor time for
         the matrices; ``truncated_nrmse`` over (window, channel) of the first test set; ``rank``.
     """
-    spec: Any = fitted.settings
+    spec = fitted.settings
     parts, states, inputs = plan.taught(plan.training[unit.training].spans)
     data = gather(parts, states, inputs, None, spec)
     groups = (data.states, spec.state_delays), (data.delayed, spec.input_delays)
@@ -476,7 +476,7 @@ def collect(plan: Plan, facts: Groups, computed: Mapping[Unit, Groups]) -> Group
         grid = [[computed[Unit(model, k)][group] for k in numbers] for model in models]
         return side_by_side(grid, names, FILL)
 
-    out: Groups = {}
+    out = {}
     for test, windows in plan.tests.items():
         every = {"training": sets, "window": range(len(windows))}
         means = stacked(f"tests/{test}", plan.models, "model").reindex(every)

@@ -131,7 +131,7 @@ def _probes(played: Played, time: FloatArray, rate: float, rng: np.random.Genera
         linear = played.elevation(position, time)
         return linear + played.crest(position, time) if instruments.second_order else linear
 
-    columns: Columns = {}
+    columns = {}
     for name, probe in instruments.probes.items():
         values = wave(probe.position) + probe.noise * rng.standard_normal(time.size)
         columns[name] = "mm", 1e3 * _dropouts(values, rate, probe.dropouts, rng)
@@ -154,7 +154,7 @@ def _mru(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -
         "pitch": ("deg", q[2], noise.angle_noise),
         "yaw": ("deg", zero, noise.angle_noise),
     }
-    columns: Columns = {}
+    columns = {}
     for name, (unit, values, sigma) in true.items():
         factor = np.rad2deg(1.0) if unit.startswith("deg") else 1.0
         columns[name] = unit, factor * (values + sigma * rng.standard_normal(time.size))
@@ -175,7 +175,7 @@ def _loads(played: Played, time: FloatArray, _: float, rng: np.random.Generator)
     instruments = played.settings.instruments
     # Whether a line is wet changes slowly: every tenth sample finds the crossings.
     coarse = time[::10]
-    columns: Columns = {}
+    columns = {}
     for line, (name, true) in enumerate(
         zip(played.rig.line_names, played.loads(time), strict=True)
     ):

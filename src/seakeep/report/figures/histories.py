@@ -409,7 +409,7 @@ def _draw_channel(
             curves.append(Curve(words, line, _standard(at, mean)))
             continue
         band = [_standard(at, at[side].sel(ensemble=model)) for side in ("lower", "upper")]
-        wider: list[Any] = []
+        wider = []
         if calibration is not None:
             edges = (each[0, 0, :, result.channels.index(name)]
                      for each in band_of(cell, model, calibration))  # fmt: skip
