@@ -1,7 +1,5 @@
 """Public data sets of the examples: origin, licence, checksums; fetched only on request."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from collections.abc import Mapping, Sequence

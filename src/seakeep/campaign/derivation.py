@@ -1,7 +1,5 @@
 """Derived channels: expressions and named steps, from ``[derived]`` to arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

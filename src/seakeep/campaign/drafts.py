@@ -1,7 +1,5 @@
 """A draft campaign file, guessed from the files of its runs, as ``seakeep init`` writes it."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Guesses about columns, files and runs of a campaign, from names, units and waves."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections import Counter

@@ -5,8 +5,6 @@ same steps run on the last part of the record, and a sample is handed out once `
 after it are there: it differs from the offline one by what the ends of the window still do to it.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace

@@ -14,8 +14,6 @@ step       what it does
 ========== =====================================================================================
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property

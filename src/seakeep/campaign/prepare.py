@@ -1,7 +1,5 @@
 """The campaign: runs as measured, and as models take them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Iterator

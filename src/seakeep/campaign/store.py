@@ -1,7 +1,5 @@
 """Prepared runs on disk: one NetCDF file per run, used again while it is fresh and unaltered."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 

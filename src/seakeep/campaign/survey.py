@@ -1,7 +1,5 @@
 """Computed from all runs together: the clocks of the loggers and the encounter period."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From a TOML file to settings, with one message that names every mistake in it."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
 

@@ -3,8 +3,6 @@
 :func:`check_model` makes all of them on the runs of a campaign.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping
 from contextlib import suppress

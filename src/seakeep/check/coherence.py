@@ -1,9 +1,6 @@
 """Coherence of inputs and states, and the error that no linear model of the inputs goes below."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr

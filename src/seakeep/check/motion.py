@@ -1,7 +1,5 @@
 """Motion by a model's matrices: its modes, its decay beside the vessel's, and its second order."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy
 import xarray as xr

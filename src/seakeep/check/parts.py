@@ -1,7 +1,5 @@
 """Data of the checks: test parts of runs without gaps, and free runs over them."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Statistics of responses, as designers read them: measured against forecast."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """What a model is worth: its error over the tests beside baselines, and where it may be used."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

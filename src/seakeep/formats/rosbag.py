@@ -4,8 +4,6 @@ A topic is a table: one row per message, one column per number in it. Needs rosb
 ``ros``; no installation of ROS.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -3,8 +3,6 @@
 Needs nptdms, the extra ``tdms`` (its licence is the LGPL, so it is never installed unasked).
 """
 
-from __future__ import annotations
-
 import logging
 import os
 from collections import Counter

@@ -1,7 +1,5 @@
 """Tables in text files: CSV and its relatives, as loggers and spreadsheets write them."""
 
-from __future__ import annotations
-
 import codecs
 import csv
 import gzip

@@ -3,8 +3,6 @@
 Input of the checks: the channels of a run, and what the campaign says about them.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Checks of one channel: flagged samples, constant values, levels, values that cannot be."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The page over the acts of ``seakeep reproduce``: side by side, and against the paper's claims."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -252,8 +250,7 @@ class Claims(Evidence):
 
     def judge(self, claim: str) -> Judged:
         """Our number, and whether the claim holds."""
-        verdict = getattr(self, f"_{claim}")()
-        return verdict
+        return getattr(self, f"_{claim}")()
 
     def _robust(self) -> Judged:
         own, fir = (self.error(model=model) for model in (ENSEMBLE, "fir"))

@@ -1,7 +1,5 @@
 """The page of ``seakeep check``: what a model is worth, section by section."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The data-quality sheet: one page with a table per run and a picture of its channels."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

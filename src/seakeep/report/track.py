@@ -1,7 +1,5 @@
 """What ``seakeep track`` writes and says: a track as a Dataset, as files, and in words."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterator

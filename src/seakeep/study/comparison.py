@@ -5,8 +5,6 @@ Runs and forecasts at full scale, by Froude's law.
 Parts of runs on which the band of an ensemble is calibrated.
 """
 
-from __future__ import annotations
-
 import math
 import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence

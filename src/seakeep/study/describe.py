@@ -1,7 +1,5 @@
 """Data of a study: channels with their signs, runs with their quality, spectra."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

@@ -6,8 +6,6 @@ printed. The recommended variant lets no block cross a join, and takes Silverman
 the block length of Politis and White.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -199,8 +197,7 @@ def difference_table(
     def ratio(drawn: FloatArray) -> FloatArray:
         middle = median_of(drawn.reshape(len(drawn), -1, *drawn.shape[3:]))
         with np.errstate(divide="ignore", invalid="ignore"):
-            out = middle[:, :, None] / middle[:, None]
-        return out
+            return middle[:, :, None] / middle[:, None]
 
     bounds = statistics.two_way_interval(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES)
     coords = {
@@ -222,8 +219,7 @@ def average_of(cells: FloatArray) -> FloatArray:
     """Average of cells (…, channel) over the judged channels; NaN where a forecast diverged."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, as wanted
-        out = np.nanmean(cells, axis=-1)
-    return out
+        return np.nanmean(cells, axis=-1)
 
 
 def with_average(cells: FloatArray) -> FloatArray:
@@ -408,8 +404,7 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
 
     def change(level: FloatArray, growth: FloatArray) -> FloatArray:
         with np.errstate(invalid="ignore"):
-            out = np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
-        return out
+            return np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
 
     blocks = blocks_of([test], training)[1], 1
     bounds = statistics.two_way_interval(

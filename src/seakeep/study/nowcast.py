@@ -1,7 +1,5 @@
 """Skill against lead time: a model in service, to which waves to come are not known."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import product
 

@@ -3,8 +3,6 @@
 Windows are drawn once and are the same for all models.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ One rule, key by key, for campaigns and studies: what the table states, else wha
 else the default of the kind.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace

@@ -1,7 +1,5 @@
 """Results on disk: sealed NetCDF files of groups, one per finished unit, then one for the study."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 from collections.abc import Callable, Iterator, Mapping

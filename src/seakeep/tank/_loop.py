@@ -4,8 +4,6 @@ Imported only where a run is simulated; needs the extra ``tank`` (numba). Arrays
 `dynamics` prepares them and gives the results names.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -6,8 +6,6 @@ Needs the extra ``video`` (OpenCV). Frames are 1280 × 720 at the video clock's 
 moves in a plane of 2.5 mm per pixel. A lamp in the upper left corner shows the trigger.
 """
 
-from __future__ import annotations
-
 import io
 import tempfile
 from collections.abc import Iterator, Mapping

@@ -9,8 +9,6 @@ Wave forces act at the slow part of surge (surge less its linear wave-frequency 
 the full surge they would feign a mean force.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any

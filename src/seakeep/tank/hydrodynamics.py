@@ -5,8 +5,6 @@ gravity. Degrees of freedom: surge, heave, pitch about the centre of gravity, an
 a moon pool, the absolute elevations of its piston and of its first longitudinal sloshing mode.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path

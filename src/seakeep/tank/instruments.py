@@ -4,8 +4,6 @@ A logger whose clock reads c(t) = offset + (1 + drift)·t at the reference time 
 uniform readings c. The 500 Hz logger of the wave probes is the reference.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass

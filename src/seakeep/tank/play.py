@@ -1,7 +1,5 @@
 """Play a campaign: simulate its runs, record them, and write what a tank would deliver."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable
 from importlib import metadata

@@ -3,8 +3,6 @@
 The default numbers stand, with their units and reasons, in ``data/ck14e.toml``.
 """
 
-from __future__ import annotations
-
 import tomllib
 from importlib import resources
 from pathlib import Path

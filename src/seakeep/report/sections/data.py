@@ -1,7 +1,5 @@
 """What a study used: waves, channels, runs and their quality, settings, windows, versions."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from datetime import datetime

@@ -1,7 +1,5 @@
 """Results of a study: their summary in sentences, errors, bands and densities, and a glossary."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
