@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Progress, number, whole_number
+from seakeep.arrays import Groups, Progress, number, whole_number
 from seakeep.campaign.live_chain import LiveChain
 from seakeep.campaign.pipeline import (
     attributes_of,
@@ -229,7 +229,6 @@ class Campaign:
         run = surveyed.channels(name)
         dt = uniform_step(run.reference_time, f"run '{name}'")
         data = resampled(run, dt).data
-        assert data is not None
         return data.assign_attrs(self._attributes(name, data, dt, surveyed))
 
     def clocks(self, names: Iterable[str] | None = None) -> dict[str, dict[str, Clock]]:
@@ -347,7 +346,7 @@ class Campaign:
 
     def prepare(
         self, names: Iterable[str] | None = None, progress: Progress | None = None
-    ) -> dict[str, xr.Dataset]:
+    ) -> Groups:
         """Prepare runs: one uniform step for all of them, cut to their spans.
 
         Each record is resampled as a whole, onto instants that are multiples of the step from the
@@ -421,10 +420,9 @@ class Campaign:
                 run = checked(resampled(run, dt), surveyed.doubts.get(name), surveyed.left_out)
                 warn_of(run.findings, reported)
                 data = cropped(run).data
-                assert data is not None
                 data.attrs["quality"] = as_json(run.findings)
                 for channel in data.data_vars.values():
-                    channel.attrs["noise_std"] = noise_floor(channel.to_numpy())
+                    channel.attrs["noise_std"] = noise_floor(channel.values)
                 data.attrs.update(self._attributes(name, data, dt, surveyed))
             except SeakeepError as error:
                 is_named = f"'{name}'" in str(error)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from seakeep.arrays import Progress
+from seakeep.arrays import Groups, Progress
 from seakeep.campaign.prepare import Campaign
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, warn
@@ -87,7 +87,7 @@ def load_prepared(
     progress: Progress | None = None,
     *,
     channels: Collection[str] = (),
-) -> dict[str, xr.Dataset]:
+) -> Groups:
     """Take prepared runs from their files where these are fresh, else prepare them in memory.
 
     Parameters

@@ -196,8 +196,7 @@ def _period(run: Run, channel: str) -> tuple[float, float]:
     waves = next((group for group in run.groups.values() if channel in group), None)
     if waves is None:  # it needs several loggers
         waves = resampled(run, uniform_step(run.reference_time)).data
-        assert waves is not None
-    time, series = waves["time"].to_numpy(), waves[channel].to_numpy()
+    time, series = waves["time"].values, waves[channel].values
     step = uniform_step(time, f"run '{run.name}'")
     used = inside(time, used_span(run.own), step)
     series = series[used] if used.sum() > 2 else series

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray
+from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups
 from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
@@ -69,7 +69,7 @@ def is_regular(run: xr.Dataset) -> bool:
     return bool(run.attrs.get("waves") == "regular")
 
 
-def irregular(runs: Datasets, what: str) -> dict[str, xr.Dataset]:
+def irregular(runs: Datasets, what: str) -> Groups:
     """Runs that are not regular; an error says what cannot be had without them."""
     skipped = {name: run for name, run in runs.items() if not is_regular(run)}
     if not skipped:
@@ -80,7 +80,7 @@ def irregular(runs: Datasets, what: str) -> dict[str, xr.Dataset]:
     return skipped
 
 
-def of_part(runs: Datasets, part: str) -> dict[str, xr.Dataset]:
+def of_part(runs: Datasets, part: str) -> Groups:
     """Runs with a span that trains ("train") or tests ("test"), and with this span alone.
 
     A run that states neither span tests as a whole.
@@ -94,7 +94,7 @@ def of_part(runs: Datasets, part: str) -> dict[str, xr.Dataset]:
     return parts
 
 
-def judged(runs: Datasets) -> tuple[dict[str, xr.Dataset], str]:
+def judged(runs: Datasets) -> tuple[Groups, str]:
     """Tests, or what trains where there is none, and the word for it."""
     tests = of_part(runs, "test")
     return (tests, "tests") if tests else (of_part(runs, "train"), "training")

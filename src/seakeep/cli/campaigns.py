@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -337,13 +338,13 @@ def _report_runs(
 
 def _print_findings(runs: Datasets) -> None:
     """Print what the checks found and no warning said: one line per channel and kind."""
-    from seakeep.quality import Finding, findings_of
+    from seakeep.quality import findings_of
 
-    groups: dict[tuple[str, str], list[Finding]] = {}
+    groups = defaultdict(list)
     for run in runs.values():
         for each in findings_of(run):
             if not each.kind.remedy:
-                groups.setdefault((each.channel, each.kind.name), []).append(each)
+                groups[each.channel, each.kind.name].append(each)
     for same in list(groups.values())[:SHOWN]:
         others = len({each.run for each in same}) - 1
         alike = f" (and in {others} more run{'s' * (others > 1)})" if others else ""

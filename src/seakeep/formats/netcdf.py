@@ -52,7 +52,7 @@ def read_netcdf(path: Path, options: Options) -> Columns:
         if array.dims != (axis,)
     }
     flat = {name: array for name, array in flat.items() if array.dims == (axis,)}
-    values = {name: array.to_numpy().astype(float) for name, array in flat.items()}
+    values = {name: array.values.astype(float) for name, array in flat.items()}
     units = {
         name: _text(array.attrs["units"]) for name, array in flat.items() if "units" in array.attrs
     }
@@ -140,7 +140,7 @@ def _split(path: Path, name: str, array: xr.DataArray) -> dict[str, xr.DataArray
         )
     labels = array.coords.get(second)
     if labels is not None and labels.dtype.kind in "UOST":
-        return {str(label): array[:, i] for i, label in enumerate(labels.to_numpy())}
+        return {str(label): array[:, i] for i, label in enumerate(labels.values)}
     if count > WIDEST:
         raise DataError(
             f"{path}: '{name}' has {count} columns without names; beyond {WIDEST} it is taken for "

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import binomtest
 
-from seakeep.arrays import FloatArray, Progress
+from seakeep.arrays import FloatArray, IntArray, Progress
 from seakeep.core.bands import split_bands
 from seakeep.core.metrics import slack_share
 from seakeep.report.figures.histories import acts_figure
@@ -102,7 +101,7 @@ class Evidence:
     result: StudyResult
 
     @cached_property
-    def order(self) -> npt.NDArray[np.intp]:
+    def order(self) -> IntArray:
         """Places of the training sets, run by run."""
         return training_order(self.result.groups["training"])[0]
 

@@ -31,12 +31,12 @@ def channel_rows(run: xr.Dataset) -> list[tuple[str, ...]]:
     findings, rows = findings_of(run), []
     for name, channel in run.data_vars.items():
         factor, unit = displayed(str(channel.attrs.get("units", "")))
-        x = factor * channel.to_numpy()
+        x = factor * channel.values
         known = x[np.isfinite(x)]
         numbers = (np.nan,) * 4
         if known.size:
             numbers = (known.min(), known.max(), known.mean(), known.std(ddof=1))
-        flags = run.coords.get(f"{name}_flags", xr.zeros_like(channel)).to_numpy().astype(int)
+        flags = run.coords.get(f"{name}_flags", xr.zeros_like(channel)).values.astype(int)
         flagged = ", ".join(
             f"{word} {100 * np.mean((flags & bit) > 0):.2g} %"
             for word, bit in FLAGS.items()

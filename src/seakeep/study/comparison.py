@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep import metrics, statistics
-from seakeep.arrays import Datasets, Progress, whole_number
+from seakeep.arrays import Datasets, Groups, Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.check.parts import samples_in
 from seakeep.conventions import displayed, froude_factor, is_elevation
@@ -608,7 +608,7 @@ def calibration_parts(
     dt: float,
     start: str | None = None,
     stop: str | None = None,
-) -> dict[str, xr.Dataset]:
+) -> Groups:
     """Part of each run between two instants, by default its training span, or the whole run.
 
     Parameters

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, Groups
 from seakeep.campaign import Campaign
 from seakeep.check.parts import whole_span
 from seakeep.conventions import is_elevation
@@ -31,7 +31,7 @@ POSITIVE = {
 WELCH = ("paper", "recommended")
 
 
-def describe_study(study: Study, plan: Plan) -> dict[str, xr.Dataset]:
+def describe_study(study: Study, plan: Plan) -> Groups:
     """Data that a study used."""
     groups = {
         "channels": _channels(study.campaign, plan),

@@ -18,7 +18,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep import metrics, statistics
-from seakeep.arrays import ComplexArray, Datasets, FloatArray
+from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray
 from seakeep.core.bands import split_bands
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.metrics import over_channels, paired, root_mean_square
@@ -101,10 +101,10 @@ def judge(
     settings: StudySettings,
     channels: Sequence[str],
     executor: Executor | None = None,
-) -> dict[str, xr.Dataset]:
+) -> Groups:
     """All statistics of a study, as groups ``statistics/…``; the densities side by side."""
     seed = settings.study.seed
-    tables: dict[str, dict[str, xr.Dataset]] = defaultdict(dict)
+    tables: dict[str, Groups] = defaultdict(dict)
     for name in settings.tests:
         test = groups[f"tests/{name}"]
         rng = random_stream(seed, f"differences.{name}")
@@ -239,7 +239,7 @@ def window_spans(test: xr.Dataset) -> list[tuple[str, float, float]]:
     return list(zip(runs, starts, starts + float(test["time"].values[-1]), strict=True))
 
 
-def training_order(training: xr.Dataset) -> tuple[npt.NDArray[np.intp], int]:
+def training_order(training: xr.Dataset) -> tuple[IntArray, int]:
     """Training sets in the order of their instants, and how many neighbours overlap."""
     if "run" not in training:
         return np.arange(training.sizes["training"]), 1
@@ -301,9 +301,7 @@ COVERAGE = ("inside", "below", "above", "relative_width")
 PARTS = ("inside", "width", "relative_width", "winkler", "crps")
 
 
-def band_tables(
-    test: xr.Dataset, calibration: xr.Dataset | None, level: float
-) -> dict[str, xr.Dataset]:
+def band_tables(test: xr.Dataset, calibration: xr.Dataset | None, level: float) -> Groups:
     """How bands hold the measurement; empty without ensembles.
 
     ``coverage`` over (model, band, against, channel) is the fraction of the instants at which a
@@ -451,7 +449,7 @@ def density_tables(
     settings: StudySettings,
     name: str,
     executor: Executor | None = None,
-) -> dict[str, xr.Dataset]:
+) -> Groups:
     """Divergences of forecasts from the measurement, and the densities, per model and channel."""
     windows, steps = test.sizes["window"], test.sizes["time"]
     items, diverged = {}, []

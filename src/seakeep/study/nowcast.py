@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Progress, whole_number
+from seakeep.arrays import Groups, Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.errors import RequestError
 from seakeep.models import Model, is_ensemble
@@ -31,7 +31,7 @@ def nowcasts(
     *,
     level: float = 0.95,
     progress: Progress | None = None,
-) -> dict[str, xr.Dataset]:
+) -> Groups:
     """Play runs of a campaign to models in service, and judge what they forecast.
 
     Parameters

@@ -18,10 +18,9 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray, Progress
+from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import embed, metrics
 from seakeep.errors import DataError, SeakeepError, warn
@@ -58,7 +57,6 @@ from seakeep.study.plan import (
 from seakeep.study.settings import Study
 from seakeep.study.store import (
     RESULT,
-    Groups,
     StudyResult,
     UnitFolder,
     read_result,
@@ -407,7 +405,7 @@ def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcMode
 
 def _free_runs(
     plan: Plan, fitted: Any, tested: Mapping[str, Sequence[int]]
-) -> Iterator[tuple[str, FloatArray, npt.NDArray[np.int64], Windows]]:
+) -> Iterator[tuple[str, FloatArray, IntArray, Windows]]:
     """Free runs of all members over each test set, (member, window, steps, N), and where lost."""
     chosen = {test: [plan.tests[test][k] for k in numbers] for test, numbers in tested.items()}
     places = [

@@ -1,5 +1,7 @@
 """Results on disk: sealed NetCDF files of groups, one per finished unit, then one for the study."""
 
+from __future__ import annotations
+
 import json
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -14,7 +16,7 @@ from typing import Any
 import xarray as xr
 from filelock import FileLock, Timeout
 
-from seakeep.arrays import Datasets
+from seakeep.arrays import Datasets, Groups
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.files import (
     check_report,
@@ -34,7 +36,6 @@ UNITS = "units"
 
 STUDY, UNIT = "study", "unit of a study"
 """Kinds of these files."""
-Groups = dict[str, xr.Dataset]
 
 
 class StorageError(SeakeepError):

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import scipy
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import BoolArray, FloatArray, Groups
 from seakeep.signals.calculus import rising
 from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
@@ -91,7 +91,7 @@ def trigger(time: FloatArray, period: float, width: float) -> FloatArray:
 
 
 def slap_pulses(
-    time: FloatArray, immersed: npt.NDArray[np.bool_], slap: SlapSettings, rng: np.random.Generator
+    time: FloatArray, immersed: BoolArray, slap: SlapSettings, rng: np.random.Generator
 ) -> FloatArray:
     """Decaying pulses (N) at each immersion and emergence of a line, at uniform instants.
 
@@ -159,7 +159,7 @@ def _mru(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -
     return columns
 
 
-def _immersed(played: Played, time: FloatArray, line: int) -> npt.NDArray[np.bool_]:
+def _immersed(played: Played, time: FloatArray, line: int) -> BoolArray:
     """Whether the middle of a line is under water."""
     settings = played.settings.moorings[played.rig.line_names[line]]
     q, _, _ = played.states(time)
@@ -206,7 +206,7 @@ def _record(readings: FloatArray, columns: Columns) -> xr.Dataset:
 
 def record_run(
     played: Played, rng: np.random.Generator, single_rate: float | None = None
-) -> dict[str, xr.Dataset]:
+) -> Groups:
     """Record a run with all instruments, each with its own noise.
 
     Parameters
@@ -225,7 +225,7 @@ def record_run(
         Logger → its columns, with units, over the readings of its clock (s).
     """
     instruments = played.settings.instruments
-    records: dict[str, xr.Dataset] = {}
+    records: Groups = {}
     together: Columns = {}
     for (name, make), child in zip(_LOGGERS.items(), rng.spawn(len(_LOGGERS)), strict=True):
         clock = instruments.clocks[name] if single_rate is None else ClockSettings(rate=single_rate)

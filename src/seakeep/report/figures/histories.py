@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -141,9 +142,9 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
     tables = [comparison_table([each], intervals=False).isel(run=0) for each in compared]
     first = compared[0]
     states, time = list(map(str, first.measured.data_vars)), first.measured["time"].values
-    groups: dict[str, list[str]] = {}
+    groups = defaultdict(list)
     for name, each in first.inputs.data_vars.items():
-        groups.setdefault(str(each.attrs.get("units", "")), []).append(str(name))
+        groups[str(each.attrs.get("units", ""))].append(str(name))
     period = _period_if_long(first)
     spans = [None] if period is None else [period, None]
     rows = len(states) + len(groups)
@@ -478,16 +479,16 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
     rows = len(names) + len(lagging)
     figure = new_figure(9.5, 0.5 + 1.45 * rows)
     axes = figure.subplots(rows, 1, squeeze=False, sharex=True)[:, 0]
-    time = run["time"].to_numpy()
+    time = run["time"].values
     for at, name in zip(axes, names, strict=False):
         factor, label = shown(run[name])
-        x = factor * run[name].to_numpy()
+        x = factor * run[name].values
         if name in doubtful:  # the style sheet has the same colour for rows
             at.set_facecolor(PALETTE["blush"])
         at.plot(time, x, color=COLOURS["measured"], linewidth=0.6)
         at.set_ylabel(label, fontsize=8)
         if f"{name}_flags" in run.coords:
-            _mark(at, time, x, run[f"{name}_flags"].to_numpy().astype(int))
+            _mark(at, time, x, run[f"{name}_flags"].values.astype(int))
         known = x[np.isfinite(x)]
         if known.size and np.ptp(known) <= 1e-9 * max(np.abs(known).max(), 1e-300):
             value = float(known[0])  # an axis that shows no rounding
