@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -31,9 +31,6 @@ from seakeep.signals import Clock, uniform_step
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
 
-SHOWN_RUNS = 6
-"""Runs that a campaign's representation names."""
-
 FORMAT = 11
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 
@@ -53,16 +50,7 @@ class Campaign:
     """
 
     path: Path
-    settings: CampaignSettings
-
-    def __repr__(self) -> str:
-        runs = list(self.settings.runs)
-        shown = ", ".join(runs[:SHOWN_RUNS]) + (", …" if len(runs) > SHOWN_RUNS else "")
-        models = ", ".join(self.settings.all_models()) or "none"
-        return (
-            f"{type(self).__name__}({self.name!r}, path={str(self.path)!r}, {len(runs)} runs: "
-            f"{shown}; models: {models})"
-        )
+    settings: CampaignSettings = field(repr=False)
 
     @property
     def name(self) -> str:

@@ -299,10 +299,11 @@ def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) 
     return np.stack([forecasts[name].values for name in model.states], axis=-1)
 
 
-def whole_span(run: xr.Dataset) -> tuple[float, float]:
-    """Span of a run that may be used at all: what trains and what tests, or all of it."""
+def whole_span(run: xr.Dataset, *uses: str) -> tuple[float, float]:
+    """Span of a run that has one of the uses, by default training or testing; or all of it."""
     time = run["time"].values
-    known = [run.attrs[key] for key in ("train_span", "test_span") if key in run.attrs]
+    keys = [f"{use}_span" for use in uses or ("train", "test")]
+    known = [run.attrs[key] for key in keys if key in run.attrs]
     begins, ends = zip(*(known or [(time[0], time[-1])]), strict=True)
     return float(min(begins)), float(max(ends))
 

@@ -476,16 +476,6 @@ def _summary(results: Results) -> Section:
     )
 
 
-ROWS = (
-    ("raw", "deterministic", "(b) the paper's model"),
-    ("raw", "fir", "(b) FIR beside it"),
-    ("recommended", "deterministic", "(c) recommended"),
-    ("recommended", "bayesian", "(c) its ensemble"),
-    ("recommended", "fir", "(c) FIR beside it"),
-)
-"""Rows of the short table, besides that of the last measured state."""
-
-
 def short_table(results: Results) -> Table:
     """Median errors on the channels as measured: the models, and the best that compare with them.
 
@@ -501,8 +491,8 @@ def short_table(results: Results) -> Table:
     """
     last = list(results)[-1]
     rows = [
-        (words, *(" / ".join(pair) for pair in _pairs(results[act], model)))
-        for act, model, words in (*ROWS, (last, "hold_last", "last measured state"))
+        (said, *(" / ".join(pair) for pair in _pairs(results[act], model)))
+        for act, model, said in (*words()["rows"], (last, "hold_last", "last measured state"))
         if act in results
     ]
     first = results[last]

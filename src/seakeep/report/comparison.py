@@ -32,27 +32,10 @@ from seakeep.report.tables import (
     ratio_of,
     row,
     short,
+    words,
 )
 from seakeep.study.judge import verdict
 
-_SHOWN = {
-    "nrmse": ("NRMSE", 3, "anrmse"),
-    "training_nrmse": ("in training SD", 3, "training_anrmse"),
-    "fit": ("fit %", 1, ""),
-    "nammae": ("NAMMAE", 3, "mean_nammae"),
-    "sd_ratio": ("SD ratio", 3, ""),
-    "coverage": ("in band %", 1, "mean_coverage"),
-    "relative_band_width": ("width in SD", 3, ""),
-}
-"""Columns of a terminal: heading, decimals, and the average over the channels."""
-_IN_UNITS = {
-    "measured_min": "min measured",
-    "predicted_min": "min predicted",
-    "measured_max": "max measured",
-    "predicted_max": "max predicted",
-    "band_width": "mean width of band",
-}
-"""Columns of a second table, in the unit of the channel."""
 UNTIL = "waves read until [s]"
 """Column of a forecast's CSV file where the model looks ahead."""
 HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
@@ -61,7 +44,7 @@ HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
 
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Comparison of forecasts with measurements, tables per run that fit a terminal."""
-    shown = {name: each for name, each in _SHOWN.items() if name in table}
+    shown = {name: each for name, each in words()["comparison"].items() if name in table}
     heads, _, of_all = zip(*shown.values(), strict=True)
     digits = {name: each[1] for name, each in shown.items()}
     for at in entries(table, "run"):
@@ -105,7 +88,7 @@ def _by_channel(
 
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
-    shown = {name: heading for name, heading in _IN_UNITS.items() if name in at}
+    shown = {name: heading for name, heading in words()["extremes"].items() if name in at}
     forms = dict.fromkeys(shown, short)
     cells = partial(row, **forms)
     heads = ("unit", *shown.values())

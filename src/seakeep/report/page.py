@@ -218,7 +218,7 @@ def _drawn(drawing: Drawing, folder: Path) -> Markup:
         engine.execute(figure)
         # Without any engine; "none" stands for one, for which each file would be drawn twice.
         figure.set_layout_engine(None)
-    save_figure(figure, folder / f"{drawing.name}.png", figure.dpi)
+    save_figure(figure, folder / f"{drawing.name}.png")
     text = _svg_text(figure, drawing.name)
     write_text(folder / f"{drawing.name}.svg", text)
     return _inline_svg(text, drawing)

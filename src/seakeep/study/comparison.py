@@ -18,7 +18,7 @@ import xarray as xr
 from seakeep import metrics, statistics
 from seakeep.arrays import Datasets, Groups, Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
-from seakeep.check.parts import samples_in
+from seakeep.check.parts import samples_in, whole_span
 from seakeep.conventions import displayed, froude_factor, is_elevation
 from seakeep.core.bootstrap import FEWEST_SAMPLES
 from seakeep.core.metrics import root_mean_square
@@ -257,8 +257,7 @@ def compare_models(
         compared[label] = []
         for name, run in prepared.items():
             time = run["time"].values
-            span = run.attrs.get("test_span", (time[0], time[-1]))
-            at, last = samples_in(run, used, span, dt, history, lead, first)
+            at, last = samples_in(run, used, whole_span(run, "test"), dt, history, lead, first)
             window: Any = (
                 run,
                 float(time[at]) if first is None else first,

@@ -13,6 +13,7 @@ import xarray as xr
 from seakeep.arrays import Datasets, Groups, Progress
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.store import prepared_folder
+from seakeep.check.parts import whole_span
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, Model, Spec, is_ensemble, outside_training
 from seakeep.models.conditions import disagreements
@@ -121,8 +122,8 @@ def fit_campaign(
     folder = prepared_folder(campaign)
     others = [n for n in campaign.test_runs if n not in both and (folder / f"{n}.nc").exists()]
     for name, run in (both | load_prepared(campaign, names=others)).items():
-        begin, end = run.attrs.get("test_span", (run["time"].values[0], run["time"].values[-1]))
-        warn_of_waves(identified, run, name, float(begin), round((end - begin) / dt))
+        begin, end = whole_span(run, "test")
+        warn_of_waves(identified, run, name, begin, round((end - begin) / dt))
     look_ahead = identified.signature.input_map.look_ahead
     latest = max(look_ahead(run, dt) for run in runs.values()) - dt
     if latest > 0.5 * dt:
