@@ -427,7 +427,7 @@ def _channels(words: Sequence[str], dimension: str | None, logger: str) -> Itera
             yield "mooring_" + "_".join(place)
 
 
-def suggest_channel(column: str, unit: str | None, logger: str = "") -> str:
+def suggest_channel(column: str, unit: str | None, logger: str) -> str:
     """Name for a column: a canonical one if words and unit speak for it, else the column's own.
 
     A length of a logger called "wave_probes" is an elevation.

@@ -607,8 +607,8 @@ def redundant_pairs(settings: CampaignSettings, period: float) -> Redundant:
 
 def checked(
     run: Run,
-    period: tuple[float, float] | None = None,
-    left_out: Mapping[str, str] | None = None,
+    period: tuple[float, float] | None,
+    left_out: Mapping[str, str],
 ) -> Run:
     """Step 7: look for faults.
 
@@ -616,9 +616,9 @@ def checked(
     ----------
     run : Run
         The run, on one axis.
-    period : (float, float), optional
+    period : (float, float) or None
         Counted period and energy period of its waves, s, where they disagree.
-    left_out : mapping of str to str, optional
+    left_out : mapping of str to str
         Runs left out of what is pooled, and why.
     """
     settings, preparation = run.settings, run.settings.preparation
@@ -650,7 +650,7 @@ def checked(
         wave_columns=waves,
         bridged=preparation.longest_gap if preparation.gaps == "bridge" else None,
         anti_alias=preparation.anti_alias,
-        left_out=left_out or {},
+        left_out=left_out,
     )
     return replace(run, findings=tuple(check(record)))
 

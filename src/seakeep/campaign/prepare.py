@@ -366,8 +366,8 @@ class Campaign:
 
     def each_prepared(
         self,
-        names: Iterable[str] | None = None,
-        progress: Progress | None = None,
+        names: Iterable[str] | None,
+        progress: Progress | None,
         failures: Failures | None = None,
     ) -> Iterator[tuple[str, xr.Dataset]]:
         """Prepare runs one after the other, as :meth:`prepare` does; only one is held at a time.

@@ -129,8 +129,8 @@ def survey(
     files_of: Callable[[str], Mapping[str, Path]],
     asked: Sequence[str],
     channel: str | None,
-    progress: Progress | None = None,
-    failures: Failures | None = None,
+    progress: Progress | None,
+    failures: Failures | None,
 ) -> Survey:
     """Read each run once for its clocks and, where a `channel` of waves is given, its period.
 

@@ -11,7 +11,7 @@ from seakeep.toml import Mistake, lengths
 
 
 def derivation_order(
-    derived: Mapping[str, DerivedSettings], channels: Collection[str] = ()
+    derived: Mapping[str, DerivedSettings], channels: Collection[str]
 ) -> list[str]:
     """Order derived channels so that each finds what it needs."""
     graph = {

@@ -77,7 +77,7 @@ def write_quality_sheet(
     settings: CampaignSettings,
     title: str,
     folder: Path,
-    unread: Mapping[str, str] | None = None,
+    unread: Mapping[str, str],
 ) -> list[Path]:
     """Write the sheet of prepared runs: one self-contained page, and a PNG per run.
 
@@ -94,7 +94,7 @@ def write_quality_sheet(
                 mark, small = {"Software": f"{MARK}: {SHEET}"}, {"optimize": True}
                 figure.savefig(temporary, format="png", dpi=100, metadata=mark, pil_kwargs=small)
     rows = [(*row, kinds or "nothing found") for *row, kinds in map(run_row, runs, runs.values())]
-    rows += [(n, Number("not prepared"), MISSING, why) for n, why in (unread or {}).items()]
+    rows += [(n, Number("not prepared"), MISSING, why) for n, why in unread.items()]
     marked = [k for k, row in enumerate(rows) if row[2] != "0"]
     every = section("runs", table("runs", rows, marked=marked))
     sections = [every, *map(_section, runs, runs.values())]

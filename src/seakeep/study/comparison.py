@@ -605,8 +605,8 @@ def calibration_parts(
     campaign: Campaign,
     runs: Datasets,
     dt: float,
-    start: str | None = None,
-    stop: str | None = None,
+    start: str | None,
+    stop: str | None,
 ) -> Groups:
     """Part of each run between two instants, by default its training span, or the whole run.
 

@@ -141,7 +141,7 @@ def fit_campaign(
 
 
 def read_training(
-    campaign: Campaign, model: str | None = None, progress: Progress | None = None
+    campaign: Campaign, model: str | None, progress: Progress | None
 ) -> tuple[Spec, Groups, Groups, float | None]:
     """Read what a model of a campaign trains on; arguments and errors as :func:`fit_campaign`.
 

@@ -448,7 +448,7 @@ def density_tables(
     channels: Sequence[str],
     settings: StudySettings,
     name: str,
-    executor: Executor | None = None,
+    executor: Executor | None,
 ) -> Groups:
     """Divergences of forecasts from the measurement, and the densities, per model and channel."""
     windows, steps = test.sizes["window"], test.sizes["time"]

@@ -304,13 +304,12 @@ def write_result(
     folder: Path,
     attrs: Mapping[str, Any],
     groups: Datasets,
-    finished: Callable[[StudyResult], None] | None = None,
+    finished: Callable[[StudyResult], None],
 ) -> StudyResult:
     """Write a result into its folder, once it was handed to `finished`; errors as there."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
     result = StudyResult(folder, {"created": created, **attrs}, dict(groups))
-    if finished is not None:
-        finished(result)
+    finished(result)
     write_groups(folder / RESULT, STUDY, result.attrs, result.groups)
     return result
 

@@ -255,7 +255,7 @@ def frame_of(
     motion: tuple[float, float, float],
     surface: FloatArray,
     lamp: float,
-    centre_of_gravity: float = 0.03,
+    centre_of_gravity: float,
 ) -> Image:
     """One frame before lighting and noise, shape (720, 1280, 3).
 

@@ -320,7 +320,7 @@ def _merge(base: dict[str, Any], over: dict[str, Any], trail: tuple[str, ...]) -
 
 
 def with_waves(
-    settings: TankSettings, seed: int | None = None, spacing: str | None = None
+    settings: TankSettings, seed: int | None, spacing: str | None = None
 ) -> TankSettings:
     """Return settings with another seed, or another spacing of the components of all spectra."""
     table = settings.model_dump()

@@ -494,7 +494,7 @@ def coverage(result: StudyResult) -> Section:
     )
 
 
-def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
+def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
     """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
     prefix, band = "calibrated_" * calibrated, "calibrated" if calibrated else "members"
     shares = result.groups["statistics/coverage"].sel(model=model, band=band)
