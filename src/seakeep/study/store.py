@@ -170,17 +170,14 @@ class UnitFolder:
                 path.unlink()
             lock.release()
 
-    def _path(self, name: str) -> Path:
-        return self.folder / UNITS / f"{name}.nc"
-
     def write(self, name: str, groups: Groups) -> None:
         """Keep the groups of a finished unit; errors as :func:`write_groups`."""
-        write_groups(self._path(name), UNIT, {"digest": self.digest}, groups)
+        write_groups(self.folder / UNITS / f"{name}.nc", UNIT, {"digest": self.digest}, groups)
 
     def read(self, name: str) -> Groups | None:
         """Groups of a finished unit; None where it is not finished, or damaged."""
         try:
-            groups = load_groups(self._path(name), UNIT)
+            groups = load_groups(self.folder / UNITS / f"{name}.nc", UNIT)
         except SeakeepError:
             return None
         return groups if groups.pop("").attrs["digest"] == self.digest else None
@@ -275,11 +272,6 @@ class StudyResult:
         return {
             str(name): self.groups[f"prepared/{name}"] for name in self.groups["runs"]["run"].values
         }
-
-    @property
-    def shows_paper(self) -> bool:
-        """Whether a report puts the paper's choices and numbers beside those of the study."""
-        return bool(self.settings["output"].get("paper", False))
 
     @property
     def is_calibrated(self) -> bool:

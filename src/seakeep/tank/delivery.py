@@ -38,11 +38,6 @@ HEADING = (
 )
 
 
-def _header(name: str, unit: str) -> str:
-    """Head of a column of a text file."""
-    return f"{name} [{unit}]"
-
-
 def write_record(record: xr.Dataset, path: Path) -> Path:
     """Write one logger's record to a folder that exists, by its suffix as ``.csv`` or ``.nc``.
 
@@ -60,8 +55,8 @@ def write_record(record: xr.Dataset, path: Path) -> Path:
     table = np.column_stack([time.round(decimals[0]), *rounded.values()]) + 0.0
     rows = io.StringIO()
     np.savetxt(rows, table, [f"%.{d}f" for d in decimals], ",")
-    heads = [_header(str(name), column.attrs["units"]) for name, column in record.items()]
-    head = ",".join([_header("time", "s"), *heads])
+    heads = [f"{name} [{column.attrs['units']}]" for name, column in record.items()]
+    head = ",".join(["time [s]", *heads])
     write_text(path, f"{head}\n{rows.getvalue().replace('nan', '')}")
     return path
 
@@ -122,7 +117,7 @@ def campaign_text(
     columns = {f"eta_{name}": (name, "mm") for name in probes} | fixed["columns"]
     columns |= {line: (line, "N") for line in lines}
     channels = {
-        channel: {"column": _header(name, unit) if kind == "csv" else name, "unit": unit}
+        channel: {"column": f"{name} [{unit}]" if kind == "csv" else name, "unit": unit}
         for channel, (name, unit) in columns.items()
     }
     channels["surge"]["long_name"] = "surge, tracked in the video"

@@ -12,6 +12,7 @@ from seakeep.conventions import displayed
 from seakeep.report.style import (
     COLOURS,
     DASHED,
+    DOTTED,
     LINES,
     PALETTE,
     figure_style,
@@ -423,7 +424,7 @@ def drift(
         mean, *slow = factor * own["slow_response"]
         place.axhline(0.0, **ZERO)
         place.plot(own["frequency"], mean, **SOLID, label="model, mean")
-        dashes = (DASHED, (0, (1, 1)), (0, (5, 1, 1, 1)), (0, (8, 2)))
+        dashes = (DASHED, DOTTED, (0, (5, 1, 1, 1)), (0, (8, 2)))
         for each, dash in zip(slow, dashes, strict=False):
             style = {"color": COLOURS["ensemble"], "linewidth": 0.9, "linestyle": dash}
             words = f"model, difference {float(each['difference']):.3g} Hz"
