@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from importlib import resources
 from itertools import chain
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import energy_period, first_wave, tapered_power
 
 _TEXT = resources.files("seakeep.campaign").joinpath("vocabulary.toml").read_text("utf-8")
-_CALLED: dict[str, Any] = tomllib.loads(_TEXT)
+_CALLED = tomllib.loads(_TEXT)
 """Words of columns, runs and places in files of others."""
 
 LONG = 64

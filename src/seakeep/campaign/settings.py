@@ -207,7 +207,7 @@ class InstrumentsSettings(Table):
         return self.loggers.get(name, InstrumentSettings())
 
 
-_STEPS: dict[str, tuple[str, set[str], str]] = {
+_STEPS = {
     "band_pass": ("band", set(), "'band' (Hz), such as band = [0.3, 5.0]"),
     "integrate": ("band", {"times"}, "'band' (Hz), such as band = [0.3, 5.0]"),
     "differentiate": ("", set(), ""),

@@ -1,7 +1,7 @@
 """The page of ``seakeep check``: what a model is worth, section by section."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -431,7 +431,7 @@ def drift_section(result: xr.Dataset, checked: Checked) -> Section:
     return section("drift", figure, table("drift", rows), **result.attrs)
 
 
-CHECK_SECTIONS: dict[Callable[[xr.Dataset, Checked], Section], Sequence[str]] = {
+CHECK_SECTIONS = {
     worth_section: ("worth",),
     response_section: ("response", "measured_response", "validation"),
     possible_section: ("coherence",),

@@ -36,7 +36,7 @@ def _line(colour: str, width: float, dash: Sequence[float] = ()) -> dict[str, An
     return {"color": PALETTE[colour], "linewidth": width, "linestyle": style}
 
 
-PALETTE: dict[str, str] = _STYLE["palette"]
+PALETTE = _STYLE["palette"]
 COLOURS = {what: PALETTE[colour] for what, colour in _STYLE["colours"].items()}
 """By what a line shows."""
 

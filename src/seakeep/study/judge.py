@@ -32,7 +32,7 @@ BANDS = ("all", "low", "wave")
 MEASURES = ("nrmse", "nammae", "training_nrmse")
 """Errors of a cell: both of the paper, in SD of the window, and the first in SD of the training."""
 
-VARIANTS: dict[str, dict[str, Any]] = {
+VARIANTS = {
     "paper": {"block_length": "carlstein", "bandwidth": "paper", "joins": True},
     "recommended": {"block_length": "politis_white", "bandwidth": "silverman", "joins": False},
 }

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
     from seakeep.report.style import Places
 
-SHADE: dict[str, Any] = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
-SOLID: dict[str, Any] = {**LINES["forecast"], "linestyle": "-"}
-ZERO: dict[str, Any] = {"color": COLOURS["input"], "linewidth": 0.5}
-POINTS: dict[str, Any] = {"linestyle": "none", "elinewidth": 0.8}
-MARKS: dict[str, dict[str, Any]] = {
+SHADE = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
+SOLID = {**LINES["forecast"], "linestyle": "-"}
+ZERO = {"color": COLOURS["input"], "linewidth": 0.5}
+POINTS = {"linestyle": "none", "elinewidth": 0.8}
+MARKS = {
     "regular": {"color": COLOURS["measured"], "marker": "o", "markersize": 5, "zorder": 4},
     "irregular": {
         "color": COLOURS["input"],

@@ -462,7 +462,7 @@ MARKS = {
 """Colour and shape of each flag: shapes distinguish them in grey print."""
 LABELS = -0.06
 """Where labels of the vertical axes stand, in widths of the axes: beyond six figures."""
-WELCH: dict[str, tuple[str, Any]] = {
+WELCH = {
     "paper": (COLOURS["forecast"], DASHED),
     "recommended": (COLOURS["ensemble"], "-"),
 }
