@@ -31,7 +31,7 @@ from seakeep.cli.console import (
     show,
 )
 from seakeep.errors import RequestError, SeakeepError
-from seakeep.files import check_output, check_place, check_report, make_folder
+from seakeep.files import check_output, check_report, make_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,7 +102,6 @@ def forecast(
     """
     if out.suffix not in (".nc", ".csv"):
         raise RequestError(f"{out} ends in '{out.suffix}'; a forecast is written as .nc or .csv.")
-    check_place(out)
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.models import is_ensemble, load_model
     from seakeep.report.comparison import (
