@@ -81,11 +81,7 @@ def state_of(dataset: PublicDataset, folder: Path | None) -> str:
     )
 
 
-def fetch(
-    dataset: PublicDataset,
-    folder: Path,
-    progress: Progress | None = None,
-) -> Path:
+def fetch(dataset: PublicDataset, folder: Path, progress: Progress | None = None) -> Path:
     """Download what is missing of a data set and check it.
 
     Parameters

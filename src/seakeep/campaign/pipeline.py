@@ -605,11 +605,7 @@ def redundant_pairs(settings: CampaignSettings, period: float) -> Redundant:
     }
 
 
-def checked(
-    run: Run,
-    period: tuple[float, float] | None,
-    left_out: Mapping[str, str],
-) -> Run:
+def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str, str]) -> Run:
     """Step 7: look for faults.
 
     Parameters

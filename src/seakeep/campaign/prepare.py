@@ -13,13 +13,7 @@ import xarray as xr
 
 from seakeep.arrays import Groups, Progress, number, whole_number
 from seakeep.campaign.live_chain import LiveChain
-from seakeep.campaign.pipeline import (
-    attributes_of,
-    checked,
-    cropped,
-    resampled,
-    strays,
-)
+from seakeep.campaign.pipeline import attributes_of, checked, cropped, resampled, strays
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Failures, Survey, spare, survey
@@ -425,12 +419,7 @@ class Campaign:
             yield name, data
 
     def live_chain(
-        self,
-        run: str,
-        *,
-        delay: float | str = "1 T",
-        window: float | str = "40 T",
-        every: int = 8,
+        self, run: str, *, delay: float | str = "1 T", window: float | str = "40 T", every: int = 8
     ) -> LiveChain:
         """The chain of preparation for use in service: raw samples in, model samples out.
 

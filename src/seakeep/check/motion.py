@@ -304,10 +304,7 @@ def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:
 
 
 def _offsets(
-    model: HankelDMDcModel,
-    runs: Datasets,
-    static: ComplexArray,
-    still: FloatArray,
+    model: HankelDMDcModel, runs: Datasets, static: ComplexArray, still: FloatArray
 ) -> dict[str, object]:
     """Offsets of regular runs from the model's rest, per amplitude squared."""
     regular = {name: run for name, run in runs.items() if is_regular(run)}

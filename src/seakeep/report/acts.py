@@ -18,16 +18,7 @@ from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.results import divergence_table
 from seakeep.report.style import HEADING, model_words
-from seakeep.report.tables import (
-    Interval,
-    Number,
-    Table,
-    number,
-    numbers,
-    ratio_of,
-    table,
-    words,
-)
+from seakeep.report.tables import Interval, Number, Table, number, numbers, ratio_of, table, words
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats

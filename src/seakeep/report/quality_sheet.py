@@ -73,11 +73,7 @@ def clock_rows(run: xr.Dataset) -> list[tuple[str, str, str, str]]:
 
 
 def write_quality_sheet(
-    runs: Datasets,
-    settings: CampaignSettings,
-    title: str,
-    folder: Path,
-    unread: Mapping[str, str],
+    runs: Datasets, settings: CampaignSettings, title: str, folder: Path, unread: Mapping[str, str]
 ) -> list[Path]:
     """Write the sheet of prepared runs: one self-contained page, and a PNG per run.
 

@@ -602,11 +602,7 @@ def _state_again(forecast: xr.Dataset) -> None:
 
 
 def calibration_parts(
-    campaign: Campaign,
-    runs: Datasets,
-    dt: float,
-    start: str | None,
-    stop: str | None,
+    campaign: Campaign, runs: Datasets, dt: float, start: str | None, stop: str | None
 ) -> Groups:
     """Part of each run between two instants, by default its training span, or the whole run.
 

@@ -55,14 +55,7 @@ from seakeep.study.plan import (
     warn_of_slow_study,
 )
 from seakeep.study.settings import Study
-from seakeep.study.store import (
-    RESULT,
-    StudyResult,
-    UnitFolder,
-    read_result,
-    versions,
-    write_result,
-)
+from seakeep.study.store import RESULT, StudyResult, UnitFolder, read_result, versions, write_result
 
 
 def run_study(

@@ -333,11 +333,7 @@ def _kernel_arrays(rig: Rig) -> tuple[IntArray, FloatArray]:
 
 
 def simulate(
-    rig: Rig,
-    sea: Sea,
-    duration: float,
-    start: npt.ArrayLike | None = None,
-    begin: float = 0.0,
+    rig: Rig, sea: Sea, duration: float, start: npt.ArrayLike | None = None, begin: float = 0.0
 ) -> Motion:
     """Simulate a run.
 

@@ -60,7 +60,7 @@ class LineSettings(Table):
 
 
 KINDS: dict[str, Callable[[LineSettings], Elasticity]] = {
-    "spring": lambda line: (line.stiffness, 0.0, 0.0),
+    "spring": lambda line: (line.stiffness, 0.0, 0.0)
 }
 """The models of a line, by the word in the settings."""
 

@@ -83,10 +83,7 @@ def _answering(values: xr.DataArray) -> list[str]:
 
 
 def response(
-    result: xr.Dataset,
-    measured: xr.Dataset | None = None,
-    *,
-    axes: Places = None,
+    result: xr.Dataset, measured: xr.Dataset | None = None, *, axes: Places = None
 ) -> Figure:
     """Draw amplitude and phase of the response per wave amplitude, measured points beside.
 
@@ -141,11 +138,7 @@ def response(
     return by_state(result.sel(input=entry, state=states), axes, (2.9, 1.75), draw, 2, most)
 
 
-def coherence(
-    result: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def coherence(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw the coherence of each state with the inputs, over the state's own spectrum.
 
     Parameters
@@ -244,11 +237,7 @@ def decay(result: xr.Dataset, *, axes: Places = None) -> Figure:
     return by_state(result.rename(motion="state"), axes, (3.0, 1.8), draw)
 
 
-def residuals(
-    result: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw correlations of one-step errors, the spectrum of free runs' errors, and their age.
 
     Parameters
@@ -297,11 +286,7 @@ def residuals(
     return by_state(result, axes, (2.6, 1.75), draw, 4, 4)
 
 
-def exceedance(
-    result: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw how often peaks exceed a level, measured and forecast, beside Rayleigh and Weibull.
 
     Parameters
@@ -340,11 +325,7 @@ def exceedance(
     return by_state(result, axes, (3.0, 2.0), draw)
 
 
-def density(
-    result: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def density(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw the densities of states, measured and forecast; arguments as :func:`exceedance`."""
 
     def draw(own: xr.Dataset, place: Any) -> None:
@@ -400,11 +381,7 @@ def validity(result: xr.Dataset, *, axes: Places = None) -> Figure:
     return figure
 
 
-def drift(
-    result: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw mean drift and slow response per amplitude squared, offsets of regular runs beside.
 
     Parameters

@@ -255,12 +255,7 @@ def _input_label(inputs: xr.Dataset) -> str:
     return f"{'wave elevations' if waves else 'inputs'}\n[{shown_unit(units) or '?'}]"
 
 
-def overlay(
-    forecast: xr.Dataset,
-    measured: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def overlay(forecast: xr.Dataset, measured: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw a forecast over the measurement.
 
     Parameters
@@ -280,11 +275,7 @@ def overlay(
 
 
 def band(
-    forecast: xr.Dataset,
-    measured: xr.Dataset,
-    *,
-    level: float = 0.95,
-    axes: Places = None,
+    forecast: xr.Dataset, measured: xr.Dataset, *, level: float = 0.95, axes: Places = None
 ) -> Figure:
     """Draw the band of an ensemble and its mean over the measurement.
 
@@ -318,10 +309,7 @@ def band(
 
 @figure_style()
 def _histories(
-    forecast: xr.Dataset,
-    bounds: xr.Dataset | None,
-    measured: xr.Dataset,
-    axes: Places,
+    forecast: xr.Dataset, bounds: xr.Dataset | None, measured: xr.Dataset, axes: Places
 ) -> Figure:
     chosen = [str(name) for name, each in forecast.data_vars.items() if "time" in each.dims]
     for what, data in (("forecast", forecast), ("measured", measured)):
@@ -367,11 +355,7 @@ def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
 
 @figure_style()
 def history_figure(
-    result: StudyResult,
-    test: str,
-    training: int,
-    window: int,
-    names: Sequence[str] | None = None,
+    result: StudyResult, test: str, training: int, window: int, names: Sequence[str] | None = None
 ) -> Figure:
     """Channels of one cell over time; all of them unless `names` are given."""
     names = result.channels if names is None else names
@@ -462,10 +446,7 @@ MARKS = {
 """Colour and shape of each flag: shapes distinguish them in grey print."""
 LABELS = -0.06
 """Where labels of the vertical axes stand, in widths of the axes: beyond six figures."""
-WELCH = {
-    "paper": (COLOURS["forecast"], DASHED),
-    "recommended": (COLOURS["ensemble"], "-"),
-}
+WELCH = {"paper": (COLOURS["forecast"], DASHED), "recommended": (COLOURS["ensemble"], "-")}
 """Colour and dash of a measured spectrum, by how it is estimated."""
 Spectrum = tuple[FloatArray, FloatArray]
 

@@ -378,10 +378,7 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
         columns += [f"{label}: {key}" for key in ("amplitude", "phase [°]", "offset [SD]", "share")]
     judged = response.sel(channel=result.channels, model=judged_models(result))
     for of_model in entries(judged, "channel", "model"):
-        cells = [
-            result.words_of(of_model["channel"].item()),
-            model_words(of_model["model"].item()),
-        ]
+        cells = [result.words_of(of_model["channel"].item()), model_words(of_model["model"].item())]
         for at in entries(of_model, "test"):
             offset, *others = (float(at[f"error_{key}"]) for key in ("offset", "wave", "rest"))
             total = float(np.sum(np.square([offset, *others])))
