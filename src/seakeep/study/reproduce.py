@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +21,7 @@ from seakeep.arrays import Progress
 from seakeep.campaign import read_campaign, write_prepared
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, check_report, is_there, write_text
+from seakeep.models.executor import on_this_machine, submitting
 from seakeep.study.plan import named
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
@@ -187,8 +188,7 @@ def reproduce(
             campaigns[1].parent.mkdir(exist_ok=True)
         text = campaigns[0].read_text(encoding="utf-8")
         _write(campaigns[1], detrended_text(text), CAMPAIGN_FILE)
-    for path in campaigns:
-        write_prepared(read_campaign(path), progress=named(progress, "preparing "))
+    prepare_campaigns(campaigns, executor, progress)
     results = {}
     for act in acts:
         path = out / act.name / "study.toml"
@@ -269,6 +269,27 @@ def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:
         },
         coords={"frequency": ("frequency", frequency, {"units": "Hz"})},
     )
+
+
+def prepare_campaigns(
+    campaigns: Sequence[Path], executor: Executor | None, progress: Progress | None
+) -> None:
+    """Write the prepared runs of campaigns, which lie side by side where workers are near."""
+    near = on_this_machine(executor)
+    if near is None:
+        for path in campaigns:
+            write_prepared(read_campaign(path), progress=named(progress, "preparing "))
+        return
+    first, *others = campaigns
+    with submitting(_prepare, None, near) as submit:
+        pending = [submit([path]) for path in others]
+        write_prepared(read_campaign(first), progress=named(progress, "preparing "))
+        for each in pending:
+            each.result()
+
+
+def _prepare(_: None, path: Path) -> None:
+    write_prepared(read_campaign(path))
 
 
 def detrended_text(campaign: str) -> str:
