@@ -250,6 +250,8 @@ def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:
     mark = folder / "played.txt"
     text = f"{MARK}: {PLAYED}\n{digest}\n"
     if not mark.exists() or mark.read_bytes() != text.encode():
+        if mark.exists():
+            check_output(mark, PLAYED)
         with storing(folder):
             play(settings, folder, progress=named(progress, "playing "))
         _write(mark, text, PLAYED)

@@ -117,8 +117,7 @@ def run_study(
     hand_on = finished or (lambda result: None)
     folder = UnitFolder(out, study.digest)
     folder.check()
-    if (out / RESULT).exists() and (result := read_result(out)).attrs["digest"] == study.digest:
-        report(1, 1, "finished before")
+    if (result := _finished(study, out, report)) is not None:
         labels = _labels(study)
         if any(result.attrs[key] != value for key, value in labels.items()):
             return write_result(out, {**result.attrs, **labels}, result.groups, hand_on)
@@ -128,20 +127,35 @@ def run_study(
     warn_of_slow_study(plan)
     folder.open(study.name)
     with folder.alone():
-        facts = facts_of(study, plan)
-        computed = _computed(plan, facts, folder, executor, report)
-        report(len(computed), len(computed), "statistics and densities")
-        groups = describe_study(study, plan)
-        if "repeats" in groups:
-            warn(words_of_repeats(groups["repeats"]))
-        groups |= collect(plan, facts, computed)
-        groups |= judge(groups, study.settings, list(plan.states), executor)
-        if "statistics/lost" in groups:
-            warn(words_of_lost(groups["statistics/lost"]))
-        groups |= extra or {}
-        attributes = {**_labels(study), **_attributes(study, plan), **(notes or {})}
-        result = write_result(out, attributes, groups, hand_on)
+        result = _finished(study, out, report)  # by another process, meanwhile
+        if result is None:
+            facts = facts_of(study, plan)
+            computed = _computed(plan, facts, folder, executor, report)
+            report(len(computed), len(computed), "statistics and densities")
+            groups = describe_study(study, plan)
+            if "repeats" in groups:
+                warn(words_of_repeats(groups["repeats"]))
+            groups |= collect(plan, facts, computed)
+            groups |= judge(groups, study.settings, list(plan.states), executor)
+            if "statistics/lost" in groups:
+                warn(words_of_lost(groups["statistics/lost"]))
+            groups |= extra or {}
+            attributes = {**_labels(study), **_attributes(study, plan), **(notes or {})}
+            result = write_result(out, attributes, groups, hand_on)
+        else:
+            hand_on(result)
         folder.clear()
+    return result
+
+
+def _finished(study: Study, out: Path, report: Progress) -> StudyResult | None:
+    """The result of an earlier run, if there is one of the same study."""
+    if not (out / RESULT).exists():
+        return None
+    result = read_result(out)
+    if result.attrs.get("digest") != study.digest:
+        return None
+    report(1, 1, "finished before")
     return result
 
 
