@@ -94,7 +94,7 @@ writers = {
     "model": lambda path: write_sealed(run, path, "model"),
     "forecast": lambda path: comparison.write_forecast(run, path),
     "raw file": lambda path: delivery.write_dataset(run, path),
-    "study": lambda path: study.write_result(folder, {}, {"prepared": run}),
+    "study": lambda path: study.write_result(folder, {}, {"prepared": run}, lambda _: None),
 }
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))

@@ -29,6 +29,8 @@ TINY = float(np.finfo(float).tiny)
 """Least number above zero."""
 Datasets: TypeAlias = "Mapping[str, xr.Dataset]"
 """Prepared runs, tables or groups of a result, by name."""
+Groups: TypeAlias = "dict[str, xr.Dataset]"
+"""The same, in a dictionary that its owner may change."""
 
 _REMEDIES = {
     "c": "Give its real part or its modulus",

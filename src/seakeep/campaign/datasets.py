@@ -1,7 +1,5 @@
 """Public data sets of the examples: origin, licence, checksums; fetched only on request."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -83,11 +81,7 @@ def state_of(dataset: PublicDataset, folder: Path | None) -> str:
     )
 
 
-def fetch(
-    dataset: PublicDataset,
-    folder: Path,
-    progress: Progress | None = None,
-) -> Path:
+def fetch(dataset: PublicDataset, folder: Path, progress: Progress | None = None) -> Path:
     """Download what is missing of a data set and check it.
 
     Parameters

@@ -1,7 +1,5 @@
 """Derived channels: expressions and named steps, from ``[derived]`` to arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -50,7 +48,7 @@ def derive(
     flags = np.zeros(channel.size, dtype=np.int16)
     for source in sources_of(name, own, channels):
         if (known := channels.get(f"{source}_flags")) is not None:
-            flags |= known.to_numpy() & (MISSING | BRIDGED)
+            flags |= known.values & (MISSING | BRIDGED)
     if not flags.any():
         return {name: channel}
     return {name: channel, f"{name}_flags": xr.Variable("time", flags, flag_attributes(name))}
@@ -62,7 +60,7 @@ def _derived(dataset: Channels, name: str, settings: DerivedSettings, dt: float)
     source = {} if settings.source is None else dataset[settings.source].attrs
     if settings.expression is not None:
         expression = parse(settings.expression)
-        values = expression.evaluate({n: dataset[n].to_numpy() for n in expression.channels})
+        values = expression.evaluate({n: dataset[n].values for n in expression.channels})
         unit = settings.unit or (canonical.units if canonical else "-")
         origin = settings.expression
     else:
@@ -89,7 +87,7 @@ def _step(
 ) -> tuple[FloatArray, str, str]:
     """Values and unit of a named step, and what it does to its source."""
     source = dataset[str(settings.source)]
-    series, unit = source.to_numpy(), str(source.attrs["units"])
+    series, unit = source.values, str(source.attrs["units"])
     times, band = settings.times or 1, settings.band or (0.0, 0.0)
     passband, crossover = settings.passband or 0.0, settings.crossover or 0.0
     integrated = f"({unit}) * s^{times}"
@@ -107,7 +105,7 @@ def _step(
         case "envelope_squared":
             return envelope_squared(series, dt), si_unit(f"({unit})^2"), ""
         case "complementary_filter":
-            slow = dataset[str(settings.position)].to_numpy()
+            slow = dataset[str(settings.position)].values
             both = complementary_filter(slow, series, dt, crossover, times)
             words = f"integrated {times} time(s) above {crossover:g} Hz, {settings.position} below"
             return both, si_unit(integrated), words
@@ -124,7 +122,7 @@ def _body_step(
     if settings.step == "remove_gravity":
         words = f"gravity removed by {', '.join(name for name in TURNS if name in dataset)}"
         if settings.components is not None:
-            force = np.column_stack([dataset[each].to_numpy() for each in settings.components])
+            force = np.column_stack([dataset[each].values for each in settings.components])
             moved = remove_gravity(force, angles, zeroed=bool(settings.zeroed))
             return _afloat(moved[:, axis], axis), unit, words
         # One accelerometer alone: what gravity adds along its axis; that it turns is left out.
@@ -181,4 +179,4 @@ def _three(dataset: Channels, kind: str = "") -> FloatArray:
             "the body turns."
         )
     zero = np.zeros(next(iter(dataset.values())).size)
-    return np.column_stack([dataset[n].to_numpy() if n in dataset else zero for n in names])
+    return np.column_stack([dataset[n].values if n in dataset else zero for n in names])

@@ -1,9 +1,8 @@
 """A draft campaign file, guessed from the files of its runs, as ``seakeep init`` writes it."""
 
-from __future__ import annotations
-
 import math
 import os
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -294,9 +293,9 @@ def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> tuple[list[str],
 
     Of several regular waves, that with the least distance to the next one in period.
     """
-    groups: dict[str, list[str]] = {}
+    groups = defaultdict(list)
     for name in names if seas else ():
-        groups.setdefault(seas[name].group, []).append(name)
+        groups[seas[name].group].append(name)
     if len(groups) < 2:
         return [names[-1]], "the last run"
 

@@ -1,7 +1,5 @@
 """Guesses about columns, files and runs of a campaign, from names, units and waves."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections import Counter
@@ -10,7 +8,7 @@ from dataclasses import dataclass, replace
 from importlib import resources
 from itertools import chain
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -25,7 +23,7 @@ from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import energy_period, first_wave, tapered_power
 
 _TEXT = resources.files("seakeep.campaign").joinpath("vocabulary.toml").read_text("utf-8")
-_CALLED: dict[str, Any] = tomllib.loads(_TEXT)
+_CALLED = tomllib.loads(_TEXT)
 """Words of columns, runs and places in files of others."""
 
 LONG = 64
@@ -282,7 +280,7 @@ def _free(stem: str, taken: Counter[str]) -> str:
 
 def guess_channels(files: Sequence[File]) -> list[Guess]:
     """Guess a channel for each column of the first file of each logger."""
-    out: list[Guess] = []
+    out = []
     taken: Counter[str] = Counter()
     for logger in dict.fromkeys(file.logger for file in files):
         same = [file for file in files if file.logger == logger]
@@ -429,7 +427,7 @@ def _channels(words: Sequence[str], dimension: str | None, logger: str) -> Itera
             yield "mooring_" + "_".join(place)
 
 
-def suggest_channel(column: str, unit: str | None, logger: str = "") -> str:
+def suggest_channel(column: str, unit: str | None, logger: str) -> str:
     """Name for a column: a canonical one if words and unit speak for it, else the column's own.
 
     A length of a logger called "wave_probes" is an elevation.

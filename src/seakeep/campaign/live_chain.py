@@ -5,8 +5,6 @@ same steps run on the last part of the record, and a sample is handed out once `
 after it are there: it differs from the offline one by what the ends of the window still do to it.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -228,12 +226,11 @@ class LiveChain:
             for key, logger in self._run.loggers.items()
         }
         run = derived(cleaned(mapped(replace(self._run, loggers=loggers))))
-        ends = [each["time"].to_numpy()[[0, -1]] for each in run.groups.values()]
+        ends = [each["time"].values[[0, -1]] for each in run.groups.values()]
         low = int(np.ceil((max(each[0] for each in ends) - origin) / dt - 1e-9))
         high = int(np.floor((min(each[1] for each in ends) - origin) / dt + 1e-9))
-        axis: FloatArray = origin + dt * np.arange(low, high + 1, dtype=float)
+        axis = origin + dt * np.arange(low, high + 1, dtype=float)
         data = resampled(run, dt, axis).data
-        assert data is not None
         names = list(run.settings.channel_names)
         return data[names].reset_coords(drop=True).isel(time=slice(max(first - low, 0), stop - low))
 

@@ -14,8 +14,6 @@ step       what it does
 ========== =====================================================================================
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -141,7 +139,7 @@ class Run:
     clocks: Mapping[str, Clock] = field(default_factory=dict)
     groups: Datasets = field(default_factory=dict)
     late: tuple[str, ...] = ()
-    data: xr.Dataset | None = None
+    data: xr.Dataset = field(default_factory=xr.Dataset)
     findings: tuple[Finding, ...] = ()
 
     @property
@@ -152,7 +150,7 @@ class Run:
     @property
     def reference_time(self) -> FloatArray:
         """Instants of the reference logger, s."""
-        return next(iter(self.groups.values()))["time"].to_numpy()
+        return next(iter(self.groups.values()))["time"].values
 
 
 def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reader: Reader) -> Run:
@@ -374,11 +372,11 @@ def cleaned(run: Run) -> Run:
 
 
 def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
-    missing = {str(n): ~np.isfinite(each.to_numpy()) for n, each in data.items()}
+    missing = {str(n): ~np.isfinite(each.values) for n, each in data.items()}
     gapped = [name for name, each in missing.items() if each.any()]
     if not gapped:
         return
-    time, first = data["time"].to_numpy(), missing[gapped[0]]
+    time, first = data["time"].values, missing[gapped[0]]
     step = usual_step(time)
 
     def said(gap: tuple[int, int]) -> str:
@@ -399,7 +397,7 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
 
 def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> xr.Dataset:
     """Put the channels on a uniform axis, where that is allowed."""
-    time = data["time"].to_numpy()
+    time = data["time"].values
     try:
         uniform_step(time, name)
         return data
@@ -411,7 +409,7 @@ def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> x
             ) from None
         if report.jittered and preparation.jitter == "refuse":
             raise DataError(f"{error} Or state jitter = 'interpolate' in [preparation].") from None
-    series = np.column_stack([each.to_numpy() for each in data.values()])
+    series = np.column_stack([each.values for each in data.values()])
     new, values = onto_uniform(time, series, name)
     variables = {
         str(n): ("time", values[:, i], each.attrs) for i, (n, each) in enumerate(data.items())
@@ -426,12 +424,12 @@ def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> x
 
 def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Dataset:
     """Fill gaps, so that filters can run, and flag what was filled and what looks wrong."""
-    step = usual_step(data["time"].to_numpy())
+    step = usual_step(data["time"].values)
     longest = preparation.longest_gap if preparation.gaps == "bridge" else 0.0
     for name in list(data.data_vars):
         try:
             values, flags, known = _flagged(
-                data[name].to_numpy(), step, longest, preparation.outliers == "replace"
+                data[name].values, step, longest, preparation.outliers == "replace"
             )
         except DataError as error:
             raise DataError(f"channel '{name}': {error}") from None
@@ -491,7 +489,7 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
             late.append(name)
             continue
         data = groups[home[name]]
-        step = uniform_step(data["time"].to_numpy(), f"run '{run.name}'")
+        step = uniform_step(data["time"].values, f"run '{run.name}'")
         variable = derive(data.variables, name, settings, step, run.name)
         groups[home[name]] = data.assign({name: variable.pop(name)}).assign_coords(variable)
     return replace(run, groups=groups, late=tuple(late))
@@ -514,8 +512,8 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
     for name in (each for each in run.settings.channel_names if each in channels):
         data[name] = channels[name]
         if (flags := channels.get(f"{name}_flags")) is not None:
-            lost = (flags.to_numpy() & MISSING) > 0
-            data[name] = data[name].copy(data=np.where(lost, np.nan, data[name].to_numpy()))
+            lost = (flags.values & MISSING) > 0
+            data[name] = data[name].copy(data=np.where(lost, np.nan, data[name].values))
             coordinates[f"{name}_flags"] = flags
     return replace(run, data=xr.Dataset(data, coordinates))
 
@@ -524,7 +522,7 @@ def _axis(run: Run, dt: float) -> FloatArray:
     begin = max(float(each["time"][0]) for each in run.groups.values())
     end = min(float(each["time"][-1]) for each in run.groups.values())
     if end <= begin:
-        times = {name: each["time"].to_numpy() for name, each in run.groups.items()}
+        times = {name: each["time"].values for name, each in run.groups.items()}
         spans = ", ".join(
             f"{name} {span_text(t[0], t[-1], usual_step(t))}" for name, t in times.items()
         )
@@ -547,10 +545,10 @@ def _on_axis(
     group: xr.Dataset, wanted: FloatArray, dt: float, settings: PreparationSettings, run: str
 ) -> dict[str, xr.Variable]:
     """Channels of a logger and their flags at other instants."""
-    time = group["time"].to_numpy()
+    time = group["time"].values
     own = uniform_step(time, f"run '{run}'")
     channels = {name: group.variables[name] for name in group.data_vars}
-    series = np.column_stack([channel.to_numpy() for channel in channels.values()])
+    series = np.column_stack([channel.values for channel in channels.values()])
     low = settings.low_pass
     if low is not None and low[1] >= 0.5 / own:
         low = None
@@ -576,7 +574,7 @@ def _on_axis(
     }
     for name, flags in group.variables.items():
         if str(name).endswith("_flags"):
-            new = _flags_at(flags.to_numpy(), time, wanted, dt)
+            new = _flags_at(flags.values, time, wanted, dt)
             out[str(name)] = xr.Variable("time", new, flags.attrs)
     return out
 
@@ -607,23 +605,18 @@ def redundant_pairs(settings: CampaignSettings, period: float) -> Redundant:
     }
 
 
-def checked(
-    run: Run,
-    period: tuple[float, float] | None = None,
-    left_out: Mapping[str, str] | None = None,
-) -> Run:
+def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str, str]) -> Run:
     """Step 7: look for faults.
 
     Parameters
     ----------
     run : Run
         The run, on one axis.
-    period : (float, float), optional
+    period : (float, float) or None
         Counted period and energy period of its waves, s, where they disagree.
-    left_out : mapping of str to str, optional
+    left_out : mapping of str to str
         Runs left out of what is pooled, and why.
     """
-    assert run.data is not None
     settings, preparation = run.settings, run.settings.preparation
     rates = {}
     for name in run.groups:
@@ -653,7 +646,7 @@ def checked(
         wave_columns=waves,
         bridged=preparation.longest_gap if preparation.gaps == "bridge" else None,
         anti_alias=preparation.anti_alias,
-        left_out=left_out or {},
+        left_out=left_out,
     )
     return replace(run, findings=tuple(check(record)))
 
@@ -668,9 +661,8 @@ def used_span(settings: RunSettings) -> tuple[float, float]:
 
 def cropped(run: Run) -> Run:
     """Step 8: cut the run to its span; spans that lie outside the record are refused."""
-    assert run.data is not None
     data, reference = run.data, run.reference_time
-    dt = usual_step(data["time"].to_numpy())
+    dt = usual_step(data["time"].values)
     record = float(reference[0]), float(reference[-1])
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
     slack = max(dt, (record[1] - record[0]) / (reference.size - 1)) * (1 + 1e-6)
@@ -678,13 +670,13 @@ def cropped(run: Run) -> Run:
     spans = {k: (number(each[0]), number(each[1])) for k, each in stated.items() if each}
 
     def used(key: str, record: tuple[float, float], slack: float) -> BoolArray:
-        time = data["time"].to_numpy()
+        time = data["time"].values
         return _part(f"runs.{run.name}.{key}", spans[key], time, dt, record, slack)
 
     parts = {key: used(key, record, slack) for key in spans}
     if "span" in parts:
         data = data.isel(time=parts.pop("span"))
-        time = data["time"].to_numpy()
+        time = data["time"].values
         for key in parts:
             used(key, (float(time[0]), float(time[-1])), np.inf)
     return replace(run, data=data)
@@ -734,7 +726,7 @@ def attributes_of(
 ) -> dict[str, Any]:
     """Attributes that settings (lengths in seconds) and clocks give to a run that was cut."""
     settings, rig, general = campaign.runs[name], campaign.rig, campaign.campaign
-    time = run["time"].to_numpy()
+    time = run["time"].values
     attributes: dict[str, Any] = {
         "run": name,
         "seakeep_version": version(),
@@ -782,7 +774,7 @@ def celerity_of(run: xr.Dataset, dt: float, campaign: CampaignSettings) -> float
         return None
     apart = campaign.rig.positions[channels[1]] - campaign.rig.positions[channels[0]]
     try:
-        first, last = (run[name].to_numpy() for name in channels)
+        first, last = (run[name].values for name in channels)
         celerity = effective_celerity(first, last, dt, apart, depth)
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
         return None

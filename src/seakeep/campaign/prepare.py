@@ -1,11 +1,9 @@
 """The campaign: runs as measured, and as models take them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,15 +11,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Progress, number, whole_number
+from seakeep.arrays import Groups, Progress, number, whole_number
 from seakeep.campaign.live_chain import LiveChain
-from seakeep.campaign.pipeline import (
-    attributes_of,
-    checked,
-    cropped,
-    resampled,
-    strays,
-)
+from seakeep.campaign.pipeline import attributes_of, checked, cropped, resampled, strays
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Failures, Survey, spare, survey
@@ -32,9 +24,6 @@ from seakeep.quality import as_json, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
-
-SHOWN_RUNS = 6
-"""Runs that a campaign's representation names."""
 
 FORMAT = 11
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
@@ -55,16 +44,7 @@ class Campaign:
     """
 
     path: Path
-    settings: CampaignSettings
-
-    def __repr__(self) -> str:
-        runs = list(self.settings.runs)
-        shown = ", ".join(runs[:SHOWN_RUNS]) + (", …" if len(runs) > SHOWN_RUNS else "")
-        models = ", ".join(self.settings.all_models()) or "none"
-        return (
-            f"{type(self).__name__}({self.name!r}, path={str(self.path)!r}, {len(runs)} runs: "
-            f"{shown}; models: {models})"
-        )
+    settings: CampaignSettings = field(repr=False)
 
     @property
     def name(self) -> str:
@@ -231,7 +211,6 @@ class Campaign:
         run = surveyed.channels(name)
         dt = uniform_step(run.reference_time, f"run '{name}'")
         data = resampled(run, dt).data
-        assert data is not None
         return data.assign_attrs(self._attributes(name, data, dt, surveyed))
 
     def clocks(self, names: Iterable[str] | None = None) -> dict[str, dict[str, Clock]]:
@@ -349,7 +328,7 @@ class Campaign:
 
     def prepare(
         self, names: Iterable[str] | None = None, progress: Progress | None = None
-    ) -> dict[str, xr.Dataset]:
+    ) -> Groups:
         """Prepare runs: one uniform step for all of them, cut to their spans.
 
         Each record is resampled as a whole, onto instants that are multiples of the step from the
@@ -381,8 +360,8 @@ class Campaign:
 
     def each_prepared(
         self,
-        names: Iterable[str] | None = None,
-        progress: Progress | None = None,
+        names: Iterable[str] | None,
+        progress: Progress | None,
         failures: Failures | None = None,
     ) -> Iterator[tuple[str, xr.Dataset]]:
         """Prepare runs one after the other, as :meth:`prepare` does; only one is held at a time.
@@ -423,10 +402,9 @@ class Campaign:
                 run = checked(resampled(run, dt), surveyed.doubts.get(name), surveyed.left_out)
                 warn_of(run.findings, reported)
                 data = cropped(run).data
-                assert data is not None
                 data.attrs["quality"] = as_json(run.findings)
                 for channel in data.data_vars.values():
-                    channel.attrs["noise_std"] = noise_floor(channel.to_numpy())
+                    channel.attrs["noise_std"] = noise_floor(channel.values)
                 data.attrs.update(self._attributes(name, data, dt, surveyed))
             except SeakeepError as error:
                 is_named = f"'{name}'" in str(error)
@@ -441,12 +419,7 @@ class Campaign:
             yield name, data
 
     def live_chain(
-        self,
-        run: str,
-        *,
-        delay: float | str = "1 T",
-        window: float | str = "40 T",
-        every: int = 8,
+        self, run: str, *, delay: float | str = "1 T", window: float | str = "40 T", every: int = 8
     ) -> LiveChain:
         """The chain of preparation for use in service: raw samples in, model samples out.
 

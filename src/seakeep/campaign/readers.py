@@ -1,7 +1,5 @@
 """A run's file as a table with a time axis: :func:`read_table`."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

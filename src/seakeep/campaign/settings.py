@@ -10,13 +10,7 @@ import math
 import re
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    model_validator,
-)
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
 from seakeep.conventions import canonical_channel, is_elevation
 from seakeep.errors import RequestError
@@ -49,9 +43,8 @@ class GeneralSettings(Table):
         "the wave channel whose zero-up-crossings define the encounter period"
     )
     period_hysteresis: Annotated[float, Field(ge=0, lt=1)] = optional(
-        "fraction of its standard deviation by which a wave must pass its mean "
-        "either way "
-        "to count; 0, the paper's, counts all. Still water around the waves never counts",
+        "fraction of its standard deviation by which a wave must pass its mean either way to "
+        "count; 0, the paper's, counts all. Still water around the waves never counts",
         0.0,
     )
 
@@ -208,7 +201,7 @@ class InstrumentsSettings(Table):
         return self.loggers.get(name, InstrumentSettings())
 
 
-_STEPS: dict[str, tuple[str, set[str], str]] = {
+_STEPS = {
     "band_pass": ("band", set(), "'band' (Hz), such as band = [0.3, 5.0]"),
     "integrate": ("band", {"times"}, "'band' (Hz), such as band = [0.3, 5.0]"),
     "differentiate": ("", set(), ""),
@@ -355,7 +348,7 @@ class PreparationSettings(Table):
     def _with_preset(cls, received: Any) -> Any:
         preset = received.get("preset") if isinstance(received, dict) else None
         if isinstance(preset, str) and preset in _FILTERS:
-            chain: dict[str, Any] = dict(_FILTERS[preset])
+            chain = dict(_FILTERS[preset])
             if not {"sampling_rate", "dt", "steps_per_period"} & set(received):
                 chain["steps_per_period"] = 32
             return {**chain, **received}

@@ -1,13 +1,11 @@
 """Prepared runs on disk: one NetCDF file per run, used again while it is fresh and unaltered."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 import xarray as xr
 
-from seakeep.arrays import Progress
+from seakeep.arrays import Groups, Progress
 from seakeep.campaign.prepare import Campaign
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, warn
@@ -55,7 +53,7 @@ def write_prepared(
     RequestError, DataError
         As :meth:`Campaign.prepare`.
     """
-    failed: Failures = {} if failures is None else failures
+    failed = {} if failures is None else failures
     folder = prepared_folder(campaign, out_dir)
     wanted = list(campaign.runs if names is None else names)
     files = {name: folder / f"{name}.nc" for name in wanted}
@@ -89,7 +87,7 @@ def load_prepared(
     progress: Progress | None = None,
     *,
     channels: Collection[str] = (),
-) -> dict[str, xr.Dataset]:
+) -> Groups:
     """Take prepared runs from their files where these are fresh, else prepare them in memory.
 
     Parameters

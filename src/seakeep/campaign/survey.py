@@ -1,7 +1,5 @@
 """Computed from all runs together: the clocks of the loggers and the encounter period."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -131,8 +129,8 @@ def survey(
     files_of: Callable[[str], Mapping[str, Path]],
     asked: Sequence[str],
     channel: str | None,
-    progress: Progress | None = None,
-    failures: Failures | None = None,
+    progress: Progress | None,
+    failures: Failures | None,
 ) -> Survey:
     """Read each run once for its clocks and, where a `channel` of waves is given, its period.
 
@@ -146,9 +144,9 @@ def survey(
     clock_runs = dict.fromkeys([*own, *filter(lambda name: settings.runs[name].files, others)])
     period_runs = () if channel is None else settings.period_runs
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
-    clocks: dict[str, dict[str, Clock]] = {}
-    spans: dict[str, tuple[float, float]] = {}
-    bad: Failures = {}
+    clocks = {}
+    spans = {}
+    bad = {}
     for count, name in enumerate(runs, 1):
         if progress is not None:
             progress(0, len(runs), f"clocks and waves of {name} ({count} of {len(runs)})")
@@ -198,8 +196,7 @@ def _period(run: Run, channel: str) -> tuple[float, float]:
     waves = next((group for group in run.groups.values() if channel in group), None)
     if waves is None:  # it needs several loggers
         waves = resampled(run, uniform_step(run.reference_time)).data
-        assert waves is not None
-    time, series = waves["time"].to_numpy(), waves[channel].to_numpy()
+    time, series = waves["time"].values, waves[channel].values
     step = uniform_step(time, f"run '{run.name}'")
     used = inside(time, used_span(run.own), step)
     series = series[used] if used.sum() > 2 else series

@@ -1,7 +1,5 @@
 """From a TOML file to settings, with one message that names every mistake in it."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
 
@@ -13,7 +11,7 @@ from seakeep.toml import Mistake, lengths
 
 
 def derivation_order(
-    derived: Mapping[str, DerivedSettings], channels: Collection[str] = ()
+    derived: Mapping[str, DerivedSettings], channels: Collection[str]
 ) -> list[str]:
     """Order derived channels so that each finds what it needs."""
     graph = {
@@ -50,7 +48,7 @@ def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) 
 
 def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[str]:
     """Names of channels and of all that they are derived from."""
-    needed: set[str] = set()
+    needed = set()
     ahead = list(wanted)
     while ahead:
         name = ahead.pop()

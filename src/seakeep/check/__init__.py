@@ -3,8 +3,6 @@
 :func:`check_model` makes all of them on the runs of a campaign.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -14,7 +12,7 @@ from typing import Any
 
 import xarray as xr
 
-from seakeep.arrays import Datasets, Progress
+from seakeep.arrays import Datasets, Groups, Progress
 from seakeep.check.coherence import coherence
 from seakeep.check.motion import decay, drift, measured_decay, modes
 from seakeep.check.parts import Known, of_part
@@ -84,7 +82,7 @@ class Checked:
         Tests whose input repeats training input, in words.
     """
 
-    results: dict[str, xr.Dataset]
+    results: Groups
     refused: dict[str, str]
     notes: dict[str, tuple[str, ...]]
     repeats: dict[str, str] = field(default_factory=dict)
@@ -120,7 +118,7 @@ def check_model(
     """
     for name, run in runs.items():
         check_channels(run, [*model.states, *model.inputs], name)
-    results: dict[str, xr.Dataset] = {}
+    results: Groups = {}
     refused, notes = {}, {}
     shared: dict[str, Any] = {"free": {}, "baselines": baselines}
     for number, (name, check) in enumerate(CHECKS.items()):

@@ -1,9 +1,6 @@
 """Coherence of inputs and states, and the error that no linear model of the inputs goes below."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -125,7 +122,7 @@ def coherence(
         for k, each in enumerate(still)
     ])  # fmt: skip
     unjudged = still | (slow > segment * model.dt / 3)
-    variables: dict[str, Any] = {
+    variables = {
         "ordinary": (("state", "input", "frequency"), spectra.ordinary()[..., :size].T),
         "spectrum": (over, spectra.outputs[:, :size].T),
         "nrmse": ("state", np.where(still, np.nan, pooled_nrmse(own))),
@@ -136,7 +133,7 @@ def coherence(
     bounds = {"linear_bound": ("multiple", spectra, 1 if names else len(references) + linear)}
     if names:
         bounds["observables_bound"] = ("multiple_observables", further, len(references) + 1)
-    least: FloatArray = spectra.ordinary()[..., :size].max(axis=1).T
+    least = spectra.ordinary()[..., :size].max(axis=1).T
     for bound, (multiple, of_all, count) in bounds.items():
         ends, alike = _bound(of_all, spreads, size, count)
         for key, values in zip(("", "_lower", "_upper"), ends, strict=True):

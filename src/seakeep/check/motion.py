@@ -1,7 +1,5 @@
 """Motion by a model's matrices: its modes, its decay beside the vessel's, and its second order."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy
 import xarray as xr
@@ -247,7 +245,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
             )
         turns = np.zeros((bins[-1] + DIFFERENCES + 1, 1))
     amplitude = float(np.sqrt(2) * single.input_scale.spread[reference])
-    differences: FloatArray = step * np.arange(DIFFERENCES + 1, dtype=float)
+    differences = step * np.arange(DIFFERENCES + 1, dtype=float)
     slow = transfer(model, single.dynamics, differences)
     still = _columns(single, np.zeros((samples, len(single.inputs))))
     forces = np.empty((len(single.states), DIFFERENCES + 1, bins.size), dtype=complex)
@@ -281,7 +279,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
 def _probed(model: HankelDMDcModel, step: float) -> IntArray:
     """Multiples of the step at which waves probe: up to twelve that were trained."""
     every = np.arange(1, int(0.4 / model.dt / step))
-    frequency: FloatArray = step * every.astype(float)
+    frequency = step * every.astype(float)
     known = every[model.coverage.is_trained(frequency).any(axis=0)]
     if not known.size:
         raise DataError("training holds no waves by which the model could be probed.")
@@ -306,10 +304,7 @@ def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:
 
 
 def _offsets(
-    model: HankelDMDcModel,
-    runs: Datasets,
-    static: ComplexArray,
-    still: FloatArray,
+    model: HankelDMDcModel, runs: Datasets, static: ComplexArray, still: FloatArray
 ) -> dict[str, object]:
     """Offsets of regular runs from the model's rest, per amplitude squared."""
     regular = {name: run for name, run in runs.items() if is_regular(run)}

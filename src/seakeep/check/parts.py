@@ -1,7 +1,5 @@
 """Data of the checks: test parts of runs without gaps, and free runs over them."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -11,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray
+from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups
 from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
@@ -71,7 +69,7 @@ def is_regular(run: xr.Dataset) -> bool:
     return bool(run.attrs.get("waves") == "regular")
 
 
-def irregular(runs: Datasets, what: str) -> dict[str, xr.Dataset]:
+def irregular(runs: Datasets, what: str) -> Groups:
     """Runs that are not regular; an error says what cannot be had without them."""
     skipped = {name: run for name, run in runs.items() if not is_regular(run)}
     if not skipped:
@@ -82,7 +80,7 @@ def irregular(runs: Datasets, what: str) -> dict[str, xr.Dataset]:
     return skipped
 
 
-def of_part(runs: Datasets, part: str) -> dict[str, xr.Dataset]:
+def of_part(runs: Datasets, part: str) -> Groups:
     """Runs with a span that trains ("train") or tests ("test"), and with this span alone.
 
     A run that states neither span tests as a whole.
@@ -96,7 +94,7 @@ def of_part(runs: Datasets, part: str) -> dict[str, xr.Dataset]:
     return parts
 
 
-def judged(runs: Datasets) -> tuple[dict[str, xr.Dataset], str]:
+def judged(runs: Datasets) -> tuple[Groups, str]:
     """Tests, or what trains where there is none, and the word for it."""
     tests = of_part(runs, "test")
     return (tests, "tests") if tests else (of_part(runs, "train"), "training")
@@ -180,7 +178,7 @@ def gathered(
 
 def ratio(values: FloatArray, per: FloatArray) -> FloatArray:
     """Quotient; NaN where nothing is divided by."""
-    out: FloatArray = np.full(values.shape, np.nan)
+    out = np.full(values.shape, np.nan)
     np.divide(values, per, out=out, where=per > 0)
     return out
 
@@ -301,10 +299,11 @@ def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) 
     return np.stack([forecasts[name].values for name in model.states], axis=-1)
 
 
-def whole_span(run: xr.Dataset) -> tuple[float, float]:
-    """Span of a run that may be used at all: what trains and what tests, or all of it."""
+def whole_span(run: xr.Dataset, *uses: str) -> tuple[float, float]:
+    """Span of a run that has one of the uses, by default training or testing; or all of it."""
     time = run["time"].values
-    known = [run.attrs[key] for key in ("train_span", "test_span") if key in run.attrs]
+    keys = [f"{use}_span" for use in uses or ("train", "test")]
+    known = [run.attrs[key] for key in keys if key in run.attrs]
     begins, ends = zip(*(known or [(time[0], time[-1])]), strict=True)
     return float(min(begins)), float(max(ends))
 

@@ -1,7 +1,5 @@
 """Statistics of responses, as designers read them: measured against forecast."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 
@@ -19,10 +17,7 @@ PLACES = 161
 
 
 def statistics(
-    model: Model,
-    runs: Datasets,
-    duration: float | None = None,
-    free: Known | None = None,
+    model: Model, runs: Datasets, duration: float | None = None, free: Known | None = None
 ) -> xr.Dataset:
     r"""Peaks of each state over the test parts in irregular waves, measured and forecast.
 

@@ -1,7 +1,5 @@
 """Residuals: whiteness, past inputs, spectrum, bands, and age of the forecast."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

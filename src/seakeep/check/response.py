@@ -45,9 +45,7 @@ LEVEL = 0.95
 
 
 def response(
-    model: Model,
-    frequencies: npt.ArrayLike | None = None,
-    runs: Datasets | None = None,
+    model: Model, frequencies: npt.ArrayLike | None = None, runs: Datasets | None = None
 ) -> xr.Dataset:
     r"""Transfer functions of a model from its matrices, per input and for a passing wave.
 

@@ -1,7 +1,5 @@
 """What a model is worth: its error over the tests beside baselines, and where it may be used."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -18,6 +16,7 @@ from seakeep.check.parts import (
     no_energy,
     reference_probe,
     used_parts,
+    whole_span,
 )
 from seakeep.core.harmonics import dominant_frequency
 from seakeep.errors import DataError
@@ -232,7 +231,5 @@ def _sea(wave: FloatArray, dt: float, run: xr.Dataset) -> tuple[float, float, fl
 def _outside(model: Model, run: xr.Dataset, is_test: bool) -> str:
     if not is_test:
         return ""
-    time = run["time"].values
-    begin, end = run.attrs.get("test_span", (time[0], time[-1]))
-    steps = round((float(end) - float(begin)) / model.dt)
-    return "; ".join(outside_training(model, run, float(begin), steps))
+    begin, end = whole_span(run, "test")
+    return "; ".join(outside_training(model, run, begin, round((end - begin) / model.dt)))

@@ -1,7 +1,5 @@
 """The command ``seakeep``."""
 
-from __future__ import annotations
-
 import io
 import os
 import platform

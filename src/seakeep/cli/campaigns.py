@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -25,16 +26,14 @@ def tank(
         int | None, Option(min=0, max=2**64 - 1, help="Seed of waves and noise.")
     ] = None,
     settings: Annotated[
-        Path | None,
-        Option(help="Tank settings (TOML); by default the CK-14e's."),
+        Path | None, Option(help="Tank settings (TOML); by default the CK-14e's.")
     ] = None,
     run: Annotated[list[str] | None, Option(help="Play this run only; may be repeated.")] = None,
     kind: Annotated[
         Literal["csv", "nc"], Option("--raw-format", help="Format of the raw files.")
     ] = "csv",
     one_logger: Annotated[
-        bool,
-        Option("--one-logger", help="One file and one clock per run, for all instruments."),
+        bool, Option("--one-logger", help="One file and one clock per run, for all instruments.")
     ] = False,
     spacing: Annotated[
         Literal["equal", "jittered"] | None,
@@ -70,12 +69,10 @@ def track(
         Option("-o", "--out", help="Result, .csv or .nc; by default CSV on standard output."),
     ] = None,
     sheet: Annotated[
-        Path | None,
-        Option("--contact-sheet", help="PNG of tracked frames, including the worst."),
+        Path | None, Option("--contact-sheet", help="PNG of tracked frames, including the worst.")
     ] = None,
     metres_per_pixel: Annotated[
-        float | None,
-        Option(help="Calibration; by default from the panel's size as seen."),
+        float | None, Option(help="Calibration; by default from the panel's size as seen.")
     ] = None,
     panel: Annotated[
         tuple[float, float],
@@ -136,15 +133,11 @@ def track(
     passband: Annotated[
         float, Option(help="Edge of the low-pass filter, Hz; 0 filters nothing.")
     ] = 4.0,
-    mru: Annotated[
-        Path | None,
-        Option(help="Record with heave and pitch to compare with."),
-    ] = None,
+    mru: Annotated[Path | None, Option(help="Record with heave and pitch to compare with.")] = None,
     max_lag: Annotated[
         float | None,
         Option(
-            help="Longest lag searched against --mru, s; by default 10, or a quarter of the "
-            "record.",
+            help="Longest lag searched against --mru, s; by default 10, or a quarter of the record."
         ),
     ] = None,
 ) -> None:
@@ -216,14 +209,12 @@ SHOWN = 12
 def init(
     files: Annotated[list[Path], Argument(help="Files of measured runs.", metavar="FILE…")],
     out: Annotated[
-        Path | None,
-        Option("-o", "--out", help="File to write; by default standard output."),
+        Path | None, Option("-o", "--out", help="File to write; by default standard output.")
     ] = None,
     force: Annotated[bool, Option("--force", help="Overwrite an earlier draft.")] = False,
     skip_rows: Annotated[int | None, Option(min=0, help="Lines to skip above the header.")] = None,
     delimiter: Annotated[
-        Literal[",", ";", "tab", "blank"] | None,
-        Option(help="Mark between columns."),
+        Literal[",", ";", "tab", "blank"] | None, Option(help="Mark between columns.")
     ] = None,
     decimal: Annotated[Literal[".", ","] | None, Option(help="Decimal mark.")] = None,
     group: Annotated[str | None, Option(help="Group of HDF5 or TDMS, topic of ROS.")] = None,
@@ -337,13 +328,13 @@ def _report_runs(
 
 def _print_findings(runs: Datasets) -> None:
     """Print what the checks found and no warning said: one line per channel and kind."""
-    from seakeep.quality import Finding, findings_of
+    from seakeep.quality import findings_of
 
-    groups: dict[tuple[str, str], list[Finding]] = {}
+    groups = defaultdict(list)
     for run in runs.values():
         for each in findings_of(run):
             if not each.kind.remedy:
-                groups.setdefault((each.channel, each.kind.name), []).append(each)
+                groups[each.channel, each.kind.name].append(each)
     for same in list(groups.values())[:SHOWN]:
         others = len({each.run for each in same}) - 1
         alike = f" (and in {others} more run{'s' * (others > 1)})" if others else ""
@@ -389,10 +380,7 @@ def _list(context: typer.Context) -> None:
 @datasets.command("fetch")
 def _fetch(
     name: Annotated[str, Argument(help="Name of the data set.")],
-    to: Annotated[
-        Path | None,
-        Option(help="Data folder; by default SEAKEEP_DATA_DIR."),
-    ] = None,
+    to: Annotated[Path | None, Option(help="Data folder; by default SEAKEEP_DATA_DIR.")] = None,
 ) -> None:
     """Fetch a data set from its origin and check it; the one command that uses the network.
 

@@ -152,26 +152,22 @@ Level = Annotated[
     float | None,
     Option(
         help="For an ensemble: probability between the bounds of the band; by default 0.95, or "
-        "what a calibrated band was made for.",
+        "what a calibrated band was made for."
     ),
 ]
 Steps = Annotated[
     str | None,
-    Option(
-        help="Number of instants, or encounter periods such as '15 T'; by default to the end.",
-    ),
+    Option(help="Number of instants, or encounter periods such as '15 T'; by default to the end."),
 ]
 Workers = Annotated[
     int | None,
     Option(
-        help="Processes for the members of a large ensemble; by default this process alone.",
-        min=1,
+        help="Processes for the members of a large ensemble; by default this process alone.", min=1
     ),
 ]
 ModelFile = Annotated[Path, Argument(help="Model file written by seakeep fit.", metavar="MODEL.nc")]
 ModelKey = Annotated[
-    str | None,
-    Option("--model", help="Key in [models.NAME]; by default the table [model]."),
+    str | None, Option("--model", help="Key in [models.NAME]; by default the table [model].")
 ]
 Scheduler = Annotated[
     str | None,

@@ -31,7 +31,7 @@ from seakeep.cli.console import (
     show,
 )
 from seakeep.errors import RequestError, SeakeepError
-from seakeep.files import check_output, check_place, check_report, make_folder
+from seakeep.files import check_output, check_report, make_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,17 +62,14 @@ def forecast(
     run: Annotated[str, Option(help="Name of the run.")],
     start: Annotated[
         str,
-        Option(
-            help="Instant of the last measured state, s or encounter periods such as '20 T'.",
-        ),
+        Option(help="Instant of the last measured state, s or encounter periods such as '20 T'."),
     ],
     out: Annotated[Path, Option("-o", "--out", help="Result: .nc or .csv.")],
     steps: Steps = None,
     level: Level = None,
     band: BandKind = None,
     members: Annotated[
-        bool,
-        Option("--members", help="For an ensemble: write each member, and no statistics."),
+        bool, Option("--members", help="For an ensemble: write each member, and no statistics.")
     ] = False,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -82,7 +79,7 @@ def forecast(
         Literal["refuse", "predict"],
         Option(
             help="If the waves end before the model's look-ahead: 'refuse', or 'predict' them "
-            "from their record.",
+            "from their record."
         ),
     ] = "refuse",
 ) -> None:
@@ -102,7 +99,6 @@ def forecast(
     """
     if out.suffix not in (".nc", ".csv"):
         raise RequestError(f"{out} ends in '{out.suffix}'; a forecast is written as .nc or .csv.")
-    check_place(out)
     from seakeep.campaign import load_prepared, read_campaign
     from seakeep.models import is_ensemble, load_model
     from seakeep.report.comparison import (
@@ -168,19 +164,17 @@ def forecast(
 
 def compare(
     model: Annotated[
-        list[Path],
-        Argument(help="Model files written by seakeep fit.", metavar="MODEL.nc..."),
+        list[Path], Argument(help="Model files written by seakeep fit.", metavar="MODEL.nc...")
     ],
     campaign: CampaignFile,
     run: Annotated[
-        list[str] | None,
-        Option(help="Name of a run (repeatable); by default the test runs."),
+        list[str] | None, Option(help="Name of a run (repeatable); by default the test runs.")
     ] = None,
     start: Annotated[
         str | None,
         Option(
             help="Instant of the last measured state, s or encounter periods such as '20 T'; by "
-            "default the first possible one in waves.",
+            "default the first possible one in waves."
         ),
     ] = None,
     steps: Steps = None,

@@ -39,7 +39,7 @@ def tune(
         Option(
             help="What to choose beside the ridge: observables, lead, input_delays, state_delays, "
             "memory, alignment, readouts, kind (FIR, ARX and subspace models too). Repeat it for "
-            "several. Default: observables, which are chosen too where the file leaves them open.",
+            "several. Default: observables, which are chosen too where the file leaves them open."
         ),
     ] = None,
     out: Annotated[
@@ -169,26 +169,25 @@ def calibrate(
         str,
         Option(
             help="Length of a window, as long as forecasts will be: a number of instants, or "
-            "encounter periods such as '15 T'.",
+            "encounter periods such as '15 T'."
         ),
     ],
     out: Annotated[Path, Option("-o", "--out", help="Ensemble file to write (NetCDF).")],
     run: Annotated[
-        list[str] | None,
-        Option(help="Name of a run (repeatable); by default those that train."),
+        list[str] | None, Option(help="Name of a run (repeatable); by default those that train.")
     ] = None,
     start: Annotated[
         str | None,
         Option(
             help="First instant used of each run, s or encounter periods such as '20 T'; by "
-            "default the start of its training span, or of the run.",
+            "default the start of its training span, or of the run."
         ),
     ] = None,
     stop: Annotated[
         str | None,
         Option(
             help="Last instant used of each run, s or encounter periods such as '40 T'; by default "
-            "the end of its training span, or of the run.",
+            "the end of its training span, or of the run."
         ),
     ] = None,
     level: Level = None,
@@ -197,14 +196,14 @@ def calibrate(
         Option(
             help="Half-width of the band: 'spread', a factor times that of the members with a "
             "floor, 'constant', the members' band moved outwards by the same amount everywhere, or "
-            "'learnt' from spread, horizon and waves.",
+            "'learnt' from spread, horizon and waves."
         ),
     ] = "spread",
     folds: Annotated[
         Literal["run"] | None,
         Option(
             help="'run': members trained on the other runs forecast each training run; by default "
-            "only windows that no member has read count.",
+            "only windows that no member has read count."
         ),
     ] = None,
     workers: Workers = None,
@@ -267,7 +266,7 @@ def calibrate(
         say(
             "Note: errors that last for a whole window are seen only once in each. Counted as "
             f"such, {counted(whole, 'window')} would support {100 * whole / (whole + 1):.0f} %; "
-            "more windows make the margin surer.",
+            "more windows make the margin surer."
         )
     say(f"Wrote {out}. Judge it elsewhere with: seakeep compare {out} {campaign} --band calibrated")
 
@@ -275,28 +274,20 @@ def calibrate(
 def export(
     model: ModelFile,
     c: Annotated[
-        Path | None,
-        Option(help="Folder for C99 sources: a library of two files.", metavar="DIR"),
+        Path | None, Option(help="Folder for C99 sources: a library of two files.", metavar="DIR")
     ] = None,
     estimator: Annotated[
-        bool,
-        Option("--estimator", help="Of C99 sources and FMU: an estimator beside a vessel."),
+        bool, Option("--estimator", help="Of C99 sources and FMU: an estimator beside a vessel.")
     ] = False,
     fmu: Annotated[
-        Path | None,
-        Option(help="FMU 2.0 for co-simulation to write.", metavar="FILE.fmu"),
+        Path | None, Option(help="FMU 2.0 for co-simulation to write.", metavar="FILE.fmu")
     ] = None,
-    onnx: Annotated[
-        Path | None,
-        Option(help="ONNX graph to write.", metavar="FILE.onnx"),
-    ] = None,
+    onnx: Annotated[Path | None, Option(help="ONNX graph to write.", metavar="FILE.onnx")] = None,
     mat: Annotated[
-        Path | None,
-        Option(help="State-space system for MATLAB.", metavar="FILE.mat"),
+        Path | None, Option(help="State-space system for MATLAB.", metavar="FILE.mat")
     ] = None,
     order: Annotated[
-        int | None,
-        Option(help="Order of the MATLAB system, by balanced truncation.", min=1),
+        int | None, Option(help="Order of the MATLAB system, by balanced truncation.", min=1)
     ] = None,
     steps: Annotated[
         int | None,
@@ -306,8 +297,7 @@ def export(
         ),
     ] = None,
     member: Annotated[
-        int | None,
-        Option(help="For an ensemble: the member to export, from 0.", min=0),
+        int | None, Option(help="For an ensemble: the member to export, from 0.", min=0)
     ] = None,
     noise: Annotated[
         list[str] | None,
@@ -355,7 +345,7 @@ def export(
     from seakeep.hosts.program import exportable, timing
 
     linear = exportable(_single(model, member), estimator)
-    written: list[Path] = []
+    written = []
     bound = ""
     if c is not None:
         written += (

@@ -30,8 +30,7 @@ Workers = Annotated[
 def study(
     study_file: Annotated[Path, Argument(help="Study file.", metavar="STUDY.toml")],
     out: Annotated[
-        Path | None,
-        Option("-o", "--out", help="Folder; by default named after the study file."),
+        Path | None, Option("-o", "--out", help="Folder; by default named after the study file.")
     ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -71,13 +70,9 @@ def reproduce(
     quick: Annotated[
         bool, Option("--quick", help="All stages with small counts, in half of the time.")
     ] = False,
-    preset: Annotated[
-        Preset | None,
-        Option(help="The acts of this preset alone."),
-    ] = None,
+    preset: Annotated[Preset | None, Option(help="The acts of this preset alone.")] = None,
     seed: Annotated[
-        int,
-        Option(help="Seed of waves, noise, windows, draws.", min=0, max=2**64 - 1),
+        int, Option(help="Seed of waves, noise, windows, draws.", min=0, max=2**64 - 1)
     ] = 0,
     workers: Workers = None,
     scheduler: Scheduler = None,

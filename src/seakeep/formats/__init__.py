@@ -4,8 +4,6 @@ A reader takes a path and :class:`Options` and returns :class:`Columns`. :data:`
 readers.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from seakeep.errors import DataError

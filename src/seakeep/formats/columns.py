@@ -3,8 +3,6 @@
 Readers, and what may be known about a file before it is read.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping

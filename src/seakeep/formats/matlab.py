@@ -59,7 +59,7 @@ def _loaded(path: Path) -> dict[str, Any]:
         warnings.simplefilter("ignore")  # of classes: they are not channels
         content = read_mat(path, ignore_fields=[name.rpartition("/")[2] for name in opaque])
     # HDF5 keeps no order, and pymatreader hands names on as a set.
-    tidy: dict[str, Any] = _tidy(content, in_order=hdf5)
+    tidy = _tidy(content, in_order=hdf5)
     if opaque and not tidy:
         listed = ", ".join(f"{name} ({kind})" for name, kind in opaque.items())
         raise DataError(
@@ -85,7 +85,7 @@ def _opaque(path: Path) -> dict[str, str]:
     """Variables and fields that only MATLAB can read (table, string, sparse …), with their kind."""
     import h5py
 
-    opaque: dict[str, str] = {}
+    opaque = {}
 
     def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
         if name.startswith("#"):

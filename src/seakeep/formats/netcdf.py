@@ -27,8 +27,8 @@ def read_netcdf(path: Path, options: Options) -> Columns:
     ``NAME_n``. `group` may be left out where one group alone holds channels.
     """
     dataset = opened_netcdf(path, options.group)
-    flat: dict[str, xr.DataArray] = {}
-    faults: dict[str, str] = {}
+    flat = {}
+    faults = {}
     for name, variable in dataset.variables.items():
         array = dataset[name] if name in dataset else xr.DataArray(variable)
         if array.dtype.kind not in "fiub" or array.ndim == 0 or array.size < 2:
@@ -52,7 +52,7 @@ def read_netcdf(path: Path, options: Options) -> Columns:
         if array.dims != (axis,)
     }
     flat = {name: array for name, array in flat.items() if array.dims == (axis,)}
-    values = {name: array.to_numpy().astype(float) for name, array in flat.items()}
+    values = {name: array.values.astype(float) for name, array in flat.items()}
     units = {
         name: _text(array.attrs["units"]) for name, array in flat.items() if "units" in array.attrs
     }
@@ -140,7 +140,7 @@ def _split(path: Path, name: str, array: xr.DataArray) -> dict[str, xr.DataArray
         )
     labels = array.coords.get(second)
     if labels is not None and labels.dtype.kind in "UOST":
-        return {str(label): array[:, i] for i, label in enumerate(labels.to_numpy())}
+        return {str(label): array[:, i] for i, label in enumerate(labels.values)}
     if count > WIDEST:
         raise DataError(
             f"{path}: '{name}' has {count} columns without names; beyond {WIDEST} it is taken for "

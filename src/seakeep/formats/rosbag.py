@@ -4,10 +4,7 @@ A topic is a table: one row per message, one column per number in it. Needs rosb
 ``ros``; no installation of ROS.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -58,21 +55,11 @@ def read_recording(path: Path, options: Options) -> Columns:
     ):
         begin = int(reader.start_time)
         rows = _read_topic(path, reader, options.group)
-    return _columns(path, rows, begin)
+    return _columns(path, begin, *rows)
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """Messages of a topic: times of reception and header stamps (ns), and their numbers."""
-
-    topic: str
-    kind: str
-    received: list[int]
-    stamps: list[int | None]
-    numbers: list[dict[str, float]]
-
-
-def _read_topic(path: Path, reader: Any, wanted: str | None) -> _Rows:
+def _read_topic(path: Path, reader: Any, wanted: str | None) -> tuple[Any, ...]:
+    """Name and type of a topic; times of reception and header stamps (ns), and its numbers."""
     connections = list(reader.connections)
     topics = {connection.topic for connection in connections}
     if wanted is not None and wanted not in topics:
@@ -101,12 +88,12 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> _Rows:
             f"{path}: the topic '{wanted}' ({chosen[0].msgtype}, {len(received)} messages) holds "
             "no numbers. State another topic with group = 'NAME' in [files]."
         )
-    return _Rows(wanted, chosen[0].msgtype, received, stamps, numbers)
+    return wanted, chosen[0].msgtype, received, stamps, numbers
 
 
 def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
     """The one topic whose messages hold numbers; an error that lists them if there are more."""
-    types: dict[str, str] = {}
+    types = {}
     for connection in connections:
         first = next(iter(reader.messages([connection])), None)
         if first is None:
@@ -149,35 +136,43 @@ def _flat(value: Any, name: str) -> Iterator[tuple[str, float]]:
             yield from _flat(getattr(value, field), f"{name}.{field}" if name else field)
 
 
-def _columns(path: Path, rows: _Rows, begin: int) -> Columns:
-    names = dict.fromkeys(key for row in rows.numbers for key in row)
+def _columns(
+    path: Path,
+    begin: int,
+    topic: str,
+    kind: str,
+    instants: list[int],
+    headers: list[int | None],
+    numbers: list[dict[str, float]],
+) -> Columns:
+    names = dict.fromkeys(key for row in numbers for key in row)
     values, faults = {}, {}
     for name in names:
-        if all(name in row for row in rows.numbers):
-            values[name] = np.array([row[name] for row in rows.numbers])
+        if all(name in row for row in numbers):
+            values[name] = np.array([row[name] for row in numbers])
         else:
-            count = sum(name in row for row in rows.numbers)
+            count = sum(name in row for row in numbers)
             faults[name] = (
-                f"{path}: '{name}' of the topic '{rows.topic}' is in {count} of "
-                f"{len(rows.numbers)} messages, since the array varies in length. Map another "
+                f"{path}: '{name}' of the topic '{topic}' is in {count} of "
+                f"{len(numbers)} messages, since the array varies in length. Map another "
                 "column."
             )
-    received = _seconds(rows.received, begin)
-    stamps = [stamp for stamp in rows.stamps if stamp is not None]
+    received = _seconds(instants, begin)
+    stamps = [stamp for stamp in headers if stamp is not None]
     times = {"time": received}
-    if len(stamps) == len(rows.stamps):
+    if len(stamps) == len(headers):
         times = {"time": _seconds(stamps, begin), "receive_time": received}
     elif stamps:
         raise DataError(
-            f"{path}: {len(rows.stamps) - len(stamps)} of {len(rows.stamps)} messages of the topic "
-            f"'{rows.topic}' have no stamp in their header. Correct the node that publishes them."
+            f"{path}: {len(headers) - len(stamps)} of {len(headers)} messages of the topic "
+            f"'{topic}' have no stamp in their header. Correct the node that publishes them."
         )
-    elif rows.kind.endswith("Stamped") or rows.kind.startswith("sensor_msgs/"):
+    elif kind.endswith("Stamped") or kind.startswith("sensor_msgs/"):
         warn(
-            f"{path}: the headers of the topic '{rows.topic}' are not stamped; the times are those "
+            f"{path}: the headers of the topic '{topic}' are not stamped; the times are those "
             "of reception, late by what the transport took."
         )
-    units = {name: unit for name in values if (unit := _unit(rows.kind, name)) is not None}
+    units = {name: unit for name in values if (unit := _unit(kind, name)) is not None}
     units |= dict.fromkeys(times, "s")
     return Columns({**times, **values}, units, faults)
 

@@ -3,8 +3,6 @@
 Needs nptdms, the extra ``tdms`` (its licence is the LGPL, so it is never installed unasked).
 """
 
-from __future__ import annotations
-
 import logging
 import os
 from collections import Counter
@@ -77,7 +75,7 @@ def _check_whole(raw: BinaryIO) -> None:
 
 
 def _chosen(path: Path, file: Any, wanted: str | None) -> Sequence[Any]:
-    groups: dict[str, Sequence[Any]] = {group.name: group.channels() for group in file.groups()}
+    groups = {group.name: group.channels() for group in file.groups()}
     if wanted is not None:
         if wanted not in groups:
             raise RequestError(

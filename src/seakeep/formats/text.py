@@ -1,7 +1,5 @@
 """Tables in text files: CSV and its relatives, as loggers and spreadsheets write them."""
 
-from __future__ import annotations
-
 import codecs
 import csv
 import gzip
@@ -286,7 +284,7 @@ def _frame(path: Path, lines: list[str], layout: _Layout) -> pd.DataFrame:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # columns of several kinds: each cell is looked at here
-            frame: pd.DataFrame = pd.read_csv(  # type: ignore[call-overload]
+            frame = pd.read_csv(  # type: ignore[call-overload]
                 io.StringIO(body),
                 sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
                 decimal=layout.decimal,

@@ -1,7 +1,5 @@
 """Checks of time: clocks, rates and records of the loggers, the common step, the period."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from statistics import median_high, median_low
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import BoolArray, FloatArray, as_series, time_step
+from seakeep.arrays import BoolArray, FloatArray, IntArray, as_series, time_step
 from seakeep.signals.filters import odd_extension
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import dominant_period
@@ -147,7 +147,7 @@ def _bursts(x: FloatArray) -> BoolArray:
     return out
 
 
-def _starts(x: FloatArray) -> npt.NDArray[np.intp]:
+def _starts(x: FloatArray) -> IntArray:
     """First sample of each run of equal readings."""
     return np.flatnonzero(np.append(True, np.diff(x) != 0))
 
@@ -256,9 +256,7 @@ def find_held(series: npt.ArrayLike, dt: float, witness: npt.ArrayLike | None = 
     return out
 
 
-def _stay(
-    x: FloatArray, starts: npt.NDArray[np.intp], begin: int, end: int, period: float
-) -> float:
+def _stay(x: FloatArray, starts: IntArray, begin: int, end: int, period: float) -> float:
     """Samples for which the motion beside a run of equal readings may stay within one reading."""
     spread, changes = _spread(x[starts])[1], np.abs(np.diff(x[starts]))
     smallest, largest = float(changes.min()), STEEP * float(np.percentile(changes, 95))

@@ -3,8 +3,6 @@
 Input of the checks: the channels of a run, and what the campaign says about them.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -277,7 +275,7 @@ def channels_of(data: xr.Dataset) -> dict[str, xr.Variable]:
 
 def filled(channel: xr.DataArray) -> FloatArray:
     """Values of a channel, straight lines across gaps."""
-    return over_gaps(channel.to_numpy())
+    return over_gaps(channel.values)
 
 
 def sound(data: xr.Dataset, name: str) -> FloatArray:
@@ -285,9 +283,9 @@ def sound(data: xr.Dataset, name: str) -> FloatArray:
 
     Straight lines lead across what is missing, wrong or stuck between them.
     """
-    x, flags = data.variables[name].to_numpy(), data.variables.get(f"{name}_flags")
+    x, flags = data.variables[name].values, data.variables.get(f"{name}_flags")
     right = np.isfinite(x)
     if flags is not None:
-        right &= (flags.to_numpy() & (OUTLIER | STUCK)) == 0
+        right &= (flags.values & (OUTLIER | STUCK)) == 0
     at = np.flatnonzero(right)
     return over_gaps(x, right)[at[0] : at[-1] + 1] if at.size else x[:0]

@@ -1,7 +1,5 @@
 """Checks of one channel: flagged samples, constant values, levels, values that cannot be."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -70,7 +68,7 @@ def flagged(record: Record) -> Iterator[Finding]:
     for _, group, name, _ in record.recorded():
         if f"{name}_flags" not in group.coords:
             continue
-        flags, dt = group.variables[f"{name}_flags"].to_numpy(), step_of(group)
+        flags, dt = group.variables[f"{name}_flags"].values, step_of(group)
         for bit, kind in _FLAGS.items():
             hit = (flags & bit) > 0
             if not hit.any():
@@ -100,7 +98,7 @@ def flagged(record: Record) -> Iterator[Finding]:
 def constant(record: Record) -> Iterator[Finding]:
     """Channels that never change."""
     for _, _, name, channel in record.recorded():
-        if not np.ptp(channel.to_numpy()):
+        if not np.ptp(channel.values):
             unit = str(channel.attrs["units"])
             yield record.finding(SamplesKind.CONSTANT, name, float(channel[0]), unit=unit)
 
@@ -137,7 +135,7 @@ def impossible(record: Record) -> Iterator[Finding]:
     """
     depth = record.water_depth
     for name, channel in channels_of(record.whole).items():
-        x, turns = channel.to_numpy(), name in ("roll", "pitch")
+        x, turns = channel.values, name in ("roll", "pitch")
         x, limit = x[np.isfinite(x)], np.pi / 2 if turns else depth
         if x.size and limit is not None and (turns or name == "heave" or is_elevation(name)):
             reached = float(np.percentile(np.abs(x if turns else x - x.mean()), 99))

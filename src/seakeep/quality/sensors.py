@@ -71,7 +71,7 @@ def compared(run: xr.Dataset, groups: Redundant) -> dict[tuple[str, str], Agreem
         for name in others:
             stuck = None
             if f"{name}_flags" in run.coords:
-                stuck = (run[f"{name}_flags"].to_numpy() & STUCK) > 0
+                stuck = (run[f"{name}_flags"].values & STUCK) > 0
             step = float(run[name].attrs.get("reading_step", np.nan))
             out[name, first] = compare_sensors(filled(run[name]), trusted, dt, window, stuck, step)
     return out
@@ -333,5 +333,5 @@ def _windows(
 
 def _together(lags: Lags) -> BoolArray:
     """Windows in which the two go together: elsewhere a lag says nothing."""
-    alike: BoolArray = lags.correlation >= 0.6
+    alike = lags.correlation >= 0.6
     return alike if alike.sum() > 3 else np.ones(alike.size, dtype=bool)

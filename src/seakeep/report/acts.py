@@ -1,7 +1,5 @@
 """The page over the acts of ``seakeep reproduce``: side by side, and against the paper's claims."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -10,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import binomtest
 
-from seakeep.arrays import FloatArray, Progress
+from seakeep.arrays import FloatArray, IntArray, Progress
 from seakeep.core.bands import split_bands
 from seakeep.core.metrics import slack_share
 from seakeep.report.figures.histories import acts_figure
@@ -21,16 +18,7 @@ from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.results import divergence_table
 from seakeep.report.style import HEADING, model_words
-from seakeep.report.tables import (
-    Interval,
-    Number,
-    Table,
-    number,
-    numbers,
-    ratio_of,
-    table,
-    words,
-)
+from seakeep.report.tables import Interval, Number, Table, number, numbers, ratio_of, table, words
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -104,7 +92,7 @@ class Evidence:
     result: StudyResult
 
     @cached_property
-    def order(self) -> npt.NDArray[np.intp]:
+    def order(self) -> IntArray:
         """Places of the training sets, run by run."""
         return training_order(self.result.groups["training"])[0]
 
@@ -252,8 +240,7 @@ class Claims(Evidence):
 
     def judge(self, claim: str) -> Judged:
         """Our number, and whether the claim holds."""
-        verdict: Judged = getattr(self, f"_{claim}")()
-        return verdict
+        return getattr(self, f"_{claim}")()
 
     def _robust(self) -> Judged:
         own, fir = (self.error(model=model) for model in (ENSEMBLE, "fir"))
@@ -480,16 +467,6 @@ def _summary(results: Results) -> Section:
     )
 
 
-ROWS = (
-    ("raw", "deterministic", "(b) the paper's model"),
-    ("raw", "fir", "(b) FIR beside it"),
-    ("recommended", "deterministic", "(c) recommended"),
-    ("recommended", "bayesian", "(c) its ensemble"),
-    ("recommended", "fir", "(c) FIR beside it"),
-)
-"""Rows of the short table, besides that of the last measured state."""
-
-
 def short_table(results: Results) -> Table:
     """Median errors on the channels as measured: the models, and the best that compare with them.
 
@@ -505,8 +482,8 @@ def short_table(results: Results) -> Table:
     """
     last = list(results)[-1]
     rows = [
-        (words, *(" / ".join(pair) for pair in _pairs(results[act], model)))
-        for act, model, words in (*ROWS, (last, "hold_last", "last measured state"))
+        (said, *(" / ".join(pair) for pair in _pairs(results[act], model)))
+        for act, model, said in (*words()["rows"], (last, "hold_last", "last measured state"))
         if act in results
     ]
     first = results[last]

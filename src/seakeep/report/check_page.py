@@ -1,8 +1,7 @@
 """The page of ``seakeep check``: what a model is worth, section by section."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -98,9 +97,9 @@ def _verdicts(result: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
         bounds = interval(every, "nrmse")
         error = number(every["nrmse"]) + f" ({bounds})" * (bounds != MISSING)
         yield f"{len(names)} {tests} in {kind} waves: ANRMSE {error}{beside}."
-        groups: dict[tuple[float, str], list[str]] = {}
+        groups = defaultdict(list)
         for state in result["state"].values[1:]:
-            groups.setdefault(_verdict(own.sel(state=state)), []).append(str(state))
+            groups[_verdict(own.sel(state=state))].append(str(state))
         for (_, use), alike in sorted(groups.items(), key=lambda each: (not each[0][0], each[0])):
             yield f"{kind.capitalize()} waves, {', '.join(alike)}: {use}{memory}."
 
@@ -237,27 +236,27 @@ def _validation_table(result: xr.Dataset) -> Table:
 def possible_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return coherence, and the least error of a linear map beside the model's."""
     rows, trained = [], checked.results.get("training_coherence")
-    advice: dict[str, list[str]] = {}
-    unjudged: dict[str, list[str]] = {}
+    advice = defaultdict(list)
+    unjudged = defaultdict(list)
     worth, segment = checked.results.get("worth"), result.attrs["segment"]
     ahead = worth is not None and bool((worth["look_ahead"] > 0).any())
     for state in map(str, result["state"].values):
         own = result.sel(state=state)
         rows += [_bounds(each.sel(state=state)) for each in (result, trained) if each is not None]
         if bool(own["still"]):
-            unjudged.setdefault("it stands still in these runs", []).append(state)
+            unjudged["it stands still in these runs"].append(state)
         elif float(own["period"]) > segment / 3:
             why = (
                 f"its slow period of {float(own['period']):.3g} s exceeds a third of a segment of "
                 f"{segment:.3g} s"
             )
-            unjudged.setdefault(why, []).append(state)
+            unjudged[why].append(state)
         else:
             model, linear = float(own["nrmse"]), float(own["linear_bound"])
             more = float(own.get("observables_bound", np.nan))
             beside = f"{state}: model {model:.2g}, linear bound {linear:.2g}"
             beside += f", with the observables {more:.2g}" * bool(np.isfinite(more))
-            advice.setdefault(_advice(model, linear, more, ahead), []).append(beside)
+            advice[_advice(model, linear, more, ahead)].append(beside)
     points = [f"{'; '.join(states)}. {words}" for words, states in advice.items()]
     points += [f"{', '.join(of)}: cannot be judged: {why}." for why, of in unjudged.items()]
     if worth is not None and (state := worth.attrs["conditional_on"]):
@@ -309,10 +308,9 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
         most = np.abs(result["displacement"].values).max(axis=1)
         # None swings farther than it was moved in still water.
         points = [
-            f"{motion}: after its release the model swings to {reach:.2g} times the offset, "
-            "where a vessel in still water swings back by less than it was moved. Read no period "
-            "and no damping off it: the state of this model follows the waves, or its delays fit "
-            "noise."
+            f"{motion}: after its release the model swings to {reach:.2g} times the offset, where "
+            "a vessel in still water swings back by less than it was moved. Read no period and no "
+            "damping off it: the state of this model follows the waves, or its delays fit noise."
             for motion, reach in zip(result["motion"].values, most, strict=True)
             if reach > OVERSHOOT
         ]
@@ -433,7 +431,7 @@ def drift_section(result: xr.Dataset, checked: Checked) -> Section:
     return section("drift", figure, table("drift", rows), **result.attrs)
 
 
-CHECK_SECTIONS: dict[Callable[[xr.Dataset, Checked], Section], Sequence[str]] = {
+CHECK_SECTIONS = {
     worth_section: ("worth",),
     response_section: ("response", "measured_response", "validation"),
     possible_section: ("coherence",),

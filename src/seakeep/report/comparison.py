@@ -3,8 +3,6 @@
 Table of the margins of a calibrated band.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -22,7 +20,6 @@ from seakeep.files import MARK, replacing, write_netcdf, write_text
 from seakeep.models import HankelEnsemble
 from seakeep.models.forecasts import counted
 from seakeep.report.tables import (
-    Form,
     Number,
     Table,
     band_verdict,
@@ -35,27 +32,10 @@ from seakeep.report.tables import (
     ratio_of,
     row,
     short,
+    words,
 )
 from seakeep.study.judge import verdict
 
-_SHOWN = {
-    "nrmse": ("NRMSE", 3, "anrmse"),
-    "training_nrmse": ("in training SD", 3, "training_anrmse"),
-    "fit": ("fit %", 1, ""),
-    "nammae": ("NAMMAE", 3, "mean_nammae"),
-    "sd_ratio": ("SD ratio", 3, ""),
-    "coverage": ("in band %", 1, "mean_coverage"),
-    "relative_band_width": ("width in SD", 3, ""),
-}
-"""Columns of a terminal: heading, decimals, and the average over the channels."""
-_IN_UNITS = {
-    "measured_min": "min measured",
-    "predicted_min": "min predicted",
-    "measured_max": "max measured",
-    "predicted_max": "max predicted",
-    "band_width": "mean width of band",
-}
-"""Columns of a second table, in the unit of the channel."""
 UNTIL = "waves read until [s]"
 """Column of a forecast's CSV file where the model looks ahead."""
 HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
@@ -64,7 +44,7 @@ HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
 
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Comparison of forecasts with measurements, tables per run that fit a terminal."""
-    shown = {name: each for name, each in _SHOWN.items() if name in table}
+    shown = {name: each for name, each in words()["comparison"].items() if name in table}
     heads, _, of_all = zip(*shown.values(), strict=True)
     digits = {name: each[1] for name, each in shown.items()}
     for at in entries(table, "run"):
@@ -108,8 +88,8 @@ def _by_channel(
 
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
-    shown = {name: heading for name, heading in _IN_UNITS.items() if name in at}
-    forms: dict[str, Form] = dict.fromkeys(shown, short)
+    shown = {name: heading for name, heading in words()["extremes"].items() if name in at}
+    forms = dict.fromkeys(shown, short)
     cells = partial(row, **forms)
     heads = ("unit", *shown.values())
     return _by_channel(at, "extremes", title, heads, lambda one: cells(one, "channel_units"))
@@ -168,7 +148,7 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
     changes: list[tuple[str, ...]] = []
     for at in entries(table, "model"):
         value, low, high = ratio_of(at, "all_")
-        cells: tuple[str, ...] = ("", "", "")
+        cells = ("", "", "")
         if changes:
             known = bool(np.isfinite([low, high]).all())
             bounds = (change(low, high), verdict(low - 1, high - 1)) if known else ("", "")
@@ -278,9 +258,8 @@ def band_findings(table: xr.Dataset) -> list[str]:
             continue
         words = band_verdict(inside / 100, float(at["level"]))
         said.append(
-            f"{run}: the {_band_words(at)} of {members - lost:.0f} members holds "
-            f"{inside:.0f} % of the measured instants, {words}. {_CARRIES[str(at['band'].values)]}"
-            f"{left_out}."
+            f"{run}: the {_band_words(at)} of {members - lost:.0f} members holds {inside:.0f} % of "
+            f"the measured instants, {words}. {_CARRIES[str(at['band'].values)]}{left_out}."
         )
     return said
 

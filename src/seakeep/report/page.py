@@ -162,7 +162,7 @@ def write_page(
     page = folder / "report.html"
     check_output(page, "report")
     drawings = [each for section in sections for each in section.figures]
-    drawn: dict[str, Markup] = {}
+    drawn = {}
     with storing(folder), figure_style():
         if not page.exists():  # figures of an interrupted report are known as ours
             write_text(page, UNFINISHED)
@@ -218,7 +218,7 @@ def _drawn(drawing: Drawing, folder: Path) -> Markup:
         engine.execute(figure)
         # Without any engine; "none" stands for one, for which each file would be drawn twice.
         figure.set_layout_engine(None)
-    save_figure(figure, folder / f"{drawing.name}.png", figure.dpi)
+    save_figure(figure, folder / f"{drawing.name}.png")
     text = _svg_text(figure, drawing.name)
     write_text(folder / f"{drawing.name}.svg", text)
     return _inline_svg(text, drawing)

@@ -1,7 +1,5 @@
 """The data-quality sheet: one page with a table per run and a picture of its channels."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -33,12 +31,12 @@ def channel_rows(run: xr.Dataset) -> list[tuple[str, ...]]:
     findings, rows = findings_of(run), []
     for name, channel in run.data_vars.items():
         factor, unit = displayed(str(channel.attrs.get("units", "")))
-        x = factor * channel.to_numpy()
+        x = factor * channel.values
         known = x[np.isfinite(x)]
         numbers = (np.nan,) * 4
         if known.size:
             numbers = (known.min(), known.max(), known.mean(), known.std(ddof=1))
-        flags = run.coords.get(f"{name}_flags", xr.zeros_like(channel)).to_numpy().astype(int)
+        flags = run.coords.get(f"{name}_flags", xr.zeros_like(channel)).values.astype(int)
         flagged = ", ".join(
             f"{word} {100 * np.mean((flags & bit) > 0):.2g} %"
             for word, bit in FLAGS.items()
@@ -75,11 +73,7 @@ def clock_rows(run: xr.Dataset) -> list[tuple[str, str, str, str]]:
 
 
 def write_quality_sheet(
-    runs: Datasets,
-    settings: CampaignSettings,
-    title: str,
-    folder: Path,
-    unread: Mapping[str, str] | None = None,
+    runs: Datasets, settings: CampaignSettings, title: str, folder: Path, unread: Mapping[str, str]
 ) -> list[Path]:
     """Write the sheet of prepared runs: one self-contained page, and a PNG per run.
 
@@ -96,7 +90,7 @@ def write_quality_sheet(
                 mark, small = {"Software": f"{MARK}: {SHEET}"}, {"optimize": True}
                 figure.savefig(temporary, format="png", dpi=100, metadata=mark, pil_kwargs=small)
     rows = [(*row, kinds or "nothing found") for *row, kinds in map(run_row, runs, runs.values())]
-    rows += [(n, Number("not prepared"), MISSING, why) for n, why in (unread or {}).items()]
+    rows += [(n, Number("not prepared"), MISSING, why) for n, why in unread.items()]
     marked = [k for k, row in enumerate(rows) if row[2] != "0"]
     every = section("runs", table("runs", rows, marked=marked))
     sections = [every, *map(_section, runs, runs.values())]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import textwrap
+import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,65 +26,28 @@ if TYPE_CHECKING:
 
     Places = Sequence[Axes] | Axes | None
 
-PALETTE = {
-    "black": "#000000",
-    "vermilion": "#D55E00",
-    "blue": "#0072B2",
-    "green": "#009E73",
-    "pink": "#CC79A7",
-    "amber": "#E69F00",
-    "sky": "#56B4E9",
-    "slate": "#56606B",
-    "brown": "#8C564B",
-    "violet": "#9467BD",
-    "grey": "#999999",
-    "pale": "#BBBBBB",
-    "light": "#D9D9D9",
-    "blush": "#FDEEE4",
-}
-"""From the palette of Okabe and Ito, their greys differ too; then two more colours, and tints."""
+_FILE = resources.files("seakeep.report").joinpath("templates/style.toml")
+_STYLE = tomllib.loads(_FILE.read_text("utf-8"))
 
-COLOURS = {
-    "measured": PALETTE["black"],
-    "forecast": PALETTE["vermilion"],
-    "ensemble": PALETTE["blue"],
-    "input": PALETTE["slate"],
-    "start": PALETTE["green"],
-}
+
+def _line(colour: str, width: float, dash: Sequence[float] = ()) -> dict[str, Any]:
+    """Line as matplotlib takes it, from one of the style sheet."""
+    style = (0, tuple(dash)) if dash else "-"
+    return {"color": PALETTE[colour], "linewidth": width, "linestyle": style}
+
+
+PALETTE = _STYLE["palette"]
+COLOURS = {what: PALETTE[colour] for what, colour in _STYLE["colours"].items()}
 """By what a line shows."""
 
-DASHED, DOTTED = (0, (4, 1.5)), (0, (1, 1))
-LINES: dict[str, dict[str, Any]] = {
-    "measured": {"color": COLOURS["measured"], "linewidth": 1.6, "linestyle": "-"},
-    "forecast": {"color": COLOURS["forecast"], "linewidth": 1.2, "linestyle": DASHED},
-    "ensemble": {
-        "color": COLOURS["ensemble"],
-        "linewidth": 1.3,
-        "linestyle": (0, (4, 2.5, 1, 2.5)),
-    },
-    "input": {"color": COLOURS["input"], "linewidth": 0.9, "linestyle": "-"},
-}
+LINES = {what: _line(**each) for what, each in _STYLE["lines"].items()}
 """Lines differ in dash and width as well as in colour."""
+DASHED, DOTTED = LINES["forecast"]["linestyle"], (0, (1, 1))
 
-THIN: dict[str, Any] = {**LINES["measured"], "linewidth": 0.8}
+THIN = {**LINES["measured"], "linewidth": 0.8}
 """Measured, between a band and its mean: a band is often little wider than a line."""
 
-SERIES: tuple[dict[str, Any], ...] = (
-    {**LINES["forecast"], "marker": "o"},
-    {**LINES["ensemble"], "marker": "s"},
-    *(
-        {"color": PALETTE[colour], "linewidth": 1.2, "linestyle": (0, dash), "marker": marker}
-        for colour, dash, marker in (
-            ("pink", (8, 2), "D"),
-            ("amber", (3, 1, 1, 1, 1, 1), "v"),
-            ("green", (1, 1), "^"),
-            ("sky", (6, 1, 1, 1), "P"),
-            ("brown", (2, 2), "X"),
-            ("slate", (2, 2, 6, 2), "*"),
-            ("violet", (1, 2.5), "p"),
-        )
-    ),
-)
+SERIES = [_line(**each) | {"marker": marker} for marker, each in _STYLE["series"].items()]
 """Colour, dash and marker of each of several things of one kind."""
 
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
@@ -96,21 +61,6 @@ NARROWEST = 7.5
 _WITH_PREFIX = ("N", "N m", "Pa", "W")
 """Units whose values run into millions at full scale."""
 
-_RC: Any = {
-    "font.size": 9,
-    "axes.titlesize": 8,
-    "axes.titlelocation": "left",
-    "axes.labelsize": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": PALETTE["light"],
-    "grid.linewidth": 0.5,
-    "legend.frameon": False,
-    "figure.dpi": 110,  # of layout and picture alike: what is measured for one serves the other
-    "svg.fonttype": "none",
-}
-
 
 @contextmanager
 def figure_style() -> Iterator[None]:
@@ -122,7 +72,7 @@ def figure_style() -> Iterator[None]:
             "figures need matplotlib, which is not installed. "
             "Install it with: pip install 'seakeep[figures]'"
         ) from error
-    with mpl.rc_context(_RC):
+    with mpl.rc_context(_STYLE["rc"]):
         yield
 
 
@@ -150,7 +100,7 @@ def panels(
         for spare in every[count:]:
             spare.remove()
         return figure, every[:count]
-    given: list[Any] = list(np.ravel(np.array(axes, dtype=object)))
+    given = list(np.ravel(np.array(axes, dtype=object)))
     if len(given) != count:
         raise RequestError(
             f"axes holds {len(given)} Axes and the figure draws {count} panels. Give as many, or "
@@ -173,7 +123,7 @@ def legend_outside(figure: Any, *places: Any, side: str = "lower center", **opti
     return figure.legend(unique.values(), unique, loc=loc, ncols=columns, **options)
 
 
-def save_figure(figure: Figure, path: Path, dpi: float | None = None) -> Path:
+def save_figure(figure: Figure, path: Path) -> Path:
     """Write a figure to a temporary name and rename it; the suffix decides the format."""
     with figure_style(), replacing(path) as temporary:
         kind = path.suffix.removeprefix(".")
@@ -183,7 +133,6 @@ def save_figure(figure: Figure, path: Path, dpi: float | None = None) -> Path:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from PIL import Image, PngImagePlugin  # comes with matplotlib
 
-        figure.set_dpi(_RC["figure.dpi"] if dpi is None else dpi)
         canvas: Any = FigureCanvasAgg(figure)
         canvas.draw()
         full = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")

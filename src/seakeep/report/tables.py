@@ -455,23 +455,43 @@ def latex_text(text: str) -> str:
 
 def write_latex(table: Table, path: Path) -> Path:
     r"""Write a table as LaTeX with booktabs rules; longer than a page it is a longtable."""
-    caption = rf"\caption{{{latex_text(f'{table.title}. {table.note}'.strip())}}}"
-    label = rf"\label{{tab:{table.name}}}"
-    head = [r"\toprule", _latex_line(table.columns), r"\midrule"]
-    body = []
-    for k, row in enumerate(table.rows):
-        body += [r"\midrule"] * (k in table.averages) + [_latex_line(row)]
-    form = _latex_columns(table)
-    if len(table.rows) > PAGE:
-        lines = [r"\begingroup\small", rf"\begin{{longtable}}{{{form}}}", rf"{caption}{label}\\"]
-        lines += [*head, r"\endfirsthead", *head, r"\endhead", *body, r"\bottomrule"]
-        lines += [r"\end{longtable}", r"\endgroup", ""]
-    else:
-        lines = [r"\begin{table}", r"\centering\small", caption, label]
-        lines += [rf"\begin{{tabular}}{{{form}}}", *head, *body, r"\bottomrule"]
-        lines += [r"\end{tabular}", r"\end{table}", ""]
-    write_text(path, "\n".join(lines))
+    rows = [
+        "\\midrule\n" * (k in table.averages) + _latex_line(row) for k, row in enumerate(table.rows)
+    ]
+    text = (_LONG if len(table.rows) > PAGE else _SHORT).format(
+        name=table.name,
+        caption=latex_text(f"{table.title}. {table.note}".strip()),
+        form=_latex_columns(table),
+        head=f"\\toprule\n{_latex_line(table.columns)}\n\\midrule",
+        body="\n".join(rows),
+    )
+    write_text(path, text)
     return path
+
+
+_SHORT = r"""\begin{{table}}
+\centering\small
+\caption{{{caption}}}
+\label{{tab:{name}}}
+\begin{{tabular}}{{{form}}}
+{head}
+{body}
+\bottomrule
+\end{{tabular}}
+\end{{table}}
+"""
+_LONG = r"""\begingroup\small
+\begin{{longtable}}{{{form}}}
+\caption{{{caption}}}\label{{tab:{name}}}\\
+{head}
+\endfirsthead
+{head}
+\endhead
+{body}
+\bottomrule
+\end{{longtable}}
+\endgroup
+"""
 
 
 def _latex_line(cells: Iterable[str]) -> str:
@@ -480,7 +500,7 @@ def _latex_line(cells: Iterable[str]) -> str:
 
 def _latex_columns(table: Table) -> str:
     """Columns of numbers to the right, of text to the left, of long text in lines that break."""
-    columns: Sequence[Sequence[str]] = list(zip(table.columns, *table.rows, strict=True))
+    columns = list(zip(table.columns, *table.rows, strict=True))
     longest = [max(map(len, column)) for column in columns]
     wide = [length for length in longest if length > WIDE]
     room = 1.0 - sum(length + 2 for length in longest if length <= WIDE) / LINE

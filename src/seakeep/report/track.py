@@ -1,7 +1,5 @@
 """What ``seakeep track`` writes and says: a track as a Dataset, as files, and in words."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterator
@@ -81,10 +79,8 @@ def agreement_words(
     for name in ("heave", "pitch"):
         other, unit = reference[name], LABELS[name][0]
         factor = conversion(str(other.attrs.get("units", unit)), unit, f"'{name}'")
-        time = reference["time"].to_numpy()
-        agreement = compare_motion(
-            track[name], track.time, factor * other.to_numpy(), time, max_lag
-        )
+        time = reference["time"].values
+        agreement = compare_motion(track[name], track.time, factor * other.values, time, max_lag)
         shown, unit = (1e3, "mm") if unit == "m" else displayed(unit)
         yield (
             (

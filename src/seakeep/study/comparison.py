@@ -5,8 +5,6 @@ Runs and forecasts at full scale, by Froude's law.
 Parts of runs on which the band of an ensemble is calibrated.
 """
 
-from __future__ import annotations
-
 import math
 import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,9 +16,9 @@ import numpy as np
 import xarray as xr
 
 from seakeep import metrics, statistics
-from seakeep.arrays import Datasets, Progress, whole_number
+from seakeep.arrays import Datasets, Groups, Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
-from seakeep.check.parts import samples_in
+from seakeep.check.parts import samples_in, whole_span
 from seakeep.conventions import displayed, froude_factor, is_elevation
 from seakeep.core.bootstrap import FEWEST_SAMPLES
 from seakeep.core.metrics import root_mean_square
@@ -259,8 +257,7 @@ def compare_models(
         compared[label] = []
         for name, run in prepared.items():
             time = run["time"].values
-            span = run.attrs.get("test_span", (time[0], time[-1]))
-            at, last = samples_in(run, used, span, dt, history, lead, first)
+            at, last = samples_in(run, used, whole_span(run, "test"), dt, history, lead, first)
             window: Any = (
                 run,
                 float(time[at]) if first is None else first,
@@ -605,12 +602,8 @@ def _state_again(forecast: xr.Dataset) -> None:
 
 
 def calibration_parts(
-    campaign: Campaign,
-    runs: Datasets,
-    dt: float,
-    start: str | None = None,
-    stop: str | None = None,
-) -> dict[str, xr.Dataset]:
+    campaign: Campaign, runs: Datasets, dt: float, start: str | None, stop: str | None
+) -> Groups:
     """Part of each run between two instants, by default its training span, or the whole run.
 
     Parameters
@@ -635,7 +628,7 @@ def calibration_parts(
         If an instant lies in none of the runs, or the start at or after the stop.
     """
     spans = {name: (float(each["time"][0]), float(each["time"][-1])) for name, each in runs.items()}
-    edges: dict[str, float] = {}
+    edges = {}
     for option, stated in (("--start", start), ("--stop", stop)):
         if stated is None:
             continue

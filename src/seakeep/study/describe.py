@@ -1,14 +1,12 @@
 """Data of a study: channels with their signs, runs with their quality, spectra."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, Groups
 from seakeep.campaign import Campaign
 from seakeep.check.parts import whole_span
 from seakeep.conventions import is_elevation
@@ -33,7 +31,7 @@ POSITIVE = {
 WELCH = ("paper", "recommended")
 
 
-def describe_study(study: Study, plan: Plan) -> dict[str, xr.Dataset]:
+def describe_study(study: Study, plan: Plan) -> Groups:
     """Data that a study used."""
     groups = {
         "channels": _channels(study.campaign, plan),

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, Progress
+from seakeep.arrays import Datasets, Groups, Progress
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.campaign.store import prepared_folder
+from seakeep.check.parts import whole_span
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.models import KINDS, Model, Spec, is_ensemble, outside_training
 from seakeep.models.conditions import disagreements
@@ -30,7 +31,7 @@ MAPS = {"alignment", "lead", "observables"}
 """Settings that say how measured inputs drive a model."""
 
 
-def training_runs(prepared: Datasets, window: int | None = None) -> dict[str, xr.Dataset]:
+def training_runs(prepared: Datasets, window: int | None = None) -> Groups:
     """Parts of prepared runs that train.
 
     Parameters
@@ -121,8 +122,8 @@ def fit_campaign(
     folder = prepared_folder(campaign)
     others = [n for n in campaign.test_runs if n not in both and (folder / f"{n}.nc").exists()]
     for name, run in (both | load_prepared(campaign, names=others)).items():
-        begin, end = run.attrs.get("test_span", (run["time"].values[0], run["time"].values[-1]))
-        warn_of_waves(identified, run, name, float(begin), round((end - begin) / dt))
+        begin, end = whole_span(run, "test")
+        warn_of_waves(identified, run, name, begin, round((end - begin) / dt))
     look_ahead = identified.signature.input_map.look_ahead
     latest = max(look_ahead(run, dt) for run in runs.values()) - dt
     if latest > 0.5 * dt:
@@ -140,8 +141,8 @@ def fit_campaign(
 
 
 def read_training(
-    campaign: Campaign, model: str | None = None, progress: Progress | None = None
-) -> tuple[Spec, dict[str, xr.Dataset], dict[str, xr.Dataset], float | None]:
+    campaign: Campaign, model: str | None, progress: Progress | None
+) -> tuple[Spec, Groups, Groups, float | None]:
     """Read what a model of a campaign trains on; arguments and errors as :func:`fit_campaign`.
 
     Returns
@@ -269,9 +270,7 @@ def _warn_of_slow_model(model: Model, runs: Datasets) -> None:
     warn_of_slow_motions(parts, model.states, trained, period)
 
 
-def repeats_of(
-    model: Model, campaign: Campaign, tested: dict[str, xr.Dataset]
-) -> dict[str, Repeat]:
+def repeats_of(model: Model, campaign: Campaign, tested: Groups) -> dict[str, Repeat]:
     """Tests whose input repeats the model's training input, up to a constant phase, by run.
 
     Training runs that the campaign marks as regular waves are left out: regular waves repeat by
@@ -300,7 +299,7 @@ def repeats_of(
     return repeats
 
 
-def warn_of_repeats(model: Model, campaign: Campaign, tested: dict[str, xr.Dataset]) -> None:
+def warn_of_repeats(model: Model, campaign: Campaign, tested: Groups) -> None:
     """Warn where a test run's input repeats the model's training input."""
     for repeat in repeats_of(model, campaign, tested).values():
         warn(f"{repeat} This test shows memory, not skill: test on another run.")

@@ -6,8 +6,6 @@ printed. The recommended variant lets no block cross a join, and takes Silverman
 the block length of Politis and White.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,7 +18,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep import metrics, statistics
-from seakeep.arrays import ComplexArray, Datasets, FloatArray
+from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray
 from seakeep.core.bands import split_bands
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.metrics import over_channels, paired, root_mean_square
@@ -34,7 +32,7 @@ BANDS = ("all", "low", "wave")
 MEASURES = ("nrmse", "nammae", "training_nrmse")
 """Errors of a cell: both of the paper, in SD of the window, and the first in SD of the training."""
 
-VARIANTS: dict[str, dict[str, Any]] = {
+VARIANTS = {
     "paper": {"block_length": "carlstein", "bandwidth": "paper", "joins": True},
     "recommended": {"block_length": "politis_white", "bandwidth": "silverman", "joins": False},
 }
@@ -103,10 +101,10 @@ def judge(
     settings: StudySettings,
     channels: Sequence[str],
     executor: Executor | None = None,
-) -> dict[str, xr.Dataset]:
+) -> Groups:
     """All statistics of a study, as groups ``statistics/…``; the densities side by side."""
     seed = settings.study.seed
-    tables: dict[str, dict[str, xr.Dataset]] = defaultdict(dict)
+    tables: dict[str, Groups] = defaultdict(dict)
     for name in settings.tests:
         test = groups[f"tests/{name}"]
         rng = random_stream(seed, f"differences.{name}")
@@ -153,7 +151,7 @@ def side_by_side(
     grid: Sequence[Sequence[xr.Dataset]], names: Mapping[str, Any], fill: Any = np.nan
 ) -> xr.Dataset:
     """Datasets over two new dimensions, first that of the rows."""
-    how: Any = {"join": "outer", "combine_attrs": "override", "fill_value": fill}
+    how = {"join": "outer", "combine_attrs": "override", "fill_value": fill}
     out = xr.combine_nested(grid, list(names), **how).assign_coords(names)
     return out.transpose(*names, ...)
 
@@ -199,8 +197,7 @@ def difference_table(
     def ratio(drawn: FloatArray) -> FloatArray:
         middle = median_of(drawn.reshape(len(drawn), -1, *drawn.shape[3:]))
         with np.errstate(divide="ignore", invalid="ignore"):
-            out: FloatArray = middle[:, :, None] / middle[:, None]
-        return out
+            return middle[:, :, None] / middle[:, None]
 
     bounds = statistics.two_way_interval(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES)
     coords = {
@@ -222,8 +219,7 @@ def average_of(cells: FloatArray) -> FloatArray:
     """Average of cells (…, channel) over the judged channels; NaN where a forecast diverged."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, as wanted
-        out: FloatArray = np.nanmean(cells, axis=-1)
-    return out
+        return np.nanmean(cells, axis=-1)
 
 
 def with_average(cells: FloatArray) -> FloatArray:
@@ -243,7 +239,7 @@ def window_spans(test: xr.Dataset) -> list[tuple[str, float, float]]:
     return list(zip(runs, starts, starts + float(test["time"].values[-1]), strict=True))
 
 
-def training_order(training: xr.Dataset) -> tuple[npt.NDArray[np.intp], int]:
+def training_order(training: xr.Dataset) -> tuple[IntArray, int]:
     """Training sets in the order of their instants, and how many neighbours overlap."""
     if "run" not in training:
         return np.arange(training.sizes["training"]), 1
@@ -305,9 +301,7 @@ COVERAGE = ("inside", "below", "above", "relative_width")
 PARTS = ("inside", "width", "relative_width", "winkler", "crps")
 
 
-def band_tables(
-    test: xr.Dataset, calibration: xr.Dataset | None, level: float
-) -> dict[str, xr.Dataset]:
+def band_tables(test: xr.Dataset, calibration: xr.Dataset | None, level: float) -> Groups:
     """How bands hold the measurement; empty without ensembles.
 
     ``coverage`` over (model, band, against, channel) is the fraction of the instants at which a
@@ -408,8 +402,7 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
 
     def change(level: FloatArray, growth: FloatArray) -> FloatArray:
         with np.errstate(invalid="ignore"):
-            out: FloatArray = np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
-        return out
+            return np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
 
     blocks = blocks_of([test], training)[1], 1
     bounds = statistics.two_way_interval(
@@ -455,8 +448,8 @@ def density_tables(
     channels: Sequence[str],
     settings: StudySettings,
     name: str,
-    executor: Executor | None = None,
-) -> dict[str, xr.Dataset]:
+    executor: Executor | None,
+) -> Groups:
     """Divergences of forecasts from the measurement, and the densities, per model and channel."""
     windows, steps = test.sizes["window"], test.sizes["time"]
     items, diverged = {}, []

@@ -1,15 +1,14 @@
 """Skill against lead time: a model in service, to which waves to come are not known."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import product
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Progress, whole_number
+from seakeep.arrays import Groups, Progress, whole_number
 from seakeep.campaign import Campaign, load_prepared
+from seakeep.check.parts import whole_span
 from seakeep.errors import RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.labelled import channel_matrix
@@ -33,7 +32,7 @@ def nowcasts(
     *,
     level: float = 0.95,
     progress: Progress | None = None,
-) -> dict[str, xr.Dataset]:
+) -> Groups:
     """Play runs of a campaign to models in service, and judge what they forecast.
 
     Parameters
@@ -112,7 +111,7 @@ def nowcast(model: Servable, run: xr.Dataset, steps: int, *, level: float = 0.95
     whole_number(steps, "steps")
     signature = model.signature
     time, name = run["time"].values, str(run.attrs.get("run", "the run"))
-    begin, end = run.attrs.get("test_span", (time[0], time[-1]))
+    begin, end = whole_span(run, "test")
     first = max(int(np.searchsorted(time, begin)), signature.history_samples - 1)
     last = int(np.searchsorted(time, end + 0.5 * signature.dt)) - 1 - steps
     if last < first:

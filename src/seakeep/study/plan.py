@@ -3,16 +3,15 @@
 Windows are drawn once and are the same for all models.
 """
 
-from __future__ import annotations
-
 import zlib
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, Progress
+from seakeep.arrays import Datasets, Groups, Progress
 from seakeep.campaign import load_prepared
 from seakeep.check.parts import whole_span
 from seakeep.errors import DataError, RequestError
@@ -108,11 +107,11 @@ def _samples(run: xr.Dataset, span: tuple[float, float]) -> tuple[int, int]:
     return first, last
 
 
-def parts_of(runs: Datasets, spans: Iterable[Span]) -> dict[str, xr.Dataset]:
+def parts_of(runs: Datasets, spans: Iterable[Span]) -> Groups:
     """Part of each run from the start of its first to the end of its last span."""
-    edges: dict[str, list[float]] = {}
+    edges = defaultdict[str, list[float]](list)
     for name, *ends in spans:
-        edges.setdefault(name, []).extend(ends)
+        edges[name] += ends
     return {name: between(runs[name], (min(ends), max(ends))) for name, ends in edges.items()}
 
 
@@ -124,11 +123,12 @@ def choose_training(
     inputs: Sequence[str],
 ) -> tuple[TrainingSet, ...]:
     """Choose what the models learn from."""
-    training, groups = settings.training, dict[str, list[str]]()
+    training = settings.training
+    groups = defaultdict(list)
     if training.scheme == "leave_out":
         of_run = groups_of({n: runs[n] for n in names}, training.leave_out, inputs)
         for name, group in of_run.items():
-            groups.setdefault(group, []).append(name)
+            groups[group].append(name)
         if len(groups) < 2:
             what = training.leave_out.replace("_", " ")
             what = "run with its repetitions" if what == "auto" else what
@@ -192,7 +192,7 @@ def _places(
     """Feasible last samples in random order; with 'apart' no two within `width` samples."""
     drawn = asked.placement == "random"
     step = 1 if drawn else max(width, 1)
-    every: list[tuple[str, int]] = []
+    every = []
     for name, (first, last) in spans.items():
         stops = range(last, first + needed - 2, -step)
         every += [(name, stop) for stop in (reversed(stops) if drawn else stops)]
@@ -321,7 +321,7 @@ class Plan:
     needs: Needs
     training: tuple[TrainingSet, ...]
     tests: dict[str, tuple[TestWindow, ...]]
-    runs: dict[str, xr.Dataset]
+    runs: Groups
     calibrated_on: tuple[str, ...] = ()
 
     @property
@@ -339,7 +339,7 @@ class Plan:
         """Windows of all test sets."""
         return [each for windows in self.tests.values() for each in windows]
 
-    def taught(self, spans: Iterable[Span]) -> tuple[dict[str, xr.Dataset], list[str], list[str]]:
+    def taught(self, spans: Iterable[Span]) -> tuple[Groups, list[str], list[str]]:
         """What a spec is fitted to: parts of runs, states, inputs."""
         return parts_of(self.runs, spans), list(self.states), list(self.inputs)
 

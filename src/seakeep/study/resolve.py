@@ -4,12 +4,10 @@ One rule, key by key, for campaigns and studies: what the table states, else wha
 else the default of the kind.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 from seakeep.campaign import ModelSettings
 from seakeep.campaign.settings import CampaignSettings
@@ -70,9 +68,9 @@ class ResolvedModel:
         }
 
 
-def _defaults(kind: type[Spec]) -> dict[str, Any]:
+def _defaults(kind: Any) -> dict[str, Any]:
     """Keys that a kind of model has, and their defaults."""
-    settable = [each for each in fields(cast("Any", kind)) if each.init]
+    settable = [each for each in fields(kind) if each.init]
     return {each.name: each.default for each in settable if each.name not in OF_THE_DATA}
 
 
@@ -167,12 +165,12 @@ def resolve_model(
     from_study: dict[str, Any] = (
         {"seed": seed} if ensemble and seed is not None and "seed" not in stated else {}
     )
-    filled: Spec | None = None
+    filled: Any = None
     if preset is not None:
         filled = getattr(kind, preset)(encounter_period, dt)
         # That of the preset is optional: windows of runs that allow none have no room for it.
         if "alignment" in known and (alignment or (not aligned and "alignment" not in stated)):
-            filled = replace(cast("Any", filled), alignment=alignment)
+            filled = replace(filled, alignment=alignment)
     data = {"encounter_period": encounter_period, "dt": dt}
     spec = _spec_of(kind, filled, {**from_study, **stated}, data).resolved(dt, encounter_period)
     open_spec = left_open(spec)
@@ -228,7 +226,7 @@ def _kind_of(settings: ModelSettings) -> type[Spec]:
 
 
 def _spec_of(
-    kind: type[Spec], filled: Spec | None, given: dict[str, Any], data: Mapping[str, float | None]
+    kind: Any, filled: Any, given: dict[str, Any], data: Mapping[str, float | None]
 ) -> Spec:
     for name, table in TABLES.items():
         if isinstance(given.get(name), dict):
@@ -245,7 +243,7 @@ def _spec_of(
         closed = {name: False for name in select.opened if name in given}
         given = {**given, "select": replace(select, **closed)} if closed else given
     if filled is not None:
-        return cast("Spec", replace(cast("Any", filled), **given))
+        return replace(filled, **given)
     needed = [key for key, default in _defaults(kind).items() if default is MISSING]
     if missing := [key for key in needed if key not in given]:
         as_priors = (
@@ -256,7 +254,7 @@ def _spec_of(
             f"the [model] table states no {missing[0]}. Add {', '.join(missing)}{as_priors}"
             + (f", or a preset: preset = {' or '.join(presets)}." if presets else ".")
         )
-    of_data = {each.name for each in fields(cast("Any", kind))} & set(OF_THE_DATA)
+    of_data = {each.name for each in fields(kind)} & set(OF_THE_DATA)
     return kind(**{**{key: data[key] for key in of_data}, **given})
 
 

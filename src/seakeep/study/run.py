@@ -18,10 +18,9 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray, Progress
+from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import embed, metrics
 from seakeep.errors import DataError, SeakeepError, warn
@@ -56,15 +55,7 @@ from seakeep.study.plan import (
     warn_of_slow_study,
 )
 from seakeep.study.settings import Study
-from seakeep.study.store import (
-    RESULT,
-    Groups,
-    StudyResult,
-    UnitFolder,
-    read_result,
-    versions,
-    write_result,
-)
+from seakeep.study.store import RESULT, StudyResult, UnitFolder, read_result, versions, write_result
 
 
 def run_study(
@@ -372,7 +363,7 @@ def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcMode
         Over ``variant``: ``radius``, the spectral radius, and ``seconds`` of processor time for
         the matrices; ``truncated_nrmse`` over (window, channel) of the first test set; ``rank``.
     """
-    spec: Any = fitted.settings
+    spec = fitted.settings
     parts, states, inputs = plan.taught(plan.training[unit.training].spans)
     data = gather(parts, states, inputs, None, spec)
     groups = (data.states, spec.state_delays), (data.delayed, spec.input_delays)
@@ -407,7 +398,7 @@ def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcMode
 
 def _free_runs(
     plan: Plan, fitted: Any, tested: Mapping[str, Sequence[int]]
-) -> Iterator[tuple[str, FloatArray, npt.NDArray[np.int64], Windows]]:
+) -> Iterator[tuple[str, FloatArray, IntArray, Windows]]:
     """Free runs of all members over each test set, (member, window, steps, N), and where lost."""
     chosen = {test: [plan.tests[test][k] for k in numbers] for test, numbers in tested.items()}
     places = [
@@ -476,7 +467,7 @@ def collect(plan: Plan, facts: Groups, computed: Mapping[Unit, Groups]) -> Group
         grid = [[computed[Unit(model, k)][group] for k in numbers] for model in models]
         return side_by_side(grid, names, FILL)
 
-    out: Groups = {}
+    out = {}
     for test, windows in plan.tests.items():
         every = {"training": sets, "window": range(len(windows))}
         means = stacked(f"tests/{test}", plan.models, "model").reindex(every)

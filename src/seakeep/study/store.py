@@ -16,7 +16,7 @@ from typing import Any
 import xarray as xr
 from filelock import FileLock, Timeout
 
-from seakeep.arrays import Datasets
+from seakeep.arrays import Datasets, Groups
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.files import (
     check_report,
@@ -36,7 +36,6 @@ UNITS = "units"
 
 STUDY, UNIT = "study", "unit of a study"
 """Kinds of these files."""
-Groups = dict[str, xr.Dataset]
 
 
 class StorageError(SeakeepError):
@@ -171,17 +170,14 @@ class UnitFolder:
                 path.unlink()
             lock.release()
 
-    def _path(self, name: str) -> Path:
-        return self.folder / UNITS / f"{name}.nc"
-
     def write(self, name: str, groups: Groups) -> None:
         """Keep the groups of a finished unit; errors as :func:`write_groups`."""
-        write_groups(self._path(name), UNIT, {"digest": self.digest}, groups)
+        write_groups(self.folder / UNITS / f"{name}.nc", UNIT, {"digest": self.digest}, groups)
 
     def read(self, name: str) -> Groups | None:
         """Groups of a finished unit; None where it is not finished, or damaged."""
         try:
-            groups = load_groups(self._path(name), UNIT)
+            groups = load_groups(self.folder / UNITS / f"{name}.nc", UNIT)
         except SeakeepError:
             return None
         return groups if groups.pop("").attrs["digest"] == self.digest else None
@@ -278,11 +274,6 @@ class StudyResult:
         }
 
     @property
-    def shows_paper(self) -> bool:
-        """Whether a report puts the paper's choices and numbers beside those of the study."""
-        return bool(self.settings["output"].get("paper", False))
-
-    @property
     def is_calibrated(self) -> bool:
         """Whether bands of ensembles are calibrated."""
         return "calibration" in self.groups
@@ -305,13 +296,12 @@ def write_result(
     folder: Path,
     attrs: Mapping[str, Any],
     groups: Datasets,
-    finished: Callable[[StudyResult], None] | None = None,
+    finished: Callable[[StudyResult], None],
 ) -> StudyResult:
     """Write a result into its folder, once it was handed to `finished`; errors as there."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
     result = StudyResult(folder, {"created": created, **attrs}, dict(groups))
-    if finished is not None:
-        finished(result)
+    finished(result)
     write_groups(folder / RESULT, STUDY, result.attrs, result.groups)
     return result
 

@@ -4,16 +4,13 @@ Imported only where a run is simulated; needs the extra ``tank`` (numba). Arrays
 `dynamics` prepares them and gives the results names.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, IntArray
 
 # Reassociation lets the memory integral run in vector registers; NaN is still NaN. Contraction to
 # fused multiply-adds is left out: code compiled in this process and code read from the cache fuse
@@ -142,7 +139,7 @@ def _body_forces(
 
 @numba.njit(cache=True, fastmath=_FAST)
 def _memory_ahead(
-    pairs: npt.NDArray[np.int64], kernel: FloatArray, v: FloatArray, origin: int, out: FloatArray
+    pairs: IntArray, kernel: FloatArray, v: FloatArray, origin: int, out: FloatArray
 ) -> None:
     """Memory of the velocities up to column `origin`, for the next instant, less its own share."""
     length = kernel.shape[1] - 1
@@ -207,7 +204,7 @@ def integrate(
     quadratic: FloatArray,
     pool: FloatArray,
     lines: FloatArray,
-    pairs: npt.NDArray[np.int64],
+    pairs: IntArray,
     kernel: FloatArray,
     waves: FloatArray,
     phase: FloatArray,

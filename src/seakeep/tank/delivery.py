@@ -6,11 +6,11 @@ Needs the extra ``video`` (OpenCV). Frames are 1280 × 720 at the video clock's 
 moves in a plane of 2.5 mm per pixel. A lamp in the upper left corner shows the trigger.
 """
 
-from __future__ import annotations
-
 import io
 import tempfile
+import tomllib
 from collections.abc import Iterator, Mapping
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -31,34 +31,11 @@ CAMPAIGN, RAW, TRUTH = "campaign", "raw file", "truth"
 
 FIRST_LINE = r"time \[s\],(trigger \[V\]|lamp \[-\]|\w+ \[mm\]),.*"
 """First line of a raw text file."""
-MOTIONS = {
-    "heave": ("heave", "m"),
-    "pitch": ("pitch", "deg"),
-    "pitch_rate": ("rate_y", "deg/s"),
-    "surge_acceleration": ("acceleration_x", "m/s^2"),
-    "heave_acceleration": ("acceleration_z", "m/s^2"),
-}
-DERIVED = {
-    # Above the band the low-pass filter of [preparation] ends what is integrated, as in the paper.
-    "surge_rate": {"from": "surge_acceleration", "step": "integrate", "band": [0.2, 15.0]},
-    "heave_rate": {"from": "heave_acceleration", "step": "integrate", "band": [0.2, 15.0]},
-    "pitch_acceleration": {"from": "pitch_rate", "step": "differentiate"},
-}
-LOW_PASS = {"step": "low_pass", "passband": 10.0, "stopband": 10.75}  # Hz, of the paper
-STATES = (
-    "surge", "heave", "pitch", "surge_rate", "heave_rate", "pitch_rate",
-    "surge_acceleration", "heave_acceleration", "pitch_acceleration",
-)  # fmt: skip
 HEADING = (
     f"{MARK}: {CAMPAIGN}",
     "Written by `seakeep tank`. Spans are in seconds of the reference clock (wave probes);",
     "what lies before them is the start-up of the waves: cut it from every analysis.",
 )
-
-
-def _header(name: str, unit: str) -> str:
-    """Head of a column of a text file."""
-    return f"{name} [{unit}]"
 
 
 def write_record(record: xr.Dataset, path: Path) -> Path:
@@ -78,8 +55,8 @@ def write_record(record: xr.Dataset, path: Path) -> Path:
     table = np.column_stack([time.round(decimals[0]), *rounded.values()]) + 0.0
     rows = io.StringIO()
     np.savetxt(rows, table, [f"%.{d}f" for d in decimals], ",")
-    heads = [_header(str(name), column.attrs["units"]) for name, column in record.items()]
-    head = ",".join([_header("time", "s"), *heads])
+    heads = [f"{name} [{column.attrs['units']}]" for name, column in record.items()]
+    head = ",".join(["time [s]", *heads])
     write_text(path, f"{head}\n{rows.getvalue().replace('nan', '')}")
     return path
 
@@ -135,10 +112,12 @@ def campaign_text(
         near = min(place, key=lambda name: abs(place[name] - settings.vessel.position))
         inputs = list(dict.fromkeys(filtered[n] for n in (min(place, key=place.__getitem__), near)))
     lines = [f"mooring_{name}" for name in settings.moorings]
-    columns = {f"eta_{name}": (name, "mm") for name in probes} | MOTIONS
-    columns |= {"surge": ("surge", "m")} | {line: (line, "N") for line in lines}
+    data = resources.files("seakeep.tank").joinpath("data/campaign.toml").read_text("utf-8")
+    fixed = tomllib.loads(data)
+    columns = {f"eta_{name}": (name, "mm") for name in probes} | fixed["columns"]
+    columns |= {line: (line, "N") for line in lines}
     channels = {
-        channel: {"column": _header(name, unit) if kind == "csv" else name, "unit": unit}
+        channel: {"column": f"{name} [{unit}]" if kind == "csv" else name, "unit": unit}
         for channel, (name, unit) in columns.items()
     }
     channels["surge"]["long_name"] = "surge, tracked in the video"
@@ -169,17 +148,14 @@ def campaign_text(
             | {filtered[name]: position for name, position in place.items()},
         },
         "channels": channels,
-        "derived": {filtered[n]: {"from": f"eta_{n}"} | LOW_PASS for n in filtered} | DERIVED,
+        "derived": {filtered[n]: {"from": f"eta_{n}"} | fixed["filter"] for n in filtered}
+        | fixed["derived"],
         "instruments": instruments,
         "runs": {n: _run(run, files[n], one_logger) for n, run in settings.runs.items()},
-        "preparation": {"preset": "paper", "gaps": "mask"},
-        "model": {
-            "kind": "hankel_dmdc",
-            "preset": "paper",
-            "states": [*STATES, *lines],
-            "inputs": inputs,
-        },
+        "preparation": fixed["preparation"],
+        "model": fixed["model"] | {"inputs": inputs},
     }
+    tables["model"]["states"] += lines
     if one_logger:
         del tables["instruments"], tables["preparation"]["gaps"]
     document = tomlkit.document()
@@ -274,7 +250,7 @@ def frame_of(
     motion: tuple[float, float, float],
     surface: FloatArray,
     lamp: float,
-    centre_of_gravity: float = 0.03,
+    centre_of_gravity: float,
 ) -> Image:
     """One frame before lighting and noise, shape (720, 1280, 3).
 

@@ -9,8 +9,6 @@ Wave forces act at the slow part of surge (surge less its linear wave-frequency 
 the full surge they would feign a mean force.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
@@ -18,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.arrays import ComplexArray, FloatArray, IntArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.tank.hydrodynamics import (
     Hydrodynamics,
@@ -324,7 +322,7 @@ def _wave_arrays(rig: Rig, sea: Sea) -> tuple[Any, ...]:
     return waves, excitation, signs, drift, damping
 
 
-def _kernel_arrays(rig: Rig) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def _kernel_arrays(rig: Rig) -> tuple[IntArray, FloatArray]:
     """Pairs of degrees of freedom that have a memory, and their weights from the oldest lag."""
     values = rig.kernel.values
     pairs = np.argwhere(np.any(values != 0.0, axis=0))
@@ -335,11 +333,7 @@ def _kernel_arrays(rig: Rig) -> tuple[npt.NDArray[np.int64], FloatArray]:
 
 
 def simulate(
-    rig: Rig,
-    sea: Sea,
-    duration: float,
-    start: npt.ArrayLike | None = None,
-    begin: float = 0.0,
+    rig: Rig, sea: Sea, duration: float, start: npt.ArrayLike | None = None, begin: float = 0.0
 ) -> Motion:
     """Simulate a run.
 

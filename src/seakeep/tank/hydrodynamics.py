@@ -5,8 +5,6 @@ gravity. Degrees of freedom: surge, heave, pitch about the centre of gravity, an
 a moon pool, the absolute elevations of its piston and of its first longitudinal sloshing mode.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -84,16 +82,11 @@ class Hydrodynamics:
 
 @dataclass(frozen=True)
 class Kernel:
-    """Radiation memory: K (kg/s²) at uniform lags (s), the added mass at infinite frequency.
-
-    `omega` and `damping` are the grid and the passive matrices from which K was made.
-    """
+    """Radiation memory: K (kg/s²) at uniform lags (s), the added mass at infinite frequency."""
 
     lags: FloatArray
     values: FloatArray
     infinite_mass: FloatArray
-    omega: FloatArray
-    damping: FloatArray
 
 
 def shipped_hydrodynamics() -> Path:
@@ -213,7 +206,7 @@ def radiation_kernel(
     sines /= hydro.omega[band, None]
     infinite = added + (sines @ values).reshape(added.shape)
     shape = hydro.mass.shape
-    return Kernel(lags, values.reshape(-1, *shape), infinite.mean(axis=0), omega, damping)
+    return Kernel(lags, values.reshape(-1, *shape), infinite.mean(axis=0))
 
 
 def kernel_coefficients(kernel: Kernel, omega: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -4,8 +4,6 @@ A logger whose clock reads c(t) = offset + (1 + drift)·t at the reference time 
 uniform readings c. The 500 Hz logger of the wave probes is the reference.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +13,7 @@ import numpy.typing as npt
 import scipy
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import BoolArray, FloatArray, Groups
 from seakeep.signals.calculus import rising
 from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
@@ -93,7 +91,7 @@ def trigger(time: FloatArray, period: float, width: float) -> FloatArray:
 
 
 def slap_pulses(
-    time: FloatArray, immersed: npt.NDArray[np.bool_], slap: SlapSettings, rng: np.random.Generator
+    time: FloatArray, immersed: BoolArray, slap: SlapSettings, rng: np.random.Generator
 ) -> FloatArray:
     """Decaying pulses (N) at each immersion and emergence of a line, at uniform instants.
 
@@ -131,7 +129,7 @@ def _probes(played: Played, time: FloatArray, rate: float, rng: np.random.Genera
         linear = played.elevation(position, time)
         return linear + played.crest(position, time) if instruments.second_order else linear
 
-    columns: Columns = {}
+    columns = {}
     for name, probe in instruments.probes.items():
         values = wave(probe.position) + probe.noise * rng.standard_normal(time.size)
         columns[name] = "mm", 1e3 * _dropouts(values, rate, probe.dropouts, rng)
@@ -154,14 +152,14 @@ def _mru(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -
         "pitch": ("deg", q[2], noise.angle_noise),
         "yaw": ("deg", zero, noise.angle_noise),
     }
-    columns: Columns = {}
+    columns = {}
     for name, (unit, values, sigma) in true.items():
         factor = np.rad2deg(1.0) if unit.startswith("deg") else 1.0
         columns[name] = unit, factor * (values + sigma * rng.standard_normal(time.size))
     return columns
 
 
-def _immersed(played: Played, time: FloatArray, line: int) -> npt.NDArray[np.bool_]:
+def _immersed(played: Played, time: FloatArray, line: int) -> BoolArray:
     """Whether the middle of a line is under water."""
     settings = played.settings.moorings[played.rig.line_names[line]]
     q, _, _ = played.states(time)
@@ -175,7 +173,7 @@ def _loads(played: Played, time: FloatArray, _: float, rng: np.random.Generator)
     instruments = played.settings.instruments
     # Whether a line is wet changes slowly: every tenth sample finds the crossings.
     coarse = time[::10]
-    columns: Columns = {}
+    columns = {}
     for line, (name, true) in enumerate(
         zip(played.rig.line_names, played.loads(time), strict=True)
     ):
@@ -208,7 +206,7 @@ def _record(readings: FloatArray, columns: Columns) -> xr.Dataset:
 
 def record_run(
     played: Played, rng: np.random.Generator, single_rate: float | None = None
-) -> dict[str, xr.Dataset]:
+) -> Groups:
     """Record a run with all instruments, each with its own noise.
 
     Parameters
@@ -227,7 +225,7 @@ def record_run(
         Logger → its columns, with units, over the readings of its clock (s).
     """
     instruments = played.settings.instruments
-    records: dict[str, xr.Dataset] = {}
+    records: Groups = {}
     together: Columns = {}
     for (name, make), child in zip(_LOGGERS.items(), rng.spawn(len(_LOGGERS)), strict=True):
         clock = instruments.clocks[name] if single_rate is None else ClockSettings(rate=single_rate)

@@ -4,8 +4,6 @@ A model of a line is an entry of :data:`KINDS`: it says how the tension grows wi
 cubic, and the time loop knows nothing else of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Annotated
 
@@ -62,7 +60,7 @@ class LineSettings(Table):
 
 
 KINDS: dict[str, Callable[[LineSettings], Elasticity]] = {
-    "spring": lambda line: (line.stiffness, 0.0, 0.0),
+    "spring": lambda line: (line.stiffness, 0.0, 0.0)
 }
 """The models of a line, by the word in the settings."""
 

@@ -1,7 +1,5 @@
 """Play a campaign: simulate its runs, record them, and write what a tank would deliver."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable
 from importlib import metadata
@@ -236,7 +234,7 @@ def play(
     part = settings.model_copy(update={"runs": {n: settings.runs[n] for n in chosen}})
     folder = Path(out)
     _check_outputs(folder, chosen, kind)
-    files: dict[str, dict[str, Path]] = {}
+    files = {}
     for done, name in enumerate(chosen):
         if progress is not None:
             progress(done, len(chosen), name)

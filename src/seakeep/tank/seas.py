@@ -4,8 +4,6 @@ Elevation is :math:`\eta = \sum a_n \cos(k_n x - \omega_n t + \varphi_n)` with x
 the vessel's position at rest, downstream.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 The default numbers stand, with their units and reasons, in ``data/ck14e.toml``.
 """
 
-from __future__ import annotations
-
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -322,7 +320,7 @@ def _merge(base: dict[str, Any], over: dict[str, Any], trail: tuple[str, ...]) -
 
 
 def with_waves(
-    settings: TankSettings, seed: int | None = None, spacing: str | None = None
+    settings: TankSettings, seed: int | None, spacing: str | None = None
 ) -> TankSettings:
     """Return settings with another seed, or another spacing of the components of all spectra."""
     table = settings.model_dump()

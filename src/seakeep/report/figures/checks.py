@@ -12,6 +12,7 @@ from seakeep.conventions import displayed
 from seakeep.report.style import (
     COLOURS,
     DASHED,
+    DOTTED,
     LINES,
     PALETTE,
     figure_style,
@@ -26,11 +27,11 @@ if TYPE_CHECKING:
 
     from seakeep.report.style import Places
 
-SHADE: dict[str, Any] = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
-SOLID: dict[str, Any] = {**LINES["forecast"], "linestyle": "-"}
-ZERO: dict[str, Any] = {"color": COLOURS["input"], "linewidth": 0.5}
-POINTS: dict[str, Any] = {"linestyle": "none", "elinewidth": 0.8}
-MARKS: dict[str, dict[str, Any]] = {
+SHADE = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
+SOLID = {**LINES["forecast"], "linestyle": "-"}
+ZERO = {"color": COLOURS["input"], "linewidth": 0.5}
+POINTS = {"linestyle": "none", "elinewidth": 0.8}
+MARKS = {
     "regular": {"color": COLOURS["measured"], "marker": "o", "markersize": 5, "zorder": 4},
     "irregular": {
         "color": COLOURS["input"],
@@ -82,10 +83,7 @@ def _answering(values: xr.DataArray) -> list[str]:
 
 
 def response(
-    result: xr.Dataset,
-    measured: xr.Dataset | None = None,
-    *,
-    axes: Places = None,
+    result: xr.Dataset, measured: xr.Dataset | None = None, *, axes: Places = None
 ) -> Figure:
     """Draw amplitude and phase of the response per wave amplitude, measured points beside.
 
@@ -140,11 +138,7 @@ def response(
     return by_state(result.sel(input=entry, state=states), axes, (2.9, 1.75), draw, 2, most)
 
 
-def coherence(
-    result: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def coherence(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw the coherence of each state with the inputs, over the state's own spectrum.
 
     Parameters
@@ -243,11 +237,7 @@ def decay(result: xr.Dataset, *, axes: Places = None) -> Figure:
     return by_state(result.rename(motion="state"), axes, (3.0, 1.8), draw)
 
 
-def residuals(
-    result: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw correlations of one-step errors, the spectrum of free runs' errors, and their age.
 
     Parameters
@@ -296,11 +286,7 @@ def residuals(
     return by_state(result, axes, (2.6, 1.75), draw, 4, 4)
 
 
-def exceedance(
-    result: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw how often peaks exceed a level, measured and forecast, beside Rayleigh and Weibull.
 
     Parameters
@@ -339,11 +325,7 @@ def exceedance(
     return by_state(result, axes, (3.0, 2.0), draw)
 
 
-def density(
-    result: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def density(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw the densities of states, measured and forecast; arguments as :func:`exceedance`."""
 
     def draw(own: xr.Dataset, place: Any) -> None:
@@ -399,11 +381,7 @@ def validity(result: xr.Dataset, *, axes: Places = None) -> Figure:
     return figure
 
 
-def drift(
-    result: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw mean drift and slow response per amplitude squared, offsets of regular runs beside.
 
     Parameters
@@ -423,7 +401,7 @@ def drift(
         mean, *slow = factor * own["slow_response"]
         place.axhline(0.0, **ZERO)
         place.plot(own["frequency"], mean, **SOLID, label="model, mean")
-        dashes = (DASHED, (0, (1, 1)), (0, (5, 1, 1, 1)), (0, (8, 2)))
+        dashes = (DASHED, DOTTED, (0, (5, 1, 1, 1)), (0, (8, 2)))
         for each, dash in zip(slow, dashes, strict=False):
             style = {"color": COLOURS["ensemble"], "linewidth": 0.9, "linestyle": dash}
             words = f"model, difference {float(each['difference']):.3g} Hz"

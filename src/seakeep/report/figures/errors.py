@@ -58,8 +58,8 @@ def draw_box_violin(
     place: float,
     width: float,
     colour: str,
-    hatch: str = "",
-    label: str | None = None,
+    hatch: str,
+    label: str | None,
 ) -> float:
     """Draw one box-violin and return its upper whisker; the hatch sets models apart in grey print.
 

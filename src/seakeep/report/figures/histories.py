@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -141,9 +142,9 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
     tables = [comparison_table([each], intervals=False).isel(run=0) for each in compared]
     first = compared[0]
     states, time = list(map(str, first.measured.data_vars)), first.measured["time"].values
-    groups: dict[str, list[str]] = {}
+    groups = defaultdict(list)
     for name, each in first.inputs.data_vars.items():
-        groups.setdefault(str(each.attrs.get("units", "")), []).append(str(name))
+        groups[str(each.attrs.get("units", ""))].append(str(name))
     period = _period_if_long(first)
     spans = [None] if period is None else [period, None]
     rows = len(states) + len(groups)
@@ -254,12 +255,7 @@ def _input_label(inputs: xr.Dataset) -> str:
     return f"{'wave elevations' if waves else 'inputs'}\n[{shown_unit(units) or '?'}]"
 
 
-def overlay(
-    forecast: xr.Dataset,
-    measured: xr.Dataset,
-    *,
-    axes: Places = None,
-) -> Figure:
+def overlay(forecast: xr.Dataset, measured: xr.Dataset, *, axes: Places = None) -> Figure:
     """Draw a forecast over the measurement.
 
     Parameters
@@ -279,11 +275,7 @@ def overlay(
 
 
 def band(
-    forecast: xr.Dataset,
-    measured: xr.Dataset,
-    *,
-    level: float = 0.95,
-    axes: Places = None,
+    forecast: xr.Dataset, measured: xr.Dataset, *, level: float = 0.95, axes: Places = None
 ) -> Figure:
     """Draw the band of an ensemble and its mean over the measurement.
 
@@ -317,10 +309,7 @@ def band(
 
 @figure_style()
 def _histories(
-    forecast: xr.Dataset,
-    bounds: xr.Dataset | None,
-    measured: xr.Dataset,
-    axes: Places,
+    forecast: xr.Dataset, bounds: xr.Dataset | None, measured: xr.Dataset, axes: Places
 ) -> Figure:
     chosen = [str(name) for name, each in forecast.data_vars.items() if "time" in each.dims]
     for what, data in (("forecast", forecast), ("measured", measured)):
@@ -366,11 +355,7 @@ def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
 
 @figure_style()
 def history_figure(
-    result: StudyResult,
-    test: str,
-    training: int,
-    window: int,
-    names: Sequence[str] | None = None,
+    result: StudyResult, test: str, training: int, window: int, names: Sequence[str] | None = None
 ) -> Figure:
     """Channels of one cell over time; all of them unless `names` are given."""
     names = result.channels if names is None else names
@@ -409,7 +394,7 @@ def _draw_channel(
             curves.append(Curve(words, line, _standard(at, mean)))
             continue
         band = [_standard(at, at[side].sel(ensemble=model)) for side in ("lower", "upper")]
-        wider: list[Any] = []
+        wider = []
         if calibration is not None:
             edges = (each[0, 0, :, result.channels.index(name)]
                      for each in band_of(cell, model, calibration))  # fmt: skip
@@ -461,10 +446,7 @@ MARKS = {
 """Colour and shape of each flag: shapes distinguish them in grey print."""
 LABELS = -0.06
 """Where labels of the vertical axes stand, in widths of the axes: beyond six figures."""
-WELCH: dict[str, tuple[str, Any]] = {
-    "paper": (COLOURS["forecast"], DASHED),
-    "recommended": (COLOURS["ensemble"], "-"),
-}
+WELCH = {"paper": (COLOURS["forecast"], DASHED), "recommended": (COLOURS["ensemble"], "-")}
 """Colour and dash of a measured spectrum, by how it is estimated."""
 Spectrum = tuple[FloatArray, FloatArray]
 
@@ -478,16 +460,16 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
     rows = len(names) + len(lagging)
     figure = new_figure(9.5, 0.5 + 1.45 * rows)
     axes = figure.subplots(rows, 1, squeeze=False, sharex=True)[:, 0]
-    time = run["time"].to_numpy()
+    time = run["time"].values
     for at, name in zip(axes, names, strict=False):
         factor, label = shown(run[name])
-        x = factor * run[name].to_numpy()
+        x = factor * run[name].values
         if name in doubtful:  # the style sheet has the same colour for rows
             at.set_facecolor(PALETTE["blush"])
         at.plot(time, x, color=COLOURS["measured"], linewidth=0.6)
         at.set_ylabel(label, fontsize=8)
         if f"{name}_flags" in run.coords:
-            _mark(at, time, x, run[f"{name}_flags"].to_numpy().astype(int))
+            _mark(at, time, x, run[f"{name}_flags"].values.astype(int))
         known = x[np.isfinite(x)]
         if known.size and np.ptp(known) <= 1e-9 * max(np.abs(known).max(), 1e-300):
             value = float(known[0])  # an axis that shows no rounding

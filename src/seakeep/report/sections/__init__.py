@@ -1,7 +1,5 @@
 """The report of a study: its sections, each a function of the result, in their order."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

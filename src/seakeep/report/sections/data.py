@@ -1,7 +1,5 @@
 """What a study used: waves, channels, runs and their quality, settings, windows, versions."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from datetime import datetime
@@ -273,7 +271,7 @@ def training_overlap(result: StudyResult) -> tuple[bool, str]:
     if result.settings["training"]["scheme"] != "halves" or "stop" not in training:
         return False, ""
     period, length = (float(result.attrs[k]) for k in ("encounter_period", "longest_training"))
-    spans: Spans = [span for (span,) in training_spans(result)]
+    spans = [span for (span,) in training_spans(result)]
     runs, readers = result.groups["runs"], whole_readers(result)
     longest = float((runs["train_end"] - runs["train_begin"]).max())
     room = (

@@ -1,7 +1,5 @@
 """Time histories: figures, and data for the interactive plot, packed small."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Results of a study: their summary in sentences, errors, bands and densities, and a glossary."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -380,7 +378,7 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
         columns += [f"{label}: {key}" for key in ("amplitude", "phase [°]", "offset [SD]", "share")]
     judged = response.sel(channel=result.channels, model=judged_models(result))
     for of_model in entries(judged, "channel", "model"):
-        cells = [result.words_of(str(of_model["channel"].values)), _model_of(of_model)]
+        cells = [result.words_of(of_model["channel"].item()), model_words(of_model["model"].item())]
         for at in entries(of_model, "test"):
             offset, *others = (float(at[f"error_{key}"]) for key in ("offset", "wave", "rest"))
             total = float(np.sum(np.square([offset, *others])))
@@ -406,16 +404,6 @@ def _slack_words(result: StudyResult, tests: list[str]) -> str:
         f"Slack line (a load within the SD of its noise): {', '.join(listed)}. A slack line does "
         "not respond linearly; where it is slack throughout, only noise is left to be forecast."
     )
-
-
-def _model_of(at: xr.Dataset) -> str:
-    """Words of the model of an entry."""
-    return model_words(str(at["model"].values))
-
-
-def _test_of(result: StudyResult, at: xr.Dataset) -> str:
-    """Words of the test set of an entry."""
-    return result.label_of(str(at["test"].values))
 
 
 def bands(result: StudyResult) -> Section:
@@ -446,7 +434,7 @@ def _by_part(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Tabl
         moving = one[["relative_width", "winkler", "crps"]].map(lambda x: x.where(np.isfinite(x)))
         means = row(moving.mean("channel"), relative_width=2, winkler=2, crps=2)
         covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
-        rows.append((_test_of(result, one), *row(one, "part"), *covered, *means))
+        rows.append((result.label_of(one["test"].item()), *row(one, "part"), *covered, *means))
     return table("bands", rows, conditional(result), name=name, band=title)
 
 
@@ -455,7 +443,7 @@ def _of_all(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table
     units, three = result.groups["channels"]["units"], partial(short, digits=3)
     rows = [
         (
-            _test_of(result, one),
+            result.label_of(one["test"].item()),
             f"{result.words_of(channel)} [{units.sel(name=channel).item()}]",
             *row(one, inside=2, relative_width=2, winkler=three, crps=three),
         )
@@ -472,9 +460,9 @@ def age(result: StudyResult) -> Section:
     trend = result.groups["statistics/trend"].sel(model=judged_models(result))
     rows = [
         (
-            _test_of(result, at),
+            result.label_of(at["test"].item()),
             BAND_WORDS[str(at["band"].values)],
-            _model_of(at),
+            model_words(at["model"].item()),
             number(at["error_mean"].mean()),
             ratio_of(at).change(),
         )
@@ -496,7 +484,7 @@ def coverage(result: StudyResult) -> Section:
     )
 
 
-def coverage_table(result: StudyResult, model: str, calibrated: bool = False) -> Table:
+def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
     """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
     prefix, band = "calibrated_" * calibrated, "calibrated" if calibrated else "members"
     shares = result.groups["statistics/coverage"].sel(model=model, band=band)
@@ -581,7 +569,7 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     data = result.groups["statistics/divergence"]
     at = data.sel(model=model, variant=variant)
     keys = ("mean", "lower", "upper", "uncertainty", "noise_floor")
-    comparable = model in result.ensembles and result.shows_paper
+    comparable = model in result.ensembles and result.settings["output"]["paper"]
 
     def cells(name: str) -> Iterator[str]:
         of_all = name == "average"
