@@ -6,7 +6,7 @@ and channels of the NRMSE decides. The noise is the standard error, over what is
 difference between two candidates. Of what settings leave open, the simplest candidate is taken that
 errs at most 5 % more than the best, or is as good but for the noise; what a search starts from is
 left for nothing less. The regressors of all candidates are made once; one Gram matrix of a
-candidate and a fold gives the whole path of λ (:mod:`seakeep.core.gram`).
+fold gives the path of λ of all candidates with the same delays (:mod:`seakeep.core.gram`).
 """
 
 from __future__ import annotations
@@ -670,9 +670,10 @@ def select(
 ) -> Selected[Settings]:
     """Choose settings by free runs on training runs that are held out in turn.
 
-    One setting after the other is chosen, each candidate with the whole path of λ: first what the
-    settings leave open, of which the simplest is taken that is as good as the best but for the
-    noise; then what is varied from there, which is left for what is better by more than the noise.
+    One setting after the other is chosen, each candidate with the path of λ, or every fourth λ
+    where it errs half as much again as the best: first what the settings leave open, of which the
+    simplest is taken that is as good as the best but for the noise; then what is varied from there,
+    which is left for what is better by more than the noise.
     Of the λ the largest is taken that is as good as the best. Where that model grows, it is the
     best of all that were tried and do not.
 
