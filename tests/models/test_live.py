@@ -249,6 +249,15 @@ def test_what_samples_tell_does_not_depend_on_when_it_is_read(models, run, key):
     np.testing.assert_allclose(late.innovation, often.innovation, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("key", ["plain", "aligned"])
+def test_samples_that_wait_to_be_judged_are_in_a_saved_state(models, run, tmp_path, key):
+    live = started(models[key], run)
+    for at in range(START, START + 20):
+        play(live, run, at, at + 1)
+        again = load_live(models[key], live.save(tmp_path / "state.nc"))
+        np.testing.assert_array_equal(again.consistency_by_state, live.consistency_by_state)
+
+
 def test_outside_the_training_the_band_widens_and_says_why(models, run, monkeypatch):
     model, higher = models["plain"], run.copy(deep=True)
     for name in (*STATES, *INPUTS):

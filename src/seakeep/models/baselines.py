@@ -20,7 +20,6 @@ from seakeep.errors import RequestError
 from seakeep.models.checks import Json, check_keys
 from seakeep.models.engine import Windows, cut_lost
 from seakeep.models.forecasts import Model, counted
-from seakeep.models.growth import weighed_runs
 from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs, common_step, mean_period
 from seakeep.models.linear import HankelDMDcModel, LinearKind, packed, unpacked
@@ -403,7 +402,7 @@ class SubspaceModel(Model):
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
-        return weighed_runs(self, lambda of: [self._free_run(each)[None] for each in of], groups)
+        return [self._free_run(windows)[None] for windows in groups]
 
     def _free_run(self, windows: Windows) -> FloatArray:
         signature, histories = self.signature, windows.histories

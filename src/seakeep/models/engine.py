@@ -413,8 +413,9 @@ class _Opened:
         values = self.read(signature.inputs, 0, stop)
         values = np.pad(values, ((0, stop - len(values)), (0, 0)), constant_values=np.nan)
         gaps = np.flatnonzero(~np.isfinite(values).all(axis=1))
-        # Only the future is predicted: missing samples before a start are refused.
-        if gaps.max(initial=0) <= start or np.any((gaps > start - 4) & (gaps <= start)):
+        # Only the future is predicted: missing samples that are read before a start are refused.
+        begin = min(signature.input_map.reads(span).first for span in spans)
+        if gaps.max(initial=0) <= start or np.any((gaps >= begin) & (gaps <= start)):
             return [self]
         if signature.input_map.reads_surge:
             raise RequestError(
@@ -484,15 +485,18 @@ def foresight(signature: Signature, run: xr.Dataset | None = None) -> partial[Fo
     Positions are NaN where none is known. Without a run they are those of training, if the model
     takes raw probes.
     """
-    places, depth = tuple[float | None, ...]([None]), math.nan
+    places: tuple[float | None, ...] = (None,)
+    depth = math.nan
     if (alignment := signature.input_map.alignment) is not None:
         if run is not None or signature.input_map.follows is not None:
             _, places, depth = alignment.rig(run)
     elif run is not None:
-        places = tuple(run[name].attrs.get("x_position") for name in signature.inputs)
-        depth = run.attrs.get("water_depth", depth)
-    stated = np.array(places, dtype=float)  # None becomes NaN
-    positions = np.where(math.isnan(depth), math.nan, stated)
+        stated = [run.attrs.get("water_depth")]
+        stated += [run[name].attrs.get("x_position") for name in signature.inputs]
+        numbers = [float(x) if isinstance(x, int | float | np.number) else math.nan for x in stated]
+        depth, places = numbers[0], tuple(numbers[1:])
+    known = np.array(places, dtype=float)  # None becomes NaN
+    positions = np.where(math.isnan(depth), math.nan, known)
     return partial(foresee, dt=signature.dt, positions=positions, depth=depth)
 
 
@@ -732,8 +736,6 @@ def member_series(
         If the temporary folder has no room.
     """
     count, channels = model.n_members, len(model.signature.states)
-    if any(each.departures for each in groups):
-        getattr(model, "errors", None)  # found once, and handed to all workers
     with ExitStack() as stack:
         runs: list[Series] = [
             (

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
@@ -44,7 +44,7 @@ from seakeep.models.forecasts import (
     window_coords,
     with_units,
 )
-from seakeep.models.growth import LeadErrors, Stretch, lead_errors, weighed_runs
+from seakeep.models.growth import LeadErrors, Stretch, lead_errors
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
@@ -203,9 +203,8 @@ class HankelEnsemble(Model):
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (member, window, steps, N), NaN where lost."""
-        every = [self.dynamics(number) for number in members]
-        run = partial(linear_runs, every, readouts=self.signature.readouts)
-        return weighed_runs(self, run, groups)
+        runs = [self.dynamics(number) for number in members]
+        return linear_runs(runs, groups, self.signature.readouts)
 
     def system_matrices(self) -> Iterator[FloatArray]:
         """Â of each member."""
@@ -671,10 +670,8 @@ class HankelEnsemble(Model):
         return [self.dynamics(number) for number in range(first, len(self._taught))]
 
     @cached_property
-    def errors(self) -> LeadErrors | None:
-        """Errors of the members' mean on what they learnt from; none of departures from means."""
-        if self.signature.input_map.reference:
-            return None
+    def errors(self) -> LeadErrors:
+        """Errors of the members' mean on what they learnt from."""
         signature, arrays, members = self.signature, self.arrays, self._means
         stretches = [
             Stretch(x, u, v, signature.history_samples - 1, min(len(x) - 1, len(u)))

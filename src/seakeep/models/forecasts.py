@@ -223,9 +223,9 @@ class Model:
             What to do if the input ends before the look-ahead: refuse, or predict it as
             ``live().forecast`` does, from its record by linear prediction
             (:func:`seakeep.signals.predict_waves`), and from what probes up-wave have seen where
-            positions and depth are known. Samples missing at the end count as not recorded. As
-            the error that is expected comes near the SD of training, the forecast tends to the
-            mean there, so that no lead errs more than the mean.
+            positions and depth are known. Samples missing after `start` count as not recorded.
+            As the error that is expected comes near the SD of training, the forecast of a
+            single model that holds its errors in training tends to the mean there.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Growth of a model's errors with the time after a start, found in its training runs."""
+"""Growth of errors in training with the time after a start, and forecasts that it weighs."""
 
 from __future__ import annotations
 
@@ -243,7 +243,9 @@ def weighed(
     if len(middle) > 1:
         spread += middle.var(axis=0, ddof=1)
     low, high = DOUBTED
-    trust = (high - (spread + errors) / scale.spread**2) / (high - low)
+    # A state that never moved is as it is.
+    claimed = (spread + errors) / np.maximum(scale.spread**2, np.finfo(float).tiny)
+    trust = (high - claimed) / (high - low)
     lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)
     known, mean, centre = foreseen[..., None], middle.mean(axis=0), scale.centre + zero
     shrunk = centre + lasting * (mean + np.cumsum(moved.mean(axis=0), axis=-2) - centre)
@@ -255,15 +257,14 @@ def weighed_runs(
 ) -> list[FloatArray]:
     """Free runs that `run` makes over groups of windows, weighed where inputs are predicted.
 
-    Each is of shape (member, window, steps, N), and members are weighed one by one, by the errors
-    in training of the `model`, where it holds them.
+    Each is of shape (1, window, steps, N). A `model` that holds no errors of its training, by which
+    they are weighed, leaves them as they are.
     """
     runs = run(groups)
     for values, windows in zip(runs, groups, strict=True):
-        if windows.departures:
+        if windows.departures and (learnt := model.errors) is not None:
             every = np.stack([values, *run(windows.departures)])[None]
-            learnt = getattr(model, "errors", None)
-            errors = learnt.of_forecast(windows.steps) if learnt else 0.0
+            errors = learnt.of_forecast(windows.steps)
             first = np.array(windows.predicted)[:, None]
             foreseen = (np.arange(windows.steps) < first) | (first < 0)
             zero = 0.0 if windows.zero is None else windows.zero[:, None]
