@@ -253,7 +253,7 @@ def test_a_search_that_was_interrupted_goes_on(tmp_path):
     again = seakeep.tune(
         SPEC, runs(), STATES, INPUTS, progress=lambda *each: counted.append(each), **more
     )
-    assert len(counted) == 2  # of three folds
+    assert len(counted) == 2 + 3  # of three folds, and the rest of λ in all
     whole = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,))
     assert again.table.identical(whole.table)
     with pytest.raises(RequestError, match="keeps scores of other runs or settings"):

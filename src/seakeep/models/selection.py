@@ -71,11 +71,11 @@ Step = Callable[[Any], list[Any]]
 Scores = tuple[FloatArray, FloatArray]
 """Scores, shape (level, window), and weights of the windows, which sum to one in a fold."""
 Known = MutableMapping[str, list[list[Any]]]
-"""Scores and weights by candidate, fold and limit, as JSON values."""
+"""Scores and weights by candidate, fold and λ, as JSON values."""
 COARSE = 4
 """Every so-many-th λ is tried first."""
 NEAR = 1.5
-"""Error, in parts of the best on what is held out, above which a candidate's other λ are left."""
+"""Error, in parts of the best, above which the other λ of a candidate are left."""
 ALIKE = 0.03
 """Part of the lowest error by which the chosen λ may be worse.
 
@@ -143,11 +143,10 @@ class Trial:
         """Score at the best level."""
         return float(np.nanmin(self.means))
 
-    def of_group(self, group: int) -> float:
-        """Score in a group at the level that is best there."""
-        own = self.groups == group
-        total = max(float(self.weights[own].sum()), np.finfo(float).tiny)
-        return float(np.nanmin(self.scores[:, own] @ self.weights[own])) / total
+    @property
+    def tried(self) -> tuple[float, ...]:
+        """λ that were tried."""
+        return tuple(itertools.compress(self.levels, np.isfinite(self.means)))
 
     def level(self, alike: float, stated: float | None = None) -> float:
         """The largest λ that is as good as the best, or the stated one if that is."""
@@ -396,22 +395,8 @@ class Problem:
                 every[steps] = FreeRuns(predicted, measured, dynamics.state_scale.std)
         yield from (every[steps] for steps in horizons if steps in every)
 
-    def judge(self, candidate: HankelSettings, fold: int, limit: float) -> Scores:
-        """Judge free runs on a run that is held out, over all horizons that fit.
-
-        Where every ``COARSE``-th λ errs more than the limit, no other is tried.
-        """
-        levels = self.levels(candidate)
-        first = np.arange(len(levels)) % (COARSE if math.isfinite(limit) else 1) == 0
-        scores, weights = self._judged(candidate, [*itertools.compress(levels, first)], fold)
-        every = np.full((len(levels), weights.size), np.nan)
-        every[first] = scores
-        if not first.all() and (scores @ weights).min() <= limit:
-            left = [*itertools.compress(levels, ~first)]
-            every[~first], _ = self._judged(candidate, left, fold)
-        return every, weights
-
-    def _judged(self, candidate: HankelSettings, levels: Sequence[float], fold: int) -> Scores:
+    def judge(self, candidate: HankelSettings, fold: int, levels: Sequence[float]) -> Scores:
+        """Judge free runs on a run that is held out, over all horizons that fit."""
         every = self.free_runs(candidate, levels, fold, self.horizons)
         scores = [each for each in map(scores_of, every) if each.size]
         counts = [each.shape[1] for each in scores]
@@ -495,59 +480,67 @@ def _judge(
 ) -> None:
     """Add trials of candidates that are not among them; `later` more are to come at most.
 
-    The richest comes first: of those that err much more, few λ are tried.
+    Every ``COARSE``-th λ is tried, and the others of what errs little more than the best.
     """
+    new = [each for each in dict.fromkeys(candidates) if each not in trials]
+    work = known, executor, progress, later
+    _try(problems, trials, new, slice(None, None, COARSE), *work)
+    least = NEAR * min((each.best for each in trials.values()), default=math.inf)
+    _try(problems, trials, [each for each in new if trials[each].best <= least], slice(None), *work)
+
+
+def _try(
+    problems: Mapping[Columns, Problem],
+    trials: dict[Settings, Trial],
+    candidates: Sequence[Settings],
+    some: slice,
+    known: Known,
+    executor: Executor | None,
+    progress: Progress | None,
+    later: int = 0,
+) -> None:
+    """Try some λ of candidates that were not tried yet."""
     problem = next(iter(problems.values()))
     folds, firsts = problem.folds(), list(dict.fromkeys(problem.groups))
-    places = [firsts.index(each) for each in problem.groups]
-    new = [each for each in dict.fromkeys(candidates) if each not in trials]
-    count = len(folds) * (len(trials) + len(new) + later)
-    made: dict[Settings, Trial] = {}
+    again = sum(each in trials for each in candidates)  # each has two parts
+    before = len(folds) * (2 * len(trials) - again)
+    after = len(folds) * (len(candidates) - again + 2 * later)
 
     def tell(done: int, total: int, what: str) -> None:
         if progress is not None:
-            progress(len(folds) * (len(trials) + len(made)) + done, count, what)
+            progress(before + done, before + total + after, what)
 
-    richest = sorted(new, key=_parts_of)[-1:]
-    for some in (richest, [each for each in new if each not in richest]):
-        best = min((*trials.values(), *made.values()), key=lambda each: each.best, default=None)
-        limits = {
-            fold: math.inf if best is None else round(NEAR * best.of_group(places[fold]), 6)
-            for fold in folds
-        }
-        keys = {
-            unit: _key(*unit)
-            for unit in ((each, fold, limits[fold]) for fold in folds for each in some)
-        }
-        units = [unit for unit, key in keys.items() if key not in known]
-        outcomes = in_order(_unit, problems, units, executor, tell, "candidate and fold")
-        for unit, outcome in zip(units, outcomes, strict=True):
-            known[keys[unit]] = [part.tolist() for part in outcome]
-        for candidate in some:
-            parts = [map(np.array, known[keys[candidate, fold, limits[fold]]]) for fold in folds]
-            scores, weights = zip(*parts, strict=True)
-            joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
-            groups = np.repeat([places[fold] for fold in folds], [len(each) for each in weights])
-            every, levels = np.concatenate(scores, axis=1), problem.levels(candidate)
-            made[candidate] = Trial(levels, every, joined / joined.sum(), groups)
-    trials |= {each: made[each] for each in new}
-
-
-def _complete(
-    problems: Mapping[Columns, Problem], trials: dict[Settings, Trial], taken: Settings, *work: Any
-) -> None:
-    """Try all λ of a candidate of which few were tried."""
-    if np.isnan(trials[taken].means).any():
-        alone: dict[Settings, Trial] = {}
-        _judge(problems, alone, [taken], *work)
-        trials |= alone
+    left: dict[Settings, list[float]] = {}
+    for each in candidates:
+        tried = () if each not in trials else trials[each].tried
+        left[each] = [level for level in problem.levels(each)[some] if level not in tried]
+    items = ((each, fold, tuple(left[each])) for fold in folds for each in candidates if left[each])
+    keys = {unit: _key(*unit) for unit in items}
+    units = [unit for unit, key in keys.items() if key not in known]
+    outcomes = in_order(_unit, problems, units, executor, tell, "candidate and fold")
+    for unit, outcome in zip(units, outcomes, strict=True):
+        known[keys[unit]] = [part.tolist() for part in outcome]
+    for each in (each for each in candidates if left[each]):
+        levels = problem.levels(each)
+        parts = [map(np.array, known[keys[each, fold, tuple(left[each])]]) for fold in folds]
+        scores, weights = zip(*parts, strict=True)
+        joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
+        places = [firsts.index(problem.groups[fold]) for fold in folds]
+        groups = np.repeat(places, [len(each) for each in weights])
+        every = np.full((len(levels), joined.size), np.nan)
+        if each in trials:
+            every[:] = trials[each].scores
+        every[[levels.index(level) for level in left[each]]] = np.concatenate(scores, axis=1)
+        trials[each] = Trial(levels, every, joined / joined.sum(), groups)
 
 
-def _key(candidate: HankelSettings, fold: int, limit: float) -> str:
-    return json.dumps([candidate.to_json(), fold, limit], sort_keys=True)
+def _key(candidate: HankelSettings, fold: int, levels: Sequence[float]) -> str:
+    return json.dumps([candidate.to_json(), fold, levels], sort_keys=True)
 
 
-def _unit(problems: Mapping[Columns, Problem], item: tuple[HankelSettings, int, float]) -> Scores:
+def _unit(
+    problems: Mapping[Columns, Problem], item: tuple[HankelSettings, int, Sequence[float]]
+) -> Scores:
     problem = _problem_of(problems, item[0])
     assert problem is not None
     return problem.judge(*item)
@@ -780,7 +773,7 @@ def select(
     start = simplest(trials, best, alike) if left else base
     best = searched(start, varied)
     taken = start if trials[start].is_as_good_as(trials[best]) else best
-    _complete(problems, trials, taken, *work)
+    _try(problems, trials, [taken], slice(None), *work)
     level = trials[taken].level(alike, stated if taken == start else None)
     taken, level = _stable(problems, trials, taken, level)
     worth = _worth(problems, trials, taken, *work)
@@ -1077,7 +1070,7 @@ def _rivalled(
     for other, its in sorted(others.items(), key=lambda each: each[1].best):
         if trials[chosen[0]].is_as_good_as(its):
             continue
-        _complete(problems, others, other, *work)
+        _try(problems, others, [other], slice(None), *work)
         problem, level = _problem_of(problems, other), others[other].level(alike)
         assert problem is not None
         if not problem.grows(other, level):
