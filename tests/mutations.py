@@ -185,7 +185,7 @@ CHANGES = (
     ("models/live.py", "self._filter.limit(self.errors.at(since + 1) ** 2, exactly=blind)", "self._filter.limit(self.errors.at(since + 1) ** 2)", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
     ("models/growth.py", "apart = 0.5 * np.abs(plus - minus)", "apart = np.abs(plus - minus)", "hosts/test_estimator.py::test_each_estimate_and_forecast_is_that_of_the_live_model"),
     ("models/growth.py", "(0.5 * (plus + minus) - middle[:, None])", "(0.0 * (plus + minus - middle[:, None]))", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
-    ("models/live.py", "weighed(complete, errors, scale, foreseen)", "weighed(complete, wider * errors, scale, foreseen)", "models/test_live.py::test_a_band_that_is_widened_does_not_move_a_mean_that_is_not_known"),
+    ("models/live.py", "weighed(complete, errors, scale, given)", "weighed(complete, wider * errors, scale, given)", "models/test_live.py::test_a_band_that_is_widened_does_not_move_a_mean_that_is_not_known"),
     ("models/growth.py", "np.clip(trust, 0.0, 1.0)", "np.clip(trust, 1.0, 1.0)", "models/test_live.py::test_without_waves_to_come_no_lead_errs_more_than_the_mean models/test_ahead.py::test_no_lead_errs_more_than_the_mean"),
     ("models/growth.py", "np.where(known, mean, shrunk)", "shrunk", "models/test_ahead.py::test_where_waves_are_known_nothing_is_weighed"),
     ("models/growth.py", "errors = learnt.of_forecast(windows.steps)", "errors = 0.0", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),

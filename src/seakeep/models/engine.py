@@ -223,17 +223,21 @@ def read_groups(
         name: each.continued(signature, wanted[name]) if predicts else [each]
         for name, each in opened.items()
     }
+    # A run of which nothing is predicted has one future, whose drive all share.
+    driven = {
+        name: [(each, each.drive(signature, wanted[name])) for each in runs_of]
+        for name, runs_of in futures.items()
+    }
     made = []
-    for number in range(max(map(len, futures.values()), default=0)):
-        opened = {name: each[number % len(each)] for name, each in futures.items()}
-        drives = {name: each.drive(signature, wanted[name]) for name, each in opened.items()}
+    for number in range(max(map(len, driven.values()), default=0)):
+        now = {name: each[number % len(each)] for name, each in driven.items()}
         made.append(
             [
                 _driven(
                     signature,
-                    [drives[name] for name, _ in places],
+                    [now[name][1] for name, _ in places],
                     mine,
-                    [opened[name] for name, _ in places],
+                    [now[name][0] for name, _ in places],
                 )
                 for (places, _), mine in zip(groups, spans, strict=True)
             ]

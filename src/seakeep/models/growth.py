@@ -209,7 +209,7 @@ def weighed(
     runs: FloatArray,
     errors: FloatArray | float,
     scale: Scale,
-    foreseen: BoolArray,
+    given: BoolArray,
     zero: FloatArray | float = 0.0,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean of runs that passes over to that of training as the claimed error nears the SD there.
@@ -225,7 +225,7 @@ def weighed(
         Mean squares of the model's errors.
     scale : Scale
         Moments of training.
-    foreseen : ndarray of bool, shape (…, steps)
+    given : ndarray of bool, shape (…, steps)
         Whether the waves that a step reads are known: nothing changes there.
     zero : ndarray, shape (…, 1, N), optional
         What the mean of training is added to.
@@ -247,7 +247,7 @@ def weighed(
     claimed = (spread + errors) / np.maximum(scale.spread**2, np.finfo(float).tiny)
     trust = (high - claimed) / (high - low)
     lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)
-    known, mean, centre = foreseen[..., None], middle.mean(axis=0), scale.centre + zero
+    known, mean, centre = given[..., None], middle.mean(axis=0), scale.centre + zero
     shrunk = centre + lasting * (mean + np.cumsum(moved.mean(axis=0), axis=-2) - centre)
     return np.where(known, mean, shrunk), spread, np.where(known, 1.0, lasting)
 
@@ -266,7 +266,7 @@ def weighed_runs(
             every = np.stack([values, *run(windows.departures)])[None]
             errors = learnt.of_forecast(windows.steps)
             first = np.array(windows.predicted)[:, None]
-            foreseen = (np.arange(windows.steps) < first) | (first < 0)
+            given = (np.arange(windows.steps) < first) | (first < 0)
             zero = 0.0 if windows.zero is None else windows.zero[:, None]
-            values[:] = weighed(every, errors, model.signature.state_scale, foreseen, zero)[0]
+            values[:] = weighed(every, errors, model.signature.state_scale, given, zero)[0]
     return runs

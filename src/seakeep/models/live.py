@@ -717,8 +717,8 @@ class Live:
             if self._count.partly:
                 own = self.errors.of_forecast(count)
                 errors = np.minimum(own + self._filter.ahead(count), errors)
-            foreseen = np.arange(count) <= known - self._ahead
-            table[0], spread, weight = weighed(complete, errors, scale, foreseen)
+            given = np.arange(count) <= known - self._ahead
+            table[0], spread, weight = weighed(complete, errors, scale, given)
             # The error passes over with the mean, to that of the mean of training.
             variance = weight * (spread + wider * errors)
             table[1] = np.sqrt(variance + (1.0 - weight) * wider * scale.spread**2)
