@@ -164,31 +164,41 @@ class _Line:
     ) -> None:
         self.waves, self.places, self.column, self.columns = waves, places, column, columns
         self.spread = data.signature.state_scale.spread[[column]]
-        self.pieces = []  # motions, wave and load of each run, shape (place, sample, …)
+        # Of each run: motions and load, shape (sample, …), and waves, shape (place, sample, 2).
+        self.pieces = []
         for window, x, wave in zip(data.windows, states, waves, strict=True):
             inside = slice(window.first_column + 1, window.last + 1)
-            known = x[inside, [*columns, column]], wave[inside].swapaxes(0, 1)
-            motions = np.broadcast_to(known[0], (len(places), *known[0].shape))
-            every = np.concatenate([motions[..., :-1], known[1], motions[..., -1:]], axis=2)
-            self.pieces.append(every[:, np.isfinite(every).all(axis=(0, 2))])
-        pooled = np.concatenate(self.pieces, axis=1)[..., :-1]
-        self.mean, self.std = pooled.mean(axis=1), pooled.std(axis=1, ddof=1)
-        self.knots = np.quantile((pooled[0, :, 0] - self.mean[0, 0]) / self.std[0, 0], KNOTS)
+            known, seen = x[inside, [*columns, column]], wave[inside]
+            sound = np.isfinite(known).all(axis=1) & np.isfinite(seen).all(axis=(1, 2))
+            self.pieces.append((known[sound], seen[sound].swapaxes(0, 1)))
+        motions = np.concatenate([known[:, :-1] for known, _ in self.pieces])
+        around = np.concatenate([seen for _, seen in self.pieces], axis=1)
+        every = len(places), 1
+        self.mean = np.hstack([np.tile(motions.mean(axis=0), every), around.mean(axis=1)])
+        spreads = motions.std(axis=0, ddof=1), around.std(axis=1, ddof=1)
+        self.std = np.hstack([np.tile(spreads[0], every), spreads[1]])
+        self.knots = np.quantile((motions[:, 0] - self.mean[0, 0]) / self.std[0, 0], KNOTS)
+        runs = range(len(self.pieces))
         self.sums = np.array(
             [
                 [
-                    sums((each[at, :, :-1] - mean) / std, each[at, :, -1], self.knots)
-                    for each in self.pieces
+                    sums((values[:, :-1] - mean) / std, values[:, -1], self.knots)
+                    for values in (self._read(run, at) for run in runs)
                 ]
                 for at, (mean, std) in enumerate(zip(self.mean, self.std, strict=True))
             ]
         )
 
+    def _read(self, run: int, at: int) -> FloatArray:
+        """Motions, wave and load of a run with the line at a place, shape (sample, …)."""
+        known, seen = self.pieces[run]
+        return np.column_stack([known[:, :-1], seen[at], known[:, -1]])
+
     def map(self, runs: Sequence[int]) -> LoadMap:
         """The load as some runs tell it."""
         products = self.sums[:, list(runs)]
         at = best_place(products)
-        seen = np.concatenate([self.pieces[run][at] for run in runs])
+        seen = np.concatenate([self._read(run, at) for run in runs])
         low, high = seen.min(axis=0), seen.max(axis=0)
         margin = MARGIN * (high[-1] - low[-1])
         return LoadMap(

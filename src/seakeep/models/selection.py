@@ -1282,7 +1282,7 @@ def groups_of(runs: Datasets, folds: Folds, inputs: Sequence[str]) -> dict[str, 
     waves = {name: labelled.wave_channel(run, inputs, name) for name, run in runs.items()}
     if folds == "run" or None in waves.values():
         return {name: name for name in runs}
-    records = {name: runs[name][wave].to_numpy() for name, wave in waves.items()}
+    records = {name: runs[name][wave].values for name, wave in waves.items()}
     periods = regular_periods(runs, inputs)
     firsts: list[str] = []
     for name in sorted(periods, key=lambda each: periods[each]):
@@ -1301,7 +1301,7 @@ def regular_periods(runs: Datasets, inputs: Sequence[str]) -> dict[str, float]:
     periods, step = {}, labelled.common_step(runs)
     for name, run in runs.items():
         wave = labelled.wave_channel(run, inputs, name)
-        series = np.full(1, np.nan) if wave is None else run[wave].to_numpy()
+        series = np.full(1, np.nan) if wave is None else run[wave].values
         stated = run.attrs.get("waves") == "regular"
         if not np.isfinite(series).all() or not (stated or is_regular(series)):
             return {}
