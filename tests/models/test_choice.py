@@ -85,7 +85,24 @@ def test_a_group_that_repeats_counts_once():
     assert replace(other, groups=pair).is_as_good_as(replace(one, groups=pair))
 
 
-def test_every_ridge_of_what_is_taken_is_tried(monkeypatch):
+@pytest.mark.parametrize(
+    ("means", "left"),
+    [
+        ([0.1, None, 0.2, None, 0.3], [1]),  # the best is the first
+        ([0.3, None, 0.2, None, 0.1], [3]),  # and the last
+        ([0.2, None, 0.1, None, 0.2], [1, 3]),
+        ([0.1, None, 0.102, None, 0.2], [1, 3]),  # 2 % worse counts as the best
+        ([0.2, 0.1, 0.2, None, 0.3], []),
+        ([None, None, 0.1, None, 0.2], [0, 1, 3]),
+    ],
+)
+def test_the_ridges_about_the_best_are_tried(means, left):
+    scores = np.array(means, dtype=float)[:, None]
+    its = Trial((0.0, 1.0, 2.0, 3.0, 4.0), scores, np.ones(1), np.zeros(1, dtype=int))
+    assert its.between() == left
+
+
+def test_the_ridges_about_the_best_of_what_is_taken_are_tried(monkeypatch):
     monkeypatch.setattr(selection, "NEAR", 0.0)
     given = {name: run.drop_vars("drift") for name, run in runs().items()}
     found = select(replace(SPEC, select=None), given, ["heave"], INPUTS, opened=("observables",))
@@ -93,9 +110,9 @@ def test_every_ridge_of_what_is_taken_is_tried(monkeypatch):
     levels = {}
     for row in found.rows:
         levels.setdefault(row["observables"], []).append(row["ridge"])
-    # First every fourth; at last all of what is taken.
+    # First every fourth; at last those about the best of what is taken.
     every = list(selection.RIDGES)
-    assert levels.pop("none") == every
+    assert levels.pop("none") == [*every[:5], every[8]]
     assert [*levels.values()] == [every[::4]] * 3
 
 

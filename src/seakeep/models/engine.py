@@ -285,7 +285,7 @@ def _series(
             zero[follows.column] = 0.0  # it is a place
         zeros.append(zero)
         states.append(each[-rows:] - zero)
-    drives = [drive.about(span.known) for drive, span in zip(drives, spans, strict=True)]
+    drives = [drive.about(span) for drive, span in zip(drives, spans, strict=True)]
     out = {"histories": np.stack(states), "zero": np.stack(zeros)}
     return out | _regressors(signature, drives, spans)
 
@@ -305,12 +305,12 @@ def _regressors(
     place = signature.input_map.follows.place
     tables, starts, first = [], {}, 0
     for drive in dict.fromkeys(drives):
-        mine = [span for each, span in pairs if each is drive]
-        begin, end = min(span.first for span in mine), max(span.stop for span in mine)
+        begin, table = drive.whole
         starts[drive] = first - begin
-        tables.append(drive.table(begin, end))
-        first += end - begin
-    table, steps = np.concatenate(tables), spans[0].stop - spans[0].known
+        tables.append(table)
+        first += len(table)
+    table = tables[0] if len(tables) == 1 else np.concatenate(tables)
+    steps = spans[0].stop - spans[0].known
     at = np.array([starts[drive] + span.known for drive, span in pairs])
     here = np.stack([drive.places(span.first, span.known + 1) for drive, span in pairs])
     here = np.concatenate([here, here[:, -1:].repeat(steps - 1, axis=1)], axis=1)

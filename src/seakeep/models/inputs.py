@@ -150,7 +150,7 @@ class InputMap:
             Surge of the vessel at the same samples, where the model follows it.
         """
         if self.follows is not None:
-            return Drive(self, values, first, surge, self.follows.banks(run), run)
+            return Drive(self, values, first, surge, self.follows.banks(run), run, spans)
         if spans:
             read = [self.reads(span) for span in spans]
             if self.alignment is not None and run is not None:
@@ -205,6 +205,8 @@ class Drive:
         Carriers in the rig of the run, of a model that follows its surge.
     run : Dataset, optional
         The run, with its rig; that of training without one.
+    spans : sequence of Span
+        Samples whose regressors are wanted, where the model follows its surge.
     zero : Regressors, optional
         What the regressors depart from.
     """
@@ -215,15 +217,17 @@ class Drive:
     surge: FloatArray | None = None
     banks: tuple[Bank, ...] = ()
     run: xr.Dataset | None = None
+    spans: Sequence[Span] = ()
     zero: Regressors | None = None
 
-    def about(self, known: int) -> Drive:
-        """The same as departures from the means over the reference period up to a sample.
+    def about(self, span: Span) -> Drive:
+        """Drive of some samples, departing from the means over the reference period before them.
 
         The squared place of a vessel that is followed stays as it is.
         """
-        rows = self.rows(known + 1 - self.input_map.reference, known + 1)
-        return replace(self, zero=Regressors(*(each.mean(axis=0) for each in rows)))
+        rows = self.rows(span.known + 1 - self.input_map.reference, span.known + 1)
+        zero = Regressors(*(each.mean(axis=0) for each in rows))
+        return replace(self, spans=[span], zero=zero)
 
     def rows(self, first: int, stop: int) -> Regressors:
         """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
@@ -255,6 +259,12 @@ class Drive:
         values = self.values[begin - self.first : stop + after - self.first]
         rows = self.input_map.observed.direct(values)[first - begin : stop - begin]
         return self._departing(rows, 1)
+
+    @cached_property
+    def whole(self) -> tuple[int, FloatArray]:
+        """First of the samples that are wanted, and the table of all of them."""
+        first = min(span.first for span in self.spans)
+        return first, self.table(first, max(span.stop for span in self.spans))
 
     def table(self, first: int, stop: int) -> FloatArray:
         """Delayed regressors of samples at all places, shape (time, place, n)."""

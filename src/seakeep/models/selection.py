@@ -39,7 +39,7 @@ from seakeep.core.gram import PrimalSystem, ridge_path
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
-from seakeep.models.engine import Dynamics, Windows, model_runs, read_windows
+from seakeep.models.engine import Dynamics, Windows, model_runs, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.executor import in_order
 from seakeep.models.following import LEAD
@@ -76,6 +76,8 @@ COARSE = 4
 """Every so-many-th λ is tried first."""
 NEAR = 1.5
 """Error, in parts of the best, above which the other λ of a candidate are left."""
+LAST = 4
+"""Runs whose windows stay in memory."""
 ALIKE = 0.03
 """Part of the lowest error by which the chosen λ may be worse.
 
@@ -143,10 +145,14 @@ class Trial:
         """Score at the best level."""
         return float(np.nanmin(self.means))
 
-    @property
-    def tried(self) -> tuple[float, ...]:
-        """λ that were tried."""
-        return tuple(itertools.compress(self.levels, np.isfinite(self.means)))
+    def between(self) -> list[float]:
+        """λ that were not tried, up to the next that is worse on either side of the best."""
+        tried = np.isfinite(self.means)
+        near = np.flatnonzero(self.means <= (1.0 + ALIKE) * self.best)
+        worse = np.flatnonzero(tried)
+        low = worse[worse < near[0]].max(initial=-1)
+        high = worse[worse > near[-1]].min(initial=len(tried))
+        return [self.levels[at] for at in range(low + 1, high) if not tried[at]]
 
     def level(self, alike: float, stated: float | None = None) -> float:
         """The largest λ that is as good as the best, or the stated one if that is."""
@@ -217,8 +223,8 @@ class Problem:
     horizons : tuple of int
         Lengths of the windows that are judged, samples.
     read : dict
-        Run, starts and windows that were read last, by their length: candidates are judged on one
-        run after the other.
+        Windows of the ``LAST`` runs that were read, by run and lengths: candidates are judged on
+        one run after the other, and the best on all again.
     taught : dict
         By the runs that teach, the normal equations of all columns that were made last, which
         candidates share.
@@ -230,7 +236,7 @@ class Problem:
     widest: HankelSettings
     ridges: tuple[float, ...]
     horizons: tuple[int, ...]
-    read: dict[int, tuple[int, list[int], Windows]] = field(
+    read: dict[tuple[int, tuple[int, ...]], dict[int, Windows]] = field(
         default_factory=dict, init=False, repr=False
     )
     taught: dict[tuple[int, ...], tuple[Any, list[Scale], PrimalSystem]] = field(
@@ -330,15 +336,25 @@ class Problem:
         first = window.first_column + self.widest.centre
         return np.arange(first, window.last - steps + 1, steps)
 
-    def windows(self, run: int, starts: list[int], steps: int) -> Windows:
-        """What free runs of all candidates from some samples of a run read."""
-        read = self.read.get(steps)
-        if read is None or read[:2] != (run, starts):
-            begin, dt = self.data.begin(run), self.data.signature.dt
-            places = [(self.data.names[run], begin + at * dt) for at in starts]
-            windows = read_windows(self.reader, self.runs, places, steps)
-            read = self.read[steps] = run, starts, windows
-        return read[2]
+    def windows(self, run: int, horizons: Sequence[int]) -> dict[int, Windows]:
+        """What free runs of all candidates on a run read, by length.
+
+        A longer free run begins with the shorter one from the same sample, which is left out.
+        """
+        key = run, tuple(horizons)
+        if key not in self.read:
+            begin, dt, known = self.data.begin(run), self.data.signature.dt, set[int]()
+            groups = []
+            for steps in sorted(horizons, reverse=True):
+                new = [at for at in self.starts(run, steps).tolist() if at not in known]
+                known.update(new)
+                places = [(self.data.names[run], begin + at * dt) for at in new]
+                groups += [(places, steps)] * bool(new)
+            if len(self.read) == LAST:
+                self.read.pop(next(iter(self.read)))
+            windows = read_groups(self.reader, self.runs, groups)
+            self.read[key] = {each.steps: each for each in windows}
+        return self.read[key]
 
     def folds(self) -> list[int]:
         """Runs in which a window of some length fits: each is held out once."""
@@ -371,11 +387,12 @@ class Problem:
         zeros: dict[int, FloatArray] = {}
         known: dict[int, FloatArray] = {}  # by start: a longer run begins with the shorter one
         every: dict[int, FreeRuns] = {}
+        read = self.windows(run, horizons)
         for steps in sorted(horizons, reverse=True):
             starts = self.starts(run, steps).tolist()
             new = [at for at in starts if at not in known]
             if new:
-                windows = self.windows(run, new, steps)
+                windows = read[steps]
                 last = windows.delayed.shape[1] - self.ahead(candidate)
                 windows = replace(
                     windows,
@@ -480,26 +497,25 @@ def _judge(
 ) -> None:
     """Add trials of candidates that are not among them; `later` more are to come at most.
 
-    Every ``COARSE``-th λ is tried, and the others of what errs little more than the best.
+    Every ``COARSE``-th λ is tried, and of what errs little more than the best those about its own.
     """
     new = [each for each in dict.fromkeys(candidates) if each not in trials]
     work = known, executor, progress, later
-    _try(problems, trials, new, slice(None, None, COARSE), *work)
+    _try(problems, trials, new, *work)
     least = NEAR * min((each.best for each in trials.values()), default=math.inf)
-    _try(problems, trials, [each for each in new if trials[each].best <= least], slice(None), *work)
+    _try(problems, trials, [each for each in new if trials[each].best <= least], *work)
 
 
 def _try(
     problems: Mapping[Columns, Problem],
     trials: dict[Settings, Trial],
     candidates: Sequence[Settings],
-    some: slice,
     known: Known,
     executor: Executor | None,
     progress: Progress | None,
     later: int = 0,
 ) -> None:
-    """Try some λ of candidates that were not tried yet."""
+    """Try every ``COARSE``-th λ of candidates, or those next to the best of what was tried."""
     problem = next(iter(problems.values()))
     folds, firsts = problem.folds(), list(dict.fromkeys(problem.groups))
     again = sum(each in trials for each in candidates)  # each has two parts
@@ -512,8 +528,8 @@ def _try(
 
     left: dict[Settings, list[float]] = {}
     for each in candidates:
-        tried = () if each not in trials else trials[each].tried
-        left[each] = [level for level in problem.levels(each)[some] if level not in tried]
+        levels = problem.levels(each)
+        left[each] = trials[each].between() if each in trials else [*levels[::COARSE]]
     items = ((each, fold, tuple(left[each])) for fold in folds for each in candidates if left[each])
     keys = {unit: _key(*unit) for unit in items}
     units = [unit for unit, key in keys.items() if key not in known]
@@ -663,10 +679,10 @@ def select(
 ) -> Selected[Settings]:
     """Choose settings by free runs on training runs that are held out in turn.
 
-    One setting after the other is chosen, each candidate with the path of λ, or every fourth λ
-    where it errs half as much again as the best: first what the settings leave open, of which the
-    simplest is taken that is as good as the best but for the noise; then what is varied from there,
-    which is left for what is better by more than the noise.
+    One setting after the other is chosen, each candidate with every fourth λ, and those about its
+    best unless it errs half as much again as the best of all: first what the settings leave open,
+    of which the simplest is taken that is as good as the best but for the noise; then what is
+    varied from there, which is left for what is better by more than the noise.
     Of the λ the largest is taken that is as good as the best. Where that model grows, it is the
     best of all that were tried and do not.
 
@@ -773,7 +789,7 @@ def select(
     start = simplest(trials, best, alike) if left else base
     best = searched(start, varied)
     taken = start if trials[start].is_as_good_as(trials[best]) else best
-    _try(problems, trials, [taken], slice(None), *work)
+    _try(problems, trials, [taken], *work)
     level = trials[taken].level(alike, stated if taken == start else None)
     taken, level = _stable(problems, trials, taken, level)
     worth = _worth(problems, trials, taken, *work)
@@ -1070,7 +1086,7 @@ def _rivalled(
     for other, its in sorted(others.items(), key=lambda each: each[1].best):
         if trials[chosen[0]].is_as_good_as(its):
             continue
-        _try(problems, others, [other], slice(None), *work)
+        _try(problems, others, [other], *work)
         problem, level = _problem_of(problems, other), others[other].level(alike)
         assert problem is not None
         if not problem.grows(other, level):
