@@ -520,11 +520,11 @@ class Live:
 
     def _finish(self, late: int = 0) -> None:
         """Judge samples whose estimates no wave to come moves; up to `late` complete ones wait."""
-        count, is_exact = self._count, self._is_exact()
+        count = self._count
         final = count.taken - 1 - max(self._ahead - 1, 0)
-        if count.taken > self._begins and final > count.final + is_exact * late:
+        if count.taken > self._begins and final > count.final + self._is_exact() * late:
             self._find_rows(final, self._known_inputs())
-            self._advance(self._history, count.final + 1, final, moves=not is_exact, is_final=True)
+            self._advance(self._history, count.final + 1, final, is_final=True)
             count.final = final
 
     def _is_exact(self) -> bool:
@@ -535,24 +535,18 @@ class Live:
         return self._updates[at - self._count.taken]
 
     def _advance(
-        self,
-        history: FloatArray,
-        first: int,
-        last: int,
-        *,
-        moves: bool = True,
-        is_final: bool = False,
+        self, history: FloatArray, first: int, last: int, *, is_final: bool = False
     ) -> None:
         """Run the mean through samples, with the gains that were found for them.
 
-        The vessel `moves` where estimates are not what rows were read at.
+        Rows of several final ones were read where the vessel was measured.
         """
         s = self.signature.state_delays
         for at in range(first, last + 1):
             update, measured = self._update_of(at), self._rows("y", at, at + 1)[0]
             predicted = self.signature.state_scale.centre
             if at >= self._begins:
-                if moves:
+                if not is_final:
                     self._place(at - 1)
                 predicted = self._predicted(history, at - 1)
             innovation = measured - predicted
