@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.files import MARK, check_output, replacing, write_netcdf
+from seakeep.files import MARK, check_output, load_sealed, replacing, write_netcdf, write_sealed
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path):
@@ -77,6 +77,19 @@ def test_a_netcdf_file_holds_what_was_written(tmp_path):
     xr.testing.assert_equal(found, heave)
     assert found["heave"].attrs == {"units": "m"}
     assert found.attrs["name"] == "Mörkö"
+
+
+def test_a_sealed_file_holds_what_was_written(tmp_path):
+    flags = xr.Dataset(
+        {"flag": ("time", np.array([True, False])), "name": ("time", ["a", "Ä"])},
+        coords={"time": [0.0, 0.1], "depth": 3.0},
+        attrs={"span": (1.0, 2.0), "title": "Mörkö"},
+    )
+    write_sealed(flags, tmp_path / "a.nc", "model")
+    found = load_sealed(tmp_path / "a.nc", "model")
+    xr.testing.assert_equal(found, flags)
+    assert (found.attrs["span"], found.attrs["title"]) == ((1.0, 2.0), "Mörkö")
+    assert found["flag"].dtype == bool
 
 
 FULL = """

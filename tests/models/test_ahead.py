@@ -183,3 +183,31 @@ def test_where_waves_are_known_nothing_is_weighed(model):
     mean, _, weight = weighed(runs, 0.0, scale, known)
     np.testing.assert_array_equal(mean, np.where(known[:, None], runs[0, 0], scale.centre))
     np.testing.assert_array_equal(weight, np.repeat(known[:, None], 2, axis=1))
+
+
+def test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises(model):
+    scale = model.state_scale
+    claimed = np.array([0.4, 0.6, 0.8, 0.7, 1.0])[:, None]  # squares over those of training
+    weight = weighed(np.zeros((1, 1, 5, 2)), claimed * scale.spread**2, scale, np.zeros(5, bool))[2]
+    np.testing.assert_allclose(weight[:, 0], [1.0, 0.75, 0.25, 0.25, 0.0], atol=1e-12)
+
+
+def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(runs, test_run):
+    model, at, steps = model_of(runs), 400, 250
+    # Waves are known for longer than a forecast without them is trusted.
+    start, last = float(test_run.time[at]), at + 100
+    short = test_run.isel(time=slice(0, last + 1)).copy()
+    for name in INPUTS:  # arrays do not say where their probes stand
+        del short[name].attrs["x_position"]
+    x, u = (np.stack([short[n].values for n in names], axis=1) for names in (STATES, INPUTS))
+    found = model.forecast_arrays(x[: at + 1], u[: at + 1], u[at + 1 :], steps, ahead="predict")
+    known = model.forecast(test_run, start, steps)
+    given = last - at + 1 - LEAD
+    for column, name in enumerate(STATES):
+        np.testing.assert_allclose(found[:given, column], known[name][:given], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found[-20:, 1], model.state_scale.centre[1], atol=1e-12)
+    windows = model.forecast_windows(short, [10.0, start], steps, ahead="predict")
+    whole = model.forecast(test_run, 10.0, steps)  # all waves of that window were measured
+    for column, name in enumerate(STATES):
+        np.testing.assert_allclose(windows[name].values[1], found[:, column], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(windows[name].values[0], whole[name].values, rtol=0, atol=1e-9)

@@ -139,7 +139,8 @@ def test_models_and_windows_side_by_side_are_each_alone():
     place = Place(np.full(P, 1 / P), -1.0, 0.25, places, 0.1)
     a, b, d = (0.1 * rng.standard_normal((3, N, each)) for each in (N * (s + 1), n * (z + 1), 1))
     models = Recursion(a, b, d[..., 0], 0.7, 0.2, 1)
-    histories, delayed = rng.standard_normal((2, 6, N)), rng.standard_normal((2, z, n))
+    # So wide that the vessel leaves the grid at both ends.
+    histories, delayed = 9 * rng.standard_normal((2, 6, N)), rng.standard_normal((2, z, n))
     table, starts = rng.standard_normal((60, places, n)), np.array([0, 25])
     forcing = rng.standard_normal((3, 2, steps, N))
     found, used = recursion(models, place, histories, delayed, table, starts, forcing)
@@ -171,3 +172,11 @@ def test_models_and_windows_side_by_side_are_each_alone():
             )
             np.testing.assert_allclose(one[0], x[6:], rtol=1e-10, atol=1e-12)
             np.testing.assert_allclose(driven[0], u[z:], rtol=1e-10, atol=1e-12)
+    lost = np.where(np.arange(steps)[:, None] < 20, forcing, np.nan)
+    for of in (slice(1), slice(3)):  # a run that is lost stays so, and keeps a place
+        alone = Recursion(a[of], b[of], d[of, :, 0], 0.7, 0.2, 1)
+        one, driven = recursion(
+            alone, place, histories[:1], delayed[:1], table, starts[:1], lost[of, :1]
+        )
+        np.testing.assert_array_equal(np.isnan(one), np.isnan(lost[of, :1]))
+        assert np.isfinite(driven).all()

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from seakeep.signals import predict_waves
-from seakeep.signals.prediction import foresee, predictable_time
+from seakeep.signals.prediction import Foreseen, fill_future, foresee, predictable_time
 from seakeep.waves import wavenumber
 
 
@@ -24,6 +24,29 @@ def test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on():
     error = np.abs(found - [3.0, -1.0] - expected[2:]).max(axis=0) / spread
     assert np.all(error < 0.25)
     assert np.all(np.abs(expected[2:]).max(axis=0) > 0.5 * spread)  # what there was to foresee
+
+
+def test_what_is_missing_is_filled_from_the_record_after_the_last_gap():
+    series = np.arange(24.0).reshape(12, 2)
+    series[3, 0] = np.nan  # before what is filled
+    series[7:, 0] = series[9:11, 1] = np.nan  # the second probe is back at the end
+
+    def foreseen(record, count):
+        np.testing.assert_array_equal(record, series[4:7])
+        departures = np.arange(1.0, 21.0).reshape(2, 5, 2)
+        return Foreseen(100.0 + np.arange(10.0).reshape(5, 2), departures, 3.0)
+
+    futures, first, freedom = fill_future(series, 6, foreseen)
+    assert (first, freedom) == (7, 3.0)
+    filled = series.copy()
+    filled[7:, 0], filled[9:11, 1] = 100.0 + np.arange(0.0, 10.0, 2), [105.0, 107.0]
+    np.testing.assert_array_equal(futures[0], filled)
+    moved = np.zeros((2, 5, 2))
+    moved[0] = np.arange(1.0, 11.0).reshape(5, 2)
+    moved[1, 2:] = np.arange(11.0, 17.0).reshape(3, 2)  # from where it is first missing on
+    moved[:, [0, 1, 4], 1] = 0.0  # what is measured does not depart
+    np.testing.assert_array_equal(futures[1:3, 7:] - filled[7:], moved)
+    np.testing.assert_array_equal(futures[3:] + futures[1:3], [2 * filled] * 2)
 
 
 def test_columns_are_continued_alone_and_a_still_one_stays():
