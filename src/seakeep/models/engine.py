@@ -433,7 +433,7 @@ class _Opened:
         beyond = self.time[-1] + signature.dt * np.arange(1, more + 1)
         run = run.pad(time=(0, more), keep_attrs=True)
         run = run.assign_coords(time=np.concatenate([self.time[:stop], beyond]))
-        futures, first, _ = fill_future(values, start + 1, foresight(signature, self.run))
+        futures, first = filled(signature, values, start + 1, self.run)
         out = []
         for future in futures:
             columns = zip(signature.inputs, future.T, strict=True)
@@ -481,6 +481,18 @@ class _Opened:
         beyond = self.time[-1] + dt * np.arange(1, span.stop - span.known - inside.size + 1)
         attrs = dict(self.run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
         return xr.Variable(("time",), np.concatenate([inside, beyond]), attrs)
+
+
+def filled(
+    signature: Signature, values: FloatArray, known: int, run: xr.Dataset | None = None
+) -> tuple[FloatArray, int]:
+    """Inputs with what is missing from a sample on, and the first sample that is.
+
+    As :func:`seakeep.signals.prediction.fill_future`, without departures for a model of departures
+    from means before a start, which holds no errors to weigh them by.
+    """
+    futures, first, _ = fill_future(values, known, foresight(signature, run))
+    return futures[:1] if signature.input_map.reference else futures, first
 
 
 def foresight(signature: Signature, run: xr.Dataset | None = None) -> partial[Foreseen]:

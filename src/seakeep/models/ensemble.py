@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple, Self
@@ -28,7 +29,7 @@ from seakeep.models.calibration import (
 )
 from seakeep.models.checks import Json
 from seakeep.models.draws import Draw, draws_dataset
-from seakeep.models.engine import Dynamics, Windows, linear_runs, member_series
+from seakeep.models.engine import Dynamics, Series, Windows, linear_runs, member_series
 from seakeep.models.executor import in_order
 from seakeep.models.forecasts import (
     Model,
@@ -44,7 +45,7 @@ from seakeep.models.forecasts import (
     window_coords,
     with_units,
 )
-from seakeep.models.growth import LeadErrors, Stretch, lead_errors
+from seakeep.models.growth import LeadErrors, Stretch, lead_errors, weigh_members
 from seakeep.models.interface import Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
@@ -399,8 +400,20 @@ class HankelEnsemble(Model):
             As :meth:`HankelDMDcModel.forecast`.
         """
         windows = self.read_windows(*one_run(run, [start]), steps, ahead)
-        with member_series(self, [windows], executor, progress) as ((series, lost),):
+        with self._series(windows, executor, progress) as (series, lost):
             return self._single(run, windows, np.array(series[:, 0]), lost, "member")
+
+    @contextmanager
+    def _series(
+        self, windows: Windows, executor: Executor | None, progress: Progress | None
+    ) -> Iterator[Series]:
+        """Series of the members, weighed where waves are predicted, as :func:`member_series`."""
+        every = [windows, *windows.departures]
+        with member_series(self, every, executor, progress) as parts:
+            if windows.departures:
+                runs = [series for series, _ in parts]
+                weigh_members(windows, runs, self.errors, self.signature.state_scale)
+            yield parts[0]
 
     def forecast_summary(
         self,
@@ -504,7 +517,7 @@ class HankelEnsemble(Model):
             As :meth:`forecast`.
         """
         windows = self.read_windows(*one_run(run, starts), steps, ahead)
-        with member_series(self, [windows], executor, progress) as ((series, lost),):
+        with self._series(windows, executor, progress) as (series, lost):
             values = np.array(series).swapaxes(0, 1)
         variables = label_channels(self.signature, values, ("window", "member", "lead"))
         status = [statuses(row, windows, window, self.dt) for window, row in enumerate(lost.T)]
@@ -566,7 +579,7 @@ class HankelEnsemble(Model):
         """Statistics (window, 4, steps, N) of all members, and where these were lost."""
         level = fraction(level, "level")
         check_band(self.calibration, level, band)
-        with member_series(self, [windows], executor, progress) as ((series, lost),):
+        with self._series(windows, executor, progress) as (series, lost):
             values = reduce_members(series, lost, level)
         return widened(self.calibration, values, band, self.signature, windows), lost
 

@@ -24,7 +24,6 @@ from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix, run_name
 from seakeep.models.training import Training
 from seakeep.models.validity import outside_training
-from seakeep.signals.prediction import fill_future
 from seakeep.signals.time_axis import instant_text, span_text
 
 
@@ -224,8 +223,8 @@ class Model:
             ``live().forecast`` does, from its record by linear prediction
             (:func:`seakeep.signals.predict_waves`), and from what probes up-wave have seen where
             positions and depth are known. Samples missing after `start` count as not recorded.
-            As the error that is expected comes near the SD of training, the forecast of a
-            single model that holds its errors in training tends to the mean there.
+            As the error that is expected comes near the SD of training, the forecast, or the
+            mean of an ensemble, tends to the mean there, unless ``centre = "run"``.
 
         Returns
         -------
@@ -527,7 +526,7 @@ def check_arrays(
     if missing := needed - len(after):
         _finite("u_history", past)
         whole = np.pad(whole, ((0, missing), (0, 0)), constant_values=np.nan)
-        futures = fill_future(whole, len(past), engine.foresight(signature))[0]
+        futures, _ = engine.filled(signature, whole, len(past))
         first = max(len(after) - signature.lead_samples + 1, 0)
     windows, *departures = (
         engine.array_windows(signature, x[None], each[None, -z - 1 - needed :], count)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -210,7 +210,6 @@ def weighed(
     errors: FloatArray | float,
     scale: Scale,
     given: BoolArray,
-    zero: FloatArray | float = 0.0,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean of runs that passes over to that of training as the claimed error nears the SD there.
 
@@ -227,8 +226,6 @@ def weighed(
         Moments of training.
     given : ndarray of bool, shape (…, steps)
         Whether the waves that a step reads are known: nothing changes there.
-    zero : ndarray, shape (…, 1, N), optional
-        What the mean of training is added to.
 
     Returns
     -------
@@ -247,26 +244,32 @@ def weighed(
     claimed = (spread + errors) / np.maximum(scale.spread**2, np.finfo(float).tiny)
     trust = (high - claimed) / (high - low)
     lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)
-    known, mean, centre = given[..., None], middle.mean(axis=0), scale.centre + zero
+    known, mean, centre = given[..., None], middle.mean(axis=0), scale.centre
     shrunk = centre + lasting * (mean + np.cumsum(moved.mean(axis=0), axis=-2) - centre)
     return np.where(known, mean, shrunk), spread, np.where(known, 1.0, lasting)
 
 
-def weighed_runs(
-    model: Any, run: Callable[[Sequence[Windows]], list[FloatArray]], groups: Sequence[Windows]
-) -> list[FloatArray]:
-    """Free runs that `run` makes over groups of windows, weighed where inputs are predicted.
+def weigh_members(
+    windows: Windows, parts: Sequence[FloatArray], errors: LeadErrors, scale: Scale
+) -> None:
+    """Weigh members in place where windows read predicted inputs, and keep their spread.
 
-    Each is of shape (1, window, steps, N). A `model` that holds no errors of its training, by which
-    they are weighed, leaves them as they are.
+    Parameters
+    ----------
+    windows : Windows
+        With their departures.
+    parts : sequence of ndarray, each of shape (member, window, steps, N)
+        Runs over the windows, which are changed, and over the departures. A member that is lost in
+        any of a window does not count there.
+    errors : LeadErrors
+        Errors of the members' mean.
+    scale : Scale
+        Moments of training.
     """
-    runs = run(groups)
-    for values, windows in zip(runs, groups, strict=True):
-        if windows.departures and (learnt := model.errors) is not None:
-            every = np.stack([values, *run(windows.departures)])[None]
-            errors = learnt.of_forecast(windows.steps)
-            first = np.array(windows.predicted)[:, None]
-            given = (np.arange(windows.steps) < first) | (first < 0)
-            zero = 0.0 if windows.zero is None else windows.zero[:, None]
-            values[:] = weighed(every, errors, model.signature.state_scale, given, zero)[0]
-    return runs
+    steps, squares = np.arange(windows.steps), errors.of_forecast(windows.steps)
+    for number, first in enumerate(windows.predicted):
+        runs = np.stack([each[:, number] for each in parts], axis=1)
+        runs = runs[np.isfinite(runs).all(axis=(1, 2, 3))]
+        if first >= 0 and len(runs):
+            mean, *_ = weighed(runs, squares, scale, steps < first)
+            parts[0][:, number] += mean - runs[:, 0].mean(axis=0)

@@ -19,7 +19,7 @@ from seakeep.models import engine, export, labelled, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
 from seakeep.models.forecasts import Model, check_arrays, counted, one_run, rows_by_name
-from seakeep.models.growth import LeadErrors, training_errors, weighed_runs
+from seakeep.models.growth import LeadErrors, training_errors, weigh_members
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.live import Live
@@ -202,7 +202,12 @@ class HankelDMDcModel(Model):
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
         if self.variation is None or not all(each.parameters for each in groups):
             run = partial(linear_runs, [self.dynamics], readouts=self.signature.readouts)
-            return weighed_runs(self, run, groups)
+            runs = run(groups)
+            for values, windows in zip(runs, groups, strict=True):
+                if windows.departures and self.errors is not None:
+                    parts = [values, *run(windows.departures)]
+                    weigh_members(windows, parts, self.errors, self.state_scale)
+            return runs
         runs = [np.empty((1, len(each), each.steps, len(self.states))) for each in groups]
         for value in sorted({value for each in groups for value in each.parameters}):
             there = [np.array(each.parameters) == value for each in groups]
