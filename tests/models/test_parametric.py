@@ -48,9 +48,28 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
     again = load_model(model.save(tmp_path / "model.nc"))
     xr.testing.assert_identical(again.forecast(run, start=5.0, steps=200), forecast)
     assert "parameter     rig.draught, trained from 0 to 1" in again.summary()
+    # Its errors are those at each value, and of the file too.
+    np.testing.assert_allclose(model.errors.rms, 0.0, rtol=0, atol=1e-6)
+    served = [each.at(parameter=0.7).live().errors for each in (model, again)]
+    np.testing.assert_array_equal(served[0].rms, served[1].rms)
     arrays = at.forecast_arrays(run[["heave"]].to_array().T[:51], run[["eta"]].to_array().T[:51],
                                 run[["eta"]].to_array().T[51:251], 200)  # fmt: skip
     np.testing.assert_allclose(arrays[:, 0], forecast.heave, rtol=0, atol=1e-9)
+
+
+def test_where_waves_are_predicted_the_forecast_is_that_of_its_file(tmp_path):
+    spec = replace(SPEC, ridge=1.0, standardize=True)
+    runs = [vessel(p, 40 + n, 800, 0.5) for n, p in enumerate((0.0, 1.0))]
+    model = spec.fit(runs, ["heave"], ["eta"])
+    again = load_model(model.save(tmp_path / "model.nc"))
+    run = vessel(0.4, 3).isel(time=slice(0, 60))
+    forecast = model.forecast(run, start=5.9, steps=50, ahead="predict")
+    xr.testing.assert_identical(again.forecast(run, start=5.9, steps=50, ahead="predict"), forecast)
+    live = again.at(parameter=0.4).live(like=run)
+    for eta, heave in zip(run.eta.values, run.heave.values, strict=True):
+        live.step([eta], [heave])
+    served = live.forecast(50).heave.sel(statistic="mean")
+    np.testing.assert_allclose(served, forecast.heave, rtol=0, atol=1e-9)
 
 
 def test_windows_of_several_runs_take_the_value_of_each(model):

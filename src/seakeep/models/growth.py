@@ -50,6 +50,13 @@ class LeadErrors:
     residual: FloatArray
     rms: FloatArray
 
+    @classmethod
+    def together(cls, parts: Sequence[LeadErrors]) -> LeadErrors:
+        """Errors of several models that count alike, as far as all of them are known."""
+        steps = min(len(each.rms) for each in parts)
+        squares = np.mean([each.rms[:steps] ** 2 for each in parts], axis=0)
+        return cls(np.mean([each.residual for each in parts], axis=0), np.sqrt(squares))
+
     def of_forecast(self, steps: int, since: int = 0) -> FloatArray:
         """Mean squares over a forecast, shape (steps, N), `since` samples after measured states."""
         return self.at(np.arange(1, steps + 1) + since) ** 2

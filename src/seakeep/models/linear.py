@@ -23,7 +23,7 @@ from seakeep.models.growth import LeadErrors, training_errors, weigh_members
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.live import Live
-from seakeep.models.parametric import Variation, nearest_data
+from seakeep.models.parametric import Variation, data_by_value
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import Training, TrainingData
@@ -50,9 +50,10 @@ class HankelDMDcModel(Model):
         Runs, windows and form of the regression.
     coverage : Coverage
         Waves that it was trained in.
-    learnt : (TrainingData, runs) or LeadErrors, optional
-        What it was fitted to, or its errors there; a member of an ensemble has neither, nor has a
-        model of departures from the means before each start.
+    learnt : (TrainingData, runs), LeadErrors or HankelDMDcModel, optional
+        What it was fitted to, its errors there, or the varying model that it was taken from, whose
+        errors are its own. A member of an ensemble has none of them, nor has a model of departures
+        from the means before each start.
     selection : str
         How free runs chose what the settings left open; empty where they stated all.
     variation : Variation, optional
@@ -64,7 +65,7 @@ class HankelDMDcModel(Model):
     signature: Signature = field(repr=False)
     training: Training
     coverage: Coverage = field(repr=False)
-    learnt: tuple[TrainingData, Mapping[str, xr.Dataset]] | LeadErrors | None = field(
+    learnt: tuple[TrainingData, Datasets] | LeadErrors | HankelDMDcModel | None = field(
         default=None, repr=False
     )
     selection: str = ""
@@ -102,10 +103,22 @@ class HankelDMDcModel(Model):
 
     @cached_property
     def errors(self) -> LeadErrors | None:
-        """Its errors in training, computed on first use, which weigh forecasts and their bands."""
+        """Its errors in training, computed on first use, which weigh forecasts and their bands.
+
+        Those of a model that varies with a parameter are of the runs at each value together.
+        """
+        if isinstance(self.learnt, HankelDMDcModel):
+            return self.learnt.errors
         if not isinstance(self.learnt, tuple):
             return self.learnt
-        return training_errors(self.dynamics, self.learnt[0], self.signature, self.learnt[1])
+        data, runs = self.learnt
+        if self.variation is None:
+            return training_errors(self.dynamics, data, self.signature, runs)
+        parts = data_by_value(data, runs, self.signature.parameter)
+        each = [(self.at(parameter=value), part) for value, part in parts.items()]
+        return LeadErrors.together(
+            [training_errors(own.dynamics, part, own.signature, runs) for own, part in each]
+        )
 
     @property
     def alignment(self) -> FittedAlignment | None:
@@ -245,15 +258,12 @@ class HankelDMDcModel(Model):
             )
         coefficients, signature = self.variation.at(self.coefficients, self.signature, parameter)
         settings = replace(self.settings, parameter="")
-        learnt = self.learnt
-        if isinstance(learnt, tuple):  # its errors are those of the runs at the nearest value
-            learnt = nearest_data(learnt[0], learnt[1], self.signature.parameter, parameter)
         return replace(
             self,
             settings=settings,
             coefficients=coefficients,
             signature=signature,
-            learnt=learnt,
+            learnt=self,
             variation=None,
         )
 
@@ -594,11 +604,10 @@ class HankelDMDcModel(Model):
 
     def to_dataset(self) -> xr.Dataset:
         """The model as a Dataset: what :meth:`save` writes."""
-        is_plain = self.variation is None
         return packed(
             self,
             coefficients=self.coefficients,
-            learnt=self.errors if is_plain else None,
+            learnt=self.errors,
             selection=self.selection,
             variation=self.variation,
         )

@@ -150,12 +150,13 @@ def regress_varying(
     return Solution(fixed, "primal", ridge, len(gram)), data, variation
 
 
-def nearest_data(
-    data: TrainingData, runs: Datasets, parameter: str, value: float
-) -> tuple[TrainingData, Datasets]:
-    """Training data of the runs at the value nearest to one."""
-    off = {name: abs(parameter_of(runs[name], parameter, name) - value) for name in data.names}
-    near = [n for n, name in enumerate(data.names) if off[name] == min(off.values())]
+def data_by_value(data: TrainingData, runs: Datasets, parameter: str) -> dict[float, TrainingData]:
+    """Training data of the runs at each value of a parameter."""
+    values = [parameter_of(runs[name], parameter, name) for name in data.names]
     per_run = ("names", "states", "delayed", "direct", "windows", "instants", "inputs")
-    cut: dict[str, Any] = {key: tuple(getattr(data, key)[n] for n in near) for key in per_run}
-    return replace(data, **cut), runs
+    out = {}
+    for value in sorted(set(values)):
+        there = [number for number, each in enumerate(values) if each == value]
+        cut: dict[str, Any] = {key: tuple(getattr(data, key)[n] for n in there) for key in per_run}
+        out[value] = replace(data, **cut)
+    return out
