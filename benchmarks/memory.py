@@ -18,7 +18,7 @@ import numpy as np
 from problem import DT, Problem, as_run, linear_system, names
 
 import seakeep
-from seakeep.models.executor import one_blas_thread
+from seakeep.executor import one_blas_thread
 
 MIB = 2**20
 

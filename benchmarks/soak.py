@@ -21,7 +21,7 @@ from problem import DT, as_run, linear_system, names
 
 import seakeep
 from seakeep.formats import read_columns
-from seakeep.models.executor import one_blas_thread
+from seakeep.executor import one_blas_thread
 
 RESULT = Path(__file__).parent / "results" / "soak.md"
 HEAD = "| case | CPU, s | held before, MiB | peak beyond it, MiB | growth in the last half, MiB |"

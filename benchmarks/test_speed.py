@@ -10,7 +10,7 @@ import pytest
 from problem import DT, STEPS, as_run, linear_system, names
 
 import seakeep
-from seakeep.models.executor import one_blas_thread
+from seakeep.executor import one_blas_thread
 from seakeep.waves import wavenumber
 
 PROBLEM = linear_system()

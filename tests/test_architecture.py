@@ -15,6 +15,7 @@ SOURCE = Path(__file__).parents[1] / "src" / "seakeep"
 FLOORS = (
     ("errors",),
     ("arrays",),
+    ("executor",),
     ("files",),
     ("conventions", "waves"),
     ("toml",),

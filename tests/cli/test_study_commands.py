@@ -10,7 +10,7 @@ from started import started
 from tutorial_study import put_tutorial
 
 from seakeep import cli
-from seakeep.models import executor
+from seakeep import executor
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 

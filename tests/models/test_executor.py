@@ -17,9 +17,9 @@ import xarray as xr
 from ensembles import few
 
 import seakeep
-from seakeep.models import executor as executors
+from seakeep import executor as executors
+from seakeep.executor import WorkerLostError, as_finished, in_order, make_executor
 from seakeep.models import processes
-from seakeep.models.executor import WorkerLostError, as_finished, in_order, make_executor
 
 posix = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
 
@@ -102,7 +102,7 @@ def test_a_process_that_is_killed_at_work_is_reported():
 
 def alone(script, *lines):
     """Start a script of its own, which imports what a caller of the executors imports."""
-    header = "import side_work\nfrom seakeep.models.executor import as_finished, processes\n"
+    header = "import side_work\nfrom seakeep.executor import as_finished, processes\n"
     script.write_text(header + "if __name__ == '__main__':\n    " + "\n    ".join(lines))
     places = [*sys.path, str(Path(side_work.__file__).parent)]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(places)}

@@ -58,7 +58,7 @@ def record(name, seconds, rng):
     return xr.Dataset(noisy, coords={"time": ("time", t, {"units": "s"})})
 
 
-def play_small(settings, out, progress=None):
+def play_small(settings, out, executor, progress):
     """Stands in for the tank: six small runs, and the campaign file that the tank would write."""
     for each in ("raw", "truth"):
         (out / each).mkdir(parents=True, exist_ok=True)

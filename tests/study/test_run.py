@@ -10,7 +10,7 @@ import xarray as xr
 from tutorial_study import assert_cells_are_what_the_models_say, put_tutorial
 
 from seakeep.errors import RequestError, SeakeepWarning
-from seakeep.models.executor import processes
+from seakeep.executor import processes
 from seakeep.statistics import split_bands
 from seakeep.study import read_study, run, run_study, store
 from seakeep.study.judge import joined

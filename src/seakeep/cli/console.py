@@ -203,7 +203,7 @@ def member_executor(
     workers: int | None, scheduler: str | None
 ) -> AbstractContextManager[Executor | None]:
     """Executor for the members of an ensemble; without either option this process."""
-    from seakeep.models.executor import make_executor
+    from seakeep.executor import make_executor
 
     given = workers is not None or scheduler is not None
     return make_executor(checked_count(workers, scheduler) if given else 1, scheduler)

@@ -42,7 +42,7 @@ def study(
 
     Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
     """
-    from seakeep.models.executor import make_executor
+    from seakeep.executor import make_executor
     from seakeep.report.sections.results import findings, overview_table
     from seakeep.study import read_study, run_study
 
@@ -85,7 +85,7 @@ def reproduce(
 
     Example: seakeep reproduce --quick --out quick
     """
-    from seakeep.models.executor import make_executor, on_this_machine, submitting
+    from seakeep.executor import make_executor, on_this_machine, submitting
     from seakeep.report.acts import finding, short_table
     from seakeep.study.reproduce import ACTS, Size
     from seakeep.study.reproduce import reproduce as reproduce_study
@@ -136,7 +136,7 @@ def _write_reproduction(
     folder: Path, results: dict[str, StudyResult], executor: Executor | None = None
 ) -> Path:
     """Write the page over all acts, and those of the acts where no worker has drawn them."""
-    from seakeep.models.executor import on_this_machine
+    from seakeep.executor import on_this_machine
     from seakeep.report.acts import write_reproduction
     from seakeep.report.sections import write_report
 

@@ -1,8 +1,8 @@
 """Models identified from prepared runs, ensembles of them, and their forecasts."""
 
+from seakeep.executor import processes
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.ensemble import BandForecast, HankelEnsemble
-from seakeep.models.executor import processes
 from seakeep.models.forecasts import Model, Spec
 from seakeep.models.inputs import InputMap
 from seakeep.models.interface import Needs, Signature

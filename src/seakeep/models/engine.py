@@ -25,9 +25,9 @@ from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress, 
 from seakeep.core.recursion import Recursion, read_table, recursion
 from seakeep.core.rollout import rollouts
 from seakeep.errors import RequestError
+from seakeep.executor import in_order
 from seakeep.models import labelled
 from seakeep.models.checks import check_choice
-from seakeep.models.executor import in_order
 from seakeep.models.following import Following
 from seakeep.models.inputs import Drive
 from seakeep.models.interface import Scale, Signature

@@ -17,6 +17,7 @@ import xarray as xr
 from seakeep.arrays import FloatArray, Progress, fraction
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
+from seakeep.executor import in_order
 from seakeep.models import store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.calibration import (
@@ -30,7 +31,6 @@ from seakeep.models.calibration import (
 from seakeep.models.checks import Json
 from seakeep.models.draws import Draw, draws_dataset
 from seakeep.models.engine import Dynamics, Series, Windows, linear_runs, member_series
-from seakeep.models.executor import in_order
 from seakeep.models.forecasts import (
     Model,
     check_arrays,

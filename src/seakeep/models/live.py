@@ -34,11 +34,11 @@ from seakeep.arrays import (
 from seakeep.core.kalman import DelayFilter, process_noise
 from seakeep.core.recursion import read_row, read_table
 from seakeep.errors import RequestError, did_you_mean
+from seakeep.executor import one_blas_thread
 from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
 from seakeep.models.checks import check_choice
 from seakeep.models.engine import Dynamics, Runs
-from seakeep.models.executor import one_blas_thread
 from seakeep.models.forecasts import label_channels, rows_by_name
 from seakeep.models.growth import WINDOWS, LeadErrors, weighed
 from seakeep.models.inputs import Drive

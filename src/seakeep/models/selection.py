@@ -37,11 +37,11 @@ from seakeep.core import metrics
 from seakeep.core.embedding import spread_means
 from seakeep.core.gram import PrimalSystem, ridge_path
 from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.executor import in_order
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.engine import Dynamics, Windows, model_runs, read_groups
 from seakeep.models.ensemble import spectral_radius
-from seakeep.models.executor import in_order
 from seakeep.models.following import LEAD
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.loads import PERIODS, Held, fit_readouts

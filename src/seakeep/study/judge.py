@@ -23,7 +23,7 @@ from seakeep.core.bands import split_bands
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.metrics import over_channels, paired, root_mean_square
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
-from seakeep.models.executor import in_order
+from seakeep.executor import in_order
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
 

@@ -20,8 +20,8 @@ import xarray as xr
 from seakeep.arrays import Progress
 from seakeep.campaign import read_campaign, write_prepared
 from seakeep.errors import RequestError
+from seakeep.executor import on_this_machine, submitting
 from seakeep.files import MARK, check_output, check_report, is_there, write_text
-from seakeep.models.executor import on_this_machine, submitting
 from seakeep.study.plan import named
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
@@ -180,7 +180,7 @@ def reproduce(
             (out / act.name).mkdir(parents=True, exist_ok=True)
         check_output(out / act.name / "study.toml", STUDY_FILE)
     check_report(out)
-    nominal = _play(out / "campaign", seed, progress)
+    nominal = _play(out / "campaign", seed, executor, progress)
     campaigns = [out / "campaign" / "campaign.toml"]
     if any(act.without_drift for act in acts):
         campaigns.append(out / "campaign" / "detrended" / "campaign.toml")
@@ -233,7 +233,9 @@ def _write(path: Path, text: str, kind: str) -> None:
         write_text(path, text)
 
 
-def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:
+def _play(
+    folder: Path, seed: int, executor: Executor | None, progress: Progress | None
+) -> xr.Dataset:
     """Play the campaign unless it lies there already; return its nominal spectra."""
     try:
         from seakeep.tank.play import play
@@ -253,7 +255,8 @@ def _play(folder: Path, seed: int, progress: Progress | None) -> xr.Dataset:
         if mark.exists():
             check_output(mark, PLAYED)
         with storing(folder):
-            play(settings, folder, progress=named(progress, "playing "))
+            near, tell = on_this_machine(executor), named(progress, "playing ")
+            play(settings, folder, executor=near, progress=tell)
         _write(mark, text, PLAYED)
     frequency = np.linspace(0.2, 1.5, 261)
     spectra = {

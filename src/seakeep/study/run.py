@@ -24,11 +24,11 @@ from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import embed, metrics
 from seakeep.errors import DataError, SeakeepError, warn
+from seakeep.executor import WorkerLostError, as_finished
 from seakeep.formats.netcdf import opened_netcdf
 from seakeep.models.calibration import envelope_of, held_out, learn_margin
 from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.ensemble import spectral_radius
-from seakeep.models.executor import WorkerLostError, as_finished
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
@@ -78,7 +78,7 @@ def run_study(
         Folder of the results. Finished units (a model of a training set) are kept there, one file
         each, and reused when the study is run again; at the end all is in ``study.nc``.
     executor : concurrent.futures.Executor, optional
-        Does units side by side: :func:`seakeep.models.executor.processes`, or ``get_executor()``
+        Does units side by side: :func:`seakeep.executor.processes`, or ``get_executor()``
         of a Dask client. Its workers need no disk in common. The arrays do not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, what)``.

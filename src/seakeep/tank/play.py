@@ -2,6 +2,7 @@
 
 import zlib
 from collections.abc import Iterable
+from concurrent.futures import Executor
 from importlib import metadata
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import xarray as xr
 from seakeep.arrays import Progress
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
+from seakeep.executor import in_order
 from seakeep.files import MARK, check_output, is_there, make_folder, write_text
 from seakeep.signals.panel import opencv
 from seakeep.tank.delivery import (
@@ -188,6 +190,7 @@ def play(
     one_logger: bool = False,
     names: Iterable[str] | None = None,
     videos: Iterable[str] = (),
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> dict[str, dict[str, Path]]:
     """Play a campaign and write raw files, campaign.toml and, in a folder apart, the truth.
@@ -207,8 +210,10 @@ def play(
         Runs; the default is all.
     videos : iterable of str, optional
         Runs of which to render the side view as MP4 (extra ``video``).
+    executor : Executor, optional
+        Plays runs side by side, on this machine.
     progress : callable, optional
-        Called with how many runs are done, how many there are, and the next one's name.
+        Called as ``progress(done, total, what)``.
 
     Returns
     -------
@@ -234,28 +239,30 @@ def play(
     part = settings.model_copy(update={"runs": {n: settings.runs[n] for n in chosen}})
     folder = Path(out)
     _check_outputs(folder, chosen, kind)
-    files = {}
-    for done, name in enumerate(chosen):
-        if progress is not None:
-            progress(done, len(chosen), name)
-        played = play_run(part, name, rig)
-        raw, hidden = make_folder(folder / "raw" / name), make_folder(folder / "truth")
-        write_dataset(truth(played, name), hidden / f"{name}.nc")
-        rng = generator(part, name, "instruments")
-        records = record_run(played, rng, SINGLE_RATE if one_logger else None)
-        files[name] = {
-            logger: write_record(record, raw / f"{logger}.{kind}")
-            for logger, record in records.items()
-        }
-        if name in filmed:
-            files[name][SIDE_VIEW] = render_side_view(
-                played, raw / f"{SIDE_VIEW}.mp4", generator(part, name, "video")
-            )
+    asked = part, rig, folder, kind, one_logger, filmed
+    played = in_order(_record_run, asked, chosen, executor, progress, "run")
+    files = dict(zip(chosen, played, strict=True))
     relative = {
         run: {key: path.relative_to(folder).as_posix() for key, path in paths.items()}
         for run, paths in files.items()
     }
     write_text(folder / CAMPAIGN_FILE, campaign_text(part, relative, kind, one_logger))
-    if progress is not None:
-        progress(len(chosen), len(chosen), "done")
+    return files
+
+
+def _record_run(
+    asked: tuple[TankSettings, Rig, Path, str, bool, list[str]], name: str
+) -> dict[str, Path]:
+    """Play a run, and write its truth and its raw files."""
+    settings, rig, folder, kind, one_logger, filmed = asked
+    played = play_run(settings, name, rig)
+    raw, hidden = make_folder(folder / "raw" / name), make_folder(folder / "truth")
+    write_dataset(truth(played, name), hidden / f"{name}.nc")
+    rng = generator(settings, name, "instruments")
+    records = record_run(played, rng, SINGLE_RATE if one_logger else None)
+    files = {each: write_record(record, raw / f"{each}.{kind}") for each, record in records.items()}
+    if name in filmed:
+        files[SIDE_VIEW] = render_side_view(
+            played, raw / f"{SIDE_VIEW}.mp4", generator(settings, name, "video")
+        )
     return files
