@@ -174,7 +174,7 @@ CHANGES = (
     ("models/growth.py", "middle.var(axis=0, ddof=1)", "middle.var(axis=0, ddof=0)", "models/test_live.py::test_members_that_are_held_give_the_mean_of_the_ensemble"),
     ("models/live.py", "final = count.taken - 1 - max(self._ahead - 1, 0)", "final = count.taken - 1", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
     ("models/live.py", "self._ahead + LATE + longest + 4", "self._ahead + longest + 4", "models/test_live.py::test_samples_that_wait_to_be_judged_are_in_a_saved_state"),
-    ("models/live.py", "direct[:, -1] = (places - self._follows.place.centre) ** 2", "direct[:, -1] = places", "models/test_live.py::test_what_samples_tell_does_not_depend_on_when_it_is_read"),
+    ("models/live.py", "direct[:, -1] = (places - self._follows.place.centre) ** 2", "direct[:, -1] = places", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
     ("models/live.py", "names, steps - 1 + self._ahead)", "names, steps + self._ahead)", "models/test_live.py::test_fed_with_everything_it_is_the_forecast"),
     ("models/live.py", "np.minimum(own + self._filter.ahead(count), errors)", "np.minimum(own, errors)", "models/test_live.py::test_a_dead_sensor_is_followed_through_the_others"),
     ("models/live.py", "(1.0 - weight) * wider * scale.spread**2", "0.0", "models/test_live.py::test_without_waves_to_come_no_lead_errs_more_than_the_mean"),
