@@ -32,7 +32,7 @@ a smooth series small, and τ = 1 one that turns its sign at every sample.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -70,6 +70,8 @@ REFINED_LIMIT = 1e-11
 
 Each correction gains four digits or more, up to those of singular values."""
 CORRECTIONS = 2
+PART = 512
+"""Snapshot pairs of a part."""
 
 
 @dataclass(frozen=True)
@@ -281,6 +283,13 @@ class _Delayed:
             targets.append(embed(piece.states, target_delays, piece.first + 1, piece.count))
         return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
 
+    def parts(self) -> Iterator[_Delayed]:
+        """The same in parts, whose matrices stay in the processor's cache."""
+        for piece in self.pieces:
+            for at in range(0, piece.count, PART):
+                count = min(PART, piece.count - at)
+                yield replace(self, pieces=[replace(piece, first=piece.first + at, count=count)])
+
     def primal(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
         system = primal_system(self.pieces, self.delays)
@@ -291,9 +300,11 @@ class _Delayed:
         if ridge >= GRAM_LIMIT * self.trace:
             return solution
         # λ is small: residuals of the data correct what the Gram matrix lost.
-        regressors, targets = self.matrices()
         for _ in range(CORRECTIONS):
-            right = (targets - solution @ regressors) @ regressors.T - ridge * solution
+            right = -ridge * solution
+            for part in self.parts():
+                regressors, targets = part.matrices()
+                right += (targets - solution @ regressors) @ regressors.T
             solution += solve_rows(factor, right)
         return solution
 
