@@ -9,8 +9,7 @@ import pytest
 from started import started
 from tutorial_study import put_tutorial
 
-from seakeep import cli
-from seakeep import executor
+from seakeep import cli, executor
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
