@@ -25,7 +25,6 @@ from collections.abc import (
 )
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 import numpy as np
@@ -480,84 +479,118 @@ def _columns_of(candidate: HankelSettings) -> Columns:
     return aligned, None, bool(lead) or any(squares)
 
 
-def _problem_of(problems: Mapping[Columns, Problem], candidate: HankelSettings) -> Problem | None:
-    """The columns that hold those of a candidate; without a look-ahead, at best none has one."""
-    aligned, lead, ahead = _columns_of(candidate)
-    return problems.get((aligned, lead, ahead)) or problems.get((aligned, lead, True))
+@dataclass(frozen=True, eq=False)
+class _Trials:
+    """Trials of candidates, and what more are made with.
 
-
-def _judge(
-    problems: Mapping[Columns, Problem],
-    trials: dict[Settings, Trial],
-    candidates: Iterable[Settings],
-    known: Known,
-    executor: Executor | None,
-    progress: Progress | None,
-    later: int = 0,
-) -> None:
-    """Add trials of candidates that are not among them; `later` more are to come at most.
-
-    Every ``COARSE``-th λ is tried, and of what errs little more than the best those about its own.
+    Parameters
+    ----------
+    problems : mapping
+        Columns of the candidates.
+    known : mapping
+        As for :func:`select`.
+    executor, progress
+        As for :func:`select`.
+    made : dict of Trial
+        By candidate.
     """
-    new = [each for each in dict.fromkeys(candidates) if each not in trials]
-    work = known, executor, progress, later
-    _try(problems, trials, new, *work)
-    least = NEAR * min((each.best for each in trials.values()), default=math.inf)
-    _try(problems, trials, [each for each in new if trials[each].best <= least], *work)
+
+    problems: Mapping[Columns, Problem]
+    known: Known
+    executor: Executor | None
+    progress: Progress | None
+    made: dict[Any, Trial] = field(default_factory=dict)
+
+    def problem(self, candidate: HankelSettings) -> Problem | None:
+        """The columns of a candidate; without a look-ahead, at best those that have none."""
+        aligned, lead, ahead = _columns_of(candidate)
+        problems = self.problems
+        return problems.get((aligned, lead, ahead)) or problems.get((aligned, lead, True))
+
+    @property
+    def best(self) -> Any:
+        """The candidate that errs least."""
+        return min(self.made, key=lambda each: self.made[each].best)
+
+    def judge(self, candidates: Iterable[HankelSettings], later: int = 0) -> None:
+        """Try candidates that were not and have columns; `later` more are to come at most.
+
+        Every ``COARSE``-th λ is tried, and of what errs little more than the best those about its
+        own.
+        """
+        new = [each for each in dict.fromkeys(candidates) if each not in self.made]
+        new = [each for each in new if self.problem(each)]
+        self.try_more(new, later)
+        least = NEAR * min((each.best for each in self.made.values()), default=math.inf)
+        self.try_more([each for each in new if self.made[each].best <= least], later)
+
+    def try_more(self, candidates: Sequence[HankelSettings], later: int = 0) -> None:
+        """Try every ``COARSE``-th λ of candidates, or those next to the best of what was tried."""
+        problem = next(iter(self.problems.values()))
+        folds, firsts = problem.folds(), list(dict.fromkeys(problem.groups))
+        again = sum(each in self.made for each in candidates)  # each has two parts
+        before = len(folds) * (2 * len(self.made) - again)
+        after = len(folds) * (len(candidates) - again + 2 * later)
+
+        def tell(done: int, total: int, what: str) -> None:
+            if self.progress is not None:
+                self.progress(before + done, before + total + after, what)
+
+        left: dict[Any, list[float]] = {}
+        for each in candidates:
+            levels = problem.levels(each)
+            new = self.made[each].between() if each in self.made else [*levels[::COARSE]]
+            left |= {each: new} if new else {}
+        keys = {
+            (each, fold, tuple(new)): json.dumps([each.to_json(), fold, new], sort_keys=True)
+            for fold in folds
+            for each, new in left.items()
+        }
+        units = [unit for unit, key in keys.items() if key not in self.known]
+        alone = _Trials(self.problems, {}, None, None)  # what a worker needs
+        outcomes = in_order(_unit, alone, units, self.executor, tell, "candidate and fold")
+        for unit, outcome in zip(units, outcomes, strict=True):
+            self.known[keys[unit]] = [part.tolist() for part in outcome]
+        for each, new in left.items():
+            levels = problem.levels(each)
+            parts = [map(np.array, self.known[keys[each, fold, tuple(new)]]) for fold in folds]
+            scores, weights = zip(*parts, strict=True)
+            joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
+            places = [firsts.index(problem.groups[fold]) for fold in folds]
+            groups = np.repeat(places, [len(each) for each in weights])
+            every = np.full((len(levels), joined.size), np.nan)
+            if each in self.made:
+                every[:] = self.made[each].scores
+            every[[levels.index(level) for level in new]] = np.concatenate(scores, axis=1)
+            self.made[each] = Trial(levels, every, joined / joined.sum(), groups)
+
+    def stable(self, taken: Any, level: float) -> tuple[Any, float]:
+        """A candidate and λ; where that grows, the best of all that do not."""
+        every = [
+            (float(score), candidate, ridge)
+            for candidate, trial in self.made.items()
+            for score, ridge in zip(trial.means, trial.levels, strict=True)
+            if np.isfinite(score)
+        ]
+        wanted = [(taken, level), *(each[1:] for each in sorted(every, key=lambda each: each[0]))]
+        for candidate, ridge in wanted:
+            problem = self.problem(candidate)
+            if problem is not None and not problem.grows(candidate, ridge):
+                return candidate, ridge
+        return taken, level
+
+    def worth(self, taken: HankelSettings) -> str:
+        """What a candidate errs without each of its observables, in words."""
+        parts = taken.observables
+        without = {o: replace(taken, observables=tuple(p for p in parts if p != o)) for o in parts}
+        self.judge(without.values())
+        return "".join(
+            f"; without {named(o)} {self.made[less].best:.3f}" for o, less in without.items()
+        )
 
 
-def _try(
-    problems: Mapping[Columns, Problem],
-    trials: dict[Settings, Trial],
-    candidates: Sequence[Settings],
-    known: Known,
-    executor: Executor | None,
-    progress: Progress | None,
-    later: int = 0,
-) -> None:
-    """Try every ``COARSE``-th λ of candidates, or those next to the best of what was tried."""
-    problem = next(iter(problems.values()))
-    folds, firsts = problem.folds(), list(dict.fromkeys(problem.groups))
-    again = sum(each in trials for each in candidates)  # each has two parts
-    before = len(folds) * (2 * len(trials) - again)
-    after = len(folds) * (len(candidates) - again + 2 * later)
-
-    def tell(done: int, total: int, what: str) -> None:
-        if progress is not None:
-            progress(before + done, before + total + after, what)
-
-    left: dict[Settings, list[float]] = {}
-    for each in candidates:
-        levels = problem.levels(each)
-        left[each] = trials[each].between() if each in trials else [*levels[::COARSE]]
-    items = ((each, fold, tuple(left[each])) for fold in folds for each in candidates if left[each])
-    keys = {unit: _key(*unit) for unit in items}
-    units = [unit for unit, key in keys.items() if key not in known]
-    outcomes = in_order(_unit, problems, units, executor, tell, "candidate and fold")
-    for unit, outcome in zip(units, outcomes, strict=True):
-        known[keys[unit]] = [part.tolist() for part in outcome]
-    for each in (each for each in candidates if left[each]):
-        levels = problem.levels(each)
-        parts = [map(np.array, known[keys[each, fold, tuple(left[each])]]) for fold in folds]
-        scores, weights = zip(*parts, strict=True)
-        joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
-        places = [firsts.index(problem.groups[fold]) for fold in folds]
-        groups = np.repeat(places, [len(each) for each in weights])
-        every = np.full((len(levels), joined.size), np.nan)
-        if each in trials:
-            every[:] = trials[each].scores
-        every[[levels.index(level) for level in left[each]]] = np.concatenate(scores, axis=1)
-        trials[each] = Trial(levels, every, joined / joined.sum(), groups)
-
-
-def _key(candidate: HankelSettings, fold: int, levels: Sequence[float]) -> str:
-    return json.dumps([candidate.to_json(), fold, levels], sort_keys=True)
-
-
-def _unit(
-    problems: Mapping[Columns, Problem], item: tuple[HankelSettings, int, Sequence[float]]
-) -> Scores:
-    problem = _problem_of(problems, item[0])
+def _unit(trials: _Trials, item: tuple[HankelSettings, int, Sequence[float]]) -> Scores:
+    problem = trials.problem(item[0])
     assert problem is not None
     return problem.judge(*item)
 
@@ -769,8 +802,7 @@ def select(
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
         complete = settings.having(readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
-    trials: dict[Settings, Trial] = {}
-    work = ({} if known is None else known), executor, progress
+    trials = _Trials(problems, {} if known is None else known, executor, progress)
     left, varied = search.left_open(), search.varied()
     later = sum(len(step_of(base)) - 1 for step_of in (*left, *varied))  # the best is among them
 
@@ -779,37 +811,36 @@ def select(
         for step_of in steps:
             tried = step_of(best)
             later -= len(tried) - 1
-            sound = [each for each in (best, *tried) if _problem_of(problems, each)]
-            _judge(problems, trials, sound, *work, later)
-            best = min(trials, key=lambda each: trials[each].best)
+            trials.judge((best, *tried), later)
+            best = trials.best
         return best
 
-    best = searched(base, left or [lambda alone: [alone]])
+    made, best = trials.made, searched(base, left or [lambda alone: [alone]])
     alike = 0.0 if by_sea else ALIKE
-    start = simplest(trials, best, alike) if left else base
+    start = simplest(made, best, alike) if left else base
     best = searched(start, varied)
-    taken = start if trials[start].is_as_good_as(trials[best]) else best
-    _try(problems, trials, [taken], *work)
-    level = trials[taken].level(alike, stated if taken == start else None)
-    taken, level = _stable(problems, trials, taken, level)
-    worth = _worth(problems, trials, taken, *work)
+    taken = start if made[start].is_as_good_as(made[best]) else best
+    trials.try_more([taken])
+    level = made[taken].level(alike, stated if taken == start else None)
+    taken, level = trials.stable(taken, level)
+    worth = trials.worth(taken)
     if taken != best or (varied and taken == start):
         worth += (
             "; what it starts from: nothing that was tried is better by more than the noise"
             if varied
-            else f"; the simplest that is as good as the best ({trials[best].best:.3f})"
+            else f"; the simplest that is as good as the best ({made[best].best:.3f})"
         )
-    taken, level, words = _rivalled(search, problems, trials, (taken, level), kinds, alike, *work)
-    problem = _problem_of(problems, taken)
+    taken, level, words = _rivalled(search, trials, taken, level, kinds, alike)
+    problem = trials.problem(taken)
     assert problem is not None
     readouts = readouts if taken.kind == settings.kind else {}
     fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
     return Selected(
         taken.having(ridge=level, readouts=_asked(settings, fitted, vary)),
-        tuple(_rows_of(trials, taken, level, seed)),
+        tuple(_rows_of(made, taken, level, seed)),
         _note(
             problem,
-            trials,
+            made,
             taken,
             level,
             worth + words,
@@ -1027,76 +1058,39 @@ def _parts_of(candidate: HankelSettings) -> int:
     return sum(map(bool, parts)) + len(candidate.observables)
 
 
-def _stable(
-    problems: Mapping[Columns, Problem],
-    trials: Mapping[Settings, Trial],
-    taken: Settings,
-    level: float,
-) -> tuple[Settings, float]:
-    """A candidate and λ; where that grows, the best of all that do not."""
-    every = [
-        (float(score), candidate, ridge)
-        for candidate, trial in trials.items()
-        for score, ridge in zip(trial.means, trial.levels, strict=True)
-        if np.isfinite(score)
-    ]
-    wanted = [(taken, level), *(each[1:] for each in sorted(every, key=lambda each: each[0]))]
-    for candidate, ridge in wanted:
-        problem = _problem_of(problems, candidate)
-        if problem is not None and not problem.grows(candidate, ridge):
-            return candidate, ridge
-    return taken, level
-
-
-def _worth(
-    problems: Mapping[Columns, Problem],
-    trials: dict[Settings, Trial],
-    taken: Settings,
-    *work: Any,
-) -> str:
-    """What a candidate errs without each of its observables, in words."""
-    without = {
-        left_out: replace(taken, observables=tuple(o for o in taken.observables if o != left_out))
-        for left_out in taken.observables
-    }
-    _judge(problems, trials, without.values(), *work)
-    return "".join(f"; without {named(o)} {trials[less].best:.3f}" for o, less in without.items())
-
-
 def _rivalled(
     search: _Search,
-    problems: Mapping[Columns, Problem],
-    trials: dict[Settings, Trial],
-    chosen: tuple[Settings, float],
+    trials: _Trials,
+    taken: Any,
+    level: float,
     kinds: Sequence[HankelSettings],
     alike: float,
-    *work: Any,
-) -> tuple[Settings, float, str]:
+) -> tuple[Any, float, str]:
     """A candidate and λ, of another kind where that is varied and better, and words on the better.
 
     The better one is the best that errs less by more than the noise and does not grow.
     """
     # Beside a fit only the waves themselves are tried, which takes a hundredth of its time.
-    own = {"ridge"} if "kind" in search.vary else {"ridge", "observables"}
-    plain = {key: v for key, v in vars(search.at_rest(chosen[0])).items() if key not in own}
-    rivals: list[Any] = [each.having(**plain) for each in kinds if search.given[2]]
-    both, words = dict[Any, Trial](trials), ""
-    _judge(problems, both, filter(partial(_problem_of, problems), rivals), *work)
-    others = {each: both[each] for each in both if each not in trials}
-    for other, its in sorted(others.items(), key=lambda each: each[1].best):
-        if trials[chosen[0]].is_as_good_as(its):
+    is_varied, words = "kind" in search.vary, ""
+    own = {"ridge"} if is_varied else {"ridge", "observables"}
+    plain = {key: v for key, v in vars(search.at_rest(taken)).items() if key not in own}
+    both = replace(trials, made=dict(trials.made))
+    both.judge(each.having(**plain) for each in kinds if search.given[2])
+    others = [each for each in both.made if each not in trials.made]
+    for other in sorted(others, key=lambda each: both.made[each].best):
+        if trials.made[taken].is_as_good_as(both.made[other]):
             continue
-        _try(problems, others, [other], *work)
-        problem, level = _problem_of(problems, other), others[other].level(alike)
+        both.try_more([other])
+        problem, own_level = both.problem(other), both.made[other].level(alike)
         assert problem is not None
-        if not problem.grows(other, level):
-            score = others[other].at(level)
+        if not problem.grows(other, own_level):
+            score = both.made[other].at(own_level)
             words = f"; kind = '{other.kind}' errs {score:.3f}, less by more than the noise"
-            chosen = (other, level) if "kind" in search.vary else chosen
+            taken, level = (other, own_level) if is_varied else (taken, level)
             break
-    if "kind" in search.vary:
-        trials |= others
-    return *chosen, words
+    if is_varied:
+        trials.made.update(both.made)
+    return taken, level, words
 
 
 def _note(
