@@ -12,12 +12,13 @@ import re
 import secrets
 import stat
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from seakeep.arrays import Datasets, Groups
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
 
 if TYPE_CHECKING:
@@ -250,9 +251,7 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", newline="")
 
 
-def write_netcdf(
-    path: Path, dataset: xr.Dataset, groups: Mapping[str, xr.Dataset] | None = None
-) -> None:
+def write_netcdf(path: Path, dataset: xr.Dataset, groups: Datasets | None = None) -> None:
     """Write a NetCDF file with a checksum at its end, which :func:`read_sealed` compares.
 
     HDF5 does not survive a write that fails: it raises errors of many kinds, keeps the file open,
@@ -425,7 +424,7 @@ def load_sealed(path: Path | str, kind: str) -> xr.Dataset:
     return load_groups(path, kind)[""]
 
 
-def load_groups(path: Path | str, kind: str) -> dict[str, xr.Dataset]:
+def load_groups(path: Path | str, kind: str) -> Groups:
     """Read a file of ours into memory.
 
     What it holds is trusted: its checksum fits, and this version knows its format.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Progress
+from seakeep.arrays import Datasets, Progress
 from seakeep.errors import RequestError
 from seakeep.files import read_bytes, write_text
 from seakeep.models import HankelDMDc
@@ -209,7 +209,7 @@ def tune(
     return TuneResult(**vars(replace(found, settings=settings, note=note)))
 
 
-def _digest(asked: object, runs: dict[str, xr.Dataset], channels: Sequence[str]) -> str:
+def _digest(asked: object, runs: Datasets, channels: Sequence[str]) -> str:
     """Checksum of what a search depends on."""
     digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode())
     for name, run in runs.items():

@@ -18,7 +18,6 @@ from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress, whole_number
@@ -711,7 +710,7 @@ def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows)
     return values
 
 
-Series = tuple[FloatArray, npt.NDArray[np.int64]]
+Series = tuple[FloatArray, IntArray]
 
 
 def _run_member(data: tuple[Runs, Sequence[Windows]], member: int) -> list[FloatArray]:
@@ -773,7 +772,7 @@ def member_series(
         yield runs
 
 
-def _centre(series: FloatArray, lost: npt.NDArray[np.int64], runs: FloatArray) -> None:
+def _centre(series: FloatArray, lost: IntArray, runs: FloatArray) -> None:
     """Move members, shape (member, window, steps, N), so that their mean is a single model's run.
 
     Members that are lost in a window count in none of it. Where the single model is lost, the
@@ -809,7 +808,7 @@ def _room(shape: tuple[int, ...]) -> Iterator[FloatArray]:
         yield np.memmap(file, dtype=np.float64, mode="w+", shape=shape)
 
 
-def first_lost(values: FloatArray) -> npt.NDArray[np.int64]:
+def first_lost(values: FloatArray) -> IntArray:
     """First instant at which a channel is NaN, or −1, of values (…, steps, N)."""
     gone: BoolArray = np.isnan(values.sum(axis=-1))
     return np.where(gone.any(axis=-1), gone.argmax(axis=-1), -1)

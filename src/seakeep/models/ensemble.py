@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, Progress, fraction
+from seakeep.arrays import FloatArray, IntArray, Progress, fraction
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.executor import in_order
@@ -461,7 +461,7 @@ class HankelEnsemble(Model):
         run: xr.Dataset,
         windows: Windows,
         values: FloatArray,
-        lost: npt.NDArray[np.int64],
+        lost: IntArray,
         dimension: str,
     ) -> xr.Dataset:
         """Dataset of one window: values of shape (members or statistics, steps, N)."""
@@ -575,7 +575,7 @@ class HankelEnsemble(Model):
         band: Band,
         executor: Executor | None = None,
         progress: Progress | None = None,
-    ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    ) -> tuple[FloatArray, IntArray]:
         """Statistics (window, 4, steps, N) of all members, and where these were lost."""
         level = fraction(level, "level")
         check_band(self.calibration, level, band)

@@ -12,7 +12,15 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray, IntArray, Progress, as_real, whole_number
+from seakeep.arrays import (
+    Datasets,
+    FloatArray,
+    Groups,
+    IntArray,
+    Progress,
+    as_real,
+    whole_number,
+)
 from seakeep.errors import RequestError, warn
 from seakeep.files import write_sealed
 from seakeep.models import engine, store
@@ -386,9 +394,7 @@ def _warn_of_reach(signature: Signature, windows: Windows, values: FloatArray) -
         )
 
 
-def one_run(
-    run: xr.Dataset, starts: Sequence[float]
-) -> tuple[dict[str, xr.Dataset], list[tuple[str, float]]]:
+def one_run(run: xr.Dataset, starts: Sequence[float]) -> tuple[Groups, list[tuple[str, float]]]:
     """A run and the places in it, as :func:`engine.read_windows` takes them."""
     if np.ndim(starts) == 0:
         raise RequestError(

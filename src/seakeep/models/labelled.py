@@ -10,7 +10,7 @@ from typing import NamedTuple, cast
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray
+from seakeep.arrays import Datasets, FloatArray, Groups
 from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.signals import uniform_step
@@ -45,7 +45,7 @@ class Span(NamedTuple):
     stop: int
 
 
-def as_runs(runs: Runs) -> dict[str, xr.Dataset]:
+def as_runs(runs: Runs) -> Groups:
     """Name the runs.
 
     Parameters
@@ -63,7 +63,7 @@ def as_runs(runs: Runs) -> dict[str, xr.Dataset]:
     RequestError
         If there is no run, or something is not a Dataset.
     """
-    named: dict[str, xr.Dataset] = {}
+    named: Groups = {}
     if isinstance(runs, xr.Dataset):
         named[run_name(runs, "run")] = runs
     elif isinstance(runs, Mapping):

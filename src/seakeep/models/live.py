@@ -25,6 +25,7 @@ from scipy import special
 from seakeep.arrays import (
     BoolArray,
     FloatArray,
+    IntArray,
     as_real,
     as_table,
     fraction,
@@ -903,7 +904,7 @@ def load_live(model: Servable, path: str | Path) -> Live:
     return live
 
 
-def held_samples(inside: BoolArray) -> npt.NDArray[np.intp]:
+def held_samples(inside: BoolArray) -> IntArray:
     """Leads that are all `inside` from the first on: how many of (steps, N), shape (N,)."""
     ended = np.concatenate([inside, np.zeros((1, inside.shape[1]), bool)])
     return np.argmin(ended, axis=0)

@@ -28,7 +28,6 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 import numpy as np
-import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
 from seakeep.conventions import is_elevation
@@ -59,7 +58,7 @@ On the virtual tank and on both measured sets the best lies between 3e-5 and 3e-
 within half a decade of it."""
 Settings = TypeVar("Settings", bound=HankelSettings)
 Chosen = TypeVar("Chosen")
-Given = tuple[Mapping[str, xr.Dataset], Sequence[str], Sequence[str]]
+Given = tuple[Datasets, Sequence[str], Sequence[str]]
 """Training runs, states and inputs."""
 Changes = dict[str, Any]
 """Settings of a candidate that differ from those of the best so far."""
@@ -446,7 +445,7 @@ def _problem(
     most["input_delays"] += most["lead"] - min(each.lead for each in candidates)
     widest = settings.having(**most, observables=observables, ridge=1.0, standardize=True)
     runs, states, inputs = given
-    chain = widest.input_map(dict(runs), states, inputs, settings.window)
+    chain = widest.input_map(runs, states, inputs, settings.window)
     before = max(widest.state_reach, chain.history(widest.input_delays))
     after = max(chain.lead_samples - 1, 0)
     pieces = dict(runs)

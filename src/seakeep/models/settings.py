@@ -9,9 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar, Literal, Self, get_args
 
-import xarray as xr
-
-from seakeep.arrays import TINY, number, whole_number
+from seakeep.arrays import TINY, Datasets, number, whole_number
 from seakeep.core.embedding import History
 from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
 from seakeep.models import labelled
@@ -314,7 +312,7 @@ class HankelSettings:
         }
         return replace(self, **values) if values else self
 
-    def resolved_in(self, runs: dict[str, xr.Dataset], inputs: Sequence[str]) -> Self:
+    def resolved_in(self, runs: Datasets, inputs: Sequence[str]) -> Self:
         """Settings whose lengths are samples of some runs, with the period that these have."""
         dt = labelled.common_step(runs)
         return self.resolved(
@@ -385,7 +383,7 @@ class HankelSettings:
 
     def input_map(
         self,
-        runs: dict[str, xr.Dataset],
+        runs: Datasets,
         states: Sequence[str],
         inputs: Sequence[str],
         window: int | None,

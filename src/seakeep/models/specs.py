@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Progress, whole_number
+from seakeep.arrays import Datasets, Progress, whole_number
 from seakeep.core.embedding import TrainingWindow
 from seakeep.errors import SHOWN, DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled, store
@@ -101,14 +101,14 @@ class Choosing(HankelSettings, Generic[Fitted]):
         raise NotImplementedError
 
     def variants(
-        self, runs: dict[str, xr.Dataset], states: list[str], inputs: list[str], *settings: Self
+        self, runs: Datasets, states: list[str], inputs: list[str], *settings: Self
     ) -> list[tuple[Self, str]]:
         """Settings to fit until a model does not grow, each with words on its choice."""
         return [(each, "") for each in settings]
 
     def _fitted(
         self,
-        runs: dict[str, xr.Dataset],
+        runs: Datasets,
         states: list[str],
         inputs: list[str],
         readouts: tuple[FittedReadOut, ...],
@@ -433,7 +433,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
 
     def variants(
         self,
-        runs: dict[str, xr.Dataset],
+        runs: Datasets,
         states: list[str],
         inputs: list[str],
         *settings: HankelDMDc,
@@ -483,7 +483,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
 
     def _fitted(
         self,
-        runs: dict[str, xr.Dataset],
+        runs: Datasets,
         states: list[str],
         inputs: list[str],
         readouts: tuple[FittedReadOut, ...],
@@ -780,7 +780,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         )
         return Selected(spec, choice.rows, choice.note, choice.readouts)
 
-    def resolved_in(self, runs: dict[str, xr.Dataset], inputs: Sequence[str]) -> Self:
+    def resolved_in(self, runs: Datasets, inputs: Sequence[str]) -> Self:
         """Settings with the encounter period of some runs, where it counts and none is stated."""
         dt, period = _step_of(self.dt, runs), self.encounter_period
         if period is None and (self.in_periods or self.train_on == "auto"):
@@ -799,7 +799,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
 
     def _fitted(
         self,
-        runs: dict[str, xr.Dataset],
+        runs: Datasets,
         states: list[str],
         inputs: list[str],
         readouts: tuple[FittedReadOut, ...],

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, fraction
+from seakeep.arrays import FloatArray, IntArray, fraction
 
 STATISTICS = ("mean", "std", "lower", "upper")
 CHUNK = 8 * 2**20
@@ -73,7 +72,7 @@ def statistic_coordinate(level: float, bounds: str = "") -> xr.Variable:
     return xr.Variable(("statistic",), list(STATISTICS), attrs)
 
 
-def reduce_members(series: FloatArray, lost: npt.NDArray[np.int64], level: float) -> FloatArray:
+def reduce_members(series: FloatArray, lost: IntArray, level: float) -> FloatArray:
     """Reduce members to statistics, piece by piece in time.
 
     A member that is lost (NaN) anywhere in a window is left out of that window's statistics from

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self, cast
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray
+from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups
 from seakeep.core import gram
 from seakeep.core.embedding import (
     History,
@@ -435,7 +435,7 @@ def _lengthened(values: FloatArray, length: int) -> FloatArray:
     return np.concatenate([values, values[-1:]]) if missing > 0 else values
 
 
-def until(runs: Datasets, stop: Stop) -> dict[str, xr.Dataset]:
+def until(runs: Datasets, stop: Stop) -> Groups:
     """Cut runs at the last instants of their training windows.
 
     Parameters

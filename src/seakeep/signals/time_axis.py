@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import BoolArray, FloatArray, as_real, time_step
+from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, time_step
 from seakeep.errors import DataError
 
 STEP_TOLERANCE = 0.01
@@ -241,7 +241,7 @@ def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
     )
 
 
-def _grid(t: FloatArray) -> tuple[npt.NDArray[np.int64], float, float]:
+def _grid(t: FloatArray) -> tuple[IntArray, float, float]:
     """Whole number of steps from the first instant to each, the step, and the grid's start."""
     usual = usual_step(t)
     place = np.concatenate([[0], np.cumsum(np.maximum(np.rint(np.diff(t) / usual), 1))])
