@@ -1,10 +1,7 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from seakeep.tank.dynamics import tensions
-from seakeep.tank.moorings import KINDS, line_table, mooring_stiffness
+from seakeep.tank.dynamics import mooring_stiffness, tensions
 
 pytest.importorskip("numba", reason="needs the extra tank")
 
@@ -53,24 +50,6 @@ def test_stiffness_is_the_slope_of_the_forces(rig):
     # Central differences of step 1e-6: rounding of 1e-10.
     assert mooring_stiffness(rig.lines) == pytest.approx(-np.array(slopes).T, abs=1e-8)
     assert mooring_stiffness(rig.lines)[0, 0] == pytest.approx(1.89 + 1.33, rel=1e-9)
-
-
-def test_another_kind_of_line_is_one_entry(rig, settings, monkeypatch):
-    monkeypatch.setitem(KINDS, "stiffening", lambda line: (line.stiffness, 0.5, 2.0))
-    lines = {
-        name: line.model_copy(update={"kind": "stiffening"})
-        for name, line in settings.moorings.items()
-    }
-    other = replace(rig, lines=line_table(lines, 52.09, 0.03))
-    offsets = np.linspace(-1.0, 2.0, 61)
-    bow, _ = along_surge(other, offsets)
-    rest = lines["bow"].stretch
-    assert 1.89 * rest + 0.5 * rest**2 + 2.0 * rest**3 == pytest.approx(1.1, rel=1e-12)
-    stretch = np.maximum(0.0, rest + offsets)
-    assert bow == pytest.approx(1.89 * stretch + 0.5 * stretch**2 + 2.0 * stretch**3, abs=1e-12)
-    near = along_surge(other, np.array([-1e-6, 1e-6]))
-    slope = (near[0] - near[1])[1] / 2e-6 - (near[0] - near[1])[0] / 2e-6
-    assert mooring_stiffness(other.lines)[0, 0] == pytest.approx(slope, rel=1e-6)
 
 
 @pytest.mark.oracle

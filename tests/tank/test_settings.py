@@ -26,8 +26,6 @@ def test_a_file_changes_what_it_states_and_keeps_the_rest(tmp_path):
     [
         ("[moorings.bow]\nstiffness = -1.0\npretension = 0.8\neye = [0, 0]\npole = [1, 0]",
          r"line 2, moorings\.bow\.stiffness: received -1\.0, which should be greater than 0"),
-        ("[moorings.bow]\nkind = 'sprung'\nstiffness = 1\npretension = 1\neye = [0, 0]\n"
-         "pole = [1, 0]", r"moorings\.bow\.kind: the kinds are spring\. Did you mean 'spring'\?"),
         ("[facility]\nwater_depth = 0", r"water_depth: received 0, .* Give a depth of 0\.01 to"),
         ("[facility]\nwave_band = [1.4, 0.1]", r"wave_band: a band is \[low, high\] in Hz"),
         ("[simulation]\nstepp = 0.1", r"stepp: unknown key, .* Did you mean 'step'"),

@@ -24,7 +24,7 @@ def line_tension(
 ) -> tuple[float, float, float, float]:
     """Tension of a line and its force on the vessel.
 
-    `line` is a row of `moorings.line_table`. Returns tension, force along x and z, moment about y.
+    `line` is a row of `dynamics.line_table`. Returns tension, force along x and z, moment about y.
     """
     cosine, sine = math.cos(pitch), math.sin(pitch)
     arm_x = line[0] * cosine + line[1] * sine
@@ -37,8 +37,7 @@ def line_tension(
     speed_x = velocity[0] + velocity[2] * arm_z
     speed_z = velocity[1] - velocity[2] * arm_x
     rate = -(dx * speed_x + dz * speed_z) / length
-    elastic = ((line[8] * stretch + line[7]) * stretch + line[4]) * stretch
-    tension = max(0.0, elastic + line[6] * rate)
+    tension = max(0.0, line[4] * stretch + line[6] * rate)
     force_x, force_z = tension * dx / length, tension * dz / length
     return tension, force_x, force_z, arm_z * force_x - arm_x * force_z
 

@@ -28,9 +28,8 @@ from seakeep.tank.hydrodynamics import (
     radiation_kernel,
     trapezoid,
 )
-from seakeep.tank.moorings import line_table, mooring_stiffness
 from seakeep.tank.seas import Sea
-from seakeep.tank.settings import DriftSettings, TankSettings
+from seakeep.tank.settings import DriftSettings, LineSettings, TankSettings
 from seakeep.waves import GRAVITY, wavenumber
 
 LIMITS = {"surge": 20.0, "heave": 2.0, "pitch": 1.2, "piston": 2.0, "slosh": 2.0}
@@ -39,6 +38,7 @@ LIMITS = {"surge": 20.0, "heave": 2.0, "pitch": 1.2, "piston": 2.0, "slosh": 2.0
 STABLE = 2.7  # RK4 is stable for |λ|·dt up to 2.78 on the imaginary and 2.785 on the real axis
 ITERATIONS = 100  # of the losses in a sea; some twenty are enough
 SLOPE = 0.02  # rad/s, to either side for the slope of the drift force
+LINES = "eye_x", "eye_z", "pole_x", "pole_z", "stiffness", "unstretched", "damping"
 KERNEL_RATE = 40.0  # rad/s, the fastest motion in the radiation kernel
 
 
@@ -123,6 +123,56 @@ def _loop() -> ModuleType:
             "Install the extra: pip install 'seakeep[tank]'."
         ) from error
     return _loop
+
+
+def line_table(
+    lines: dict[str, LineSettings], position: float, centre_of_gravity: float
+) -> FloatArray:
+    """Lines as rows of numbers for the time loop, columns as in ``LINES``.
+
+    Lengths count from the centre of gravity at rest: `position` from the wave maker, the other
+    above still water.
+
+    Raises
+    ------
+    RequestError
+        If eye and pole coincide, or the pretension stretches a line beyond its length at rest.
+    """
+    table = np.zeros((len(lines), len(LINES)))
+    for row, (name, line) in zip(table, lines.items(), strict=True):
+        eye = (line.eye[0], line.eye[1] - centre_of_gravity)
+        pole = (line.pole[0] - position, line.pole[1] - centre_of_gravity)
+        rest = float(np.hypot(line.pole[0] - position - line.eye[0], line.pole[1] - line.eye[1]))
+        stretch = line.pretension / line.stiffness
+        length = rest - stretch
+        if length <= 0:
+            raise RequestError(
+                f"moorings.{name} has no length left: at rest eye and pole are {rest:.3f} m apart "
+                f"and a pretension of {line.pretension:g} N stretches it by {stretch:.3f} "
+                "m. Lower the pretension, stiffen the line, or move its pole."
+            )
+        row[:] = [*eye, *pole, line.stiffness, length, line.damping]
+    return table
+
+
+def mooring_stiffness(table: FloatArray) -> FloatArray:
+    """Stiffness and geometric stiffness of all taut lines at rest: surge, heave and pitch."""
+    total = np.zeros((3, 3))
+    for eye_x, eye_z, pole_x, pole_z, stiffness, unstretched, _ in table:
+        along = np.array([pole_x - eye_x, pole_z - eye_z])
+        length = float(np.hypot(*along))
+        stretch = length - unstretched
+        if stretch <= 0:
+            continue
+        unit = along / length
+        tension = stiffness * stretch
+        local = stiffness * np.outer(unit, unit)
+        local += tension / length * (np.eye(2) - np.outer(unit, unit))
+        arm = np.array([[1.0, 0.0, eye_z], [0.0, 1.0, -eye_x]])
+        total += arm.T @ local @ arm
+        # A turned eye keeps its tension: its second derivative with pitch is minus the arm.
+        total[2, 2] += tension * float(unit @ np.array([eye_x, eye_z]))
+    return total
 
 
 def _viscous(settings: TankSettings, hydro: Hydrodynamics) -> tuple[FloatArray, ...]:

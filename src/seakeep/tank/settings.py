@@ -14,13 +14,27 @@ from pydantic import BeforeValidator, Field, model_validator
 from seakeep.campaign.settings import Band, ChannelName, RunName
 from seakeep.errors import RequestError
 from seakeep.files import read_bytes
-from seakeep.tank.moorings import LineSettings
 from seakeep.toml import Count, Finite, NotNegative, Pair, Positive, Table, read_toml, validated
 
 Logger = Literal["wave_probes", "mru", "loads", "video"]
+Point = Annotated[tuple[Finite, Finite], Field(strict=False)]
 Below = Annotated[float, Field(lt=0, ge=-1e4)]
 Panels = Annotated[int, Field(ge=4)]
 Depth = Annotated[float, Field(ge=0.01, le=1e4, description="a depth of 0.01 to 10 000 m")]
+
+
+class LineSettings(Table):
+    """A line from an eye on the vessel to a pole: a spring that only pulls.
+
+    `eye`: x from the centre of gravity and height above still water (m); `pole`: distance from
+    the wave maker and height above still water (m). `damping` acts on the rate of the stretch.
+    """
+
+    stiffness: Positive
+    pretension: NotNegative
+    damping: NotNegative = 0.15
+    eye: Point
+    pole: Point
 
 
 class PoolGeometry(Table):
