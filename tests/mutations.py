@@ -280,7 +280,7 @@ CHANGES = (
     ("signals/propagation.py", "centre + 0.5 * cycle)", "centre + 1.5 * cycle)", "signals/test_celerity.py::test_the_bound_keeps_the_peak_of_the_next_period_out"),
     ("signals/propagation.py", "scaled = np.clip(place / half, -1.0, 1.0)", "scaled = place / half", "signals/test_propagation.py::test_a_place_outside_the_range_is_taken_to_its_end"),
     ("signals/propagation.py", "spectrum * np.exp(-1j * k * node)", "spectrum * np.exp(1j * k * node)", "signals/test_propagation.py::test_an_irregular_sea_is_carried_by_dispersion"),
-    ("signals/rigid_body.py", 'from_euler("xyz",', 'from_euler("XYZ",', "signals/test_rigid_body.py::test_positions_differentiate_to_velocities_and_accelerations"),
+    ("signals/rigid_body.py", 'from_euler("xyz",', 'from_euler("XYZ",', "signals/test_rigid_body.py::test_a_body_yaws_then_pitches_then_rolls"),
     ("signals/rigid_body.py", "force) - upward", "force) + upward", "signals/test_rigid_body.py::test_gravity_is_removed"),
     ("signals/rigid_body.py", "np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))", "np.cross(alpha, r)", "signals/test_rigid_body.py::test_positions_differentiate_to_velocities_and_accelerations"),
     ("signals/rigid_body.py", "rotation_matrix(turn) @ r - r", "rotation_matrix(turn) @ r", "signals/test_rigid_body.py::test_positions_differentiate_to_velocities_and_accelerations"),

@@ -38,6 +38,19 @@ def body_rates(angles):
     return np.column_stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]])
 
 
+def test_a_body_yaws_then_pitches_then_rolls():
+    def about(axis, angle):
+        turned = np.eye(3)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        turned[[i, j], [i, j]] = np.cos(angle)
+        turned[[j, i], [i, j]] = np.sin(angle), -np.sin(angle)
+        return turned
+
+    roll, pitch, yaw = 0.3, -0.2, 0.5
+    expected = about(2, yaw) @ about(1, pitch) @ about(0, roll)
+    np.testing.assert_allclose(rotation_matrix([[roll, pitch, yaw]])[0], expected, atol=1e-15)
+
+
 def test_positions_differentiate_to_velocities_and_accelerations(body):
     position, angles = body
     r = [0.5, -0.2, 0.3]

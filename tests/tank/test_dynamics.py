@@ -67,6 +67,9 @@ def test_response_in_time_is_that_in_frequency(linear_rig):
     assert error.max() < 0.01
     # With their phases: surge swings on its moorings for minutes.
     assert np.all(np.abs(found / expected - 1.0)[:, :3].max(axis=0) < [0.013, 0.007, 0.007])
+    # The coefficients of the kernel, which ends after some time, are the file's to 1.5 %.
+    own = linear_response(linear_rig, sea.omega, damping)
+    assert np.abs(own / expected - 1.0).max() < 0.02
 
 
 def test_surge_decays_with_the_period_of_its_springs(ideal_rig, calm):
