@@ -8,6 +8,7 @@ says what was received and how to correct it.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -25,6 +26,8 @@ ComplexArray = npt.NDArray[np.complex128]
 
 Progress = Callable[[int, int, str], None]
 """Takes how many steps are done, how many there are, and the name of one."""
+undefined = partial(np.errstate, divide="ignore", invalid="ignore")
+"""Lets 0/0 be NaN and x/0 infinite without a warning."""
 TINY = float(np.finfo(float).tiny)
 """Least number above zero."""
 Datasets: TypeAlias = "Mapping[str, xr.Dataset]"

@@ -28,7 +28,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, fraction
+from seakeep.arrays import FloatArray, fraction, undefined
 from seakeep.core import metrics as core
 from seakeep.core.bootstrap import block_length, bootstrap_indices, student_interval
 from seakeep.errors import RequestError, SeakeepWarning
@@ -271,7 +271,7 @@ def _with_bounds(
 
 def _ratio(values: FloatArray) -> FloatArray:
     """Ratio to the first entry; one for the first itself."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with undefined():
         out: FloatArray = values / values[0]
     return out
 

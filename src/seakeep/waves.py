@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from seakeep.arrays import FloatArray, as_real
+from seakeep.arrays import FloatArray, as_real, undefined
 from seakeep.errors import RequestError
 
 __all__ = ["GRAVITY", "group_speed", "phase_speed", "wavelength_to_frequency", "wavenumber"]
@@ -104,7 +104,7 @@ def phase_speed(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> Floa
     """
     omega, h = _checked("the frequency", frequency, depth)
     k = wavenumber(omega, h)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with undefined():
         return np.where(omega > 0, omega / k, np.sqrt(GRAVITY * h))
 
 

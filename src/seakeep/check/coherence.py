@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray
+from seakeep.arrays import Datasets, FloatArray, undefined
 from seakeep.check.parts import (
     FreeRun,
     Known,
@@ -169,7 +169,7 @@ def _bound(
     `spreads` are their squares.
     """
     share = spectra.share().reshape(3, -1, size)[:, :count]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with undefined():
         error = np.sqrt(share * spreads.reshape(-1, size)[:count] / spreads[:size])
     best = np.argmin(np.where(np.isfinite(error[0]), error[0], np.inf), axis=0), np.arange(size)
     rest = spectra.unexplained().reshape(len(spectra.frequency), -1, size)[:, *best]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.interpolate import interp1d
 
-from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real
+from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real, undefined
 from seakeep.check.parts import (
     Part,
     elevations,
@@ -268,7 +268,7 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
     name = ", ".join(str(part.run.attrs.get("run", "run")) for part in parts)
     at = np.flatnonzero((power >= POWER * power.max()) & (spectra.frequency > 0))
     amplitude, half = np.abs(gain[at]), radius[at]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with undefined():
         turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
     names = {"run": name, "kind": "irregular"}
     return _points(

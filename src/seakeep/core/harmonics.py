@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize, stats
 
-from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.arrays import ComplexArray, FloatArray, undefined
 from seakeep.errors import DataError
 
 MOST = 10
@@ -153,7 +153,7 @@ def estimate(ratios: ComplexArray, type_b: FloatArray) -> Estimate:
     """
     count, mean = ratios.shape[-2], ratios.mean(axis=-2)
     modulus = np.abs(mean)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with undefined():
         turned = ratios * np.conj(mean / modulus)[..., None, :]
         widths = []
         for part in (turned.real, turned.imag):

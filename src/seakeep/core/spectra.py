@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy import signal, stats
 
-from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.arrays import ComplexArray, FloatArray, undefined
 from seakeep.errors import DataError
 
 OVERLAP_CORRELATION = 1 / 36
@@ -106,7 +106,7 @@ class Spectra:
         """
         rest, total = self.unexplained(), self.outputs.sum(axis=0)
         left = rest.sum(axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with undefined():
             freedom = left**2 / (rest**2).sum(axis=0)
             freedom *= 2 * (self.averages - self.inputs.shape[1]) / MIXED
             limits = [freedom / stats.chi2.ppf(p, freedom) for p in (0.975, 0.025)]
@@ -133,7 +133,7 @@ class Spectra:
 
 def _over(top: Any, power: FloatArray, without: float = 0.0) -> Any:
     """Ratio to a power, and what stands `without` any."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with undefined():
         return np.where(power > 0, top / power, without)
 
 

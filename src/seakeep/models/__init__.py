@@ -2,6 +2,7 @@
 
 from seakeep.executor import processes
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
+from seakeep.models.conditions import ProbeOffset, estimate_probe_offset
 from seakeep.models.ensemble import BandForecast, HankelEnsemble
 from seakeep.models.forecasts import Model, Spec
 from seakeep.models.inputs import InputMap
@@ -10,7 +11,6 @@ from seakeep.models.labelled import ChannelLabel
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live, load_live
 from seakeep.models.observables import OBSERVABLES, Expression, Powers, SlowSquares
-from seakeep.models.offsets import ProbeOffset, estimate_probe_offset
 from seakeep.models.priors import Fixed, LogUniform, Uniform
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.registry import KINDS, is_ensemble, load_model

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
 
@@ -27,7 +28,6 @@ from seakeep.models import engine, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.checks import Json, check_choice
 from seakeep.models.engine import Windows, first_lost
-from seakeep.models.html import text_html
 from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix, run_name
 from seakeep.models.training import Training
@@ -172,7 +172,7 @@ class Model:
 
     def _repr_html_(self) -> str:
         """Summary, for notebooks."""
-        return text_html(self.summary())
+        return f'<pre style="white-space: pre-wrap">{escape(self.summary())}</pre>'
 
     @property
     def training_spans(self) -> dict[str, tuple[float, float]]:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real
+from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real, undefined
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.models import engine, export, labelled, store
@@ -647,7 +647,7 @@ def unpacked(dataset: xr.Dataset, spec: Any) -> dict[str, Any]:
 def modes(eigenvalues: ComplexArray, dt: float) -> xr.Dataset:
     """Modes of a discrete system from its eigenvalues; see ``HankelDMDcModel.modes``."""
     upper = eigenvalues[eigenvalues.imag >= 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with undefined():
         poles = np.log(upper.astype(complex)) / dt
         natural = np.abs(poles)
         frequency = np.abs(poles.imag) / (2 * np.pi)

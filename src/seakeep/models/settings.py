@@ -7,6 +7,7 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from html import escape
 from typing import Any, ClassVar, Literal, Self, get_args
 
 from seakeep.arrays import TINY, Datasets, number, whole_number
@@ -23,7 +24,6 @@ from seakeep.models.checks import (
     settings_of,
 )
 from seakeep.models.following import BACK, Following
-from seakeep.models.html import settings_html
 from seakeep.models.inputs import InputMap
 from seakeep.models.interface import Needs, Role
 from seakeep.models.observables import Observed, observables_of
@@ -463,3 +463,18 @@ def _written(value: Any) -> Any:
     if isinstance(value, Length):
         return str(value)
     return prior_json(value) if isinstance(value, Prior) else value
+
+
+def settings_html(name: str, settings: Mapping[str, Any]) -> str:
+    """Settings as a table: what ``_repr_html_`` of a spec gives.
+
+    Examples
+    --------
+    >>> settings_html("HankelDMDc", {"ridge": 1.0})
+    '<table><caption>HankelDMDc</caption><tr><th>ridge</th><td>1.0</td></tr></table>'
+    """
+    rows = "".join(
+        f"<tr><th>{escape(key)}</th><td>{escape(str(value))}</td></tr>"
+        for key, value in settings.items()
+    )
+    return f"<table><caption>{escape(name)}</caption>{rows}</table>"

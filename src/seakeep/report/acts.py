@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from seakeep.arrays import FloatArray, IntArray, Progress
+from seakeep.arrays import FloatArray, IntArray, Progress, undefined
 from seakeep.core.bands import split_bands
 from seakeep.core.metrics import slack_share
 from seakeep.report.figures.histories import acts_figure
@@ -181,7 +181,7 @@ def _ratio(statistic: Statistic) -> Statistic:
     """A statistic of one model over that of another."""
 
     def ratio(drawn: FloatArray, other: FloatArray) -> FloatArray:
-        with np.errstate(invalid="ignore", divide="ignore"):  # a redraw may hold one cell alone
+        with undefined():  # a redraw may hold one cell alone
             return statistic(drawn) / statistic(other)
 
     return ratio

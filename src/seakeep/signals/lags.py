@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, IntArray, as_pair, positive, time_step
+from seakeep.arrays import FloatArray, IntArray, as_pair, positive, time_step, undefined
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import record, usual_step
 
@@ -98,7 +98,7 @@ def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float
     scale = float(np.sqrt(centred @ centred))
     spread = views.std(axis=1) * np.sqrt(length)
     moving = (spread > 0) & (scale > 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with undefined():
         coefficient = np.where(moving, (views @ centred) / (spread * scale), np.nan)
     if not np.isfinite(coefficient).any():
         return np.nan, np.nan

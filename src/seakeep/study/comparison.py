@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep import metrics, statistics
-from seakeep.arrays import Datasets, Groups, Progress, whole_number
+from seakeep.arrays import Datasets, Groups, Progress, undefined, whole_number
 from seakeep.campaign import Campaign, load_prepared
 from seakeep.check.parts import samples_in, whole_span
 from seakeep.conventions import displayed, froude_factor, is_elevation
@@ -431,7 +431,7 @@ def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
     }
     slack = metrics.is_slack(**pair)
     in_training_sd = root_mean_square(pair["predicted"] - pair["measured"]) / pair["training_std"]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with undefined():
         ratio = p.std("time", ddof=1, skipna=False) / m.std("time", ddof=1).where(~slack)
     row: dict[str, Any] = {
         "training_nrmse": in_training_sd,

@@ -18,7 +18,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep import metrics, statistics
-from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray
+from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray, undefined
 from seakeep.core.bands import split_bands
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.metrics import over_channels, paired, root_mean_square
@@ -196,7 +196,7 @@ def difference_table(
 
     def ratio(drawn: FloatArray) -> FloatArray:
         middle = median_of(drawn.reshape(len(drawn), -1, *drawn.shape[3:]))
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with undefined():
             return middle[:, :, None] / middle[:, None]
 
     bounds = statistics.two_way_interval(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES)
