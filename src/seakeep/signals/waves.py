@@ -183,13 +183,18 @@ def dominant_period(series: npt.ArrayLike, dt: float) -> float:
     >>> round(dominant_period(np.sin(np.arange(0, 100, 0.05) * 2 * np.pi / 1.6), 0.05), 1)
     1.6
     """
+    return _spectrum(series, dt)[2]
+
+
+def _spectrum(series: npt.ArrayLike, dt: float) -> tuple[FloatArray, FloatArray, float]:
+    """Power of a series, its frequencies, and the period at the peak, as `dominant_period`."""
     x = as_series(series)
     if x.size < 8 or not np.ptp(x):
-        return float("nan")
-    power = tapered_power(x)
-    power = np.convolve(power, [0.25, 0.5, 0.25], mode="same")
-    power[:3] = 0.0
-    return float(1.0 / np.fft.rfftfreq(x.size, dt)[int(np.argmax(power))])
+        return x, x, float("nan")
+    power, lines = tapered_power(x), np.asarray(np.fft.rfftfreq(x.size, dt), dtype=float)
+    smooth = np.convolve(power, [0.25, 0.5, 0.25], mode="same")
+    smooth[:3] = 0.0
+    return power, lines, float(1.0 / lines[int(np.argmax(smooth))])
 
 
 def tapered_power(x: FloatArray) -> FloatArray:
@@ -574,13 +579,9 @@ def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, 
     >>> round(share, 2), round(period, 2)
     (0.2, 1.0)
     """
-    x = as_series(series)
-    time_step(dt)
-    period = dominant_period(x, dt)
+    power, lines, period = _spectrum(series, time_step(dt))
     if not np.isfinite(period):
         return float("nan"), float("nan")
-    power = tapered_power(x)
-    lines = np.fft.rfftfreq(x.size, dt)
     waves = (lines >= WAVES[0] / period) & (lines <= WAVES[1] / period)
     return float(power[waves & (lines > edge)].sum() / power[waves].sum()), period
 
