@@ -136,8 +136,8 @@ def tune(
     states, inputs : sequence of str
         Channels of the model.
     vary : sequence of str, optional
-        Out of "ridge" (always chosen; of what errs half as much again as the best, every fourth λ
-        is tried), "observables" (none, slow squares, powers, both; or those of
+        Out of "ridge" (always chosen: every fourth λ of a path, and those about the best, unless a
+        candidate errs half as much again as another), "observables" (none, slow squares, powers, both; or those of
         the spec), "lead", "input_delays", "state_delays", "memory" (none, or eight periods),
         "alignment" (none, dispersion or one celerity, to the surge that is predicted or to the
         place at rest: what the runs allow), "readouts" (none or by the wave at the line, for
