@@ -137,12 +137,13 @@ def tune(
         Channels of the model.
     vary : sequence of str, optional
         Out of "ridge" (always chosen: every fourth λ of a path, and those about the best, unless a
-        candidate errs half as much again as another), "observables" (none, slow squares, powers, both; or those of
-        the spec), "lead", "input_delays", "state_delays", "memory" (none, or eight periods),
-        "alignment" (none, dispersion or one celerity, to the surge that is predicted or to the
-        place at rest: what the runs allow), "readouts" (none or by the wave at the line, for
-        those of the spec or for every load) and "kind" (FIR, ARX and subspace models in the place
-        of what the rest chose, with its delays and inputs, and no alignment to a predicted surge).
+        candidate errs half as much again as another), "observables" (none, slow squares, powers,
+        both; or those of the spec), "lead", "input_delays", "state_delays", "memory" (none, or
+        eight periods), "alignment" (none, dispersion or one celerity, to the surge that is
+        predicted or to the place at rest: what the runs allow), "readouts" (none or by the wave at
+        the line, for those of the spec or for every load) and "kind" (FIR, ARX and subspace models
+        in the place of what the rest chose, with its delays and inputs, and no alignment to a
+        predicted surge).
     horizon : sequence of float, optional
         Lengths of the free runs, encounter periods.
     folds : {"auto", "run", "sea_state"} or int, optional
