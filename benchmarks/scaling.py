@@ -85,11 +85,11 @@ def forecast_operations(size: Size, rows: str) -> float:
     if rows == "exact":
         return 2 * size.states * (a + b) * steps * w
     if w == 1:
-        times = doublings(a, b, 1, steps, rows == "ridge")
+        times = doublings(a, b, 1, steps)
         once = 2 * a * (a + b) / 2**times + 2 * size.states * (a + b)
         powers = times * 2 * a * a * (a + b)
         return min(2 * a * (a + b) * steps, powers + once * steps)
-    times = doublings(a, b, w, steps, False)
+    times = doublings(a, b, w, steps)
     blocks = steps / 2**times
     powers = times * 2 * a * a * (a + b)
     return powers + 2 * a * (a + b) * w * blocks + 2 * size.states * (a + b) * w * steps
@@ -113,10 +113,7 @@ def forecast_bytes(size: Size, rows: str) -> float:
         block = (K + 1) * size.states
         rows = size.steps * size.windows / K
         return 8 * (result + block * (a + b) + rows * (b + K * size.states))
-    if size.windows == 1:
-        times = doublings(a, b, 1, size.steps, rows == "ridge")
-    else:
-        times = doublings(a, b, size.windows, size.steps, False)
+    times = doublings(a, b, size.windows, size.steps)
     whole = size.windows * size.steps * (a + b) / 2**times
     return 8 * (result + 2 * a * (a + b) + min(whole, PIECE))
 

@@ -26,7 +26,7 @@ from seakeep.models.selection import WORST, default_observables
 
 HORIZONS = (15.0, 45.0)
 EVERY = 10
-VARY = ("ridge", "rank", "observables", "lead", "input_delays", "state_delays")
+VARY = ("ridge", "observables", "lead", "input_delays", "state_delays")
 
 
 def clocked(call):
@@ -56,7 +56,6 @@ def settings_of(base, row, observables):
         base,
         ridge=float(row["ridge"]),
         ridge_scale="per_snapshot",
-        rank=int(row["rank"]) or None,
         lead=int(row["lead"]),
         state_delays=int(row["state_delays"]),
         input_delays=int(row["input_delays"]),
