@@ -20,8 +20,8 @@ from memory import _held, _status
 from problem import DT, as_run, linear_system, names
 
 import seakeep
-from seakeep.formats import read_columns
 from seakeep.executor import one_blas_thread
+from seakeep.formats import read_columns
 
 RESULT = Path(__file__).parent / "results" / "soak.md"
 HEAD = "| case | CPU, s | held before, MiB | peak beyond it, MiB | growth in the last half, MiB |"
