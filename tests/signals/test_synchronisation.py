@@ -1,22 +1,15 @@
-"""Clocks: recovered from pulses, from a shared signal, and from related signals."""
+"""Clocks recovered from pulses; from signals: `tests/campaign/test_steps.py`."""
 
 import numpy as np
 import pytest
-from seas import sea
 
 from seakeep.signals import (
     Clock,
-    clock_from_correlation,
     clock_from_pulses,
-    clock_from_shared,
     pool_drift,
 )
 from seakeep.signals.lags import _correlation
 from seakeep.signals.synchronisation import without_doubtful_drift
-
-
-def waves(t):
-    return 4 * sea(9).at(t)
 
 
 def pulses(t, period=20.0, width=0.5):
@@ -89,27 +82,6 @@ def test_one_pulse_gives_an_offset_and_no_drift():
     assert np.isnan(clock.drift_error)
 
 
-@pytest.mark.parametrize("rate", [50.0, 20.0])
-def test_a_shared_signal(rate):
-    ours = logger(lambda t: 3 * waves(t) + 8, rate, 1.3, 60e-6, 300.0, 0.5, 0)
-    reference = logger(waves, 40.0, 0.0, 0.0, 300.0, 0.05, 1)
-    clock = clock_from_shared(*ours, *reference)
-    assert abs(clock.offset - 1.3) < 4 * clock.offset_error < 0.1 / rate
-    assert abs(clock.drift - 60e-6) < 4 * clock.drift_error < 40e-6
-    assert clock.method == "shared channel"
-
-
-def test_related_signals():
-    def filtered(t):  # another response to the same waves, in phase with them
-        return waves(t) + 0.3 * np.cos(11 * t)
-
-    ours = logger(filtered, 30.0, -0.8, 100e-6, 300.0, 0.3, 0)
-    reference = logger(waves, 50.0, 0.0, 0.0, 300.0, 0.05, 1)
-    clock = clock_from_correlation(*ours, *reference, window=20.0, largest_lag=3.0)
-    assert abs(clock.offset + 0.8) < 5 * clock.offset_error < 0.05
-    assert abs(clock.drift - 100e-6) < 5 * clock.drift_error < 2e-4
-
-
 def test_drifts_that_differ_are_not_pooled():
     def clock(drift):
         return Clock(0.1, drift, 1e-3, 2e-6, "trigger pulses", 13, 1e-3, centre=100.0)
@@ -139,6 +111,3 @@ def test_the_correlation_at_a_lag_is_that_of_the_samples_in_common():
     found = _correlation(a, b, np.array([-25, 0, 25]))
     expected = [np.corrcoef(x, y)[0, 1] for x, y in ((a[25:], b[:15]), (a, b), (a[:15], b[25:]))]
     np.testing.assert_allclose(found, expected, atol=1e-12)  # rounding of an FFT
-
-
-NOISE, TIMES = np.random.default_rng(0).standard_normal((2, 2000)), np.arange(2000) / 20
