@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from small_tank import write_csv
 
 from seakeep import cli
 from seakeep.campaign import read_table
@@ -112,25 +113,18 @@ def test_centroid_and_pitch_of_every_frame(tracked, plain):
     assert np.rad2deg(rms(tracked["panel_angle"] - pitch)) < 0.05
 
 
-def test_motions_of_the_centre_of_gravity(tracked):
-    time = tracked.time
-    np.testing.assert_allclose(time, np.arange(FRAMES) / RATE, rtol=1e-12)
-    inner = slice(8, -8)  # half a filter length, where its end conditions show
-    for name, true, limit in zip(
-        ("surge", "heave", "pitch"), motion(time), (1e-3, 1e-3, np.deg2rad(0.05)), strict=True
-    ):
-        error = (tracked[name] - true)[inner]
-        # Surge and heave count from their means over the first second. 1 mm is 0.4 pixel.
-        error = error if name == "pitch" else error - error.mean()
-        assert rms(error) < limit, name
-
-
-def test_a_stated_origin_gives_absolute_motions(plain):
+def test_motions_of_the_centre_of_gravity(plain, tracked):
+    """Absolute by a stated origin; else surge and heave count from their means over a second."""
     x, y = tank_video.pixel_of(0.0, COG + tank_video.PANEL_HEIGHT)
     how = TrackingSettings(metres_per_pixel=0.0025, origin=(float(x), float(y)), lamp=(40, 40, 8))
     out = track_video(plain[0], how)
-    for name, true in zip(("surge", "heave"), motion(out.time), strict=False):
-        assert rms((out[name] - true)[8:-8]) < 1e-3  # m; 0.4 pixel
+    np.testing.assert_allclose(tracked.time, np.arange(FRAMES) / RATE, rtol=1e-12)
+    limits = {"surge": 1e-3, "heave": 1e-3, "pitch": np.deg2rad(0.05)}  # 1 mm is 0.4 pixel
+    for (name, limit), true in zip(limits.items(), motion(out.time), strict=True):
+        # Without half a filter length, where its end conditions show.
+        absolute, error = ((track[name] - true)[8:-8] for track in (out, tracked))
+        assert rms(absolute) < limit, name
+        assert rms(error - error.mean() * (name != "pitch")) < limit, name
     on = (np.arange(FRAMES) >= 20) & (np.arange(FRAMES) < 30)
     assert np.all(out["lamp"][on] > 2 * out["lamp"][~on].max())
 
@@ -291,12 +285,11 @@ def test_the_command_writes_what_a_campaign_reads(plain, tracked, tmp_path, monk
 def test_the_command_compares_bridges_and_writes_netcdf(disturbed, tmp_path, capsys):
     time = np.arange(0, 5, 0.02) - 0.5
     _, heave, pitch = motion(time)
-    rows = np.column_stack([time, heave, np.rad2deg(pitch)])
-    np.savetxt(tmp_path / "mru.csv", rows, delimiter=",", header="time [s],heave [m],pitch [deg]",
-               comments="")  # fmt: skip
+    columns = {"time [s]": time, "heave [m]": heave, "pitch [deg]": np.rad2deg(pitch)}
+    mru = write_csv(tmp_path / "mru.csv", columns)
     out = tmp_path / "track.nc"
-    words = ["track", str(disturbed[0]), "-o", str(out), "--bridge", "0.2", "--mru"]
-    assert cli.main([*words, str(tmp_path / "mru.csv"), "--max-lag", "0.4"]) == 0
+    words = ["track", disturbed[0], "-o", out, "--bridge", 0.2, "--mru", mru, "--max-lag", 0.4]
+    assert cli.main(list(map(str, words))) == 0
     err = capsys.readouterr().err
     assert "flagged: 10 lost, 4 occluded, 6 overexposed (10 bridged)" in err
     assert "pitch against the MRU: correlation 1.0" in err
@@ -306,32 +299,25 @@ def test_the_command_compares_bridges_and_writes_netcdf(disturbed, tmp_path, cap
         assert '"bridge": 0.2' in stored.attrs["settings"]
 
 
-def opened(monkeypatch, **changes):
-    """Let OpenCV's videos answer otherwise: `changes` are methods of the capture."""
-    real = cv2.VideoCapture
+def test_frames_that_the_camera_dropped(plain, monkeypatch):
+    """Time stamps that skip a step leave a gap in the record, not a shorter record."""
 
-    class Capture:
-        def __init__(self, path):
-            self.inner, self.count = real(path), -1
+    class Dropping:
+        """A video whose tenth frame was lost."""
+
+        def __init__(self, path, opened=cv2.VideoCapture):
+            self.inner, self.count = opened(path), -1
 
         def __getattr__(self, name):
             return getattr(self.inner, name)
 
-    for name, method in changes.items():
-        setattr(Capture, name, method)
-    monkeypatch.setattr(cv2, "VideoCapture", Capture)
+        def read(self):
+            self.count += 1
+            if self.count == 10:
+                self.inner.read()
+            return self.inner.read()
 
-
-def test_frames_that_the_camera_dropped(plain, monkeypatch):
-    """Time stamps that skip a step leave a gap in the record, not a shorter record."""
-
-    def read(self):
-        self.count += 1
-        if self.count == 10:
-            self.inner.read()
-        return self.inner.read()
-
-    opened(monkeypatch, read=read)
+    monkeypatch.setattr(cv2, "VideoCapture", Dropping)
     out = track_video(plain[0])
     assert out.time.size == FRAMES
     assert list(np.flatnonzero(out["flag"] == FLAGS["dropped"])) == [10]
