@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from tutorial_study import put_tutorial
+from tutorial_study import edit, put_tutorial
 
 from seakeep import cli
 from seakeep.study import read_study, run_study
@@ -14,53 +14,10 @@ from seakeep.study.store import UnitFolder
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
-STUDY = """
-[study]
-campaign = "campaign.toml"
-preset = "recommended"
-[training]
-windows = 2
-[models.deterministic]
-ridge = 0.15
-observables = []
-readouts = {}
-[models.bayesian]
-kind = "bayesian_hankel_dmdc"
-n_members = 3
-ridge = { log_uniform = [0.05, 0.5] }
-observables = []
-readouts = {}
-window = { uniform = ["10 T", "20 T"] }
-[tests.unseen]
-runs = ["unseen"]
-windows = 2
-length = 6
-[statistics]
-n_series = 4
-[output]
-eigenvalues = false
-"""
-
-
-def copy_study(place):
-    put_tutorial(place, STUDY)
-
-
-@pytest.fixture
-def folder(tmp_path):
-    copy_study(tmp_path)
-    return tmp_path
-
 
 def study(folder, out="out"):
     arguments = ["study", str(folder / "study.toml"), "-o", str(folder / out), "--workers", "1"]
     return cli.main(arguments)
-
-
-def change(path, old, new):
-    text = path.read_text("utf-8")
-    assert old in text
-    path.write_text(text.replace(old, new), "utf-8")
 
 
 def units_in(folder):
@@ -88,24 +45,24 @@ def a_file(folder):
     ("spoil", "status", "words"),
     [
         (
-            lambda folder: change(
-                folder / "study.toml", '["10 T", "20 T"]', '["1000 T", "2000 T"]'
+            lambda folder: edit(
+                folder / "study.toml", ('["10 T", "20 T"]', '["1000 T", "2000 T"]')
             ),
             2,
             ["training: no window is feasible in", "Shorten window or the delays"],
         ),
         (
-            lambda folder: change(folder / "study.toml", "length = 6", "length = 600"),
+            lambda folder: edit(folder / "study.toml", ("length = 6", "length = 600")),
             2,
             ["tests.unseen: no window is feasible", "Reduce length or startup"],
         ),
         (
-            lambda folder: change(folder / "study.toml", "length = 6", "length = 6\nstartup = 1e6"),
+            lambda folder: edit(folder / "study.toml", ("length = 6", "length = 6\nstartup = 1e6")),
             2,
             ["tests.unseen: no window is feasible", "holds 0 samples", "Reduce length or startup"],
         ),
         (
-            lambda folder: change(folder / "study.toml", '["unseen"]', '["first"]'),
+            lambda folder: edit(folder / "study.toml", ('["unseen"]', '["first"]')),
             2,
             ["tests.unseen: the run 'first' trains", "no test span", "or name other runs"],
         ),
@@ -119,9 +76,11 @@ def a_file(folder):
     ],
     ids=["training", "length", "startup", "trains", "channel", "digest", "file"],
 )
-def test_each_mistake_has_its_message_and_its_exit_status(folder, spoil, status, words, capfd):
-    spoil(folder)
-    assert study(folder) == status
+def test_each_mistake_has_its_message_and_its_exit_status(
+    study_folder, spoil, status, words, capfd
+):
+    spoil(study_folder)
+    assert study(study_folder) == status
     told = " ".join(capfd.readouterr().err.split())
     for each in words:
         assert each in told
@@ -143,11 +102,12 @@ def filling(room, opened=Path.open):
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
     place = tmp_path_factory.mktemp("undisturbed")
-    copy_study(place)
+    put_tutorial(place)
     return run_study(read_study(place / "study.toml"), place / "out")
 
 
-def test_a_disk_that_fills_up_loses_no_finished_unit(folder, undisturbed, monkeypatch, capfd):
+def test_a_disk_that_fills_up_loses_no_finished_unit(study_folder, undisturbed, monkeypatch, capfd):
+    folder = study_folder
     with monkeypatch.context() as patch:
         patch.setattr(Path, "open", filling(3))
         assert study(folder) == 1

@@ -21,13 +21,6 @@ from seakeep.study.store import LOCK, UNITS, UnitFolder
 CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
 
 
-def change(folder, old, new):
-    path = folder / "study.toml"
-    text = path.read_text("utf-8")
-    assert old in text
-    path.write_text(text.replace(old, new), "utf-8")
-
-
 def same(first, second):
     assert first.groups.keys() == second.groups.keys()
     for name, group in first.groups.items():
@@ -35,9 +28,9 @@ def same(first, second):
 
 
 @pytest.fixture(scope="module")
-def finished_once(tmp_path_factory, put_study):
+def finished_once(tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
-    put_study(folder)
+    put_tutorial(folder)
     with processes(1) as pool:
         return run_study(read_study(folder / "study.toml"), folder / "out", executor=pool)
 
@@ -134,23 +127,6 @@ def test_a_damaged_unit_is_computed_again(change, tmp_path):
     path = tmp_path / UNITS / "one.nc"
     path.write_bytes(change(path.read_bytes()))
     assert units.read("one") is None
-
-
-def test_a_finished_study_is_not_run_again(study_folder, finished):
-    told = []
-    again = run_study(
-        read_study(study_folder / "study.toml"),
-        study_folder / "out",
-        progress=lambda *words: told.append(words),
-    )
-    assert told == [(1, 1, "finished before")]
-    same(finished, again)
-
-
-def test_a_folder_of_another_study_is_refused(study_folder, finished):
-    change(study_folder, "seed = 3", "seed = 4")
-    with pytest.raises(RequestError, match=r"holds the results of another study.*-o"):
-        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
 
 
 def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from tutorial_study import STUDY, put_tutorial
 
 from seakeep import statistics
 from seakeep.core import embed
@@ -27,11 +28,10 @@ from seakeep.study.plan import make_plan, random_stream
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory, put_study):
+def place(tmp_path_factory):
     """A study whose truth is known: the measurement of heave, half a centimetre higher."""
     folder = tmp_path_factory.mktemp("study")
-    text = put_study(folder).replace("seed = 3", 'seed = 3\ntruth = "truth"')
-    (folder / "study.toml").write_text(text, encoding="utf-8")
+    put_tutorial(folder, STUDY.replace("seed = 3", 'seed = 3\ntruth = "truth"'))
     runs = make_plan(read_study(folder / "study.toml")).runs
     (folder / "truth").mkdir()
     true = xr.Dataset({"heave": runs["unseen"]["heave"] + 0.005}).drop_vars(
@@ -163,14 +163,12 @@ ridge_scale = "absolute"
 """
 
 
-def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study):
-    text = put_study(tmp_path)
-    path = tmp_path / "study.toml"
-    path.write_text(text.replace("length = 6", "length = 20") + WILD, "utf-8")
+def test_forecasts_that_diverge_are_named_and_left_out(tmp_path):
+    put_tutorial(tmp_path, STUDY.replace("length = 6", "length = 20") + WILD)
     with pytest.warns(SeakeepWarning, match=r"^6 forecast\(s\) diverged and are left out: model "
         r"'wild', training set 't00', window 0 of 'unseen' \(unseen from .* and 1 more"
     ):  # fmt: skip
-        found = run_study(read_study(path), tmp_path / "out")
+        found = run_study(read_study(tmp_path / "study.toml"), tmp_path / "out")
     lost = found.groups["statistics/lost"]
     assert set(lost["model"].values) == {"wild"}
     boxes = found.groups["statistics/boxes"].sel(test="unseen", channel="average", measure="nrmse")
@@ -267,16 +265,15 @@ regularisation = true
 """
 
 
-def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path, put_study):
-    text = put_study(tmp_path)
-    path = tmp_path / "study.toml"
-    path.write_text(text + REGULARISED, "utf-8")
-    found = run_study(read_study(path), tmp_path / "out")
+def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path):
+    put_tutorial(tmp_path, STUDY + REGULARISED)
+    study = read_study(tmp_path / "study.toml")
+    found = run_study(study, tmp_path / "out")
     assert [name for name in found.groups if name.startswith("regularisation/")] == [
         "regularisation/printed"  # neither exact delay rows nor an ensemble
     ]
     at = found.groups["regularisation/printed"].isel(training=1)
-    plan = make_plan(read_study(path))
+    plan = make_plan(study)
     parts, *channels = plan.taught(plan.training[1].spans)
     spec = plan.specs["printed"]
     fitted = spec.fit(parts, *channels)
