@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from seas import sea
 from small_tank import DT, tank_columns, write_csv
 
 from seakeep import cli
@@ -120,13 +121,7 @@ sampling_rate = 10
 
 def two_loggers(folder, seed):
     """A run of two loggers that both recorded the wave; the second's clock gains 400 ppm."""
-    rng = np.random.default_rng(seed)
-    phase = rng.uniform(0, 2 * np.pi, 20)
-    frequency = np.linspace(0.3, 1.2, 20)
-
-    def wave(t):
-        return np.cos(2 * np.pi * np.outer(t, frequency) + phase).sum(axis=1)
-
+    wave = sea(seed, (0.3, 1.2), components=20).at
     t = 0.02 * np.arange(3000)
     write_csv(folder / f"mru_{seed}.csv", {"time": t, "wave": wave(t), "heave": wave(t)})
     own = 0.01 * np.arange(5900)

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from seas import sea
 from small_tank import tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
@@ -234,11 +235,7 @@ def test_a_prepared_run_has_the_celerity_of_its_waves(tmp_path):
     assert "celerity" not in two_probes(tmp_path, "eta_a = 4.0\neta_b = 4.0").attrs
 
 
-def wander(t):
-    """A motion without a period of its own, so that a lag is unique."""
-    rng = np.random.default_rng(5)
-    f, phase = rng.uniform(0.2, 1.0, 40), rng.uniform(0, 2 * np.pi, 40)
-    return np.cos(2 * np.pi * np.outer(t, f) + phase).sum(axis=1)
+WANDER = sea(5, (0.2, 1.0)).at  # without a period of its own, so that a lag is unique
 
 
 @pytest.mark.parametrize("way", ["shared", "correlated"])
@@ -249,9 +246,9 @@ def test_clocks_from_signals(tmp_path, way, offset, drift):
     reference = np.arange(0, 200, 0.01)
     seen = np.arange(0.0, 190, 1 / 30) + max(offset, 0)
     at = (seen - offset) / (1 + drift)
-    other = wander(at) if way == "shared" else wander(at) + 0.3 * np.cos(2.2 * at)
+    other = 4 * WANDER(at) + 0.3 * np.cos(2.2 * at) * (way == "correlated")
     write_csv(tmp_path / "loads.csv", {
-        "time [s]": reference, "draught [m]": 0.1 * wander(reference),
+        "time [s]": reference, "draught [m]": 0.4 * WANDER(reference),
     })  # fmt: skip
     write_csv(tmp_path / "camera.csv", {
         "time [s]": seen, "heave [mm]": 50 * other + 2 * rng.standard_normal(seen.size),

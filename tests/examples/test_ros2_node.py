@@ -136,8 +136,8 @@ def node(monkeypatch):
 
 def recorded(path, run, samples, lost):
     """Record a run as a vessel would: odometry, and two probes, messages out of order."""
-    from rosbags.rosbag2 import StoragePlugin, Writer
-    from stand_in_ros import STORE, message
+    from bags import write_bag
+    from stand_in_ros import message
 
     def header(stamp):
         sec, nanosec = divmod(stamp, 10**9)
@@ -171,14 +171,7 @@ def recorded(path, run, samples, lost):
         for topic, made in each.items():
             if (topic, at) not in lost:
                 sent.append((stamp + int(rng.integers(80_000_000)), topic, made))
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        kinds = {topic: made.__msgtype__ for _, topic, made in sent}
-        connections = {
-            topic: writer.add_connection(topic, kind, typestore=STORE)
-            for topic, kind in kinds.items()
-        }
-        for received, topic, made in sorted(sent, key=lambda each: each[0]):
-            writer.write(connections[topic], received, STORE.serialize_cdr(made, kinds[topic]))
+    write_bag(path, sorted(sent, key=lambda each: each[0]))
 
 
 def test_the_node_follows_a_recorded_bag(node, model, run, make_run, tmp_path):

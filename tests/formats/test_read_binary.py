@@ -1,9 +1,12 @@
 """MATLAB, NetCDF and HDF5."""
 
+from functools import partial
+
 import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from matlab73 import save as matlab73
 from scipy import io
 
 from seakeep.campaign import read_table
@@ -37,16 +40,19 @@ MATRIX = np.column_stack([T, HEAVE, WAVE])
         {"run": {"data": MATRIX, "channels": NAMES, "units": UNITS}},
         {"time": T, "data": MATRIX[:, 1:], "names": NAMES[1:], "units": UNITS[1:]},
         {"Fs": 20.0, "data": MATRIX[:, 1:], "names": NAMES[1:], "units": UNITS[1:]},
-        {"dt": 0.05, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}, "comment": "text"},
-        {"data": {"heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}}, "fs": 20.0, "note": "7"},
+        {"dt": 0.05, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}, "remark": "Größe"},
+        {
+            "data": {"heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}},
+            "fs": 20.0,
+            "note": True,
+        },
         {"data": MATRIX, "labels": np.array(["Time [s]", "heave [mm]", "wave (m)"], dtype=object)},
     ],
 )
-@pytest.mark.parametrize("compressed", [False, True])
-def test_matlab(tmp_path, content, compressed):
-    path = tmp_path / "run.mat"
-    io.savemat(path, content, do_compression=compressed)
-    run = read_table(path)
+@pytest.mark.parametrize("save", [io.savemat, partial(io.savemat, do_compression=True), matlab73])
+def test_matlab(tmp_path, content, save):
+    save(tmp_path / "run.mat", content)
+    run = read_table(tmp_path / "run.mat")
     # A step of 0.05 turned into a rate and back: rounding.
     np.testing.assert_allclose(run["time"], T, rtol=1e-15)
     check(run.assign_coords(time=T))

@@ -10,10 +10,10 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 
 pytest.importorskip("rosbags")
 
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from bags import STORE, write_bag
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.typesys import get_types_from_msg
 
-STORE = get_typestore(Stores.ROS2_HUMBLE)
 STORE.register(
     get_types_from_msg(
         "std_msgs/Header header\nfloat64 surge\nfloat32[2] loads\nfloat64[] cells\nstring remark\n",
@@ -66,14 +66,12 @@ def text(i):
 
 def save(path, plugin=StoragePlugin.MCAP, late=3_000_000, **topics):
     """Write topics, each a maker of messages; received `late` ns after they are stamped."""
-    with Writer(path, version=9, storage_plugin=plugin) as writer:
-        for topic, make in topics.items():
-            kind = make(0).__msgtype__
-            connection = writer.add_connection(f"/{topic}", kind, typestore=STORE)
-            for i in range(COUNT):
-                data = STORE.serialize_cdr(make(i), kind)
-                writer.write(connection, BEGIN + i * STEP + late, data)
-    return path
+    sent = (
+        (BEGIN + i * STEP + late, f"/{topic}", make(i))
+        for topic, make in topics.items()
+        for i in range(COUNT)
+    )
+    return write_bag(path, sent, plugin)
 
 
 @pytest.mark.parametrize("plugin", list(StoragePlugin), ids=lambda plugin: plugin.name)
