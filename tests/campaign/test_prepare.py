@@ -42,11 +42,8 @@ def test_raw_run_is_in_si_units(campaign):
         "eta_fwd": "m", "heave": "m", "pitch": "rad", "acc": "m/s^2", "pitch_rate": "rad/s",
     }  # fmt: skip
     assert run["acc"].attrs["long_name"] == "acceleration of the bow"
-    assert run["eta_fwd"].attrs["long_name"] == "wave elevation fwd"
     assert run["eta_fwd"].attrs["x_position"] == -2.5
     assert "x_position" not in run["heave"].attrs
-    assert list(run.dims) == ["time"]
-    assert run.attrs["dt"] == DT
 
 
 def test_offset_is_added_in_the_files_unit_before_the_sign(edited):
@@ -76,7 +73,6 @@ def test_prepared_runs(campaign):
     assert first.attrs["dt"] == second.attrs["dt"] == 0.1
     expected = {
         "run": "first",
-        "campaign": "Small tank",
         "role": "train and test",
         "sea_state": "moderate",
         "water_depth": 3.6,
@@ -87,7 +83,6 @@ def test_prepared_runs(campaign):
         "file": "first.csv",
     }
     assert {key: first.attrs[key] for key in expected} == expected
-    assert len(first.attrs["file_sha256"]) == 64
     assert "encounter_period" not in first.attrs
     assert second.attrs["role"] == "test"
     assert second.attrs["test_span"] == (2.0, 18.0)
@@ -184,28 +179,20 @@ class TestEncounterPeriod:
         assert first != second
         assert both == pytest.approx((first + second) / 2, rel=1e-15)  # rounding of a sum
 
-    def test_still_water_before_the_waves_does_not_count(self, tank):
+    def test_still_water_before_the_waves_does_not_count(self, tank, edited):
         # Spans do not cut it off, and the probe's noise crosses the mean all the while.
-        rng = np.random.default_rng(0)
-
-        def change(columns):
-            waves = tank_columns(0, seconds=60.0)
-            for name, values in waves.items():
-                columns[name] = values
-            still = waves["Time [s]"] < 25
-            noise = 0.05 * rng.standard_normal(still.sum())
-            columns["WP fwd [mm]"] = np.where(still, 0.0, waves["WP fwd [mm]"])
-            columns["WP fwd [mm]"][still] = noise
-
-        path = tank / "campaign.toml"
-        text = path.read_text().replace("train = [0, 10]\ntest = [10, inf]", 'role = "train"')
-        path.write_text(text.replace('role = "test"\nspan = [2, 18]', 'role = "unused"'))
-        campaign = rewrite(tank, change, "first.csv")
-        waves = tank_columns(0, seconds=60.0)["WP fwd [mm]"][1250:]
+        columns = tank_columns(0, seconds=60.0)
+        waves = columns["WP fwd [mm]"][1250:]
+        columns["WP fwd [mm]"][:1250] = 0.05 * np.random.default_rng(0).standard_normal(1250)
+        write_csv(tank / "first.csv", columns)
+        roles = [
+            ("train = [0, 10]\ntest = [10, inf]", 'role = "train"'),
+            ('role = "test"\nspan = [2, 18]', 'role = "unused"'),
+        ]
+        found = read_campaign(edited(*roles)).encounter_period()
         # A wave or two of 25 may fall to the still part.
-        assert campaign.encounter_period() == pytest.approx(encounter_period(waves, DT), rel=0.02)
-        hard = text.replace("[campaign]", "[campaign]\nperiod_hysteresis = 0.9")
-        path.write_text(hard.replace('role = "test"\nspan = [2, 18]', 'role = "unused"'))
+        assert found == pytest.approx(encounter_period(waves, DT), rel=0.02)
+        path = edited(*roles, ("[campaign]", "[campaign]\nperiod_hysteresis = 0.9"))
         # Only waves that pass 0.9 of a deviation on either side are counted: fewer, so longer.
         with pytest.warns(SeakeepWarning, match=r"counts waves of 3\.\d+ s, and the energy period"):
             assert read_campaign(path).encounter_period() > 1.1 * encounter_period(waves, DT)
@@ -311,10 +298,9 @@ class TestBadRuns:
         with pytest.raises(RequestError, match=message):
             read_campaign(edited((old, new))).prepare()
 
-    def test_gap_cut_off(self, tank):
+    def test_gap_cut_off(self, tank, edited):
         rewrite(tank, lambda c: c["Heave [mm]"].__setitem__(slice(20, 30), np.nan))
-        path = tank / "campaign.toml"
-        path.write_text(path.read_text().replace("span = [2, 18]", "record = [1, inf]"))
+        path = edited(("span = [2, 18]", "record = [1, inf]"))
         run = read_campaign(path).prepare()["second"]
         assert float(run["time"][0]) == 1.0
 
