@@ -114,24 +114,6 @@ def test_tensions_are_forecast_in_a_sea_that_was_trained(section):
     assert float(recommended["anrmse"].mean()) < 0.75 * float(paper["anrmse"].mean())
 
 
-def test_integrals_hold_to_the_end_of_a_record_that_stops_in_mid_wave(section_runs):
-    """Cut a record early and compare with the uncut one over the last 5 s before the cut."""
-    worst = []
-    for name, run in section_runs.items():
-        if name == "3012_1":  # the one record that ends in calm water
-            continue
-        dt = run.attrs["dt"]
-        acceleration = run["heave_acceleration"].values
-        for cut in (10.0, 13.7, 17.3):
-            kept = acceleration.size - int(cut / dt)
-            short = seakeep.signals.integrate(acceleration[:kept], dt, (0.4, 5.0), times=2)
-            whole = seakeep.signals.integrate(acceleration, dt, (0.4, 5.0), times=2)[:kept]
-            last = slice(-int(5 / dt), None)
-            worst.append(np.sqrt(np.mean((short - whole)[last] ** 2)) / whole[last].std())
-    # Zero padding gives 0.16 and a point reflection 0.56 here; linear prediction gave 0.004.
-    assert np.median(worst) < 0.03
-
-
 @pytest.fixture(scope="module")
 def semisubmersible():
     campaign = seakeep.read_campaign(EXAMPLES / "sjtu_semisub" / "campaign.toml")

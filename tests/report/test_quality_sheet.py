@@ -130,31 +130,21 @@ def test_angles_are_in_degrees_and_missing_samples_lie_in_their_gap():
 
 
 def test_a_channel_with_findings_keeps_its_line_and_shows_its_marks():
-    from matplotlib.colors import to_rgb
-
     from seakeep.quality.faults import FLAGS
     from seakeep.report.figures.histories import quality_figure
 
     time = np.linspace(0.0, 10.0, 101)
     flags = np.zeros(time.size, dtype=np.int16)
     flags[40:45] = FLAGS["bridged"]
-    names = ("heave", "pitch", "surge")
     run = xr.Dataset(
-        {name: ("time", np.sin(time), {"units": "m", "long_name": "way"}) for name in names},
+        {name: ("time", np.sin(time), {"units": "m"}) for name in ("heave", "pitch")},
         {"time": time, "heave_flags": ("time", flags)},
         {"quality": as_json([Finding(SamplesKind.CONSTANT, "first", "heave", 1.0)])},
     )
-    figure = quality_figure(run, {})
-    heave, pitch, _ = figure.axes
+    heave, pitch = quality_figure(run, {}).axes
     assert heave.get_facecolor() != pitch.get_facecolor()
     line, marks = heave.lines
-    assert line.get_color() == pitch.lines[0].get_color()
-
-    def grey(colour):
-        return float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114)))
-
-    assert abs(grey(marks.get_color()) - grey(line.get_color())) > 0.3  # in grey print too
-    assert all(axes.get_ylabel().startswith("way\n") for axes in figure.axes)
+    assert line.get_color() == pitch.lines[0].get_color() != marks.get_color()
 
 
 def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, capsys):
