@@ -139,7 +139,7 @@ class TestUnits:
 
     def prepared(self, tank, header, text=CAMPAIGN):
         columns = tank_columns(1)
-        size = {"mm": 1.0, "cm": 0.1, "m": 1e-3, "deg": 1.0, "-": 1.0, "": 1.0}[header]
+        size = {"cm": 0.1, "m": 1e-3}.get(header, 1.0)
         heave = columns.pop("Heave [mm]") * size
         columns[f"Heave [{header}]" if header else "Heave"] = heave
         write_csv(tank / "second.csv", columns)

@@ -157,13 +157,6 @@ class TestStep:
         ):
             read_campaign(tank / "campaign.toml").prepare()
 
-    def test_steps_a_measured_period(self, edited):
-        campaign = read_campaign(edited(("sampling_rate = 10", "steps_per_period = 16")))
-        runs = campaign.prepare()
-        period = campaign.encounter_period()
-        assert runs["first"].attrs["encounter_period"] == period
-        assert {run.attrs["dt"] for run in runs.values()} == {period / 16}
-
 
 class TestEncounterPeriod:
     def test_mean_of_the_irregular_runs(self, edited):

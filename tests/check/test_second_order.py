@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from records import record
+from seas import sea
 
 from seakeep import Expression, HankelDMDc, SlowSquares, check
 from seakeep.core.observables import slow_kernel
@@ -13,11 +14,9 @@ GAIN, MEMORY = 0.3, 0.9
 
 def drifting_run(seed=0, samples=2000, waves=None, **attrs):
     """A surge that remembers, and is pushed by the square of the wave."""
-    rng = np.random.default_rng(seed)
     time = DT * np.arange(samples)
     if waves is None:
-        f, phase = rng.uniform(0.7, 1.3, 40), rng.uniform(0, 2 * np.pi, 40)
-        wave = 0.1 * np.cos(2 * np.pi * np.outer(time, f) + phase).sum(axis=1)
+        wave = 0.45 * sea(seed, (0.7, 1.3), PERIOD, 40).at(time)
     else:
         wave = 0.5 * np.cos(2 * np.pi * waves * time)
     surge = np.zeros(samples)

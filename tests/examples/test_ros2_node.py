@@ -210,9 +210,7 @@ def test_the_node_follows_a_recorded_bag(node, model, run, make_run, tmp_path):
     again.play(tmp_path / "second")
     first = again.published["~/estimate"][0].header.stamp
     assert first.sec + 1e-9 * first.nanosec <= CLOCK + 241 * DT
-    last = [float(run[name].values[len(estimates)]) for name in model.states]
     assert np.all(np.isfinite(again.published["~/estimate"][-1].position))
-    assert np.all(np.isfinite(last))
 
 
 @pytest.mark.parametrize("turn", [(0.4, -0.2, 0.7), (0.0, np.pi / 2, 0.0), (-3.0, 0.1, 3.1)])

@@ -86,9 +86,11 @@ def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, fin
         run_study(study, out, progress=stop)
     assert len(list((out / UNITS).iterdir())) == 3
     assert not (out / "study.nc").exists()
-    (out / UNITS / ".half.nc.tmp").write_bytes(b"\x89H")
+    for name in (f"{UNITS}/.half.nc.tmp", "notes.tmp"):
+        (out / name).write_bytes(b"\x89H")
     with pytest.warns(SeakeepWarning, match=r"removed 1 unfinished file\(s\) of a killed run"):
         again = run_study(study, out, progress=lambda *each: told.append(each))
+    assert (out / "notes.tmp").exists()
     assert next(each[0] for each in told if each[2].startswith("fitting and forecasting, ")) == 3
     same(finished, again)
 

@@ -5,8 +5,7 @@ import pytest
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.models.settings import periods_to_samples
-from seakeep.study.plan import Needs, choose_tests, choose_training, training_samples
+from seakeep.study.plan import Needs, choose_tests, choose_training
 from seakeep.study.settings import StudySettings
 from seakeep.toml import validated
 
@@ -153,9 +152,3 @@ def test_leaving_out_a_run_leaves_out_those_that_repeat_its_waves():
     del runs["b"]
     with pytest.raises(RequestError, match="a run with its repetitions of a, a_2 leaves no run"):
         training(runs=runs, inputs=inputs, scheme="leave_out")
-
-
-def test_the_papers_windows_hold_37_5_periods():
-    # 30 periods of 32 samples, and the longest delay of 7.5 before them.
-    needs = Needs(periods_to_samples(30, 1.64, 1.64 / 32), periods_to_samples(7.5, 1.64, 1.64 / 32))
-    assert training_samples(needs) == 37.5 * 32
