@@ -8,7 +8,6 @@ from seas import sea
 from small_tank import tank_columns, write_csv
 
 from seakeep.campaign import read_campaign
-from seakeep.quality import findings_of
 from seakeep.signals import rotation_matrix
 
 G = 9.81
@@ -146,9 +145,6 @@ def test_outliers_are_flagged_and_replaced_when_asked(tank, edited, outliers):
     write_csv(tank / "first.csv", columns)
     path = edited(("sampling_rate = 10", f'dt = 0.02\noutliers = "{outliers}"'))
     run = read_campaign(path).prepare(["first"])["first"]
-    (told,) = (f.text for f in findings_of(run) if f.channel == "heave" and "outlier" in f.text)
-    assert told.startswith("outlier: 4 samples in 3 place(s)")
-    assert told.endswith("; replaced by interpolation") is (outliers == "replace")
     flags = run["heave_flags"]
     bits = dict(zip(flags.attrs["flag_meanings"].split(), flags.attrs["flag_masks"], strict=True))
     marked = np.flatnonzero(flags.values & bits["outlier"])

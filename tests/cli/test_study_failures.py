@@ -45,24 +45,22 @@ def a_file(folder):
     ("spoil", "status", "words"),
     [
         (
-            lambda folder: edit(
-                folder / "study.toml", ('["10 T", "20 T"]', '["1000 T", "2000 T"]')
-            ),
+            ('["10 T", "20 T"]', '["1000 T", "2000 T"]'),
             2,
             ["training: no window is feasible in", "Shorten window or the delays"],
         ),
         (
-            lambda folder: edit(folder / "study.toml", ("length = 6", "length = 600")),
+            ("length = 6", "length = 600"),
             2,
             ["tests.unseen: no window is feasible", "Reduce length or startup"],
         ),
         (
-            lambda folder: edit(folder / "study.toml", ("length = 6", "length = 6\nstartup = 1e6")),
+            ("length = 6", "length = 6\nstartup = 1e6"),
             2,
             ["tests.unseen: no window is feasible", "holds 0 samples", "Reduce length or startup"],
         ),
         (
-            lambda folder: edit(folder / "study.toml", ('["unseen"]', '["first"]')),
+            ('["unseen"]', '["first"]'),
             2,
             ["tests.unseen: the run 'first' trains", "no test span", "or name other runs"],
         ),
@@ -79,7 +77,7 @@ def a_file(folder):
 def test_each_mistake_has_its_message_and_its_exit_status(
     study_folder, spoil, status, words, capfd
 ):
-    spoil(study_folder)
+    spoil(study_folder) if callable(spoil) else edit(study_folder / "study.toml", spoil)
     assert study(study_folder) == status
     told = " ".join(capfd.readouterr().err.split())
     for each in words:

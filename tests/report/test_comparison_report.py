@@ -150,11 +150,9 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
     turned = difference_table(dict(reversed(found.items())))
     told = winner(turned, {})
     assert told == "Least error: ours, ANRMSE 0.100, −50 % [−50 to −50 %] from theirs."
-    assert "[models.fir]" in winner(turned, {"ours": "fir"})
     unsure = turned.assign(all_upper=abs(turned["all_upper"]))
     told = winner(unsure, {"ours": "fir"})
     assert told.endswith("from theirs: no model is surely better. Keep theirs.")
-    assert told.startswith("Least error: ours, ANRMSE 0.100, −50 % [−50 to +50 %]")
     rows = lines_of(write_differences(table, tmp_path / "d.csv"))
     assert [row["run"] for row in rows] == [*runs, *runs, "", ""]
     (only,) = difference_blocks(difference_table({k: each[:1] for k, each in found.items()}))

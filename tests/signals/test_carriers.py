@@ -71,8 +71,6 @@ def test_the_position_follows_a_slow_oscillation_and_holds_at_rest():
     true = slow[period - 1 + ahead :]
     # Thirty-two samples tell a rate, which 24 samples later is that of another phase.
     assert np.std(place[: len(true)] - true) < 0.15 * slow.std()
-    held = np.std(np.convolve(slow, np.ones(period) / period, "valid")[: len(true)] - true)
-    assert np.std(place[: len(true)] - true) < 0.5 * held
     # Without delay: what the weights are fitted to.
     middle = slice(400, -400)
     np.testing.assert_allclose(slow_position(slow + quick, period)[middle], slow[middle], atol=0.02)
