@@ -247,7 +247,7 @@ CHANGES = (
     ("report/acts.py", "slack[longer].upper + SLACKER < slack[shorter].lower", "slack[shorter].upper + SLACKER < slack[longer].lower", "report/test_claims.py::test_the_error_of_the_stern_line_falls_as_it_is_less_slack"),
     ("report/acts.py", '{words: _share(self, key, LOADS)', '{words: _share(self, key, SLOW[:1])', "report/test_claims.py::test_errors_decide"),
     ("signals/calculus.py", "(gain / (1j * omega) ** times)", "(gain / (-1j * omega) ** times)", "signals/test_calculus.py::test_integral_of_a_wave_in_the_band"),
-    ("signals/calculus.py", "(slope / dt if times == 1", "(slope if times == 1", "signals/test_calculus.py::test_a_complementary_rate_keeps_the_steady_drift"),
+    ("signals/calculus.py", "(slope / dt if times == 1", "(slope if times == 1", "signals/test_rigid_body.py::test_blend_keeps_slow_motion_and_needs_no_drift_removal"),
     ("signals/calculus.py", "reflection = -2.0 * float(", "reflection = -1.0 * float(", "signals/test_prediction.py::test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on"),
     ("signals/calculus.py", "1.1 * high - frequency) / (0.2 * high)", "1.1 * high - frequency) / (0.4 * high)", "signals/test_calculus.py::test_gain_of_the_band"),
     ("signals/calculus.py", "np.abs(analytic) ** 2", "np.abs(analytic)", "signals/test_calculus.py::test_envelope_of_a_group"),

@@ -132,16 +132,12 @@ def test_motions_of_the_centre_of_gravity(plain, tracked):
 def hide_corner(i, lit, corner, leg):
     """A dark triangle of two legs along the panel's sides (pixels), over one of its corners."""
     surge, heave, pitch = motion(i / RATE)
-    half = 0.5 * np.array(tank_video.PANEL)
-    panel = half * [[-1, 1], [1, 1], [1, -1], [-1, -1]] + [0, tank_video.PANEL_HEIGHT]
-    places = tank_video._turned(panel, (surge, heave + COG), pitch)
-    here = places[corner]
-    along, across = (
-        (places[(corner + step) % 4] - here) / np.hypot(*(places[(corner + step) % 4] - here))
-        for step in (1, -1)
-    )
-    out = here - 2 * (along + across)
-    points = np.array([out, out + (leg + 4) * along, out + (leg + 4) * across])
+    beyond = tank_video.METRES_PER_PIXEL * np.array([[2, 2], [-leg - 2, 2], [2, -leg - 2]])
+    triangle = (0.5 * np.array(tank_video.PANEL) + beyond) * [(-1, 1), (1, 1), (1, -1), (-1, -1)][
+        corner
+    ]
+    triangle[:, 1] += tank_video.PANEL_HEIGHT
+    points = tank_video._turned(triangle, (surge, heave + COG), pitch)
     hidden = np.ascontiguousarray(lit)
     cv2.fillPoly(
         hidden, [tank_video._corners(points)], (60, 60, 60), cv2.LINE_AA, tank_video.FRACTION_BITS
