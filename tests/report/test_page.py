@@ -189,7 +189,7 @@ def test_a_report_that_was_interrupted_is_written_again(tmp_path):
 
 @pytest.fixture(scope="module")
 def browser():
-    """A Chromium of the system, without a window, that logs all it asks for and complains of."""
+    """A Chromium of the system, without a window, that logs all it complains of."""
     webdriver = pytest.importorskip(
         "selenium.webdriver", reason="selenium is not installed (group 'test')"
     )
@@ -205,7 +205,7 @@ def browser():
     for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1300,1000"):
         options.add_argument(argument)
     options.add_argument("--disable-dev-shm-usage")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     started = webdriver.Chrome(options=options, service=Service(driver))
     yield started
     started.quit()
@@ -213,24 +213,12 @@ def browser():
 
 @pytest.fixture
 def opened(browser, page):
-    browser.get_log("browser"), browser.get_log("performance")
     browser.get(page.as_uri())
     return browser
 
 
 def state(browser, key):
     return browser.execute_script(f"return document.getElementById('history').dataset.{key}")
-
-
-def test_nothing_is_asked_for_and_nothing_complained_of(opened, page):
-    assert opened.get_log("browser") == []
-    messages = [json.loads(entry["message"])["message"] for entry in opened.get_log("performance")]
-    asked = {
-        each["params"]["request"]["url"].partition("#")[0]
-        for each in messages
-        if each["method"] == "Network.requestWillBeSent"
-    }
-    assert {each for each in asked if not each.startswith("data:")} == {page.as_uri()}
 
 
 def test_the_time_histories_zoom_and_choose(opened):

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from cells import cells
 
 from seakeep.report.sections.data import chosen
 from seakeep.report.sections.results import bands, regular, scales
 from seakeep.study import StudyResult
-from seakeep.study.judge import MEASURES, band_tables, box_table
+from seakeep.study.judge import band_tables, box_table
 
 
 @pytest.fixture
@@ -19,23 +20,13 @@ def result():
     time, names = np.arange(1, 13), ["heave", "load"]
     wave = np.where(time % 2, 2.0, -2.0) * np.sqrt(11 / 12)  # SD 2 with ddof = 1
     measured = np.stack([wave, np.full(12, 5.0)], axis=1)[None]
-    dims = ("training", "window", "time", "channel")
     lower, upper = np.full((1, 1, 12, 2), -10.0), np.full((1, 1, 12, 2), 10.0)
     upper[..., :4, 0] = -9.0  # the first third of the horizon misses the wave
     errors = [[[[0.3, np.nan]]], [[[0.3, np.nan]]], [[[0.075, 1.525]]]]
-    test = xr.Dataset(
-        {
-            "measured": (dims[1:], measured),
-            "judged": (("training", "window"), [[True]]),
-            "training_std": (("training", "channel"), [[8.0, 0.5]]),
-            "lower": (("ensemble", *dims), lower[None]),
-            "upper": (("ensemble", *dims), upper[None]),
-            "error": (("model", "measure", "training", "window", "channel"), [errors]),
-            "run": ("window", ["short"]),
-        },
-        coords={"channel": names, "time": time, "model": ["m"], "ensemble": ["m"]}
-        | {"measure": list(MEASURES)},
-    )
+    test = cells(
+        names, time, measured=measured, judged=[[True]], training_std=[[8.0, 0.5]],
+        lower=lower[None], upper=upper[None], error=[errors], run=["short"],
+    )  # fmt: skip
     settings = {"tests": {"t": {"label": "regular, λ/L 1.5"}}, "statistics": {"level": 0.95}}
     channels = xr.Dataset(
         {"units": ("name", ["m", "N"]), "long_name": ("name", ["heave", "stern line"])},

@@ -133,9 +133,8 @@ def hide_corner(i, lit, corner, leg):
     """A dark triangle of two legs along the panel's sides (pixels), over one of its corners."""
     surge, heave, pitch = motion(i / RATE)
     beyond = tank_video.METRES_PER_PIXEL * np.array([[2, 2], [-leg - 2, 2], [2, -leg - 2]])
-    triangle = (0.5 * np.array(tank_video.PANEL) + beyond) * [(-1, 1), (1, 1), (1, -1), (-1, -1)][
-        corner
-    ]
+    side = [(-1, 1), (1, 1), (1, -1), (-1, -1)][corner]
+    triangle = side * (0.5 * np.array(tank_video.PANEL) + beyond)
     triangle[:, 1] += tank_video.PANEL_HEIGHT
     points = tank_video._turned(triangle, (surge, heave + COG), pitch)
     hidden = np.ascontiguousarray(lit)

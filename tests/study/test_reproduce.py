@@ -35,27 +35,25 @@ def record(name, seconds, rng):
     omega = 2 * np.pi * np.array(regular.get(name, [0.4, 0.5, 0.57, 0.66, 0.75, 0.9]))
     turn = omega * t[:, None] + rng.uniform(0, 2 * np.pi, omega.size)
 
-    def waves(lag, power=0, amplitude=1.0):
-        return amplitude * (omega**power * np.cos(turn - lag + 0.5 * np.pi * power)).sum(axis=1)
-
     drift = np.sin(2 * np.pi * t / 29.9) + 0.3 * np.sin(2 * np.pi * t / 47.0)
-    values = {
-        "kn_fwd": ("mm", waves(0.0, amplitude=20.0)),
-        "kn_cog": ("mm", waves(omega**2 * 3.67 / 9.81, amplitude=20.0)),
-        "heave": ("m", waves(2.0, amplitude=0.01)),
-        "pitch": ("deg", waves(1.0)),
-        "rate_y": ("deg/s", waves(1.0, 1)),
-        "acceleration_x": ("m/s^2", waves(2.5, 2, 0.008)),
-        "acceleration_z": ("m/s^2", waves(2.0, 2, 0.01)),
-        "surge": ("m", waves(2.5, amplitude=0.008) + 0.25 * drift),
-        "mooring_bow": ("N", 2 + waves(2.5, amplitude=0.1) + 0.4 * drift),
-        "mooring_stern": ("N", 2 - waves(2.5, amplitude=0.1) - 0.4 * drift),
-    }
-    noisy = {
-        key: ("time", x + 0.01 * x.std() * rng.standard_normal(x.size), {"units": unit})
-        for key, (unit, x) in values.items()
-    }
-    return xr.Dataset(noisy, coords={"time": ("time", t, {"units": "s"})})
+    made = {}
+    for key, unit, amplitude, lag, power, drifts in (
+        ("kn_fwd", "mm", 20.0, 0.0, 0, 0.0),
+        ("kn_cog", "mm", 20.0, omega**2 * 3.67 / 9.81, 0, 0.0),
+        ("heave", "m", 0.01, 2.0, 0, 0.0),
+        ("pitch", "deg", 1.0, 1.0, 0, 0.0),
+        ("rate_y", "deg/s", 1.0, 1.0, 1, 0.0),
+        ("acceleration_x", "m/s^2", 0.008, 2.5, 2, 0.0),
+        ("acceleration_z", "m/s^2", 0.01, 2.0, 2, 0.0),
+        ("surge", "m", 0.008, 2.5, 0, 0.25),
+        ("mooring_bow", "N", 0.1, 2.5, 0, 0.4),
+        ("mooring_stern", "N", -0.1, 2.5, 0, -0.4),
+    ):
+        waves = omega**power * np.cos(turn - lag + 0.5 * np.pi * power)
+        x = 2.0 * (unit == "N") + amplitude * waves.sum(axis=1) + drifts * drift
+        noise = 0.01 * x.std() * rng.standard_normal(x.size)
+        made[key] = ("time", x + noise, {"units": unit})
+    return xr.Dataset(made, coords={"time": ("time", t, {"units": "s"})})
 
 
 def play_small(settings, out, progress=None):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from cells import cells
 
 from seakeep.study.judge import is_regular, regular_response
 
@@ -15,17 +16,11 @@ def groups(shift=0.9, offset=0.3, ratio=0.8, lead=40.0):
     turn = 2 * np.pi * FREQUENCY * TIME + np.array([0.0, 1.0, 2.0])[:, None]
     measured = shift + 0.1 * np.cos(turn)
     forecast = shift + offset + 0.1 * ratio * np.cos(turn + np.radians(lead))
-    over = ("training", "window", "time", "channel")
-    test = xr.Dataset(
-        {
-            "measured": (over[1:], measured[..., None]),
-            "judged": (over[:2], np.ones((2, 3), dtype=bool)),
-            "run": ("window", ["wave"] * 3),
-            "mean": (("model", *over), np.tile(forecast[..., None], (1, 2, 1, 1, 1))),
-            "error": (("model", "measure", *over[:2], "channel"), np.ones((1, 1, 2, 3, 1))),
-        },
-        coords={"time": TIME, "channel": ["surge"], "model": ["m"], "measure": ["nrmse"]},
-    )
+    test = cells(
+        ["surge"], TIME, measured=measured[..., None], judged=np.ones((2, 3), bool),
+        run=["wave"] * 3, mean=np.tile(forecast[..., None], (1, 2, 1, 1, 1)),
+        error=np.ones((1, 3, 2, 3, 1)),
+    )  # fmt: skip
     frequencies = ("run", [FREQUENCY, np.nan])
     runs = xr.Dataset({"wave_frequency": frequencies}, {"run": ["wave", "sea"]})
     return {"tests/t": test, "runs": runs}

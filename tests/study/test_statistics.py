@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from cells import cells
 from tutorial_study import STUDY, put_tutorial
 
 from seakeep import statistics
@@ -93,7 +94,7 @@ def test_the_truth_is_read_at_the_instants_of_the_windows(found):
     assert table["inside"].sel(channel="heave").diff("against").item() != 0
 
 
-def cells(inside=0.5):
+def four(inside=0.5):
     """Two training sets and two windows of two channels; the last pair is not judged."""
     time = np.arange(8)
     measured = np.where(time % 2, 1.0, -1.0)[None, :, None] * [[[1.0, 10.0]], [[2.0, 20.0]]]
@@ -102,28 +103,14 @@ def cells(inside=0.5):
     lower, upper = lower.copy(), upper.copy()
     lower[1, 1], upper[1, 1] = np.nan, np.nan
     errors = np.array([[[0.1, 0.3], [0.2, np.nan]], [[0.4, 0.8], [9.0, 9.0]]])
-    return xr.Dataset(
-        {
-            "measured": (("window", "time", "channel"), measured),
-            "judged": (("training", "window"), [[True, True], [True, False]]),
-            "lower": (("ensemble", "training", "window", "time", "channel"), lower[None]),
-            "upper": (("ensemble", "training", "window", "time", "channel"), upper[None]),
-            "error": (
-                ("model", "measure", "training", "window", "channel"),
-                np.stack([errors, 2 * errors, 3 * errors])[None],
-            ),
-        },
-        coords={
-            "channel": ["heave", "pitch"],
-            "model": ["m"],
-            "ensemble": ["m"],
-            "measure": list(MEASURES),
-        },
-    )
+    return cells(
+        ["heave", "pitch"], time, measured=measured, judged=[[True, True], [True, False]],
+        lower=lower[None], upper=upper[None], error=[[errors, 2 * errors, 3 * errors]],
+    )  # fmt: skip
 
 
 def test_coverage_by_hand():
-    row = band_tables(cells(), None, 0.95)["coverage"].sel(
+    row = band_tables(four(), None, 0.95)["coverage"].sel(
         model="m", band="members", against="measured"
     )
     np.testing.assert_allclose(row["inside"], 0.5, rtol=1e-15)
@@ -136,7 +123,7 @@ def test_coverage_by_hand():
 
 
 def test_boxes_are_those_of_the_judged_cells():
-    table = box_table(cells()).sel(model="m", measure="nrmse")
+    table = box_table(four()).sel(model="m", measure="nrmse")
     expected = {
         "heave": [0.1, 0.2, 0.4],
         "pitch": [0.3, 0.8],  # one cell is slack, and left out
@@ -176,25 +163,15 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path):
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
 
 
-def crossed(rng, levels, cells=10):
-    """Errors of models in cells that share training sets and windows."""
-    rows, columns = 0.1 * rng.standard_normal((cells, 1)), 0.1 * rng.standard_normal(cells)
+def crossed(rng, levels):
+    """Errors of models in 100 cells that share training sets and windows."""
+    rows, columns = 0.1 * rng.standard_normal((10, 1)), 0.1 * rng.standard_normal(10)
     shared = (1.0 + rows + columns)[..., None] * [1.0, 2.0]
     errors = np.multiply.outer(np.outer(list(levels.values()), np.ones(len(MEASURES))), shared)
-    return xr.Dataset(
-        {
-            "error": (("model", "measure", "training", "window", "channel"), errors),
-            "judged": (("training", "window"), np.ones((cells, cells), dtype=bool)),
-            "run": ("window", ["r"] * cells),
-            "start": ("window", 10.0 * np.arange(cells)),
-        },
-        coords={
-            "model": list(levels),
-            "measure": list(MEASURES),
-            "channel": ["heave", "pitch"],
-            "time": [0.1, 10.0],
-        },
-    )
+    return cells(
+        ["heave", "pitch"], [0.1, 10.0], levels, error=errors, judged=np.ones((10, 10), bool),
+        run=["r"] * 10, start=10.0 * np.arange(10),
+    )  # fmt: skip
 
 
 def test_differences_between_models_have_intervals_and_verdicts():
