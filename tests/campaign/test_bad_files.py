@@ -171,4 +171,4 @@ class TestUnits:
         )
         with pytest.warns(SeakeepWarning, match=r"heave leaves its mean by .* Check unit"):
             runs = self.prepared(tank, "deg", mended)  # millimetres, now said to be metres
-        assert float(runs["second"]["heave"].std()) > 1.0
+        assert runs["second"]["heave"].std() > 1.0

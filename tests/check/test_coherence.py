@@ -40,7 +40,7 @@ def test_a_state_too_slow_for_the_segments_is_not_judged(run):
     both = run.assign(surge=slow.assign_attrs(units="m"))
     model = HankelDMDc(0, 3, 1e-3).fit(both.isel(time=slice(0, 4000)), ["surge"], ["eta"])
     found = check.coherence(model, {"run": both})
-    assert float(found.period[0]) == pytest.approx(62.8, rel=0.05)  # a segment has 16 s
+    assert found.period[0] == pytest.approx(62.8, rel=0.05)  # a segment has 16 s
     assert np.isnan(found.linear_bound[0])
     text = possible_section(found, Checked({}, {}, {})).points[0]
     assert text.startswith("surge: cannot be judged: its slow period of 6")
@@ -53,9 +53,9 @@ def test_observables_lower_the_bound(run):
     # A baseline that takes the observables too is not linear, and bounds no linear map.
     other = {"damped": damped.fit(run.isel(time=slice(0, 4000)), ["heave"], ["eta"])}
     found = check.coherence(fitted(run, square), {"run": run}, None, other)
-    assert float(found.linear_bound[0]) == pytest.approx(0.5, abs=0.03)  # 75 x 2 segments
-    assert float(found.observables_bound[0]) < 0.15  # a lag of a sample in segments of 160
-    assert float(found.nrmse[0]) < 0.01
+    assert found.linear_bound[0] == pytest.approx(0.5, abs=0.03)  # 75 x 2 segments
+    assert found.observables_bound[0] < 0.15  # a lag of a sample in segments of 160
+    assert found.nrmse[0] < 0.01
     assert "observables_bound" not in check.coherence(fitted(run), {"run": run})
 
 
@@ -76,13 +76,13 @@ def test_no_linear_model_lies_below_the_bound_of_a_lightly_damped_vessel():
     eta, heave = (test["run"][name].values[:, None] for name in ("eta", "heave"))
     plain = float(np.sqrt(cross_spectra([(eta, heave)], 0.1, 600).share()[0, 0]))
     found = check.coherence(blurred, test)
-    assert float(found.linear_bound[0]) < float(found.nrmse[0])
-    assert float(found.linear_bound[0]) < 0.6 * plain  # of the resonance, leakage leaves much
+    assert found.linear_bound[0] < found.nrmse[0]
+    assert found.linear_bound[0] < 0.6 * plain  # of the resonance, leakage leaves much
     for each in (check.coherence(exact, test), check.coherence(blurred, test, None, {"a": exact})):
         low, high = (float(each[f"linear_bound_{end}"][0]) for end in ("lower", "upper"))
         # The noise; the start of the free run, which has it too, adds some two per cent.
         assert low / 1.02 < 0.01 / heave.std() < high
-        assert float(each.linear_bound[0]) <= float(each.nrmse[0])
+        assert each.linear_bound[0] <= each.nrmse[0]
 
 
 def test_the_interval_of_what_is_left_covers_as_it_says():

@@ -69,7 +69,7 @@ def test_statistics_of_a_narrow_sea_are_those_of_rayleigh(model):
     assert low < 0.008 * np.sqrt(2 * np.log(900)) < high
     step = float(found.deviation[1] - found.deviation[0])
     assert (step * found.density.sum("place")).values == pytest.approx(1.0, abs=0.01)
-    assert 0 <= float(found.divergence) < 0.01  # the model follows the sea
+    assert 0 <= found.divergence < 0.01  # the model follows the sea
     ranked = found.peak.sel(kind="forecast").values
     assert np.all(np.diff(ranked[np.isfinite(ranked)]) <= 0)
 

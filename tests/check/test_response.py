@@ -137,7 +137,7 @@ def test_accuracy_of_the_instruments_widens_the_interval(model):
     wide = float(found[1].amplitude_uncertainty[0, 0])
     # Two standard uncertainties of the ratio; the scatter over windows adds little.
     assert wide == pytest.approx(1.96 * 0.05 * float(found[1].amplitude[0, 0]), rel=0.03)
-    assert wide > 5 * float(found[0].amplitude_uncertainty[0, 0])
+    assert wide > 5 * found[0].amplitude_uncertainty[0, 0]
 
 
 def test_intervals_of_a_harmonic_fit_cover_as_they_say():

@@ -82,32 +82,32 @@ def test_errors_are_those_that_can_be_computed_by_hand_in_any_unit():
     spread = np.sin(TIME).std(ddof=1)
     expected = 0.1 * np.sqrt(np.mean(np.sin(TIME) ** 2)) / spread
     heave = radians.sel(channel="heave")
-    assert float(heave["nrmse"]) == pytest.approx(expected, rel=1e-12)  # rounding of sums
-    assert float(heave["training_nrmse"]) == pytest.approx(expected * spread / 0.7, rel=1e-12)
+    assert heave["nrmse"] == pytest.approx(expected, rel=1e-12)  # rounding of sums
+    assert heave["training_nrmse"] == pytest.approx(expected * spread / 0.7, rel=1e-12)
     fit = 100 * (1 - expected * np.sqrt(TIME.size / (TIME.size - 1)))
-    assert float(heave["fit"]) == pytest.approx(fit, rel=1e-12)
-    assert float(radians["sd_ratio"].sel(channel="pitch")) == pytest.approx(0.9, rel=1e-12)
+    assert heave["fit"] == pytest.approx(fit, rel=1e-12)
+    assert radians["sd_ratio"].sel(channel="pitch") == pytest.approx(0.9, rel=1e-12)
     for measure in ("nrmse", "training_nrmse"):
         np.testing.assert_allclose(radians[measure], degrees[measure], rtol=1e-12)
     pitch = degrees.sel(channel="pitch")
     assert str(pitch["channel_units"].values) == "deg"
-    assert float(pitch["measured_max"]) == pytest.approx(np.degrees(0.1 * np.cos(TIME).max()))
+    assert pitch["measured_max"] == pytest.approx(np.degrees(0.1 * np.cos(TIME).max()))
 
 
 def test_the_band_of_an_ensemble_is_judged_by_hand():
     table, outside = row_of(ensemble()), np.mean(np.abs(0.4 * np.sin(7 * TIME)) > 0.2)
     heave, spread = table.sel(channel="heave"), float(ensemble().measured["heave"].std(ddof=1))
-    assert float(heave["coverage"]) == pytest.approx(100 * (1 - outside), rel=1e-12)
-    assert float(heave["band_width"]) == pytest.approx(0.4, rel=1e-12)
-    assert float(heave["relative_band_width"]) == pytest.approx(0.4 / spread, rel=1e-12)
+    assert heave["coverage"] == pytest.approx(100 * (1 - outside), rel=1e-12)
+    assert heave["band_width"] == pytest.approx(0.4, rel=1e-12)
+    assert heave["relative_band_width"] == pytest.approx(0.4 / spread, rel=1e-12)
     assert (int(table["members"]), int(table["diverged"]), float(table["level"])) == (5, 1, 0.9)
     assert ensemble().complete
     for judged, names in ((table, UNITS), (row_of(ensemble(slack=True)), ["heave", "pitch"])):
         mean = judged["coverage"].sel(channel=list(names)).mean()  # without a slack line
-        assert float(judged["mean_coverage"]) == pytest.approx(float(mean), rel=1e-12)
+        assert judged["mean_coverage"] == pytest.approx(float(mean), rel=1e-12)
     degrees = row_of(in_degrees(ensemble()))
     np.testing.assert_array_equal(table["coverage"], degrees["coverage"])
-    assert float(degrees["band_width"].sel(channel="pitch")) == pytest.approx(np.degrees(0.4))
+    assert degrees["band_width"].sel(channel="pitch") == pytest.approx(np.degrees(0.4))
 
 
 def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path):

@@ -56,7 +56,7 @@ def test_the_test_starts_in_the_test_span_with_history_from_before_it(halves):
     assert model.training.columns == (1001 - 1 - 60,)
     (judged,) = compare(model, campaign(halves, EXACT))
     assert judged.start == 100.0  # the 60 samples of history lie in the training half
-    assert float(judged.forecast.time[-1]) == 200.0
+    assert judged.forecast.time[-1] == 200.0
     # The system is linear; what is left is the mean: the window's means are not those of a steady
     # state, and a model of deviations has no constant term (the ends of the window over its
     # length, some 1e-4 here).
@@ -158,7 +158,7 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
     with pytest.warns(SeakeepWarning, match="needs these waves ahead of time"):
         found = comparison_table(compare(model, whole)).isel(run=0)
     assert str(found["conditional_on"].values) == "surge"
-    assert float(found["probe_offset"]) == 0.1
+    assert found["probe_offset"] == 0.1
 
 
 def sines(folder: Path, periods: dict[str, tuple[float, ...]]) -> str:
@@ -227,7 +227,7 @@ def test_a_lead_reads_waves_ahead_of_time(halves):
         (whole,) = compare(model, asked)
     # The step to instant k reads the waves of k + 7: seven instants before the end it is the last.
     run = asked.prepare()[whole.run]
-    assert float(whole.forecast["time"][-1]) == pytest.approx(float(run["time"][-8]))
+    assert whole.forecast["time"][-1] == pytest.approx(float(run["time"][-8]))
 
 
 def test_a_field_of_a_spec_is_a_key_of_files(monkeypatch, halves, tmp_path):

@@ -32,10 +32,10 @@ def test_the_parts_are_what_the_forecast_was_made_of():
     own = groups()["tests/t"]["measured"].std("time", ddof=1).values[:, 0]
     offset = np.sqrt(np.mean((0.3 / own) ** 2))
     # The offset and the wave are not quite orthogonal over 6.9 periods: 1 % of the offset.
-    assert float(found["error_offset"]) == pytest.approx(offset, rel=0.01)
-    assert float(found["amplitude_ratio"]) == pytest.approx(0.8, rel=1e-9)
-    assert float(found["phase_lead"]) == pytest.approx(40.0, abs=1e-6)
-    assert float(found["error_rest"]) < 1e-6
+    assert found["error_offset"] == pytest.approx(offset, rel=0.01)
+    assert found["amplitude_ratio"] == pytest.approx(0.8, rel=1e-9)
+    assert found["phase_lead"] == pytest.approx(40.0, abs=1e-6)
+    assert found["error_rest"] < 1e-6
 
 
 def test_the_squares_add_up_to_that_of_the_error():

@@ -47,7 +47,7 @@ def test_raw_csv_reads_back(short, played, tmp_path):
     assert video["time [s]"].to_numpy() == pytest.approx(np.arange(901) / 30.0, abs=6e-7)
     true = truth(played, "irregular_1", 0.002)
     error = 1e-3 * probes["kn_cog [mm]"].to_numpy() - true["eta_kn_cog"] - true["eta_kn_cog_crest"]
-    assert float(error.std()) == pytest.approx(6e-4, rel=0.03)
+    assert error.std() == pytest.approx(6e-4, rel=0.03)
 
 
 def test_campaign_file_lists_all_files_clocks_and_spans(short, tmp_path):
@@ -78,10 +78,10 @@ def test_one_loggers_campaign_can_be_prepared(short, played, tmp_path):
     true = truth(played, "irregular_1")
     heave = np.interp(run["time"], true["time"], true["heave"])
     # Noise of 0.8 mm, most of it above the new Nyquist frequency.
-    assert float((run["heave"] - heave).std()) < 1e-3
+    assert (run["heave"] - heave).std() < 1e-3
     rate = np.interp(run["time"], true["time"], true["heave_rate"])
     middle = slice(100, -100)
-    assert float((run["heave_rate"] - rate)[middle].std()) < 0.15 * float(rate[middle].std())
+    assert (run["heave_rate"] - rate)[middle].std() < 0.15 * rate[middle].std()
 
 
 def test_nothing_that_the_tank_has_not_written_is_replaced(short, tmp_path):
