@@ -331,6 +331,7 @@ def test_a_mistake_gets_one_message_and_no_traceback(command, message, run):
         (f"compare model.nc {CAMPAIGN} -o mine", "mine/comparison.csv"),
         (f"check model.nc {CAMPAIGN} -o checked", "checked/tables/modes.csv"),
         (f"tune {CAMPAIGN} --vary rank", "docs/tutorial/campaign_tuned.png"),
+        (f"prepare --anew {CAMPAIGN} -o sheets", "sheets/quality_first.png"),
         (f"compare model.nc {CAMPAIGN} -o drawn", "drawn/unseen.png"),
     ],
 )
@@ -346,6 +347,7 @@ def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, pla
         "docs/tutorial/campaign_tuned.png": "a photograph",
         "mine/comparison.csv": "run,rating\n",
         "drawn/unseen.png": "a photograph",
+        "sheets/quality_first.png": "a photograph",
     }.items():
         (place / name).parent.mkdir(parents=True, exist_ok=True)
         (place / name).write_text(text, newline="")

@@ -50,11 +50,6 @@ def a_file(folder):
             ["training: no window is feasible in", "Shorten window or the delays"],
         ),
         (
-            ("length = 6", "length = 600"),
-            2,
-            ["tests.unseen: no window is feasible", "Reduce length or startup"],
-        ),
-        (
             ("length = 6", "length = 6\nstartup = 1e6"),
             2,
             ["tests.unseen: no window is feasible", "holds 0 samples", "Reduce length or startup"],
@@ -72,7 +67,7 @@ def a_file(folder):
         (of_another, 2, ["holds the results of another study", "000000000000", "-o"]),
         (a_file, 1, ["results could not be written to", "or choose a folder"]),
     ],
-    ids=["training", "length", "startup", "trains", "channel", "digest", "file"],
+    ids=["training", "startup", "trains", "channel", "digest", "file"],
 )
 def test_each_mistake_has_its_message_and_its_exit_status(
     study_folder, spoil, status, words, capfd

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import xarray as xr
+from records import record
 
 from seakeep.campaign.pipeline import flag_samples
 from seakeep.campaign.settings import PreparationSettings
@@ -29,9 +29,9 @@ def noisy():
 
 def reported(x):
     """Kinds of findings about samples."""
-    group = xr.Dataset({"x": ("time", x, {"units": "m"})}, {"time": T})
-    record = Record("r", group, {"": flag_samples(group, PreparationSettings())})
-    return {found.kind.name for check in (flagged, constant, noise) for found in check(record)}
+    group = record(DT, x=x)
+    run = Record("r", group, {"": flag_samples(group, PreparationSettings())})
+    return {found.kind.name for check in (flagged, constant, noise) for found in check(run)}
 
 
 def faulty(x, kind, length, place):
@@ -92,10 +92,10 @@ def test_a_probe_that_dies_has_no_drift_besides():
     x = waves()
     dead = 1500 + int(np.argmax(x[1500:1600]))
     x[dead:] = x[dead]
-    group = xr.Dataset({"eta": ("time", x, {"units": "m"})}, {"time": T})
-    group = flag_samples(group, PreparationSettings())
-    assert list(levels(Record("r", group, {"": group}))) == []
-    assert [each.kind.name for each in flagged(Record("r", group, {"": group}))] == ["STUCK"]
+    group = flag_samples(record(DT, eta=x), PreparationSettings())
+    run = Record("r", group, {"": group})
+    assert list(levels(run)) == []
+    assert [each.kind.name for each in flagged(run)] == ["STUCK"]
 
 
 def test_at_rest_around_the_waves_is_not_held(noisy):

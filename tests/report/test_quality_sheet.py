@@ -181,10 +181,3 @@ def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, capsys):
     first, second = folder / "quality_first.png", folder / "quality_second.png"
     assert second.stat().st_mtime_ns == before[second]
     assert first.stat().st_mtime_ns > before[first]
-    first.write_bytes(b"a photo of mine")
-    for command in ("prepare", "prepare --anew"):
-        assert cli.main([*command.split(), str(tmp_path / "campaign.toml")]) == 2
-    assert (
-        "quality_first.png exists and is not a data-quality sheet that" in capsys.readouterr().err
-    )
-    assert first.read_bytes() == b"a photo of mine"

@@ -53,7 +53,6 @@ def test_raw_csv_reads_back(short, played, tmp_path):
 def test_campaign_file_lists_all_files_clocks_and_spans(short, tmp_path):
     play(short, tmp_path)
     table = tomllib.loads((tmp_path / "campaign.toml").read_text(encoding="utf-8"))
-    assert table["campaign"]["scale_factor"] == 50
     assert table["instruments"]["video"]["trigger"] == "lamp"
     run = table["runs"]["irregular_1"]
     assert (run["train"], run["test"]) == ([10, 20], [20, 30])
