@@ -95,24 +95,20 @@ def test_any_order_of_arrival_within_patience_gives_the_same_estimates(model, ru
 
 def test_what_is_lost_is_estimated_and_counted(model, run):
     """A stamp an hour ahead, one that comes late, a value that is none, and messages never sent."""
-    of_40 = range(4 * 40, 4 * 41)
-    sent = {n: each for n, each in enumerate(messages(model, run)) if n not in of_40}
-    at = {(each[1], n // 4): n for n, each in sent.items()}
-    odd = {  # later, ahead, another value
-        ("heave", 20): (0.0, 3600.0, 0.0),
-        ("pitch", 25): (0.5, 0.0, 0.0),
-        ("eta_cog", 30): (0.5, 0.0, 0.0),
-        ("heave", 35): (0.0, 0.0, np.nan),
-    }
-    kept = sent.copy()
-    for key, (late, ahead, other) in odd.items():
-        arrival, channel, stamp, value = kept.pop(at[key])
-        sent[at[key]] = (arrival + late, channel, stamp + ahead, value + other)
+    odd = {("heave", 20): (3600.0, 0.0), ("pitch", 25): (0.0, 0.5), ("eta_cog", 30): (0.0, 0.5)}
+    sent, kept = [], []
+    for number, (arrival, channel, stamp, value) in enumerate(messages(model, run)):
+        ahead, late = odd.get((channel, number // 4), (0.0, 0.0))
+        if (channel, number // 4) == ("heave", 35):
+            value = np.nan
+        elif not ahead + late and number // 4 != 40:
+            kept.append((arrival, channel, stamp, value))
+        if number // 4 != 40:
+            sent.append((arrival + late, channel, stamp + ahead, value))
     follower = Follower(model.live)
-    found = play(follower, sent.values())
+    found = play(follower, sent)
     assert len(found) == COUNT
-    only = play(Follower(model.live), kept.values())
-    np.testing.assert_array_equal(states(found), states(only))
+    np.testing.assert_array_equal(states(found), states(play(Follower(model.live), kept)))
     assert follower.lost == {
         ("heave", "early"): 1,
         ("pitch", "late"): 1,
