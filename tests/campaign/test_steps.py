@@ -56,11 +56,13 @@ def turning():
     return angular_velocity(T), rate(angular_velocity, 1)(T)
 
 
-def written(folder, columns, text):
-    write_csv(folder / "run.csv", {"time [s]": T, **columns})
+def prepared(folder, columns, text, time=T):
+    """The run of a file, by a campaign whose last table may be that of the run."""
+    write_csv(folder / "run.csv", {"time [s]": time, **columns})
     path = folder / "campaign.toml"
-    path.write_text(text + '\n[runs.r]\nfile = "run.csv"\n')
-    return read_campaign(path)
+    of_run = "" if "[runs.r]" in text else "[runs.r]\n"
+    path.write_text(f"{text}\n{of_run}file = 'run.csv'\n")
+    return read_campaign(path).prepare()["r"]
 
 
 def gyroscope():
@@ -90,7 +92,7 @@ def test_motions_are_transferred_to_another_point(tmp_path):
                 f"[channels.{name}{kind}]\n[derived.bow_{name}{kind}]\nfrom = '{name}{kind}'\n"
                 f"step = 'transfer'\noffset = {ARM.tolist()}\n"
             )
-    run = written(tmp_path, columns, text).prepare()["r"]
+    run = prepared(tmp_path, columns, text)
     for axis, name in enumerate(("surge", "sway", "heave")):
         for order, kind in enumerate(("", "_rate", "_acceleration")):
             found = run[f"bow_{name}{kind}"]
@@ -116,7 +118,7 @@ def test_gravity_is_removed_from_accelerometers(tmp_path, zeroed):
             "step = 'remove_gravity'\ncomponents = ['a_x', 'a_y', 'a_z']\n"
             f"zeroed = {str(zeroed).lower()}\n"
         )
-    run = written(tmp_path, columns, text).prepare()["r"]
+    run = prepared(tmp_path, columns, text)
     for i, name in enumerate(("surge", "sway", "heave")):
         found = run[f"{name}_acceleration"]
         np.testing.assert_allclose(found, acceleration[:, i], atol=1e-6)
@@ -134,7 +136,7 @@ def test_gravity_is_removed_from_one_accelerometer(tmp_path, axis):
     columns, text = gyroscope()
     columns["a [m/s^2]"] = along + G * turn[:, 2, i]
     text += f"[channels.a]\n[derived.free]\nfrom = 'a'\nstep = 'remove_gravity'\naxis = '{axis}'\n"
-    run = written(tmp_path, columns, text).prepare()["r"]
+    run = prepared(tmp_path, columns, text)
     np.testing.assert_allclose(run["free"], along, atol=1e-9)
 
 
@@ -166,16 +168,13 @@ RATE, PERIOD = 500.0, 1.64
 
 
 def tone_campaign(folder, frequencies, preset):
-    t = np.arange(0, 60, 1 / RATE)
-    columns = {"time [s]": t}
+    t, columns = np.arange(0, 60, 1 / RATE), {}
     text = f"[campaign]\nencounter_period = {PERIOD}\n[preparation]\npreset = '{preset}'\n"
     for f in frequencies:
         name = f"tone_{f:g}".replace(".", "p")
         columns[f"{name} [m]"] = np.cos(2 * np.pi * f * t)
         text += f"[channels.{name}]\n"
-    write_csv(folder / "run.csv", columns)
-    (folder / "campaign.toml").write_text(text + "[runs.r]\nfile = 'run.csv'\n")
-    return read_campaign(folder / "campaign.toml").prepare()["r"]
+    return prepared(folder, columns, text, t)
 
 
 TONES = (0.61, 5.0, 7.7, 9.9, 11.0, 30.0)
@@ -210,14 +209,11 @@ def two_probes(folder, positions, spans=""):
     t = np.arange(0, 120, 0.05)
     late = np.where(t < 60, 0.4, 0.5) if spans else 0.5
     waves = 0.05 * np.sin(2 * np.pi * 0.78 * t), 0.05 * np.sin(2 * np.pi * 0.78 * (t - late))
-    columns = {"time [s]": t, "eta_a [m]": waves[0], "eta_b [m]": waves[1]}
-    write_csv(folder / "run.csv", columns)
-    (folder / "campaign.toml").write_text(
+    text = (
         f"[rig]\nwater_depth = 3.6\n[rig.positions]\n{positions}\n[channels.eta_a]\n"
-        "[channels.eta_b]\n[runs.r]\nfile = 'run.csv'\nwaves = 'regular'\n"
-        f"{spans}\n"
+        f"[channels.eta_b]\n[runs.r]\nwaves = 'regular'\n{spans}"
     )
-    return read_campaign(folder / "campaign.toml").prepare()["r"]
+    return prepared(folder, {"eta_a [m]": waves[0], "eta_b [m]": waves[1]}, text, t)
 
 
 def test_a_prepared_run_has_the_celerity_of_its_waves(tmp_path):

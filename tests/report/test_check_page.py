@@ -88,9 +88,7 @@ def test_a_motion_that_swings_farther_than_it_was_moved_is_named():
     found = xr.Dataset(
         {
             "displacement": (("motion", "time"), left),
-            "period": none,
-            "damping_ratio": none,
-            "p": none,
+            **dict.fromkeys(("period", "damping_ratio", "p"), none),
         },
         coords={"motion": ["heave", "pitch"], "time": np.arange(4.0)},
     )

@@ -63,17 +63,6 @@ def test_the_test_starts_in_the_test_span_with_history_from_before_it(halves):
     assert judged.anrmse < 1e-3
 
 
-@pytest.mark.filterwarnings("ignore:all. eta_fwd stuck")  # what its preparation finds
-def test_a_dead_probe_in_a_test_run_is_told(halves):
-    whole = campaign(halves, EXACT)
-    model = fit_campaign(whole)
-    table = pd.read_csv(halves / "run.csv")
-    table.loc[1001:, "eta [m]"] = 0.0
-    table.to_csv(halves / "run.csv", index=False)
-    with pytest.warns(SeakeepWarning, match="eta_fwd stuck"):
-        compare(model, whole)
-
-
 def test_runs_that_train_and_test_apart(halves):
     train = '[runs.a]\nfile = "run.csv"\nspan = [0.0, 100.0]\nrole = "train"\n'
     test = '[runs.b]\nfile = "run.csv"\nspan = [100.0, 200.0]\nrole = "test"\n'
