@@ -12,7 +12,6 @@ from tutorial_study import edit
 from seakeep.campaign import draft_campaign, read_campaign
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.quality import findings_of
-from seakeep.quality.clocks import ClocksKind
 
 LOGGERS = """
 [instruments]
@@ -45,6 +44,14 @@ inputs = ["eta_fwd"]
 """
 
 
+CLOCKS = ("ASSUMED_CLOCK", "TIMES_ASIDE", "OTHER_RATE")
+RECORDS = ("STARTS_LATE", "ENDS_EARLY")
+
+
+def told(run, kinds):
+    return [(each.channel, each.text) for each in findings_of(run) if each.kind.name in kinds]
+
+
 SPANS = "train = [0, 10]\ntest = [10, 20]"
 
 
@@ -70,12 +77,12 @@ class TestClocksAndRates:
     """What is assumed or contradicted about instants is a finding."""
 
     def test_clocks_of_which_nothing_is_said_are_assumed_the_same(self, loggers, tmp_path):
-        found = clocks(loggers().prepare()["first"])
+        found = told(loggers().prepare()["first"], CLOCKS)
         assert [channel for channel, _ in found] == ["mru"]
         assert found[0][1].startswith("clock assumed the same as the reference's: state trigger")
         stated = ("[instruments.mru]", "[instruments.mru]\noffset = 0")
         path = edit(tmp_path / "campaign.toml", stated)
-        assert not clocks(read_campaign(path).prepare()["first"])
+        assert not told(read_campaign(path).prepare()["first"], CLOCKS)
 
     @pytest.mark.parametrize(
         ("files", "text"),
@@ -85,7 +92,7 @@ class TestClocksAndRates:
     )  # fmt: skip
     def test_a_rate_against_the_times(self, edited, files, text):
         path = edited(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
-        found = clocks(read_campaign(path).prepare(["first"])["first"])
+        found = told(read_campaign(path).prepare(["first"])["first"], CLOCKS)
         assert [each[0] for each in found] == ([] if text is None else ["time"])
         assert text is None or found[0][1].startswith(text)
 
@@ -130,8 +137,8 @@ class TestSteps:
          ("sampling_rate = 10", None), ("sampling_rate = 3", None), ("sampling_rate = 100", None)],
     )  # fmt: skip
     def test_what_a_coarse_step_loses_is_told(self, edited, chain, fate):
-        path = edited(("sampling_rate = 10", chain))
-        found = step_findings(read_campaign(path).prepare(["first"])["first"])
+        run = read_campaign(edited(("sampling_rate = 10", chain))).prepare(["first"])["first"]
+        found = dict(told(run, ("COARSE_STEP", "FINE_STEP")))
         assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
         assert fate is None or re.search(fate, found["eta_fwd"])
 
@@ -157,20 +164,6 @@ class TestSteps:
             read_campaign(path).prepare(["first"])
 
 
-def step_findings(run):
-    return {each.channel: each.text for each in findings_of(run) if "STEP" in each.kind.name}
-
-
-def clocks(run):
-    timed = ("ASSUMED_CLOCK", "TIMES_ASIDE", "OTHER_RATE")
-    return [(each.channel, each.text) for each in findings_of(run) if each.kind.name in timed]
-
-
-def records(run):
-    kinds = ("STARTS_LATE", "ENDS_EARLY")
-    return [each.text for each in findings_of(run) if each.kind.name in kinds]
-
-
 class TestRecords:
     @pytest.mark.parametrize(
         ("ends", "words", "span"),
@@ -180,7 +173,7 @@ class TestRecords:
     def test_a_logger_that_was_cut_off_is_told(self, loggers, ends, words, span):
         with pytest.warns(SeakeepWarning, match=f"first: mru {words}"):
             run = loggers(*ends).prepare()["first"]
-        assert [text.startswith(words) for text in records(run)] == [True]
+        assert [text.startswith(words) for _, text in told(run, RECORDS)] == [True]
         assert run.attrs["test_span"] == pytest.approx(span)
 
     @pytest.mark.parametrize(
@@ -191,7 +184,7 @@ class TestRecords:
     def test_a_start_by_hand_and_what_the_run_does_not_use_do_no_harm(self, loggers, ends, spans):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            assert not records(loggers(*ends, spans).prepare()["first"])
+            assert not told(loggers(*ends, spans).prepare()["first"], RECORDS)
 
     @pytest.mark.parametrize("test", ["[10, 20]", "[10, inf]"])
     def test_a_test_part_without_samples_is_an_error(self, loggers, test):
@@ -220,8 +213,7 @@ class TestPeriod:
         with pytest.warns(SeakeepWarning, match=message + rest):
             run = read_campaign(edited(COUNTED)).prepare()["first"]
         assert run.attrs["encounter_period"] < sound / 1.5
-        told = [each.channel for each in findings_of(run) if each.kind is ClocksKind.PERIOD]
-        assert told == ["eta_fwd"]
+        assert [channel for channel, _ in told(run, ("PERIOD",))] == ["eta_fwd"]
 
 
 class TestValues:

@@ -1,13 +1,16 @@
 """The examples on measured data hold what their pages say (needs SEAKEEP_DATA_DIR)."""
 
 import os
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tutorial_study import edit
 
 import seakeep
+from seakeep.campaign import load_prepared, write_prepared
 from seakeep.campaign.datasets import data_folder, find_dataset, state_of
 from seakeep.study import compare, comparison_table, fit_campaign
 
@@ -27,36 +30,23 @@ SPAN = (0.0, 3065.0)  # s, the first 30 % of Data02
 
 @pytest.fixture(scope="module")
 def section(tmp_path_factory):
-    """The campaign, with the observables that its search of some minutes takes for each model."""
-    text = (EXAMPLES / "ntnu_ship_section" / "campaign.toml").read_text(encoding="utf-8")
-    assert text.count("observables = true") == 3
-    text = text.replace("observables = true", "observables = false")
-    powers = 'observables = [{ kind = "powers", of = ["eta_wp1", "eta_wp2", "eta_wp4"] }]'
-    text = text.replace("[models.tensions]", f"[models.tensions]\n{powers}", 1)
+    """The campaign, with the observables that its search of some minutes takes for each model.
+
+    Its runs are prepared where the commands look for them.
+    """
     path = tmp_path_factory.mktemp("section") / "campaign.toml"
-    path.write_text(text, encoding="utf-8")
-    return seakeep.read_campaign(path)
+    shutil.copy(EXAMPLES / "ntnu_ship_section" / "campaign.toml", path)
+    powers = 'observables = [{ kind = "powers", of = ["eta_wp1", "eta_wp2", "eta_wp4"] }]'
+    tensions = ("[models.tensions]", f"[models.tensions]\n{powers}")
+    edit(path, ("observables = true", "observables = false"), tensions)
+    campaign = seakeep.read_campaign(path)
+    write_prepared(campaign)
+    return campaign
 
 
 @pytest.fixture(scope="module")
 def section_runs(section):
-    return section.prepare()
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _prepared_once(section, section_runs):
-    """Let the commands find the runs prepared instead of preparing them in each test."""
-    patch = pytest.MonkeyPatch()
-    for module in ("fit", "comparison"):
-        target = f"seakeep.study.{module}.load_prepared"
-
-        def taken(campaign, names, progress=None, channels=()):
-            runs = section_runs if campaign.path == section.path else campaign.prepare(names)
-            return {name: runs[name] for name in names}
-
-        patch.setattr(target, taken)
-    yield
-    patch.undo()
+    return load_prepared(section)
 
 
 @pytest.mark.parametrize("name", ["ntnu_ship_section", "sjtu_semisub"])
