@@ -6,6 +6,8 @@ import pytest
 from small_tank import CAMPAIGN, tank_columns, write_csv
 from tutorial_study import edit
 
+from seakeep.campaign import read_campaign
+
 
 @pytest.fixture
 def tank(tmp_path):
@@ -25,3 +27,15 @@ def edited(tank):
         return edit(tank / "campaign.toml", *pairs)
 
     return write
+
+
+@pytest.fixture
+def changed(edited):
+    """A campaign with texts of its file replaced."""
+    return lambda *pairs: read_campaign(edited(*pairs))
+
+
+@pytest.fixture
+def first(changed):
+    """The first run of such a campaign, prepared."""
+    return lambda *pairs: changed(*pairs).prepare(["first"])["first"]

@@ -229,24 +229,25 @@ def test_names_that_no_file_or_variable_can_hold(edited):
         assert "a channel is not called 'time', nor does its name end in '_flags'" in message
 
 
-def test_a_derived_rate_of_an_elevation(edited):
+def test_a_derived_rate_of_an_elevation(changed):
     """It was refused: m/s against m."""
     rate = '[derived.eta_fwd_rate]\nfrom = "eta_fwd"\nstep = "differentiate"\n[runs.first]'
-    campaign = read_campaign(edited(("[runs.first]", rate)))
+    campaign = changed(("[runs.first]", rate))
     assert campaign.prepare(["first"])["first"]["eta_fwd_rate"].attrs["units"] == "m/s"
     assert campaign.period_channel() == "eta_fwd"
 
 
 class TestModels:
-    def test_any_kind_with_keys_of_its_constructor(self, edited):
-        path = edited(("[model]", '[model]\nkind = "fir"\nmemory = "2 T"\nlead = "0.75 T"\n'))
-        model = read_campaign(path).model()
+    def test_any_kind_with_keys_of_its_constructor(self, changed):
+        model = changed(
+            ("[model]", '[model]\nkind = "fir"\nmemory = "2 T"\nlead = "0.75 T"\n')
+        ).model()
         assert model.kind == "fir"
         assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0,
                                      "lead": Length(0.75), "memory": Length(2.0)}  # fmt: skip
 
-    def test_named_models(self, edited):
-        path = edited(
+    def test_named_models(self, changed):
+        campaign = changed(
             ("[model]", "[models.small]"),
             (
                 "ridge = 1",
@@ -254,7 +255,6 @@ class TestModels:
                 'states = ["heave"]\nn_members = 10\nridge = { log_uniform = [0.1, 1] }',
             ),
         )
-        campaign = read_campaign(path)
         assert campaign.models == ["small", "band"]
         band = campaign.model("band")
         assert band.inputs == ()
@@ -269,7 +269,6 @@ class TestModels:
         with pytest.raises(RequestError, match=r"no table \[model\]\. Name one of small, band\."):
             campaign.model()
 
-    def test_none(self, edited):
-        path = edited((CAMPAIGN[CAMPAIGN.index("[model]") :], ""))
+    def test_none(self, changed):
         with pytest.raises(RequestError, match=r"no table \[model\]\. Add \[model\] with 'states'"):
-            read_campaign(path).model()
+            changed((CAMPAIGN[CAMPAIGN.index("[model]") :], "")).model()

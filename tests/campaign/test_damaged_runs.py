@@ -32,9 +32,9 @@ def damage(tank, how):
 @pytest.mark.parametrize("how", ["cut", "empty", "noise", "missing"])
 class TestPeriod:
     def test_another_run_is_prepared_with_the_period_of_those_that_can_be_read(
-        self, edited, tank, how
+        self, changed, tank, how
     ):
-        campaign = read_campaign(edited(POOLED))
+        campaign = changed(POOLED)
         both = campaign.encounter_period()
         damage(tank, how)
         with pytest.warns(SeakeepWarning, match=NOTE):
@@ -46,8 +46,8 @@ class TestPeriod:
         assert [each.channel for each in told] == ["run second"]
         assert "run 'second' is left out of the encounter period" in told[0].text
 
-    def test_all_asked_for_the_others_are_kept_and_the_bad_file_is_named(self, edited, tank, how):
-        campaign = read_campaign(edited(POOLED))
+    def test_all_asked_for_the_others_are_kept_and_the_bad_file_is_named(self, changed, tank, how):
+        campaign = changed(POOLED)
         damage(tank, how)
         refused = RequestError if how == "missing" else DataError
         for work in (write_prepared, load_prepared):
@@ -91,13 +91,13 @@ def test_the_commands(edited, tank, capsys):
     assert "second.csv" in capsys.readouterr().err
 
 
-def test_every_bad_file_is_named(edited, tank):
-    campaign = read_campaign(edited())
+def test_every_bad_file_is_named(changed, tank):
+    campaign = changed()
     (tank / "first.csv").write_text("")
     damage(tank, "cut")
     with pytest.raises(DataError, match=r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
         write_prepared(campaign)
-    campaign = read_campaign(edited(POOLED))
+    campaign = changed(POOLED)
     with pytest.raises(DataError, match=r"(?s)^2 runs cannot be read:\n'first': .*'second': "):
         campaign.encounter_period()
 

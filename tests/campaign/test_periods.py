@@ -52,12 +52,11 @@ def test_all_lengths_of_a_campaign(tank, edited):
     assert periods.seconds(2.5) == 2.5
 
 
-def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(edited):
-    path = edited(
+def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(changed):
+    campaign = changed(
         ("train = [0, 10]", 'waves = "irregular"\ntrain = [0, 10]'),
         ("span = [2, 18]", 'waves = "regular"\nspan = ["1 T", "7.5 T"]'),
     )
-    campaign = read_campaign(path)
     period = campaign.encounter_period()
     run = campaign.prepare(["second"])["second"]
     # The first and the last instant of a grid of 0.1 s inside the span.

@@ -90,9 +90,9 @@ class TestClocksAndRates:
          ("sampling_rate = 25", "counted at the 25 Hz stated; the file's own times, which are "),
          ('time = "Time"\nsampling_rate = 50', None), ("sampling_rate = 50", None)],
     )  # fmt: skip
-    def test_a_rate_against_the_times(self, edited, files, text):
-        path = edited(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
-        found = told(read_campaign(path).prepare(["first"])["first"], CLOCKS)
+    def test_a_rate_against_the_times(self, first, files, text):
+        run = first(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
+        found = told(run, CLOCKS)
         assert [each[0] for each in found] == ([] if text is None else ["time"])
         assert text is None or found[0][1].startswith(text)
 
@@ -101,28 +101,25 @@ class TestClocksAndRates:
         [("Time", "", True), ("Sample", 'time = "Sample"', True), ("Time [s]", "", False),
          ("Time", 'time_unit = "s"', False)],
     )  # fmt: skip
-    def test_times_that_may_count_samples(self, edited, tank, header, files, is_said):
+    def test_times_that_may_count_samples(self, first, tank, header, files, is_said):
         for number, name in enumerate(("first", "second")):
             columns = tank_columns(number)
             del columns["Time [s]"]
             write_csv(tank / f"{name}.csv", {header: np.arange(1001.0)} | columns)
-        path = edited(
-            ("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"),
-            ("sampling_rate = 10", ""),
-        )
+        stated = ("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]")
         warned = pytest.warns(SeakeepWarning, match=r"state sampling_rate \(Hz\) in \[files\]")
         with warned if is_said else nullcontext():
-            assert ("counted" in kinds(read_campaign(path).prepare(["first"])["first"])) is is_said
+            run = first(stated, ("sampling_rate = 10", ""))
+        assert ("counted" in kinds(run)) is is_said
 
-    def test_a_motion_from_a_column_of_waves(self, edited):
-        path = edited(('column = "Heave"', 'column = "WP fwd"'))
+    def test_a_motion_from_a_column_of_waves(self, first):
         with pytest.warns(
             SeakeepWarning,
             match=r"heave is read from the column 'WP fwd', which is called as wave probes are\. "
             r"Correct column in \[channels\.heave\]",
         ):
-            assert "wave column" in kinds(read_campaign(path).prepare(["first"])["first"])
-        assert "wave column" not in kinds(read_campaign(edited()).prepare(["first"])["first"])
+            assert "wave column" in kinds(first(('column = "Heave"', 'column = "WP fwd"')))
+        assert "wave column" not in kinds(first())
 
 
 class TestSteps:
@@ -136,32 +133,30 @@ class TestSteps:
          ("sampling_rate = 1.5\nanti_alias = false", "0.75 Hz and is folded into slower waves"),
          ("sampling_rate = 10", None), ("sampling_rate = 3", None), ("sampling_rate = 100", None)],
     )  # fmt: skip
-    def test_what_a_coarse_step_loses_is_told(self, edited, chain, fate):
-        run = read_campaign(edited(("sampling_rate = 10", chain))).prepare(["first"])["first"]
+    def test_what_a_coarse_step_loses_is_told(self, first, chain, fate):
+        run = first(("sampling_rate = 10", chain))
         found = dict(told(run, ("COARSE_STEP", "FINE_STEP")))
         assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
         assert fate is None or re.search(fate, found["eta_fwd"])
 
     @pytest.mark.parametrize("edges", ["[0.17, 0.33]", "[2.0, 3.0]"])
-    def test_a_low_pass_that_removes_the_waves_is_named(self, edited, edges):
+    def test_a_low_pass_that_removes_the_waves_is_named(self, first, edges):
         """Waves of 0.5 to 0.9 Hz: the first filter leaves none of them, the second all."""
-        path = edited(("sampling_rate = 10", f"sampling_rate = 10\nlow_pass = {edges}"))
-        campaign = read_campaign(path)
+        stated = ("sampling_rate = 10", f"sampling_rate = 10\nlow_pass = {edges}")
         if edges == "[2.0, 3.0]":
-            assert not kinds(campaign.prepare(["first"])["first"])
+            assert not kinds(first(stated))
             return
         with pytest.warns(
             SeakeepWarning,
             match=r"loses (9\d.*|100) % of the energy of its waves .* to the filter low_pass, "
             r"which halves what lies at 0\.25 Hz .*\. Raise low_pass in \[preparation\]",
         ):
-            assert "low pass" in kinds(campaign.prepare(["first"])["first"])
+            assert "low pass" in kinds(first(stated))
 
-    def test_a_low_pass_longer_than_the_record(self, edited):
+    def test_a_low_pass_longer_than_the_record(self, first):
         """60 dB over 0.1 Hz take 41.8 s by Kaiser's formula, and the record has 20 s."""
-        path = edited(("sampling_rate = 10", "sampling_rate = 10\nlow_pass = [2.0, 2.1]"))
         with pytest.raises(DataError, match=r"'first': low_pass .* over 41\.8 s, .* lasts 20 s"):
-            read_campaign(path).prepare(["first"])
+            first(("sampling_rate = 10", "sampling_rate = 10\nlow_pass = [2.0, 2.1]"))
 
 
 class TestRecords:
@@ -202,8 +197,8 @@ COUNTED = ("sampling_rate = 10", "steps_per_period = 12")
 
 
 class TestPeriod:
-    def test_a_count_that_noise_leads_is_told(self, edited, tank):
-        sound = read_campaign(edited(COUNTED)).encounter_period()
+    def test_a_count_that_noise_leads_is_told(self, changed, tank):
+        sound = changed(COUNTED).encounter_period()
         for seed, name in enumerate(("first", "second")):
             columns = tank_columns(seed)
             columns["WP fwd [mm]"] += np.random.default_rng(seed).normal(0, 9.5, 1001)  # of 32 mm
@@ -211,7 +206,7 @@ class TestPeriod:
         message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s "
         rest = r"\(second likewise\)\. .*period_hysteresis"
         with pytest.warns(SeakeepWarning, match=message + rest):
-            run = read_campaign(edited(COUNTED)).prepare()["first"]
+            run = changed(COUNTED).prepare()["first"]
         assert run.attrs["encounter_period"] < sound / 1.5
         assert [channel for channel, _ in told(run, ("PERIOD",))] == ["eta_fwd"]
 
@@ -223,11 +218,11 @@ class TestValues:
          ("Heave [mm]", "Heave [m]", r"heave leaves its mean by .* m in water of 3\.6 m"),
          ("WP fwd [mm]", "WP fwd [m]", r"eta_fwd leaves its mean by .* m in water of 3\.6 m")],
     )  # fmt: skip
-    def test_values_that_nothing_afloat_reaches(self, edited, tank, stem, header, message):
+    def test_values_that_nothing_afloat_reaches(self, changed, tank, stem, header, message):
         columns = tank_columns(0)
         write_csv(tank / "first.csv", {header if n == stem else n: x for n, x in columns.items()})
         with pytest.warns(SeakeepWarning, match=message + r"\. Check unit and column in \[channe"):
-            runs = read_campaign(edited()).prepare()
+            runs = changed().prepare()
         assert kinds(runs["first"]) & {"impossible", "out of water"}
         assert not kinds(runs["second"])
 

@@ -46,9 +46,9 @@ def test_raw_run_is_in_si_units(campaign):
     assert "x_position" not in run["heave"].attrs
 
 
-def test_offset_is_added_in_the_files_unit_before_the_sign(edited):
+def test_offset_is_added_in_the_files_unit_before_the_sign(changed):
     stated = 'column = "Heave"\nsign = -1\noffset = 250\naccuracy = 0.5'
-    run = read_campaign(edited(('column = "Heave"', stated))).read_run("first")
+    run = changed(('column = "Heave"', stated)).read_run("first")
     # heave = -(reading + 250 mm)
     expected = -(tank_columns(0)["Heave [mm]"] + 250) * 1e-3
     np.testing.assert_allclose(run["heave"], expected, rtol=1e-15)  # order of two products
@@ -56,9 +56,9 @@ def test_offset_is_added_in_the_files_unit_before_the_sign(edited):
     assert "accuracy" not in run["eta_fwd"].attrs
 
 
-def test_parameters_of_a_run_are_its_attributes(edited):
+def test_parameters_of_a_run_are_its_attributes(changed):
     stated = "span = [2, 18]\nparameters = { draught = 0.083, water_depth = 3.0 }"
-    runs = read_campaign(edited(("span = [2, 18]", stated))).prepare()
+    runs = changed(("span = [2, 18]", stated)).prepare()
     assert (runs["second"].attrs["draught"], runs["second"].attrs["water_depth"]) == (0.083, 3.0)
     assert "draught" not in runs["first"].attrs
 
@@ -98,8 +98,8 @@ def test_the_whole_record_is_resampled_and_then_cut(campaign):
     np.testing.assert_allclose(run["pitch_rate"], whole[20:181], atol=1e-14)
 
 
-def test_derived_at_the_files_own_rate(edited):
-    path = edited(
+def test_derived_at_the_files_own_rate(changed):
+    run = changed(
         (
             "[runs.first]",
             '[derived.speed]\nfrom = "acc"\nstep = "integrate"\nband = [0.3, 5]\n'
@@ -111,8 +111,7 @@ def test_derived_at_the_files_own_rate(edited):
             '[derived.group]\nfrom = "eta_fwd"\nstep = "envelope_squared"\n'
             '[derived.sway]\nexpression = "1000 * heave"\nunit = "mm"\n[runs.first]',
         )
-    )
-    run = read_campaign(path).read_run("first")
+    ).read_run("first")
     acc, eta = run["acc"].to_numpy(), run["eta_fwd"].to_numpy()
     np.testing.assert_array_equal(run["speed"], integrate(acc, DT, (0.3, 5.0)))
     np.testing.assert_array_equal(run["way"], integrate(acc, DT, (0.3, 5.0), 2))
@@ -131,16 +130,16 @@ def test_derived_at_the_files_own_rate(edited):
 
 class TestStep:
     @pytest.mark.parametrize(("rate", "dt"), [("dt = 0.13", 0.13), ("steps_per_period = 32", 0.05)])
-    def test_stated(self, edited, rate, dt):
+    def test_stated(self, changed, rate, dt):
         period = ("scale_factor = 30.0", "encounter_period = 1.6")
-        campaign = read_campaign(edited(("sampling_rate = 10", rate), period))
+        campaign = changed(("sampling_rate = 10", rate), period)
         assert campaign.encounter_period() == 1.6
         for run in campaign.prepare().values():
             assert (run.attrs["dt"], run.attrs["encounter_period"]) == (dt, 1.6)
             np.testing.assert_allclose(np.diff(run["time"]), dt, rtol=1e-12)
 
-    def test_the_files_own(self, edited):
-        campaign = read_campaign(edited(("sampling_rate = 10", "")))
+    def test_the_files_own(self, changed):
+        campaign = changed(("sampling_rate = 10", ""))
         run = campaign.prepare()["first"]
         raw = campaign.read_run("first")
         assert run.attrs["dt"] == DT
@@ -159,20 +158,17 @@ class TestStep:
 
 
 class TestEncounterPeriod:
-    def test_mean_of_the_irregular_runs(self, edited):
-        of = lambda path: read_campaign(path).encounter_period()  # noqa: E731
-        both = of(edited())
-        first = of(edited(('sea_state = "moderate"', 'waves = "irregular"')))
-        second = of(
-            edited(
-                ('sea_state = "moderate"', 'waves = "regular"'),
-                ('role = "test"', 'role = "test"\nwaves = "irregular"'),
-            )
-        )
+    def test_mean_of_the_irregular_runs(self, changed):
+        both = changed().encounter_period()
+        first = changed(('sea_state = "moderate"', 'waves = "irregular"')).encounter_period()
+        second = changed(
+            ('sea_state = "moderate"', 'waves = "regular"'),
+            ('role = "test"', 'role = "test"\nwaves = "irregular"'),
+        ).encounter_period()
         assert first != second
         assert both == pytest.approx((first + second) / 2, rel=1e-15)  # rounding of a sum
 
-    def test_still_water_before_the_waves_does_not_count(self, tank, edited):
+    def test_still_water_before_the_waves_does_not_count(self, tank, changed):
         # Spans do not cut it off, and the probe's noise crosses the mean all the while.
         columns = tank_columns(0, seconds=60.0)
         waves = columns["WP fwd [mm]"][1250:]
@@ -182,24 +178,25 @@ class TestEncounterPeriod:
             ("train = [0, 10]\ntest = [10, inf]", 'role = "train"'),
             ('role = "test"\nspan = [2, 18]', 'role = "unused"'),
         ]
-        found = read_campaign(edited(*roles)).encounter_period()
+        found = changed(*roles).encounter_period()
         # A wave or two of 25 may fall to the still part.
         assert found == pytest.approx(encounter_period(waves, DT), rel=0.02)
-        path = edited(*roles, ("[campaign]", "[campaign]\nperiod_hysteresis = 0.9"))
+        campaign = changed(*roles, ("[campaign]", "[campaign]\nperiod_hysteresis = 0.9"))
         # Only waves that pass 0.9 of a deviation on either side are counted: fewer, so longer.
         with pytest.warns(SeakeepWarning, match=r"counts waves of 3\.\d+ s, and the energy period"):
-            assert read_campaign(path).encounter_period() > 1.1 * encounter_period(waves, DT)
+            assert campaign.encounter_period() > 1.1 * encounter_period(waves, DT)
 
-    def test_no_wave(self, edited):
-        path = edited(
-            ('inputs = ["eta_fwd"]', ""), ("[channels.eta_fwd]", '[channels.probe]'),
+    def test_no_wave(self, changed):
+        campaign = changed(
+            ('inputs = ["eta_fwd"]', ""),
+            ("[channels.eta_fwd]", "[channels.probe]"),
             ("eta_fwd = -2.5", ""),
-        )  # fmt: skip
+        )
         with pytest.raises(
             RequestError,
             match=r"no wave channel to take the encounter period from. State encounter",
         ):
-            read_campaign(path).encounter_period()
+            campaign.encounter_period()
 
     def test_still_water(self, tank):
         for name in ("first.csv", "second.csv"):
@@ -282,14 +279,13 @@ class TestBadRuns:
             ),
         ],
     )
-    def test_a_campaign_at_fault(self, edited, old, new, message):
+    def test_a_campaign_at_fault(self, changed, old, new, message):
         with pytest.raises(RequestError, match=message):
-            read_campaign(edited((old, new))).prepare()
+            changed((old, new)).prepare()
 
-    def test_gap_cut_off(self, tank, edited):
+    def test_gap_cut_off(self, tank, changed):
         rewrite(tank, lambda c: c["Heave [mm]"].__setitem__(slice(20, 30), np.nan))
-        path = edited(("span = [2, 18]", "record = [1, inf]"))
-        run = read_campaign(path).prepare()["second"]
+        run = changed(("span = [2, 18]", "record = [1, inf]")).prepare()["second"]
         assert run["time"][0] == 1.0
 
     def test_a_variable_in_a_path(self, edited, monkeypatch):
@@ -300,9 +296,9 @@ class TestBadRuns:
         assert read_campaign(path).prepare(["second"])
 
 
-def test_the_digest_follows_what_prepared_runs_depend_on(edited):
+def test_the_digest_follows_what_prepared_runs_depend_on(changed):
     def digest(*pair):
-        return read_campaign(edited(pair)).digest
+        return changed(pair).digest
 
     same = {
         digest("ridge = 1", "ridge = 2"),
@@ -343,7 +339,7 @@ class TestFiles:
         assert calls == [(2, 2, "second")]
 
     @pytest.mark.parametrize("change", ["settings", "file", "version", "name"])
-    def test_stale_files_are_not_used(self, campaign, tank, edited, change, monkeypatch):
+    def test_stale_files_are_not_used(self, campaign, tank, changed, change, monkeypatch):
         path = write_prepared(campaign)["second"]
         with xr.open_dataset(path) as opened:
             run = opened.load()
@@ -351,18 +347,18 @@ class TestFiles:
         write_netcdf(path, run)
         assert load_prepared(campaign)["second"]["heave"].std() == 0.0
         if change == "settings":
-            campaign = read_campaign(edited(("sampling_rate = 10", "sampling_rate = 12")))
+            campaign = changed(("sampling_rate = 10", "sampling_rate = 12"))
         elif change == "name":
-            campaign = read_campaign(edited(("Small tank", "Smaller tank")))
+            campaign = changed(("Small tank", "Smaller tank"))
         elif change == "file":
             write_csv(tank / "second.csv", tank_columns(5))
         else:
             monkeypatch.setattr("seakeep.campaign.store.version", lambda: "99.0")
         assert load_prepared(campaign)["second"]["heave"].std() > 0.0
 
-    def test_a_measurement_is_never_overwritten(self, tank, edited):
+    def test_a_measurement_is_never_overwritten(self, tank, changed):
         """`prepare -o .` replaced the raw run1.nc by the prepared run of that name."""
-        campaign = read_campaign(edited(('file = "first.csv"', 'file = "first.nc"')))
+        campaign = changed(('file = "first.csv"', 'file = "first.nc"'))
         (tank / "other").mkdir()
         for folder, message in (
             (tank, r"first\.nc is read by this command and would be"),
@@ -383,7 +379,7 @@ class TestFiles:
         xr.testing.assert_identical(run, expected)
 
 
-def test_a_span_to_the_end_of_the_record(tank, edited):
+def test_a_span_to_the_end_of_the_record(tank, first):
     """60 s at 50 Hz end at 59.98 s: the last sample stands for its own step."""
     columns = {name: x[:-1] for name, x in tank_columns(0).items()}
     write_csv(tank / "first.csv", columns)
@@ -392,7 +388,7 @@ def test_a_span_to_the_end_of_the_record(tank, edited):
             ("test = [10, inf]", "test = [10, 20]"),
             ("sampling_rate = 10", f"sampling_rate = {rate}"),
         ]
-        run = read_campaign(edited(*pairs)).prepare(["first"])["first"]
+        run = first(*pairs)
         assert run.attrs["test_span"][1] == pytest.approx(float(run["time"][-1]))
     with pytest.raises(RequestError, match=r"first\.test: received \[10, 20\.1\] s, and"):
-        read_campaign(edited(("test = [10, inf]", "test = [10, 20.1]"))).prepare(["first"])
+        first(("test = [10, inf]", "test = [10, 20.1]"))

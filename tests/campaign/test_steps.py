@@ -141,12 +141,11 @@ def test_gravity_is_removed_from_one_accelerometer(tmp_path, axis):
 
 
 @pytest.mark.parametrize("outliers", ["replace", "flag"])
-def test_outliers_are_flagged_and_replaced_when_asked(tank, edited, outliers):
+def test_outliers_are_flagged_and_replaced_when_asked(tank, first, outliers):
     spikes, columns = [400, 401, 777, 900], tank_columns(0)
     columns["Heave [mm]"][spikes] += [900, 900, -700, 500]
     write_csv(tank / "first.csv", columns)
-    path = edited(("sampling_rate = 10", f'dt = 0.02\noutliers = "{outliers}"'))
-    run = read_campaign(path).prepare(["first"])["first"]
+    run = first(("sampling_rate = 10", f'dt = 0.02\noutliers = "{outliers}"'))
     flags = run["heave_flags"]
     bits = dict(zip(flags.attrs["flag_meanings"].split(), flags.attrs["flag_masks"], strict=True))
     marked = np.flatnonzero(flags.values & bits["outlier"])

@@ -5,8 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
-import xarray as xr
-from tutorial_study import edit, put_tutorial
+from tutorial_study import assert_same, edit, put_tutorial
 
 from seakeep import cli
 from seakeep.study import read_study, run_study
@@ -117,6 +116,4 @@ def test_a_disk_that_fills_up_loses_no_finished_unit(study_folder, undisturbed, 
     after = {path.name: path.stat().st_mtime_ns for path in units_in(folder)}
     assert after | before == after
     found = run_study(read_study(folder / "study.toml"), folder / "out")
-    assert found.groups.keys() == undisturbed.groups.keys()
-    for name, group in undisturbed.groups.items():
-        xr.testing.assert_identical(group, found.groups[name])
+    assert_same(found, undisturbed)

@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 from seakeep.models.labelled import nearest_sample
 
@@ -57,6 +58,13 @@ def edit(path: Path, *pairs: tuple[str, str]) -> Path:
         text = text.replace(old, new)
     path.write_text(text, "utf-8")
     return path
+
+
+def assert_same(first, second) -> None:
+    """Compare the results of a study array by array."""
+    assert first.groups.keys() == second.groups.keys()
+    for name, group in first.groups.items():
+        xr.testing.assert_identical(group, second.groups[name])
 
 
 def assert_cells_are_what_the_models_say(found, plan, **near) -> None:

@@ -219,17 +219,15 @@ def test_the_figure_judges_as_the_table_does_where_loads_have_a_prefix(tmp_path)
 def test_each_channel_has_a_panel_and_inputs_share_one_with_those_of_their_unit():
     judged = comparison()
     words = "Bow line LC-1 (FWD), 2 $ shackles, 1 $ pin"
-    names = {"pitch": "Trim angle (MRU-5)", "mooring_stern": words, "heave": "heave"}
-    for name, long_name in names.items():
-        judged.measured[name].attrs["long_name"] = long_name
+    judged.measured["pitch"].attrs["long_name"] = "Trim angle (MRU-5)"
+    judged.measured["mooring_stern"].attrs["long_name"] = words
     wave = judged.inputs["eta_fwd"]
     many = {f"eta_{k + 1}": wave for k in range(9)}
     angle = wave.assign_attrs(units="deg")
     inputs = judged.inputs.assign(rudder=angle, fin=angle, **many)
     inputs["eta_fwd"].attrs["long_name"] = "probe ahead of the bow"
     figure = overlay_figure(replace(in_degrees(judged), inputs=inputs))
-    heave, pitch, load, waves, angles = figure.axes
-    assert heave.get_ylabel() == "heave\n$z$ [m]"
+    _, pitch, load, waves, angles = figure.axes
     assert pitch.get_ylabel() == "Trim angle (MRU-5)\n$\\theta$ [deg]"
     lines = load.get_ylabel().replace(r"\$", "$").split("\n")
     assert " ".join(lines[:-1]) == words

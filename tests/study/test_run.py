@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from tutorial_study import assert_cells_are_what_the_models_say, put_tutorial
+from tutorial_study import assert_cells_are_what_the_models_say, assert_same, put_tutorial
 
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models.executor import processes
@@ -19,12 +19,6 @@ from seakeep.study.run import compute, compute_task, facts_of, tasks_of, units_o
 from seakeep.study.store import LOCK, UNITS, UnitFolder
 
 CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
-
-
-def same(first, second):
-    assert first.groups.keys() == second.groups.keys()
-    for name, group in first.groups.items():
-        xr.testing.assert_identical(group, second.groups[name])
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +66,7 @@ def test_the_error_over_time_is_kept_in_bands_and_its_growth_is_that_of_each_cha
 
 def test_arrays_do_not_depend_on_workers(study_folder, finished):
     study = read_study(study_folder / "study.toml")
-    same(finished, run_study(study, study_folder / "alone"))
+    assert_same(finished, run_study(study, study_folder / "alone"))
 
 
 def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, finished):
@@ -92,7 +86,7 @@ def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, fin
         again = run_study(study, out, progress=lambda *each: told.append(each))
     assert (out / "notes.tmp").exists()
     assert next(each[0] for each in told if each[2].startswith("fitting and forecasting, ")) == 3
-    same(finished, again)
+    assert_same(finished, again)
 
 
 def test_one_process_works_in_a_folder_and_who_waited_takes_its_result(
@@ -110,10 +104,10 @@ def test_one_process_works_in_a_folder_and_who_waited_takes_its_result(
 
     def overtaken(plan):
         monkeypatch.setattr(run, "warn_of_slow_study", usual)
-        same(finished, run_study(study, out, progress=third))
+        assert_same(finished, run_study(study, out, progress=third))
 
     monkeypatch.setattr(run, "warn_of_slow_study", overtaken)
-    same(finished, run_study(study, out, progress=lambda *each: told.append(each[2])))
+    assert_same(finished, run_study(study, out, progress=lambda *each: told.append(each[2])))
     assert refused
     assert not (out / LOCK).exists()
     assert told[-1] == "finished before"
