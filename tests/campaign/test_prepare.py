@@ -24,8 +24,8 @@ def campaign(tank):
     return read_campaign(tank / "campaign.toml")
 
 
-def rewrite(tank, change, name="second.csv", seed=1):
-    columns = tank_columns(seed)
+def rewrite(tank, change, name="second.csv"):
+    columns = tank_columns(1)
     change(columns)
     write_csv(tank / name, columns)
     return read_campaign(tank / "campaign.toml")

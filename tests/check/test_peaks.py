@@ -10,11 +10,11 @@ from seakeep import HankelDMDc, check
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
 
 
-def sea_run(height=0.04, period=2.0, seed=0, samples=3000, **attrs):
+def sea_run(height=0.04, period=2.0, seed=0, **attrs):
     """A narrow sea, and a heave that follows it a sample later."""
-    waves = sea(seed, (0.8 / period, 1.2 / period), period, 60).at(0.1 * np.arange(samples))
+    waves = sea(seed, (0.8 / period, 1.2 / period), period, 60).at(0.1 * np.arange(3000))
     wave = height / 4 * waves / waves.std()
-    noise = 1e-5 * np.random.default_rng(seed).standard_normal(samples)
+    noise = 1e-5 * np.random.default_rng(seed).standard_normal(3000)
     heave = 0.8 * np.roll(wave, 1) + noise
     attrs = {"encounter_period": period, "waves": "irregular", "water_depth": np.inf, **attrs}
     return record(0.1, attrs, eta=wave, heave=heave)

@@ -12,11 +12,11 @@ DT, PERIOD = 0.1, 1.0
 GAIN, MEMORY = 0.3, 0.9
 
 
-def drifting_run(seed=0, samples=2000, waves=None, **attrs):
+def drifting_run(samples=2000, waves=None, **attrs):
     """A surge that remembers, and is pushed by the square of the wave."""
     time = DT * np.arange(samples)
     if waves is None:
-        wave = 0.45 * sea(seed, (0.7, 1.3), PERIOD, 40).at(time)
+        wave = 0.45 * sea(0, (0.7, 1.3), PERIOD, 40).at(time)
     else:
         wave = 0.5 * np.cos(2 * np.pi * waves * time)
     surge = np.zeros(samples)

@@ -14,8 +14,8 @@ from seakeep.study.store import UnitFolder
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
 
-def study(folder, out="out"):
-    arguments = ["study", str(folder / "study.toml"), "-o", str(folder / out), "--workers", "1"]
+def study(folder):
+    arguments = ["study", str(folder / "study.toml"), "-o", str(folder / "out"), "--workers", "1"]
     return cli.main(arguments)
 
 

@@ -46,12 +46,12 @@ def imu(i, stamped=True):
     )
 
 
-def rig(i, cells=2, stamped=True):
+def rig(i, stamped=True):
     return TYPES["tank_msgs/msg/Rig"](
         header=header(BEGIN + i * STEP if stamped else 0),
         surge=float(i),
         loads=np.array([i, -i], dtype=np.float32),
-        cells=np.arange(float(cells)),
+        cells=np.arange(2.0),
         remark="x",
     )
 
@@ -64,10 +64,10 @@ def text(i):
     return TYPES["std_msgs/msg/String"](data="x")
 
 
-def save(path, plugin=StoragePlugin.MCAP, late=3_000_000, **topics):
-    """Write topics, each a maker of messages; received `late` ns after they are stamped."""
+def save(path, plugin=StoragePlugin.MCAP, **topics):
+    """Write topics, each a maker of messages; received 3 ms after they are stamped."""
     sent = (
-        (BEGIN + i * STEP + late, f"/{topic}", make(i))
+        (BEGIN + i * STEP + 3_000_000, f"/{topic}", make(i))
         for topic, make in topics.items()
         for i in range(COUNT)
     )

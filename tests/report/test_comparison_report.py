@@ -31,7 +31,7 @@ TIME = np.arange(1, 401) * 0.1
 UNITS = {"heave": "m", "pitch": "rad", "mooring_stern": "N"}
 
 
-def comparison(factor=0.9, status="ok", slack=False, size=1.0):
+def comparison(factor=0.9, slack=False, size=1.0):
     """A forecast that is a factor times the measurement, of loads of a size."""
     load = (1e-6 if slack else size) * np.sin(3 * TIME)
     values = {"heave": np.sin(TIME), "pitch": 0.1 * np.cos(TIME), "mooring_stern": load}
@@ -46,22 +46,22 @@ def comparison(factor=0.9, status="ok", slack=False, size=1.0):
         )
         for scale in (1.0, factor)
     )
-    forecast.attrs = {"start": 0.0, "status": status}
+    forecast.attrs = {"start": 0.0, "status": "ok"}
     inputs = xr.Dataset({"eta_fwd": measured["heave"].assign_attrs(training_std=1.0)})
     return Comparison("r1", "calm", forecast, measured, inputs)
 
 
-def ensemble(half=0.2, diverged=1, slack=False):
+def ensemble(slack=False):
     """The mean of an ensemble with a band of known width around it."""
     single = comparison(factor=1.0, slack=slack)
     mean = single.forecast.assign_attrs(
-        status=f"{diverged} of 5 members diverged", members=5, diverged=diverged, level=0.9
+        status="1 of 5 members diverged", members=5, diverged=1, level=0.9
     )
-    band = xr.concat([mean - half, mean + half], "statistic")
+    band = xr.concat([mean - 0.2, mean + 0.2], "statistic")
     band = band.assign_coords(statistic=["lower", "upper"])
     for name in band.data_vars:
         band[name].attrs = mean[name].attrs
-    # A sinusoid beside the mean: it leaves the band where its modulus is above `half`.
+    # A sinusoid beside the mean: it leaves the band where its modulus is above 0.2.
     measured = single.measured.copy()
     measured["heave"] = mean["heave"] + 0.4 * np.sin(7 * mean["time"])
     measured["heave"].attrs = mean["heave"].attrs

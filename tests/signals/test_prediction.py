@@ -43,8 +43,8 @@ def sea():
     return waves + 0.02 * np.random.default_rng(4).standard_normal(waves.shape)
 
 
-def foreseen(sea, positions, count=60):
-    return foresee(sea[:900], count, dt=0.1, positions=positions, depth=3.6)
+def foreseen(sea, positions):
+    return foresee(sea[:900], 60, dt=0.1, positions=positions, depth=3.6)
 
 
 def test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it(sea):

@@ -12,9 +12,9 @@ from seakeep.signals.lags import _correlation
 from seakeep.signals.synchronisation import without_doubtful_drift
 
 
-def pulses(t, period=20.0, width=0.5):
-    phase = (t - 10.0 + 0.5 * period) % period - 0.5 * period
-    return np.where(np.abs(phase) < 0.5 * width, np.cos(np.pi * phase / width) ** 2, 0.0)
+def pulses(t):
+    phase = t % 20.0 - 10.0
+    return np.where(np.abs(phase) < 0.25, np.cos(2 * np.pi * phase) ** 2, 0.0)
 
 
 def logger(signal, rate, offset, drift, length, noise, seed):

@@ -38,7 +38,7 @@ def lit_frame(t, lamp=0.0, light=None):
     return cv2.multiply(frame.astype(np.float32), tank_video._light() if light is None else light)
 
 
-def render(path, hook=None, frames=FRAMES, skip=()):
+def render(path, hook=None, frames=FRAMES):
     """Write a video with noise; return the panel's place in pixels, frame by frame."""
     rng = np.random.default_rng(1)
     light, stock = tank_video._light(), tank_video._noise(cv2, rng)
@@ -47,8 +47,7 @@ def render(path, hook=None, frames=FRAMES, skip=()):
         lit = lit_frame(i / RATE, float(20 <= i < 30), light)
         lit = hook(i, lit) if hook else lit
         lit += np.roll(stock[i % len(stock)], rng.integers(1280), axis=1)[:, :, None]
-        if i not in skip:
-            writer.write(np.clip(lit, 0, 255).astype(np.uint8))
+        writer.write(np.clip(lit, 0, 255).astype(np.uint8))
     writer.release()
     surge, heave, pitch = motion(np.arange(frames) / RATE)
     return tank_video.pixel_of(

@@ -11,11 +11,11 @@ DT, FREQUENCY = 0.05, 0.86
 TIME = DT * np.arange(1, 161)
 
 
-def groups(shift=0.9, offset=0.3, ratio=0.8, lead=40.0):
+def groups():
     """Two training sets, three windows, of one channel named surge."""
     turn = 2 * np.pi * FREQUENCY * TIME + np.array([0.0, 1.0, 2.0])[:, None]
-    measured = shift + 0.1 * np.cos(turn)
-    forecast = shift + offset + 0.1 * ratio * np.cos(turn + np.radians(lead))
+    measured = 0.9 + 0.1 * np.cos(turn)
+    forecast = 0.9 + 0.3 + 0.08 * np.cos(turn + np.radians(40.0))
     test = cells(
         ["surge"], TIME, measured=measured[..., None], judged=np.ones((2, 3), bool),
         run=["wave"] * 3, mean=np.tile(forecast[..., None], (1, 2, 1, 1, 1)),

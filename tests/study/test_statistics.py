@@ -94,13 +94,12 @@ def test_the_truth_is_read_at_the_instants_of_the_windows(found):
     assert table["inside"].sel(channel="heave").diff("against").item() != 0
 
 
-def four(inside=0.5):
+def four():
     """Two training sets and two windows of two channels; the last pair is not judged."""
     time = np.arange(8)
     measured = np.where(time % 2, 1.0, -1.0)[None, :, None] * [[[1.0, 10.0]], [[2.0, 20.0]]]
-    lower = np.broadcast_to(np.where(time % 4 < 4 * inside, -30.0, 25.0)[:, None], (2, 2, 8, 2))
-    upper = np.full((2, 2, 8, 2), 30.0)
-    lower, upper = lower.copy(), upper.copy()
+    lower = np.tile(np.where(time % 4 < 2, -30.0, 25.0)[:, None], (2, 2, 1, 2))
+    upper = np.full(lower.shape, 30.0)
     lower[1, 1], upper[1, 1] = np.nan, np.nan
     errors = np.array([[[0.1, 0.3], [0.2, np.nan]], [[0.4, 0.8], [9.0, 9.0]]])
     return cells(

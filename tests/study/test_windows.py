@@ -32,19 +32,19 @@ def samples_of(run, start, stop):
 
 RUNS = {
     "a": recorded(1000, train_span=(10.0, 60.0), test_span=(60.1, 99.9)),
-    "b": recorded(800, train_span=(0.0, 40.0), test_span=(40.1, 79.9), first=0.0),
+    "b": recorded(800, train_span=(0.0, 40.0), test_span=(40.1, 79.9)),
 }
 NEEDS = Needs(snapshots=120, history=30)
 
 
-def training(needs=NEEDS, runs=RUNS, inputs=(), **table):
-    return choose_training(settings(training=table), runs, list(runs), needs, inputs)
+def training(runs=RUNS, inputs=(), **table):
+    return choose_training(settings(training=table), runs, list(runs), NEEDS, inputs)
 
 
-def windows_of(runs=RUNS, name="set", steps=50, needs=NEEDS, whole=False, **table):
+def windows_of(runs=RUNS, name="set", steps=50, **table):
     chosen = settings(tests={name: table}).tests[name]
     return choose_tests(
-        name, chosen, runs, list(runs), steps=steps, needs=needs, whole=whole, seed=5
+        name, chosen, runs, list(runs), steps=steps, needs=NEEDS, whole=False, seed=5
     )
 
 
