@@ -17,7 +17,7 @@ def pulses(t):
     return np.where(np.abs(phase) < 0.25, np.cos(2 * np.pi * phase) ** 2, 0.0)
 
 
-def logger(signal, rate, offset, drift, length, noise, seed):
+def logger(signal, rate, length, noise, seed, offset=0.0, drift=0.0):
     readings = np.arange(round(length * rate)) / rate
     true = (readings - offset) / (1 + drift)
     return signal(true) + noise * np.random.default_rng(seed).standard_normal(true.size), readings
@@ -30,8 +30,8 @@ def logger(signal, rate, offset, drift, length, noise, seed):
 def test_pulses_give_offset_and_drift_with_honest_errors(rate, offset, drift, noise):
     misses = []
     for seed in range(20):
-        ours = logger(pulses, rate, offset, drift, 270.0, noise, seed)
-        reference = logger(pulses, 500.0, 0.0, 0.0, 270.0, 0.002, 100 + seed)
+        ours = logger(pulses, rate, 270.0, noise, seed, offset, drift)
+        reference = logger(pulses, 500.0, 270.0, 0.002, 100 + seed)
         clock = clock_from_pulses(*ours, *reference)
         # Below 2 ms for a fast logger, a tenth of a sample for the others: the bounds.
         assert abs(clock.offset - offset) < (2e-3 if rate >= 500 else 0.1 / rate)
@@ -46,8 +46,8 @@ def test_pulses_give_offset_and_drift_with_honest_errors(rate, offset, drift, no
 
 
 def test_pulses_down_lost_and_doubled():
-    signal, time = logger(pulses, 100.0, 0.2, 1e-5, 200.0, 0.001, 0)
-    reference, instants = logger(pulses, 500.0, 0.0, 0.0, 200.0, 0.001, 1)
+    signal, time = logger(pulses, 100.0, 200.0, 0.001, 0, 0.2, 1e-5)
+    reference, instants = logger(pulses, 500.0, 200.0, 0.001, 1)
     signal[(time > 45) & (time < 55)] = 0.0  # a lost pulse
     signal[(time > 61) & (time < 61.02)] = 5.0  # a spike is no pulse
     clock = clock_from_pulses(-3 * signal + 7, time, reference, instants)
@@ -65,8 +65,8 @@ def test_uneven_pulses_leave_no_doubt():
         return sum(np.exp(-(((t - c) / 0.1) ** 2)) for c in (5.0, 17.0, 31.0, 64.0, 90.0))
 
     clock = clock_from_pulses(
-        *logger(train, 100.0, 33.0, 0.0, 130.0, 0.001, 0),
-        *logger(train, 500.0, 0.0, 0.0, 100.0, 0.001, 1),
+        *logger(train, 100.0, 130.0, 0.001, 0, 33.0),
+        *logger(train, 500.0, 100.0, 0.001, 1),
     )
     assert clock.offset == pytest.approx(33.0, abs=1e-3)
     assert clock.modulus == np.inf
@@ -74,8 +74,8 @@ def test_uneven_pulses_leave_no_doubt():
 
 def test_one_pulse_gives_an_offset_and_no_drift():
     clock = clock_from_pulses(
-        *logger(pulses, 100.0, 0.2, 0.0, 20.0, 0.001, 0),
-        *logger(pulses, 500.0, 0.0, 0.0, 20.0, 0.001, 1),
+        *logger(pulses, 100.0, 20.0, 0.001, 0, 0.2),
+        *logger(pulses, 500.0, 20.0, 0.001, 1),
     )
     assert clock.offset == pytest.approx(0.2, abs=1e-3)
     assert clock.drift == 0

@@ -79,12 +79,8 @@ def results(tmp_path_factory):
         return reproduce(folder, "paper", size=SMALL)
 
 
-@pytest.fixture(scope="module")
-def played(results):
-    return results["paper"].folder.parent
-
-
-def test_what_was_played_and_computed_is_taken_as_it_is(played, results, monkeypatch):
+def test_what_was_played_and_computed_is_taken_as_it_is(results, monkeypatch):
+    played = results["paper"].folder.parent
     monkeypatch.setattr("seakeep.tank.play.play", None)
     told = []
     again = reproduce(played, "paper", size=SMALL, progress=lambda *each: told.append(each[2]))
@@ -94,30 +90,26 @@ def test_what_was_played_and_computed_is_taken_as_it_is(played, results, monkeyp
     xr.testing.assert_identical(again["raw"].tests["irregular"], results["raw"].tests["irregular"])
 
 
-def test_the_acts_of_the_paper_have_the_same_windows(results):
-    assert list(results) == ["paper", "raw"]
-    paper, raw = results.values()
-    for name, data in raw.tests.items():
-        assert paper.tests[name]["run"].values.tolist() == data["run"].values.tolist()
-        np.testing.assert_array_equal(paper.tests[name]["start"], data["start"])
-    stops = [result.groups["training"]["stop"].values for result in (paper, raw)]
-    np.testing.assert_array_equal(*stops)
-    # The waves are carried to where the vessel is, drift included.
-    assert paper.attrs["conditional_on"] == "surge_with_drift"
-    assert raw.attrs["conditional_on"] == "surge"
-
-
-def test_the_recommended_model_is_tested_in_the_same_windows_and_learns_from_other_runs(
-    played, results, tmp_path
+def test_all_acts_have_the_same_windows_and_the_recommended_model_learns_from_other_runs(
+    results, tmp_path
 ):
-    text = study_text(ACTS[2], SMALL, 0).replace("../campaign", str(played / "campaign"))
+    folder = results["paper"].folder.parent
+    text = study_text(ACTS[2], SMALL, 0).replace("../campaign", str(folder / "campaign"))
     (tmp_path / "study.toml").write_text(text, "utf-8")
     plan = make_plan(read_study(tmp_path / "study.toml"))
-    for name, data in results["raw"].tests.items():
-        windows = [(each.run, each.start) for each in plan.tests[name]]
-        assert windows == list(zip(data["run"].values, data["start"].values, strict=True))
     for each in plan.training:
         assert not set(each.left_out) & set(each.runs)
+    assert list(results) == ["paper", "raw"]
+    for name, planned in plan.tests.items():
+        windows = [(each.run, each.start) for each in planned]
+        for result in results.values():
+            data = result.tests[name]
+            assert list(zip(data["run"].values, data["start"].values, strict=True)) == windows
+    stops = [result.groups["training"]["stop"].values for result in results.values()]
+    np.testing.assert_array_equal(*stops)
+    # The waves are carried to where the vessel is, drift included.
+    assert results["paper"].attrs["conditional_on"] == "surge_with_drift"
+    assert results["raw"].attrs["conditional_on"] == "surge"
 
 
 def test_the_first_act_alone_has_lost_the_drift_and_keeps_the_waves(results):

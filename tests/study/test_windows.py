@@ -12,10 +12,10 @@ from seakeep.toml import validated
 DT = 0.1
 
 
-def recorded(samples, *, waves="irregular", sea_state="", first=0.0, **spans):
+def recorded(samples, *, waves="irregular", sea_state="", **spans):
     """A run as preparation leaves it: the windows look at its clock and its attributes alone."""
     return xr.Dataset(
-        coords={"time": ("time", first + DT * np.arange(samples))},
+        coords={"time": ("time", DT * np.arange(samples))},
         attrs={"dt": DT, "waves": waves, "sea_state": sea_state, **spans},
     )
 
