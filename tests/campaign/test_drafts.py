@@ -22,7 +22,6 @@ def drafted(folder, files):
     [
         ("HEAVE_CoG", "mm", "heave", ""),
         ("z", "m", "heave", ""),
-        ("theta", "rad", "pitch", ""),
         ("GyroPitch", "deg/s", "pitch_rate", ""),
         ("acc_z", "g", "heave_acceleration", ""),
         ("ACC_Heave_SB", "m/s2", "acc_heave_sb", ""),
@@ -45,7 +44,6 @@ def drafted(folder, files):
         ("carriage", "V", "carriage", "wave_probes"),
         ("us_fwd", "mm", "us_fwd", "mru"),
         ("rate_x", "deg/s", "roll_rate", "mru"),
-        ("acc x", "g", "surge_acceleration", "imu"),
     ],
 )
 def test_guesses(column, unit, channel, logger):

@@ -235,7 +235,6 @@ class TestBadRuns:
                 "which is measured in 'm'",
             ),
         ],
-        ids=["values", "jitter", "unit"],
     )
     def test_a_file_at_fault(self, campaign, tank, change, error, message):
         write_csv(tank / "second.csv", change(tank_columns(1)))

@@ -1,6 +1,5 @@
 """Every verb, run as a user runs it, on the tutorial's campaign."""
 
-import csv
 import importlib.util
 import re
 import shlex
@@ -11,6 +10,7 @@ from unittest.mock import ANY
 import numpy as np
 import pytest
 import xarray as xr
+from tables import rows_of
 from tutorial_study import edit
 
 import seakeep
@@ -126,11 +126,6 @@ def test_the_margin_of_a_calibrated_band_is_that_of_the_ensemble(run, place):
     stored = xr.load_dataset(place / "wide_band.nc")["heave"].sel(statistic="upper")
     band = ensemble.forecast_summary(unseen, 20.0, 50, 0.9)["heave"].sel(statistic="upper")
     np.testing.assert_array_equal(stored, band + margin[0])
-
-
-def rows_of(path):
-    """Rows of a CSV file by their headings."""
-    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
 
 
 def judged_rows(folder):

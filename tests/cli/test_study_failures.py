@@ -66,7 +66,6 @@ def a_file(folder):
         (of_another, 2, ["holds the results of another study", "000000000000", "-o"]),
         (a_file, 1, ["results could not be written to", "or choose a folder"]),
     ],
-    ids=["training", "startup", "trains", "channel", "digest", "file"],
 )
 def test_each_mistake_has_its_message_and_its_exit_status(
     study_folder, spoil, status, words, capfd

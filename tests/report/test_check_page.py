@@ -1,12 +1,12 @@
 """``seakeep check``: the page, its files, and what it says of what cannot be judged."""
 
-import csv
 import re
 
 import numpy as np
 import pytest
 import xarray as xr
 from moored import moored_run
+from tables import rows_of
 from tutorial_study import edit, put_tutorial
 
 from seakeep import HankelDMDc
@@ -63,8 +63,7 @@ def test_the_page_holds_its_figures_and_tables(checked):
     ):
         assert (checked / "figures" / f"{name}.png").exists()
         assert f'id="figure-{name}"' in page
-    with (checked / "tables" / "possible.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(checked / "tables" / "possible.csv")
     assert {"heave", "pitch"} == {row["state"] for row in rows}
     for row in rows:
         assert 0 < float(row["linear bound"]) <= 1

@@ -1,11 +1,11 @@
 """The comparison's tables, files and figures."""
 
-import csv
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
+from tables import rows_of
 
 from seakeep.files import check_output
 from seakeep.report.comparison import (
@@ -72,10 +72,6 @@ def row_of(compared):
     return comparison_table([compared]).isel(run=0)
 
 
-def lines_of(path):
-    return list(csv.DictReader(path.read_text().splitlines()))
-
-
 def test_errors_are_those_that_can_be_computed_by_hand_in_any_unit():
     radians, degrees = (row_of(each) for each in (comparison(), in_degrees(comparison())))
     # Prediction is 0.9 times the measurement: the error is a tenth of it, about zero mean.
@@ -100,7 +96,7 @@ def test_the_band_of_an_ensemble_is_judged_by_hand():
     assert heave["coverage"] == pytest.approx(100 * (1 - outside), rel=1e-12)
     assert heave["band_width"] == pytest.approx(0.4, rel=1e-12)
     assert heave["relative_band_width"] == pytest.approx(0.4 / spread, rel=1e-12)
-    assert (int(table["members"]), int(table["diverged"]), float(table["level"])) == (5, 1, 0.9)
+    assert (table["members"], table["diverged"], table["level"]) == (5, 1, 0.9)
     assert ensemble().complete
     for judged, names in ((table, UNITS), (row_of(ensemble(slack=True)), ["heave", "pitch"])):
         mean = judged["coverage"].sel(channel=list(names)).mean()  # without a slack line
@@ -120,7 +116,7 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
     low, high = (float(tables["ours"][f"anrmse_{each}"][0]) for each in ("lower", "upper"))
     assert averages.rows[0][:3] == ("ours", "0.100", f"{low:.3f} to {high:.3f}")
     assert channels.rows[0] == ("heave", "0.100", "0.200", "0.050", "0.300")
-    rows = lines_of(write_comparison(tables, tmp_path / "t.csv"))
+    rows = rows_of(write_comparison(tables, tmp_path / "t.csv"))
     assert [row["model"] for row in rows[::3]] == list(tables)
 
 
@@ -153,7 +149,7 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
     unsure = turned.assign(all_upper=abs(turned["all_upper"]))
     told = winner(unsure, {"ours": "fir"})
     assert told.endswith("from theirs: no model is surely better. Keep theirs.")
-    rows = lines_of(write_differences(table, tmp_path / "d.csv"))
+    rows = rows_of(write_differences(table, tmp_path / "d.csv"))
     assert [row["run"] for row in rows] == [*runs, *runs, "", ""]
     (only,) = difference_blocks(difference_table({k: each[:1] for k, each in found.items()}))
     assert only.title == "long: change of ANRMSE from ours"
@@ -208,10 +204,10 @@ def test_the_figure_judges_as_the_table_does_where_loads_have_a_prefix(tmp_path)
     assert figure.axes[2].get_ylabel().endswith("[MN]")
     assert values.max() == pytest.approx(1e-6 * 120**3 * small.measured["mooring_stern"].max())
     table = comparison_table([large])
-    rows = lines_of(write_comparison({"m": table}, tmp_path / "t.csv"))
+    rows = rows_of(write_comparison({"m": table}, tmp_path / "t.csv"))
     assert {(row["scale"], row["scale_factor"]) for row in rows} == {("full", "120.0")}
     assert "full scale (1:120)" in next(comparison_blocks(table)).title
-    rows = lines_of(write_forecast(large.forecast, tmp_path / "f.csv"))
+    rows = rows_of(write_forecast(large.forecast, tmp_path / "f.csv"))
     assert {row["scale_factor"] for row in rows} == {"120.0"}
     assert "scale" not in write_forecast(small.forecast, tmp_path / "s.csv").read_text()
 

@@ -44,9 +44,8 @@ def result():
     return StudyResult(None, attrs, groups)
 
 
-def with_group(result, **groups):
-    named = {name.replace("__", "/"): group for name, group in groups.items()}
-    return replace(result, groups={**result.groups, **named})
+def with_group(result, name, group):
+    return replace(result, groups={**result.groups, name: group})
 
 
 def test_errors_stand_in_both_standard_deviations(result):
@@ -83,7 +82,7 @@ def test_errors_in_regular_waves_are_taken_apart_and_a_slack_line_is_named(resul
         {key: (("test", "model", "channel"), np.full((1, 1, 2), x)) for key, x in values.items()},
         coords={"test": ["t"], "model": ["m"], "channel": result.channels},
     )
-    section = regular(with_group(result, statistics__response=response))
+    section = regular(with_group(result, "statistics/response", response))
     (table,) = section.tables
     assert table.columns[2:] == (
         "λ/L 1.5: amplitude", "λ/L 1.5: phase [°]", "λ/L 1.5: offset [SD]", "λ/L 1.5: share"
@@ -98,7 +97,7 @@ def test_choices_stand_with_the_look_ahead(result):
         {"words": ("training", [tried, ""]), "look_ahead": ("training", [1.5, 0.0])},
         coords={"training": ["a", "b"]},
     ).expand_dims(model=["m"])
-    (table,) = chosen(with_group(result, chosen=group)).tables
+    (table,) = chosen(with_group(result, "chosen", group)).tables
     words = "ridge 0.001: the best; 0.3 ridge 0.001, observables none"
     assert table.rows == [("m", "a", "1.50", words)]
-    assert chosen(with_group(result, chosen=group.isel(training=[1]))).is_empty
+    assert chosen(with_group(result, "chosen", group.isel(training=[1]))).is_empty

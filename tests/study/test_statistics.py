@@ -133,7 +133,7 @@ def test_boxes_are_those_of_the_judged_cells():
         box = statistics.box_statistics(values)
         for key in ("median", "upper_quartile", "lower_whisker", "mean", "count"):
             assert row[key] == pytest.approx(getattr(box, key), rel=1e-12), key
-    assert int(table["left_out"].sel(channel="pitch")) == 1
+    assert table["left_out"].sel(channel="pitch") == 1
 
 
 WILD = """
@@ -212,7 +212,7 @@ def test_growth_is_pooled_over_cells_and_its_interval_holds_it():
         ).assign_coords(band=["all"])
         training = xr.Dataset({"begin": ("training", np.zeros(10))})
         at = trend_table(test, training, rng).sel(model="m", band="all")
-        inside += bool(at["lower"] <= growth <= at["upper"])
+        inside += at["lower"] <= growth <= at["upper"]
         changes.append(float(at["change"]))
     assert np.mean(changes) == pytest.approx(growth, abs=0.03)  # a standard error of 0.01
     # Nominally 95: 100 tables have a standard error of 2.2.
@@ -264,7 +264,7 @@ def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path):
     )
     gram = regressors @ regressors.T
     freedom = np.trace(np.linalg.solve(gram + 3 * np.eye(size), gram))
-    assert int(at["rank"]) == round(freedom)
+    assert at["rank"] == round(freedom)
     truncated = replace(spec, ridge=0.0, rank=round(freedom)).fit(parts, *channels)
     for name, model in {"ridge": fitted, "truncated": truncated}.items():
         radius = at["radius"].sel(variant=name)

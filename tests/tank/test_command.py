@@ -19,4 +19,3 @@ def test_one_logger_and_the_truth(tmp_path):
     assert cli.main(words.split()) == 0
     assert (out / "raw" / "sea" / "all.csv").is_file()
     assert (out / "truth" / "sea.nc").is_file()
-    assert not (out / "figures").exists()
