@@ -3,6 +3,7 @@
 import signal as signals
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -132,6 +133,15 @@ def oscillator() -> Oscillator:
 def channels() -> dict[str, list[str]]:
     """States and inputs of :func:`vessel_run`, as ``fit`` takes them."""
     return {"states": ["heave", "pitch"], "inputs": ["eta_fwd", "eta_cog"]}
+
+
+@pytest.fixture
+def study_folder(tmp_path: Path) -> Path:
+    """A folder with the tutorial's campaign and a study of it."""
+    from tutorial_study import put_tutorial
+
+    put_tutorial(tmp_path)
+    return tmp_path
 
 
 @pytest.fixture

@@ -4,6 +4,9 @@ from pathlib import Path
 
 import pytest
 from small_tank import CAMPAIGN, tank_columns, write_csv
+from tutorial_study import edit
+
+from seakeep.campaign import read_campaign
 
 
 @pytest.fixture
@@ -20,12 +23,19 @@ def edited(tank):
     """Write the campaign file with texts replaced; return its path."""
 
     def write(*pairs: tuple[str, str]) -> Path:
-        text = CAMPAIGN
-        for old, new in pairs:
-            assert old in text
-            text = text.replace(old, new, 1)
-        path = tank / "campaign.toml"
-        path.write_text(text, encoding="utf-8")
-        return path
+        (tank / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
+        return edit(tank / "campaign.toml", *pairs)
 
     return write
+
+
+@pytest.fixture
+def changed(edited):
+    """A campaign with texts of its file replaced."""
+    return lambda *pairs: read_campaign(edited(*pairs))
+
+
+@pytest.fixture
+def first(changed):
+    """The first run of such a campaign, prepared."""
+    return lambda *pairs: changed(*pairs).prepare(["first"])["first"]

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 DT = 0.02
 
@@ -22,10 +23,8 @@ def tank_columns(seed: int = 0, seconds: float = 20.0) -> dict[str, np.ndarray]:
     }
 
 
-def write_csv(path: Path, columns: dict[str, np.ndarray], delimiter: str = ",") -> Path:
-    rows = np.column_stack(list(columns.values()))
-    lines = [delimiter.join(columns), *(delimiter.join(map(repr, map(float, r))) for r in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+def write_csv(path: Path, columns: dict[str, np.ndarray]) -> Path:
+    pd.DataFrame(columns).to_csv(path, index=False)
     return path
 
 

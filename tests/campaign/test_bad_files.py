@@ -4,6 +4,7 @@ import re
 import shutil
 
 import h5py
+import matlab73
 import numpy as np
 import pytest
 from scipy import io
@@ -25,12 +26,7 @@ def matlab_5(path):
 
 
 def matlab_73(path):
-    with h5py.File(path, "w", userblock_size=512) as file:
-        for name, values in (("time", T), ("heave", HEAVE)):
-            file[name] = values[None, :]
-            file[name].attrs["MATLAB_class"] = np.bytes_("double")
-    with path.open("r+b") as raw:
-        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+    matlab73.save(path, {"time": T, "heave": HEAVE})
 
 
 def netcdf(path):
@@ -53,24 +49,14 @@ def tdms(path):
 
 
 def mcap(path):
-    folder = bag(path.with_name("bag"), "MCAP")
+    pytest.importorskip("rosbags")
+    from bags import STORE, write_bag
+
+    kind = STORE.types["std_msgs/msg/Float64"]
+    sent = ((int(1e9 * t), "/heave", kind(data=x)) for t, x in zip(T, HEAVE, strict=True))
+    folder = write_bag(path.with_name("bag"), sent)
     shutil.move(next(folder.glob("*.mcap")), path)
     shutil.rmtree(folder)
-
-
-def bag(folder, storage="SQLITE3"):
-    """A bag of ROS 2: a folder with metadata.yaml and its recording."""
-    pytest.importorskip("rosbags")
-    from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    store, kind = get_typestore(Stores.ROS2_HUMBLE), "std_msgs/msg/Float64"
-    with Writer(folder, version=9, storage_plugin=StoragePlugin[storage]) as writer:
-        topic = writer.add_connection("/heave", kind, typestore=store)
-        for t, x in zip(T, HEAVE, strict=True):
-            message = store.types[kind](data=float(x))
-            writer.write(topic, int(1e9 * t), store.serialize_cdr(message, kind))
-    return folder
 
 
 def read_table_of():
@@ -153,7 +139,7 @@ class TestUnits:
 
     def prepared(self, tank, header, text=CAMPAIGN):
         columns = tank_columns(1)
-        size = {"mm": 1.0, "cm": 0.1, "m": 1e-3, "deg": 1.0, "-": 1.0, "": 1.0}[header]
+        size = {"cm": 0.1, "m": 1e-3}.get(header, 1.0)
         heave = columns.pop("Heave [mm]") * size
         columns[f"Heave [{header}]" if header else "Heave"] = heave
         write_csv(tank / "second.csv", columns)
@@ -185,4 +171,4 @@ class TestUnits:
         )
         with pytest.warns(SeakeepWarning, match=r"heave leaves its mean by .* Check unit"):
             runs = self.prepared(tank, "deg", mended)  # millimetres, now said to be metres
-        assert float(runs["second"]["heave"].std()) > 1.0
+        assert runs["second"]["heave"].std() > 1.0

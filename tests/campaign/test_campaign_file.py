@@ -1,6 +1,7 @@
 """What a campaign file may say, and the words of the messages where it says something else."""
 
 import pytest
+from small_tank import CAMPAIGN
 
 from seakeep.campaign import read_campaign
 from seakeep.errors import RequestError
@@ -15,17 +16,12 @@ def refusal(path) -> str:
 
 def test_reads(tank):
     campaign = read_campaign(tank / "campaign.toml")
-    assert campaign.name == "Small tank"
-    assert campaign.runs == ["first", "second"]
     assert campaign.training_runs == ["first"]
     assert campaign.test_runs == ["first", "second"]
     model = campaign.model()
     assert model.kind == "hankel_dmdc"
     assert model.states == ("heave", "pitch")
     assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0}
-    assert hash(campaign.path)
-    with pytest.raises(AttributeError):
-        campaign.path = tank
 
 
 # One mistake each: (old text, new text, the line of the message about it).
@@ -63,11 +59,6 @@ MISTAKES = [
     ),
     (
         "sampling_rate = 10",
-        'sampling_rate = "10 Hz"',
-        "preparation.sampling_rate: received '10 Hz', which should be a number. Give samples",
-    ),
-    (
-        "sampling_rate = 10",
         "sampling_rate = 10\ndt = 0.1",
         "preparation: state only one of sampling_rate, dt; received a table with",
     ),
@@ -97,11 +88,6 @@ MISTAKES = [
         'column = "Heave"',
         'column = "Heave"\nunit = "milimetre"',
         "channels.heave.unit: the unit 'milimetre' is not known.",
-    ),
-    (
-        'column = "Heave"',
-        'column = "Heave"\nsign = 2',
-        "channels.heave.sign: received 2, which should be 1 or -1. Give 1 or -1.",
     ),
     (
         'states = ["heave", "pitch"]',
@@ -213,15 +199,9 @@ def test_mistake(edited, old, new, line):
 
 
 def test_every_mistake_is_named_at_once(edited):
-    message = refusal(
-        edited(
-            ('column = "Heave"', 'colum = "Heave"'),
-            ('role = "test"', 'role = "tset"'),
-            ("states = [", "stats = ["),
-        )
-    )
-    assert "3 mistakes in the campaign file" in message
-    for key in ("channels.heave.colum: ", "runs.second.role: ", "model.states: missing"):
+    message = refusal(edited(('role = "test"', 'role = "tset"'), ("states = [", "stats = [")))
+    assert "2 mistakes in the campaign file" in message
+    for key in ("runs.second.role: ", "model.states: missing"):
         assert key in message
 
 
@@ -239,24 +219,25 @@ def test_names_that_no_file_or_variable_can_hold(edited):
         assert "a channel is not called 'time', nor does its name end in '_flags'" in message
 
 
-def test_a_derived_rate_of_an_elevation(edited):
+def test_a_derived_rate_of_an_elevation(changed):
     """It was refused: m/s against m."""
     rate = '[derived.eta_fwd_rate]\nfrom = "eta_fwd"\nstep = "differentiate"\n[runs.first]'
-    campaign = read_campaign(edited(("[runs.first]", rate)))
+    campaign = changed(("[runs.first]", rate))
     assert campaign.prepare(["first"])["first"]["eta_fwd_rate"].attrs["units"] == "m/s"
     assert campaign.period_channel() == "eta_fwd"
 
 
 class TestModels:
-    def test_any_kind_with_keys_of_its_constructor(self, edited):
-        path = edited(("[model]", '[model]\nkind = "fir"\nmemory = "2 T"\nlead = "0.75 T"\n'))
-        model = read_campaign(path).model()
+    def test_any_kind_with_keys_of_its_constructor(self, changed):
+        model = changed(
+            ("[model]", '[model]\nkind = "fir"\nmemory = "2 T"\nlead = "0.75 T"\n')
+        ).model()
         assert model.kind == "fir"
         assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0,
                                      "lead": Length(0.75), "memory": Length(2.0)}  # fmt: skip
 
-    def test_named_models(self, edited):
-        path = edited(
+    def test_named_models(self, changed):
+        campaign = changed(
             ("[model]", "[models.small]"),
             (
                 "ridge = 1",
@@ -264,7 +245,6 @@ class TestModels:
                 'states = ["heave"]\nn_members = 10\nridge = { log_uniform = [0.1, 1] }',
             ),
         )
-        campaign = read_campaign(path)
         assert campaign.models == ["small", "band"]
         band = campaign.model("band")
         assert band.inputs == ()
@@ -279,9 +259,6 @@ class TestModels:
         with pytest.raises(RequestError, match=r"no table \[model\]\. Name one of small, band\."):
             campaign.model()
 
-    def test_none(self, edited):
-        text = edited().read_text()
-        path = edited()
-        path.write_text(text[: text.index("[model]")])
+    def test_none(self, changed):
         with pytest.raises(RequestError, match=r"no table \[model\]\. Add \[model\] with 'states'"):
-            read_campaign(path).model()
+            changed((CAMPAIGN[CAMPAIGN.index("[model]") :], "")).model()

@@ -30,13 +30,15 @@ def offline(campaign):
     return campaign.prepare(["unseen"])["unseen"]
 
 
+def between(rows, first, stop):
+    """Rows of a part of the time, which is their first column."""
+    part = slice(*np.searchsorted(next(iter(rows.values())), [first, stop]))
+    return {name: each[part] for name, each in rows.items()}
+
+
 def sent(chain, rows, stop=60.0, step=4.0):
     """What the chain gives of the rows up to an instant, sent a few seconds at a time."""
-    time, given, at = rows["t"], [], 0
-    for until in np.arange(step, stop + step / 2, step):
-        upto = int(np.searchsorted(time, until))
-        given.append(chain.push({"": {name: each[at:upto] for name, each in rows.items()}}))
-        at = upto
+    given = [chain.push({"": between(rows, at, at + step)}) for at in np.arange(0, stop, step)]
     return xr.concat([each for each in given if each.sizes["time"]], "time")
 
 
@@ -62,28 +64,22 @@ def test_how_rows_are_cut_up_does_not_matter(campaign, rows):
     settings = {"delay": "1 T", "window": "60 T", "every": 8}
     small = sent(campaign.live_chain("unseen", **settings), rows, 30.0, 0.5)
     whole = campaign.live_chain("unseen", **settings)
-    upto = int(np.searchsorted(rows["t"], 30.0))
-    large = whole.push({"": {name: each[:upto] for name, each in rows.items()}})
+    large = whole.push({"": between(rows, 0, 30)})
     assert small["time"].values[0] == large["time"].values[0]
     assert abs(small.sizes["time"] - large.sizes["time"]) < 8
     assert whole.push({}).sizes["time"] == 0
 
 
 def test_a_chain_that_was_saved_goes_on_to_the_last_bit(campaign, rows, tmp_path):
-    def cut(first, stop):
-        at = np.searchsorted(rows["t"], [first, stop])
-        return {"": {name: each[slice(*at)] for name, each in rows.items()}}
-
     settings = {"delay": "1 T", "window": "20 T"}
     whole, again, late = (campaign.live_chain("unseen", **settings) for _ in range(3))
-    whole.push(cut(0, 30))
+    whole.push({"": between(rows, 0, 30)})
     again.resume(whole.save(tmp_path / "chain.nc"))
     for first in (30, 34, 38):
-        xr.testing.assert_identical(
-            again.push(cut(first, first + 4)), whole.push(cut(first, first + 4))
-        )
+        part = {"": between(rows, first, first + 4)}
+        xr.testing.assert_identical(again.push(part), whole.push(part))
     late.resume(late.save(tmp_path / "chain.nc"))  # before the first row
-    assert late.push(cut(0, 10)).sizes["time"] > 0
+    assert late.push({"": between(rows, 0, 10)}).sizes["time"] > 0
     rig = seakeep.read_campaign(two_loggers.write(tmp_path))
     other = rig.live_chain("one", delay=2.0, window=20.0)
     with pytest.raises(RequestError, match="a chain with other loggers, columns or steps"):
@@ -112,22 +108,17 @@ def test_a_silent_logger_is_named_before_the_rows_of_others_pile_up(tmp_path):
     chain = seakeep.read_campaign(path).live_chain("one", delay=2.0, window=20.0)
     rows = {key: read_columns(tmp_path / f"one_{key}.csv").values for key in ("probes", "mru")}
 
-    def between(key, first, stop):
-        at = np.searchsorted(next(iter(rows[key].values())), [first, stop])
-        return {name: each[slice(*at)] for name, each in rows[key].items()}
-
-    for first in range(0, 20, 4):
-        chain.push({key: between(key, first, first + 4) for key in rows})
-    for first in range(20, 36, 4):
-        chain.push({"probes": between("probes", first, first + 4)})
+    for first in range(0, 36, 4):
+        sending = rows if first < 20 else ["probes"]
+        chain.push({key: between(rows[key], first, first + 4) for key in sending})
     size = len(chain._rows["probes"]["p1"])
     with pytest.raises(RequestError, match=r"'mru' has sent nothing for .* NaN in its columns"):
-        chain.push({"probes": between("probes", 36, 48)})
+        chain.push({"probes": between(rows["probes"], 36, 48)})
     assert len(chain._rows["probes"]["p1"]) == size  # nothing was taken
     lost = {
-        name: each if number == 0 else np.full(len(each), np.nan)
-        for number, (name, each) in enumerate(between("mru", 20, 48).items())
+        name: each if name == "t" else np.full(len(each), np.nan)
+        for name, each in between(rows["mru"], 20, 48).items()
     }
-    found = chain.push({"probes": between("probes", 36, 48), "mru": lost})
+    found = chain.push({"probes": between(rows["probes"], 36, 48), "mru": lost})
     assert found["eta_fwd"].sel(time=slice(25.0, 40.0)).notnull().all()
     assert found["heave"].sel(time=slice(25.0, 40.0)).isnull().all()

@@ -39,13 +39,8 @@ def test_draft(tmp_path, name):
     bare = [n for n, each in campaign.settings.channels.items() if each.unit_assumed]
     assert bare == (["wm_position"] if name == FLUME else [])
     if name == FLUME:  # files are called PERIOD and HEIGHT_REPETITION
-        seas = {n: each.sea_state for n, each in campaign.settings.runs.items() if each.sea_state}
-        assert {run: sea.split()[-1][:4] for run, sea in seas.items()} == {r: r[:4] for r in seas}
-        assert len(seas) == 8
         assert campaign.test_runs == ["3041_2"]  # T 1.21 s, between 1.158 and 1.238 s
         assert campaign.settings.runs["3041_2"].span[0] > 25  # until then the water is still
-        dead = [n for n, each in campaign.settings.runs.items() if each.role == "unused"]
-        assert len(dead) == 1  # its sway stands still
     told = pytest.warns(SeakeepWarning, match="wm_position is taken as")
     with told if bare else contextlib.nullcontext():
         used = [n for n, each in campaign.settings.runs.items() if each.role != "unused"]

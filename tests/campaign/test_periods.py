@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 import xarray as xr
-from small_tank import CAMPAIGN, tank_columns, write_csv
+from small_tank import tank_columns, write_csv
+from tutorial_study import edit
 
 from seakeep.campaign import read_campaign
 from seakeep.models.settings import periods_to_samples
@@ -13,37 +14,27 @@ PERIOD = 1.6
 STATED = ("scale_factor = 30.0", f"encounter_period = {PERIOD}")
 
 
-def in_periods(text, *pairs):
-    for seconds, periods in pairs:
-        assert seconds in text
-        text = text.replace(seconds, periods)
-    return text
-
-
-def test_all_lengths_of_a_campaign(tank):
+def test_all_lengths_of_a_campaign(tank, edited):
     """The same campaign in seconds and in periods gives the same runs."""
     for seed, name in enumerate(("first", "second")):
         columns = tank_columns(seed)
         columns["Heave [mm]"][300:304] = np.nan
         write_csv(tank / f"{name}.csv", columns)
-    text = CAMPAIGN.replace(*STATED).replace(
-        "[preparation]",
-        "[redundant.motion]\nchannels = ['heave', 'eta_fwd']\nwindow = 4.8\n"
-        "[preparation]\ngaps = 'bridge'\nlongest_gap = 0.08\n",
+    redundant = "[redundant.motion]\nchannels = ['heave', 'eta_fwd']\nwindow = 4.8\n"
+    gaps = "[preparation]\ngaps = 'bridge'\nlongest_gap = 0.08\n"
+    path = edited(
+        STATED,
+        ("[preparation]", redundant + gaps),
+        ("span = [2, 18]", "span = [3.2, 16]\nrecord = [1.6, 19.2]"),
     )
-    text = text.replace("span = [2, 18]", "span = [3.2, 16]\nrecord = [1.6, 19.2]")
-    path = tank / "campaign.toml"
-    path.write_text(text)
     seconds = read_campaign(path)
-    path.write_text(
-        in_periods(
-            text,
-            ("train = [0, 10]", "train = ['0 T', '6.25 T']"),
-            ("test = [10, inf]", "test = ['6.25 T', inf]"),
-            ("span = [3.2, 16]", "span = ['2 T', 16]"),
-            ("record = [1.6, 19.2]", "record = ['1 T', '12 T']"),
-            ("window = 4.8", "window = '3 T'"),
-        )
+    edit(
+        path,
+        ("train = [0, 10]", "train = ['0 T', '6.25 T']"),
+        ("test = [10, inf]", "test = ['6.25 T', inf]"),
+        ("span = [3.2, 16]", "span = ['2 T', 16]"),
+        ("record = [1.6, 19.2]", "record = ['1 T', '12 T']"),
+        ("window = 4.8", "window = '3 T'"),
     )
     periods = read_campaign(path)
     assert periods.digest != seconds.digest
@@ -61,12 +52,11 @@ def test_all_lengths_of_a_campaign(tank):
     assert periods.seconds(2.5) == 2.5
 
 
-def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(edited):
-    path = edited(
+def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(changed):
+    campaign = changed(
         ("train = [0, 10]", 'waves = "irregular"\ntrain = [0, 10]'),
         ("span = [2, 18]", 'waves = "regular"\nspan = ["1 T", "7.5 T"]'),
     )
-    campaign = read_campaign(path)
     period = campaign.encounter_period()
     run = campaign.prepare(["second"])["second"]
     # The first and the last instant of a grid of 0.1 s inside the span.
@@ -78,18 +68,15 @@ def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(edit
 @pytest.mark.parametrize("measured", [False, True])
 def test_delays_window_and_stop_of_a_model(edited, measured):
     pairs = [] if measured else [STATED]
-    keys = ("state_delays = 4\ninput_delays = 8\nridge = 1\n",)
-    path = edited(*pairs, (keys[0], 'state_delays = "0.5 T"\ninput_delays = "0.75 T"\nridge = 1\n'
+    keys = "state_delays = 4\ninput_delays = 8\nridge = 1\n"
+    path = edited(*pairs, (keys, 'state_delays = "0.5 T"\ninput_delays = "0.75 T"\nridge = 1\n'
                            'window = "3 T"\nstop = "5 T"\n'))  # fmt: skip
     campaign = read_campaign(path)
     period = campaign.encounter_period()
     s, z, m = (periods_to_samples(n, period, 0.1) for n in (0.5, 0.75, 3))
     model = fit_campaign(campaign)
-    assert (model.settings.state_delays, model.settings.input_delays, model.settings.window) == (
-        s,
-        z,
-        m,
-    )
-    path = edited(*pairs, (keys[0], f"state_delays = {s}\ninput_delays = {z}\nridge = 1\n"
+    found = model.settings
+    assert (found.state_delays, found.input_delays, found.window) == (s, z, m)
+    path = edited(*pairs, (keys, f"state_delays = {s}\ninput_delays = {z}\nridge = 1\n"
                            f"window = {m}\nstop = {5 * period}\n"))  # fmt: skip
     np.testing.assert_array_equal(model.A, fit_campaign(read_campaign(path)).A)

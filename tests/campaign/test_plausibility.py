@@ -7,11 +7,11 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 from small_tank import tank_columns, write_csv
+from tutorial_study import edit
 
 from seakeep.campaign import draft_campaign, read_campaign
 from seakeep.errors import DataError, SeakeepWarning
 from seakeep.quality import findings_of
-from seakeep.quality.clocks import ClocksKind
 
 LOGGERS = """
 [instruments]
@@ -44,20 +44,30 @@ inputs = ["eta_fwd"]
 """
 
 
+CLOCKS = ("ASSUMED_CLOCK", "TIMES_ASIDE", "OTHER_RATE")
+RECORDS = ("STARTS_LATE", "ENDS_EARLY")
+
+
+def told(run, kinds):
+    return [(each.channel, each.text) for each in findings_of(run) if each.kind.name in kinds]
+
+
+SPANS = "train = [0, 10]\ntest = [10, 20]"
+
+
 @pytest.fixture
 def loggers(tmp_path):
     """A run of two loggers; the motions' is written from one instant to another, both in s."""
 
-    def write(begin=0.0, end=20.0, spans=None):
+    def write(begin=0.0, end=20.0, spans=SPANS):
         columns = tank_columns()
         time = columns["Time [s]"]
         write_csv(tmp_path / "probes.csv", {n: columns[n] for n in ("Time [s]", "WP fwd [mm]")})
         kept = (time >= begin) & (time <= end)
         rest = {n: x[kept] for n, x in columns.items() if n != "WP fwd [mm]"}
         write_csv(tmp_path / "mru.csv", rest)
-        text = LOGGERS.replace("train = [0, 10]\ntest = [10, 20]", spans or "train = [0, 10]")
         path = tmp_path / "campaign.toml"
-        path.write_text(text if spans else LOGGERS, encoding="utf-8")
+        path.write_text(LOGGERS.replace(SPANS, spans), encoding="utf-8")
         return read_campaign(path)
 
     return write
@@ -67,13 +77,12 @@ class TestClocksAndRates:
     """What is assumed or contradicted about instants is a finding."""
 
     def test_clocks_of_which_nothing_is_said_are_assumed_the_same(self, loggers, tmp_path):
-        found = clocks(loggers().prepare()["first"])
+        found = told(loggers().prepare()["first"], CLOCKS)
         assert [channel for channel, _ in found] == ["mru"]
         assert found[0][1].startswith("clock assumed the same as the reference's: state trigger")
-        path = tmp_path / "campaign.toml"
-        one = path.read_text().replace("[instruments.mru]", "[instruments.mru]\noffset = 0")
-        path.write_text(one, encoding="utf-8")
-        assert not clocks(read_campaign(path).prepare()["first"])
+        stated = ("[instruments.mru]", "[instruments.mru]\noffset = 0")
+        path = edit(tmp_path / "campaign.toml", stated)
+        assert not told(read_campaign(path).prepare()["first"], CLOCKS)
 
     @pytest.mark.parametrize(
         ("files", "text"),
@@ -81,9 +90,9 @@ class TestClocksAndRates:
          ("sampling_rate = 25", "counted at the 25 Hz stated; the file's own times, which are "),
          ('time = "Time"\nsampling_rate = 50', None), ("sampling_rate = 50", None)],
     )  # fmt: skip
-    def test_a_rate_against_the_times(self, edited, files, text):
-        path = edited(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
-        found = clocks(read_campaign(path).prepare(["first"])["first"])
+    def test_a_rate_against_the_times(self, first, files, text):
+        run = first(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
+        found = told(run, CLOCKS)
         assert [each[0] for each in found] == ([] if text is None else ["time"])
         assert text is None or found[0][1].startswith(text)
 
@@ -92,28 +101,25 @@ class TestClocksAndRates:
         [("Time", "", True), ("Sample", 'time = "Sample"', True), ("Time [s]", "", False),
          ("Time", 'time_unit = "s"', False)],
     )  # fmt: skip
-    def test_times_that_may_count_samples(self, edited, tank, header, files, is_said):
+    def test_times_that_may_count_samples(self, first, tank, header, files, is_said):
         for number, name in enumerate(("first", "second")):
             columns = tank_columns(number)
             del columns["Time [s]"]
             write_csv(tank / f"{name}.csv", {header: np.arange(1001.0)} | columns)
-        path = edited(
-            ("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"),
-            ("sampling_rate = 10", ""),
-        )
+        stated = ("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]")
         warned = pytest.warns(SeakeepWarning, match=r"state sampling_rate \(Hz\) in \[files\]")
         with warned if is_said else nullcontext():
-            assert ("counted" in kinds(read_campaign(path).prepare(["first"])["first"])) is is_said
+            run = first(stated, ("sampling_rate = 10", ""))
+        assert ("counted" in kinds(run)) is is_said
 
-    def test_a_motion_from_a_column_of_waves(self, edited):
-        path = edited(('column = "Heave"', 'column = "WP fwd"'))
+    def test_a_motion_from_a_column_of_waves(self, first):
         with pytest.warns(
             SeakeepWarning,
             match=r"heave is read from the column 'WP fwd', which is called as wave probes are\. "
             r"Correct column in \[channels\.heave\]",
         ):
-            assert "wave column" in kinds(read_campaign(path).prepare(["first"])["first"])
-        assert "wave column" not in kinds(read_campaign(edited()).prepare(["first"])["first"])
+            assert "wave column" in kinds(first(('column = "Heave"', 'column = "WP fwd"')))
+        assert "wave column" not in kinds(first())
 
 
 class TestSteps:
@@ -127,49 +133,30 @@ class TestSteps:
          ("sampling_rate = 1.5\nanti_alias = false", "0.75 Hz and is folded into slower waves"),
          ("sampling_rate = 10", None), ("sampling_rate = 3", None), ("sampling_rate = 100", None)],
     )  # fmt: skip
-    def test_what_a_coarse_step_loses_is_told(self, edited, chain, fate):
-        path = edited(("sampling_rate = 10", chain))
-        found = step_findings(read_campaign(path).prepare(["first"])["first"])
+    def test_what_a_coarse_step_loses_is_told(self, first, chain, fate):
+        run = first(("sampling_rate = 10", chain))
+        found = dict(told(run, ("COARSE_STEP", "FINE_STEP")))
         assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
         assert fate is None or re.search(fate, found["eta_fwd"])
 
     @pytest.mark.parametrize("edges", ["[0.17, 0.33]", "[2.0, 3.0]"])
-    def test_a_low_pass_that_removes_the_waves_is_named(self, edited, edges):
+    def test_a_low_pass_that_removes_the_waves_is_named(self, first, edges):
         """Waves of 0.5 to 0.9 Hz: the first filter leaves none of them, the second all."""
-        path = edited(("sampling_rate = 10", f"sampling_rate = 10\nlow_pass = {edges}"))
-        campaign = read_campaign(path)
+        stated = ("sampling_rate = 10", f"sampling_rate = 10\nlow_pass = {edges}")
         if edges == "[2.0, 3.0]":
-            assert not kinds(campaign.prepare(["first"])["first"])
+            assert not kinds(first(stated))
             return
         with pytest.warns(
             SeakeepWarning,
             match=r"loses (9\d.*|100) % of the energy of its waves .* to the filter low_pass, "
             r"which halves what lies at 0\.25 Hz .*\. Raise low_pass in \[preparation\]",
         ):
-            assert "low pass" in kinds(campaign.prepare(["first"])["first"])
+            assert "low pass" in kinds(first(stated))
 
-    def test_a_low_pass_longer_than_the_record(self, edited):
+    def test_a_low_pass_longer_than_the_record(self, first):
         """60 dB over 0.1 Hz take 41.8 s by Kaiser's formula, and the record has 20 s."""
-        path = edited(("sampling_rate = 10", "sampling_rate = 10\nlow_pass = [2.0, 2.1]"))
         with pytest.raises(DataError, match=r"'first': low_pass .* over 41\.8 s, .* lasts 20 s"):
-            read_campaign(path).prepare(["first"])
-
-
-def step_findings(run):
-    return {each.channel: each.text for each in findings_of(run) if "STEP" in each.kind.name}
-
-
-def clocks(run):
-    timed = ("ASSUMED_CLOCK", "TIMES_ASIDE", "OTHER_RATE")
-    return [(each.channel, each.text) for each in findings_of(run) if each.kind.name in timed]
-
-
-def records(run):
-    return [
-        (each.channel, each.text)
-        for each in findings_of(run)
-        if each.kind.name in ("STARTS_LATE", "ENDS_EARLY")
-    ]
+            first(("sampling_rate = 10", "sampling_rate = 10\nlow_pass = [2.0, 2.1]"))
 
 
 class TestRecords:
@@ -181,18 +168,18 @@ class TestRecords:
     def test_a_logger_that_was_cut_off_is_told(self, loggers, ends, words, span):
         with pytest.warns(SeakeepWarning, match=f"first: mru {words}"):
             run = loggers(*ends).prepare()["first"]
-        assert [text.startswith(words) for _, text in records(run)] == [True]
+        assert [text.startswith(words) for _, text in told(run, RECORDS)] == [True]
         assert run.attrs["test_span"] == pytest.approx(span)
 
     @pytest.mark.parametrize(
         ("ends", "spans"),
-        [((0.5, 20.0), None), ((0.0, 19.5), None), ((5.0, 20.0), "span = [6, inf]"),
+        [((0.5, 20.0), SPANS), ((0.0, 19.5), SPANS), ((5.0, 20.0), "span = [6, inf]"),
          ((0.0, 15.0), "train = [1, 8]\ntest = [8, 14]")],
     )  # fmt: skip
     def test_a_start_by_hand_and_what_the_run_does_not_use_do_no_harm(self, loggers, ends, spans):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            assert not records(loggers(*ends, spans).prepare()["first"])
+            assert not told(loggers(*ends, spans).prepare()["first"], RECORDS)
 
     @pytest.mark.parametrize("test", ["[10, 20]", "[10, inf]"])
     def test_a_test_part_without_samples_is_an_error(self, loggers, test):
@@ -206,29 +193,22 @@ class TestRecords:
             campaign.prepare()
 
 
-def noisy(folder, noise):
-    """Two runs whose probe has white noise, in parts of the waves' standard deviation."""
-    for seed, name in enumerate(("first", "second")):
-        columns = tank_columns(seed)
-        waves = columns["WP fwd [mm]"]
-        shaken = np.random.default_rng(seed).normal(0.0, noise * waves.std(), waves.size)
-        write_csv(folder / f"{name}.csv", {**columns, "WP fwd [mm]": waves + shaken})
-
-
 COUNTED = ("sampling_rate = 10", "steps_per_period = 12")
 
 
 class TestPeriod:
-    def test_a_count_that_noise_leads_is_told(self, edited, tank):
-        sound = read_campaign(edited(COUNTED)).encounter_period()
-        noisy(tank, 0.3)
+    def test_a_count_that_noise_leads_is_told(self, changed, tank):
+        sound = changed(COUNTED).encounter_period()
+        for seed, name in enumerate(("first", "second")):
+            columns = tank_columns(seed)
+            columns["WP fwd [mm]"] += np.random.default_rng(seed).normal(0, 9.5, 1001)  # of 32 mm
+            write_csv(tank / f"{name}.csv", columns)
         message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s "
         rest = r"\(second likewise\)\. .*period_hysteresis"
         with pytest.warns(SeakeepWarning, match=message + rest):
-            run = read_campaign(edited(COUNTED)).prepare()["first"]
+            run = changed(COUNTED).prepare()["first"]
         assert run.attrs["encounter_period"] < sound / 1.5
-        told = [each.channel for each in findings_of(run) if each.kind is ClocksKind.PERIOD]
-        assert told == ["eta_fwd"]
+        assert [channel for channel, _ in told(run, ("PERIOD",))] == ["eta_fwd"]
 
 
 class TestValues:
@@ -238,25 +218,23 @@ class TestValues:
          ("Heave [mm]", "Heave [m]", r"heave leaves its mean by .* m in water of 3\.6 m"),
          ("WP fwd [mm]", "WP fwd [m]", r"eta_fwd leaves its mean by .* m in water of 3\.6 m")],
     )  # fmt: skip
-    def test_values_that_nothing_afloat_reaches(self, edited, tank, stem, header, message):
+    def test_values_that_nothing_afloat_reaches(self, changed, tank, stem, header, message):
         columns = tank_columns(0)
         write_csv(tank / "first.csv", {header if n == stem else n: x for n, x in columns.items()})
         with pytest.warns(SeakeepWarning, match=message + r"\. Check unit and column in \[channe"):
-            runs = read_campaign(edited()).prepare()
+            runs = changed().prepare()
         assert kinds(runs["first"]) & {"impossible", "out of water"}
         assert not kinds(runs["second"])
 
     def test_a_unit_that_a_draft_assumed_is_told_until_it_is_confirmed(self, tank):
         columns = tank_columns(0)
         columns["pitch"] = np.radians(columns.pop("Pitch (deg)"))
-        write_csv(tank / "bare.csv", columns)
-        path = tank / "draft.toml"
-        text = draft_campaign([tank / "bare.csv"], tank)
-        path.write_text(text, encoding="utf-8")
+        bare, path = write_csv(tank / "bare.csv", columns), tank / "draft.toml"
+        path.write_text(draft_campaign([bare], tank), encoding="utf-8")
         with pytest.warns(SeakeepWarning, match="pitch is taken as rad, .*remove unit_as"):
             run = read_campaign(path).prepare()["bare"]
         assert "unit" in kinds(run)
-        path.write_text(text.replace("unit_assumed = true", ""), encoding="utf-8")
+        edit(path, ("unit_assumed = true", ""))
         assert "unit" not in kinds(read_campaign(path).prepare()["bare"])
 
 

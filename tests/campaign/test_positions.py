@@ -4,12 +4,13 @@ import warnings
 
 import numpy as np
 import pytest
+from seas import sea
+from small_tank import write_csv
 
 import seakeep
 from seakeep.quality import findings_of
-from seakeep.waves import wavenumber
 
-PLACES = {"eta_fwd": 48.42, "eta_mid": 50.2, "eta_cog": 52.09}
+PLACES = {"fwd": 48.42, "mid": 50.2, "cog": 52.09}
 CAMPAIGN = """
 [rig]
 water_depth = 3.6
@@ -36,14 +37,9 @@ waves = "{waves}"
 def campaign(tmp_path):
     time = np.arange(0, 90, 0.05)
     for seed, name in enumerate(("one", "two")):
-        rng = np.random.default_rng(seed)
-        f, phase = rng.uniform(0.3, 1.0, 60), rng.uniform(0, 2 * np.pi, 60)
-        k = wavenumber(2 * np.pi * f, 3.6)
-        turn = np.outer(time, 2 * np.pi * f) + phase
-        columns = [0.01 * np.cos(turn - k * x).sum(axis=1) for x in PLACES.values()]
-        rows = np.column_stack([time, *columns])
-        head = "time [s],fwd [m],mid [m],cog [m]"
-        np.savetxt(tmp_path / f"{name}.csv", rows, "%.5f", ",", header=head, comments="")
+        waves = sea(seed, (0.3, 1.0), components=60)
+        columns = {f"{probe} [m]": 0.05 * waves.at(time, x) for probe, x in PLACES.items()}
+        write_csv(tmp_path / f"{name}.csv", {"time [s]": time, **columns})
 
     def make(stated, waves="irregular"):
         path = tmp_path / "campaign.toml"

@@ -24,8 +24,8 @@ def campaign(tank):
     return read_campaign(tank / "campaign.toml")
 
 
-def rewrite(tank, change, name="second.csv", seed=1):
-    columns = tank_columns(seed)
+def rewrite(tank, change, name="second.csv"):
+    columns = tank_columns(1)
     change(columns)
     write_csv(tank / name, columns)
     return read_campaign(tank / "campaign.toml")
@@ -42,16 +42,13 @@ def test_raw_run_is_in_si_units(campaign):
         "eta_fwd": "m", "heave": "m", "pitch": "rad", "acc": "m/s^2", "pitch_rate": "rad/s",
     }  # fmt: skip
     assert run["acc"].attrs["long_name"] == "acceleration of the bow"
-    assert run["eta_fwd"].attrs["long_name"] == "wave elevation fwd"
     assert run["eta_fwd"].attrs["x_position"] == -2.5
     assert "x_position" not in run["heave"].attrs
-    assert list(run.dims) == ["time"]
-    assert run.attrs["dt"] == DT
 
 
-def test_offset_is_added_in_the_files_unit_before_the_sign(edited):
+def test_offset_is_added_in_the_files_unit_before_the_sign(changed):
     stated = 'column = "Heave"\nsign = -1\noffset = 250\naccuracy = 0.5'
-    run = read_campaign(edited(('column = "Heave"', stated))).read_run("first")
+    run = changed(('column = "Heave"', stated)).read_run("first")
     # heave = -(reading + 250 mm)
     expected = -(tank_columns(0)["Heave [mm]"] + 250) * 1e-3
     np.testing.assert_allclose(run["heave"], expected, rtol=1e-15)  # order of two products
@@ -59,9 +56,9 @@ def test_offset_is_added_in_the_files_unit_before_the_sign(edited):
     assert "accuracy" not in run["eta_fwd"].attrs
 
 
-def test_parameters_of_a_run_are_its_attributes(edited):
+def test_parameters_of_a_run_are_its_attributes(changed):
     stated = "span = [2, 18]\nparameters = { draught = 0.083, water_depth = 3.0 }"
-    runs = read_campaign(edited(("span = [2, 18]", stated))).prepare()
+    runs = changed(("span = [2, 18]", stated)).prepare()
     assert (runs["second"].attrs["draught"], runs["second"].attrs["water_depth"]) == (0.083, 3.0)
     assert "draught" not in runs["first"].attrs
 
@@ -73,10 +70,8 @@ def test_prepared_runs(campaign):
     first, second = runs["first"], runs["second"]
     np.testing.assert_allclose(first["time"], np.arange(201) * 0.1, rtol=1e-15)
     np.testing.assert_allclose(second["time"], 2 + np.arange(161) * 0.1, rtol=1e-15)
-    assert first.attrs["dt"] == second.attrs["dt"] == 0.1
     expected = {
         "run": "first",
-        "campaign": "Small tank",
         "role": "train and test",
         "sea_state": "moderate",
         "water_depth": 3.6,
@@ -87,9 +82,7 @@ def test_prepared_runs(campaign):
         "file": "first.csv",
     }
     assert {key: first.attrs[key] for key in expected} == expected
-    assert len(first.attrs["file_sha256"]) == 64
     assert "encounter_period" not in first.attrs
-    assert second.attrs["role"] == "test"
     assert second.attrs["test_span"] == (2.0, 18.0)
     assert "train_span" not in second.attrs
     assert first["pitch_rate"].attrs["derived_from"] == "pitch, differentiated"
@@ -103,8 +96,8 @@ def test_the_whole_record_is_resampled_and_then_cut(campaign):
     np.testing.assert_allclose(run["pitch_rate"], whole[20:181], atol=1e-14)
 
 
-def test_derived_at_the_files_own_rate(edited):
-    path = edited(
+def test_derived_at_the_files_own_rate(changed):
+    run = changed(
         (
             "[runs.first]",
             '[derived.speed]\nfrom = "acc"\nstep = "integrate"\nband = [0.3, 5]\n'
@@ -116,8 +109,7 @@ def test_derived_at_the_files_own_rate(edited):
             '[derived.group]\nfrom = "eta_fwd"\nstep = "envelope_squared"\n'
             '[derived.sway]\nexpression = "1000 * heave"\nunit = "mm"\n[runs.first]',
         )
-    )
-    run = read_campaign(path).read_run("first")
+    ).read_run("first")
     acc, eta = run["acc"].to_numpy(), run["eta_fwd"].to_numpy()
     np.testing.assert_array_equal(run["speed"], integrate(acc, DT, (0.3, 5.0)))
     np.testing.assert_array_equal(run["way"], integrate(acc, DT, (0.3, 5.0), 2))
@@ -136,16 +128,16 @@ def test_derived_at_the_files_own_rate(edited):
 
 class TestStep:
     @pytest.mark.parametrize(("rate", "dt"), [("dt = 0.13", 0.13), ("steps_per_period = 32", 0.05)])
-    def test_stated(self, edited, rate, dt):
+    def test_stated(self, changed, rate, dt):
         period = ("scale_factor = 30.0", "encounter_period = 1.6")
-        campaign = read_campaign(edited(("sampling_rate = 10", rate), period))
+        campaign = changed(("sampling_rate = 10", rate), period)
         assert campaign.encounter_period() == 1.6
         for run in campaign.prepare().values():
             assert (run.attrs["dt"], run.attrs["encounter_period"]) == (dt, 1.6)
             np.testing.assert_allclose(np.diff(run["time"]), dt, rtol=1e-12)
 
-    def test_the_files_own(self, edited):
-        campaign = read_campaign(edited(("sampling_rate = 10", "")))
+    def test_the_files_own(self, changed):
+        campaign = changed(("sampling_rate = 10", ""))
         run = campaign.prepare()["first"]
         raw = campaign.read_run("first")
         assert run.attrs["dt"] == DT
@@ -162,64 +154,47 @@ class TestStep:
         ):
             read_campaign(tank / "campaign.toml").prepare()
 
-    def test_steps_a_measured_period(self, edited):
-        campaign = read_campaign(edited(("sampling_rate = 10", "steps_per_period = 16")))
-        runs = campaign.prepare()
-        period = campaign.encounter_period()
-        assert runs["first"].attrs["encounter_period"] == period
-        assert {run.attrs["dt"] for run in runs.values()} == {period / 16}
-
 
 class TestEncounterPeriod:
-    def test_mean_of_the_irregular_runs(self, edited):
-        of = lambda path: read_campaign(path).encounter_period()  # noqa: E731
-        both = of(edited())
-        first = of(edited(('sea_state = "moderate"', 'waves = "irregular"')))
-        second = of(
-            edited(
-                ('sea_state = "moderate"', 'waves = "regular"'),
-                ('role = "test"', 'role = "test"\nwaves = "irregular"'),
-            )
-        )
+    def test_mean_of_the_irregular_runs(self, changed):
+        both = changed().encounter_period()
+        first = changed(('sea_state = "moderate"', 'waves = "irregular"')).encounter_period()
+        second = changed(
+            ('sea_state = "moderate"', 'waves = "regular"'),
+            ('role = "test"', 'role = "test"\nwaves = "irregular"'),
+        ).encounter_period()
         assert first != second
         assert both == pytest.approx((first + second) / 2, rel=1e-15)  # rounding of a sum
 
-    def test_still_water_before_the_waves_does_not_count(self, tank):
+    def test_still_water_before_the_waves_does_not_count(self, tank, changed):
         # Spans do not cut it off, and the probe's noise crosses the mean all the while.
-        rng = np.random.default_rng(0)
-
-        def change(columns):
-            waves = tank_columns(0, seconds=60.0)
-            for name, values in waves.items():
-                columns[name] = values
-            still = waves["Time [s]"] < 25
-            noise = 0.05 * rng.standard_normal(still.sum())
-            columns["WP fwd [mm]"] = np.where(still, 0.0, waves["WP fwd [mm]"])
-            columns["WP fwd [mm]"][still] = noise
-
-        path = tank / "campaign.toml"
-        text = path.read_text().replace("train = [0, 10]\ntest = [10, inf]", 'role = "train"')
-        path.write_text(text.replace('role = "test"\nspan = [2, 18]', 'role = "unused"'))
-        campaign = rewrite(tank, change, "first.csv")
-        waves = tank_columns(0, seconds=60.0)["WP fwd [mm]"][1250:]
+        columns = tank_columns(0, seconds=60.0)
+        waves = columns["WP fwd [mm]"][1250:]
+        columns["WP fwd [mm]"][:1250] = 0.05 * np.random.default_rng(0).standard_normal(1250)
+        write_csv(tank / "first.csv", columns)
+        roles = [
+            ("train = [0, 10]\ntest = [10, inf]", 'role = "train"'),
+            ('role = "test"\nspan = [2, 18]', 'role = "unused"'),
+        ]
+        found = changed(*roles).encounter_period()
         # A wave or two of 25 may fall to the still part.
-        assert campaign.encounter_period() == pytest.approx(encounter_period(waves, DT), rel=0.02)
-        hard = text.replace("[campaign]", "[campaign]\nperiod_hysteresis = 0.9")
-        path.write_text(hard.replace('role = "test"\nspan = [2, 18]', 'role = "unused"'))
+        assert found == pytest.approx(encounter_period(waves, DT), rel=0.02)
+        campaign = changed(*roles, ("[campaign]", "[campaign]\nperiod_hysteresis = 0.9"))
         # Only waves that pass 0.9 of a deviation on either side are counted: fewer, so longer.
         with pytest.warns(SeakeepWarning, match=r"counts waves of 3\.\d+ s, and the energy period"):
-            assert read_campaign(path).encounter_period() > 1.1 * encounter_period(waves, DT)
+            assert campaign.encounter_period() > 1.1 * encounter_period(waves, DT)
 
-    def test_no_wave(self, edited):
-        path = edited(
-            ('inputs = ["eta_fwd"]', ""), ("[channels.eta_fwd]", '[channels.probe]'),
+    def test_no_wave(self, changed):
+        campaign = changed(
+            ('inputs = ["eta_fwd"]', ""),
+            ("[channels.eta_fwd]", "[channels.probe]"),
             ("eta_fwd = -2.5", ""),
-        )  # fmt: skip
+        )
         with pytest.raises(
             RequestError,
             match=r"no wave channel to take the encounter period from. State encounter",
         ):
-            read_campaign(path).encounter_period()
+            campaign.encounter_period()
 
     def test_still_water(self, tank):
         for name in ("first.csv", "second.csv"):
@@ -227,11 +202,7 @@ class TestEncounterPeriod:
         with pytest.raises(DataError, match="run 'first', channel 'eta_fwd': the record of 20"):
             campaign.encounter_period()
         # A constant channel is kept all the same: whether it serves is the model's business.
-        assert float(campaign.prepare()["first"]["eta_fwd"].std()) == 0.0
-
-
-def without(columns, part):
-    return {name: np.delete(values, part) for name, values in columns.items()}
+        assert campaign.prepare()["first"]["eta_fwd"].std() == 0.0
 
 
 def gapped(columns):
@@ -253,16 +224,9 @@ class TestBadRuns:
                 r"gap off with record = \[start, end\] in \[runs\.second\]",
             ),
             (
-                lambda columns: without(columns, slice(100, 125)),
-                DataError,
-                r"the times of run 'second' \(.*second\.csv\) have 1 gap\(s\): after t = 1\.98 s, "
-                r"25 sample\(s\) of 0\.02 s are missing; the longest gap, after t = 1\.98 s, "
-                r"lasts 0",
-            ),
-            (
                 lambda columns: columns | {"Time [s]": columns["Time [s]"] ** 1.1},
                 DataError,
-                r"the times of run 'second' .* are not uniform: steps r",
+                r"the times of run 'second' \(.*second\.csv\) are not uniform: steps r",
             ),
             (
                 lambda columns: columns | {"Heave [deg]": columns.pop("Heave [mm]")},
@@ -271,7 +235,6 @@ class TestBadRuns:
                 "which is measured in 'm'",
             ),
         ],
-        ids=["values", "times", "jitter", "unit"],
     )
     def test_a_file_at_fault(self, campaign, tank, change, error, message):
         write_csv(tank / "second.csv", change(tank_columns(1)))
@@ -305,37 +268,34 @@ class TestBadRuns:
                 for span, step in (("span = [2.01, 2.05]", 0.1), ("record = [2.001, 2.01]", 0.02))
             ),
             ("sampling_rate = 10", "dt = 50", r"of 20 s is shorter than two steps of 50 s"),
+            (
+                'file = "second.csv"',
+                'file = "${TANK_FILES}/second.csv"',
+                r"needs the environment variable TANK_FILES, which is not set\. Set it to the "
+                r"folder of the data: export TANK_FILES=",
+            ),
         ],
     )
-    def test_a_campaign_at_fault(self, edited, old, new, message):
+    def test_a_campaign_at_fault(self, changed, old, new, message):
         with pytest.raises(RequestError, match=message):
-            read_campaign(edited((old, new))).prepare()
+            changed((old, new)).prepare()
 
-    def test_gap_cut_off(self, tank):
+    def test_gap_cut_off(self, tank, changed):
         rewrite(tank, lambda c: c["Heave [mm]"].__setitem__(slice(20, 30), np.nan))
-        path = tank / "campaign.toml"
-        path.write_text(path.read_text().replace("span = [2, 18]", "record = [1, inf]"))
-        run = read_campaign(path).prepare()["second"]
-        assert float(run["time"][0]) == 1.0
+        run = changed(("span = [2, 18]", "record = [1, inf]")).prepare()["second"]
+        assert run["time"][0] == 1.0
 
-    def test_unset_variable(self, edited, monkeypatch):
-        monkeypatch.delenv("TANK_FILES", raising=False)
+    def test_a_variable_in_a_path(self, edited, monkeypatch):
         path = edited(('file = "second.csv"', 'file = "${TANK_FILES}/second.csv"'))
-        with pytest.raises(
-            RequestError,
-            match=r"needs the environment variable TANK_FILES, which is not set\. Set it to the "
-            r"folder of the data: export TANK_FILES=",
-        ):
-            read_campaign(path).prepare(["second"])
         with pytest.raises(RequestError, match=r"has no run 'secnd'\. Did you mean 'second'"):
             read_campaign(path).prepare(["secnd"])
         monkeypatch.setenv("TANK_FILES", str(path.parent))
         assert read_campaign(path).prepare(["second"])
 
 
-def test_the_digest_follows_what_prepared_runs_depend_on(edited):
+def test_the_digest_follows_what_prepared_runs_depend_on(changed):
     def digest(*pair):
-        return read_campaign(edited(pair)).digest
+        return changed(pair).digest
 
     same = {
         digest("ridge = 1", "ridge = 2"),
@@ -355,14 +315,10 @@ class TestFiles:
     def test_written_runs_come_back(self, campaign, tank, monkeypatch):
         files = write_prepared(campaign, tank / "out")
         assert files == {n: tank / "out" / f"{n}.nc" for n in ("first", "second")}
-        assert sorted(p.name for p in (tank / "out").iterdir()) == ["first.nc", "second.nc"]
         expected = campaign.prepare()
         monkeypatch.setattr(type(campaign), "prepare", None)  # nothing is prepared again
         for name, run in load_prepared(campaign, tank / "out").items():
             xr.testing.assert_identical(run, expected[name])
-            assert {k: type(v) for k, v in run.attrs.items()} == {
-                k: type(v) for k, v in expected[name].attrs.items()
-            }
 
     def test_interrupted_half_way_a_second_call_continues(self, campaign, tank):
         def stop(done, total, name):
@@ -379,26 +335,26 @@ class TestFiles:
         assert calls == [(2, 2, "second")]
 
     @pytest.mark.parametrize("change", ["settings", "file", "version", "name"])
-    def test_stale_files_are_not_used(self, campaign, tank, edited, change, monkeypatch):
+    def test_stale_files_are_not_used(self, campaign, tank, changed, change, monkeypatch):
         path = write_prepared(campaign)["second"]
         with xr.open_dataset(path) as opened:
             run = opened.load()
         run["heave"][:] = 0.0  # to be seen if it were used
         write_netcdf(path, run)
-        assert float(load_prepared(campaign)["second"]["heave"].std()) == 0.0
+        assert load_prepared(campaign)["second"]["heave"].std() == 0.0
         if change == "settings":
-            campaign = read_campaign(edited(("sampling_rate = 10", "sampling_rate = 12")))
+            campaign = changed(("sampling_rate = 10", "sampling_rate = 12"))
         elif change == "name":
-            campaign = read_campaign(edited(("Small tank", "Smaller tank")))
+            campaign = changed(("Small tank", "Smaller tank"))
         elif change == "file":
             write_csv(tank / "second.csv", tank_columns(5))
         else:
             monkeypatch.setattr("seakeep.campaign.store.version", lambda: "99.0")
-        assert float(load_prepared(campaign)["second"]["heave"].std()) > 0.0
+        assert load_prepared(campaign)["second"]["heave"].std() > 0.0
 
-    def test_a_measurement_is_never_overwritten(self, tank, edited):
+    def test_a_measurement_is_never_overwritten(self, tank, changed):
         """`prepare -o .` replaced the raw run1.nc by the prepared run of that name."""
-        campaign = read_campaign(edited(('file = "first.csv"', 'file = "first.nc"')))
+        campaign = changed(('file = "first.csv"', 'file = "first.nc"'))
         (tank / "other").mkdir()
         for folder, message in (
             (tank, r"first\.nc is read by this command and would be"),
@@ -419,7 +375,7 @@ class TestFiles:
         xr.testing.assert_identical(run, expected)
 
 
-def test_a_span_to_the_end_of_the_record(tank, edited):
+def test_a_span_to_the_end_of_the_record(tank, first):
     """60 s at 50 Hz end at 59.98 s: the last sample stands for its own step."""
     columns = {name: x[:-1] for name, x in tank_columns(0).items()}
     write_csv(tank / "first.csv", columns)
@@ -428,7 +384,7 @@ def test_a_span_to_the_end_of_the_record(tank, edited):
             ("test = [10, inf]", "test = [10, 20]"),
             ("sampling_rate = 10", f"sampling_rate = {rate}"),
         ]
-        run = read_campaign(edited(*pairs)).prepare(["first"])["first"]
+        run = first(*pairs)
         assert run.attrs["test_span"][1] == pytest.approx(float(run["time"][-1]))
     with pytest.raises(RequestError, match=r"first\.test: received \[10, 20\.1\] s, and"):
-        read_campaign(edited(("test = [10, inf]", "test = [10, 20.1]"))).prepare(["first"])
+        first(("test = [10, inf]", "test = [10, 20.1]"))

@@ -55,12 +55,12 @@ def test_errors_are_those_of_the_tests_and_verdicts_follow_from_them(model, runs
     assert [*found["run"].values] == ["one", "two"]
     free = free_runs(model, {"one": runs["one"]})["one"]
     known = metrics.anrmse(predicted=free.forecast, measured=free.measured)
-    assert float(found.anrmse.sel(model="model", run="one")) == pytest.approx(known)
+    assert found.anrmse.sel(model="model", run="one") == pytest.approx(known)
     assert found.run_nrmse.sel(run="one").values.mean() == pytest.approx(known)
     calm, rough = found.sel(waves="irregular"), found.sel(waves="regular")
     assert calm.limit.values.tolist() == [0.1, 0.1, 0.1]
-    assert bool(calm.better.all())
-    assert float(rough.limit.sel(state="surge")) == np.inf  # nine tenths of it are noise
+    assert calm.better.all()
+    assert rough.limit.sel(state="surge") == np.inf  # nine tenths of it are noise
     for key, of in (("nrmse", "model"), ("change", "fir")):
         low, value, high = (found[f"{key}{end}"].sel(model=of) for end in ("_lower", "", "_upper"))
         assert ((low < value) & (value < high)).all()
@@ -98,7 +98,7 @@ class Lost:
 
 def test_a_baseline_that_is_lost_does_not_count_and_is_named(model, runs, baselines):
     found = worth(model, runs, {**baselines, "subspace": Lost(baselines["fir"])})
-    assert bool(found.sel(waves="irregular").better.all())
+    assert found.sel(waves="irregular").better.all()
     points = worded(found)
     assert any("subspace: its forecast of one, two diverges" in each for each in points)
     assert "not shown" not in " ".join(each for each in points if "heave" in each)

@@ -1,14 +1,10 @@
-"""What the system refuses, what a killed run left, threads and encodings of a command."""
+"""What the system refuses, threads and encodings of a command."""
 
 import os
 import subprocess
 import sys
 
-import pytest
-
 from seakeep.cli import main
-from seakeep.errors import SeakeepWarning
-from seakeep.study.store import UnitFolder
 
 
 def test_what_the_system_refuses_is_no_fault_of_seakeep(monkeypatch, capsys):
@@ -18,18 +14,6 @@ def test_what_the_system_refuses_is_no_fault_of_seakeep(monkeypatch, capsys):
     monkeypatch.setattr("seakeep.campaign.read_campaign", fail)
     assert main(["prepare", "campaign.toml"]) == 1
     assert "Error: run.nc: Input/output error. Correct the path" in capsys.readouterr().err
-
-
-def test_a_study_clears_what_a_killed_run_left_and_says_so(tmp_path):
-    (tmp_path / "units").mkdir()
-    (tmp_path / "units" / ".cell.nc.12.ab.tmp").touch()
-    (tmp_path / "notes.tmp").touch()
-    with (
-        pytest.warns(SeakeepWarning, match=r"removed 1 unfinished file\(s\) of a killed run"),
-        UnitFolder(tmp_path, "digest").alone(),
-    ):
-        assert not list(tmp_path.glob("units/*"))
-    assert (tmp_path / "notes.tmp").exists()
 
 
 def test_a_command_keeps_blas_to_one_thread_and_prints_in_any_encoding(tmp_path):

@@ -16,13 +16,10 @@ from seakeep.errors import DataError, RequestError
 def upstream(tmp_path):
     folder = tmp_path / "upstream"
     folder.mkdir()
-    (folder / "a.csv").write_bytes(b"Time [s],x [m]\n0,1\n")
-    (folder / "b.csv").write_bytes(b"Time [s],x [m]\n0,2\n")
+    for name in (names := ("a.csv", "b.csv")):
+        (folder / name).write_text(f"Time [s],x [m]\n0,{name}\n")
 
-    class Quiet(http.server.SimpleHTTPRequestHandler):
-        def log_message(self, *_):
-            pass
-
+    class Handler(http.server.SimpleHTTPRequestHandler):
         def do_GET(self):
             if self.path.startswith("/cut/"):
                 self.send_response(200)
@@ -33,24 +30,14 @@ def upstream(tmp_path):
             else:
                 super().do_GET()
 
-    handler = functools.partial(Quiet, directory=str(folder))
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    files = {
-        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.iterdir())
-    }
-    address = f"http://127.0.0.1:{server.server_port}"
-    yield (
-        folder,
-        replace(
-            datasets.DATASETS[0], name="toy", files=files, sources=(f"{address}/gone", address)
-        ),
-    )
-    server.shutdown()
-    server.server_close()
-    thread.join()
+    files = {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names}
+    handler = functools.partial(Handler, directory=str(folder))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{server.server_port}"
+        sources = (f"{address}/gone", address)
+        yield folder, replace(datasets.DATASETS[0], name="toy", files=files, sources=sources)
+        server.shutdown()
 
 
 def test_fetch_takes_the_first_address_that_has_the_file_resumes_and_repairs(upstream, tmp_path):

@@ -7,49 +7,20 @@ import time
 
 import pytest
 from started import started
-from tutorial_study import put_tutorial
+from tutorial_study import edit
 
 from seakeep import cli, executor
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
 
-STUDY = """
-[study]
-campaign = "campaign.toml"
-preset = "recommended"
-[training]
-windows = 2
-[models.deterministic]
-ridge = 0.15
-observables = []
-readouts = {}
-[models.bayesian]
-kind = "bayesian_hankel_dmdc"
-n_members = 4
-ridge = { log_uniform = [0.05, 0.5] }
-observables = []
-readouts = {}
-window = { uniform = ["10 T", "20 T"] }
-[tests.unseen]
-runs = ["unseen"]
-windows = 3
-length = 6
-[statistics]
-n_series = 8
-"""
 
-
-@pytest.fixture
-def folder(tmp_path):
-    put_tutorial(tmp_path, STUDY)
-    return tmp_path
-
-
-def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd, monkeypatch):
+def test_a_study_ends_with_its_table_and_the_place_of_its_report(study_folder, capfd, monkeypatch):
     # Figures of reports are looked at in tests/report/test_page.py, of such a study.
     monkeypatch.setattr("seakeep.report.page._drawn", lambda drawing, folder: None)
-    out = folder / "out"
-    assert cli.main(["study", str(folder / "study.toml"), "-o", str(out), "--workers", "1"]) == 0
+    out = study_folder / "out"
+    assert (
+        cli.main(["study", str(study_folder / "study.toml"), "-o", str(out), "--workers", "1"]) == 0
+    )
     told = capfd.readouterr()
     assert "ANRMSE median" in told.out
     assert told.out.rstrip().endswith(f"Report: {out / 'report.html'}")
@@ -61,11 +32,13 @@ def test_a_study_ends_with_its_table_and_the_place_of_its_report(folder, capfd, 
 
 
 @pytest.mark.parametrize("verb", ["study", "reproduce"])
-def test_a_scheduler_that_does_not_answer_is_told_before_any_work(verb, folder, monkeypatch, capfd):
+def test_a_scheduler_that_does_not_answer_is_told_before_any_work(
+    verb, study_folder, monkeypatch, capfd
+):
     pytest.importorskip("distributed", reason="a Dask cluster needs distributed")
     monkeypatch.setattr(executor, "PATIENCE", 0.3)
-    out = folder / "out"
-    arguments = ["study", str(folder / "study.toml")] if verb == "study" else ["reproduce"]
+    out = study_folder / "out"
+    arguments = ["study", str(study_folder / "study.toml")] if verb == "study" else ["reproduce"]
     assert cli.main([*arguments, "-o", str(out), "--scheduler", "tcp://127.0.0.1:9"]) == 2
     told = capfd.readouterr().err
     assert "no Dask scheduler answers at 'tcp://127.0.0.1:9'" in told
@@ -74,12 +47,12 @@ def test_a_scheduler_that_does_not_answer_is_told_before_any_work(verb, folder, 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends Ctrl-C to a console alone")
-def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(folder, ctrl_c):
+def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(study_folder, ctrl_c):
     # Minutes of work after its first unit: it is never over before the signal reaches it.
-    (folder / "study.toml").write_text(STUDY.replace("n_members = 4", "n_members = 20_000"))
-    out = folder / "out"
+    edit(study_folder / "study.toml", ("n_members = 4", "n_members = 20_000"))
+    out = study_folder / "out"
     command = [sys.executable, "-m", "seakeep", "study", "study.toml", "-o", str(out)]
-    with started([*command, "--workers", "1"], folder, stderr=subprocess.PIPE) as process:
+    with started([*command, "--workers", "1"], study_folder, stderr=subprocess.PIPE) as process:
         while not list((out / "units").glob("*.nc")):
             assert process.poll() is None, process.stderr.read()
             time.sleep(0.002)

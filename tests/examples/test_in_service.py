@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
+from records import record
 from scipy import signal
 
 import seakeep
@@ -44,16 +44,11 @@ def drifting(seed):
     for k in range(samples - 1):
         moved[k + 1] = a @ moved[k] + b * 0.1 * slow[k]
     wave = signal.lfilter(*signal.butter(2, [0.08, 0.12], "bandpass"), rng.standard_normal(samples))
-    units = {"surge": "m", "surge_rate": "m/s", "eta_fwd": "m", "eta_cog": "m"}
-    series = (moved[:, 0] + 0.01 * wave, moved[:, 1], wave, np.roll(wave, 5))
-    return xr.Dataset(
-        {
-            name: ("time", values + 1e-4 * rng.standard_normal(samples), {"units": unit})
-            for (name, unit), values in zip(units.items(), series, strict=True)
-        },
-        coords={"time": dt * np.arange(samples)},
-        attrs={"encounter_period": 2.0},
-    )
+    surge, rate, fwd, cog = 1e-4 * rng.standard_normal((4, samples)) + [
+        moved[:, 0] + 0.01 * wave, moved[:, 1], wave, np.roll(wave, 5)
+    ]  # fmt: skip
+    attrs = {"encounter_period": 2.0}
+    return record(dt, attrs, surge=surge, surge_rate=rate, eta_fwd=fwd, eta_cog=cog)
 
 
 def test_a_planned_thrust_holds_a_vessel_nearer_to_its_place():

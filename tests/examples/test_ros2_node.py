@@ -136,8 +136,8 @@ def node(monkeypatch):
 
 def recorded(path, run, samples, lost):
     """Record a run as a vessel would: odometry, and two probes, messages out of order."""
-    from rosbags.rosbag2 import StoragePlugin, Writer
-    from stand_in_ros import STORE, message
+    from bags import write_bag
+    from stand_in_ros import message
 
     def header(stamp):
         sec, nanosec = divmod(stamp, 10**9)
@@ -171,14 +171,7 @@ def recorded(path, run, samples, lost):
         for topic, made in each.items():
             if (topic, at) not in lost:
                 sent.append((stamp + int(rng.integers(80_000_000)), topic, made))
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        kinds = {topic: made.__msgtype__ for _, topic, made in sent}
-        connections = {
-            topic: writer.add_connection(topic, kind, typestore=STORE)
-            for topic, kind in kinds.items()
-        }
-        for received, topic, made in sorted(sent, key=lambda each: each[0]):
-            writer.write(connections[topic], received, STORE.serialize_cdr(made, kinds[topic]))
+    write_bag(path, sorted(sent, key=lambda each: each[0]))
 
 
 def test_the_node_follows_a_recorded_bag(node, model, run, make_run, tmp_path):
@@ -217,9 +210,7 @@ def test_the_node_follows_a_recorded_bag(node, model, run, make_run, tmp_path):
     again.play(tmp_path / "second")
     first = again.published["~/estimate"][0].header.stamp
     assert first.sec + 1e-9 * first.nanosec <= CLOCK + 241 * DT
-    last = [float(run[name].values[len(estimates)]) for name in model.states]
     assert np.all(np.isfinite(again.published["~/estimate"][-1].position))
-    assert np.all(np.isfinite(last))
 
 
 @pytest.mark.parametrize("turn", [(0.4, -0.2, 0.7), (0.0, np.pi / 2, 0.0), (-3.0, 0.1, 3.1)])
@@ -229,7 +220,5 @@ def test_angles_of_a_quaternion(node, turn):
     turned = Rotation.from_euler("ZYX", turn).as_quat()
     found = message("geometry_msgs/msg/Quaternion")(**dict(zip("xyzw", turned, strict=True)))
     angles = [node.read(found, name) for name in ("yaw", "pitch", "roll")]
-    if turn[1] == np.pi / 2:
-        assert angles[1] == pytest.approx(turn[1], abs=1e-7)  # asin is steep there
-    else:
-        np.testing.assert_allclose(angles, turn, atol=1e-12)
+    # asin is steep where the bow points upwards.
+    np.testing.assert_allclose(Rotation.from_euler("ZYX", angles).as_quat(), turned, atol=1e-7)

@@ -10,10 +10,10 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 
 pytest.importorskip("rosbags")
 
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from bags import STORE, write_bag
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.typesys import get_types_from_msg
 
-STORE = get_typestore(Stores.ROS2_HUMBLE)
 STORE.register(
     get_types_from_msg(
         "std_msgs/Header header\nfloat64 surge\nfloat32[2] loads\nfloat64[] cells\nstring remark\n",
@@ -46,12 +46,12 @@ def imu(i, stamped=True):
     )
 
 
-def rig(i, cells=2, stamped=True):
+def rig(i, stamped=True):
     return TYPES["tank_msgs/msg/Rig"](
         header=header(BEGIN + i * STEP if stamped else 0),
         surge=float(i),
         loads=np.array([i, -i], dtype=np.float32),
-        cells=np.arange(float(cells)),
+        cells=np.arange(2.0),
         remark="x",
     )
 
@@ -64,16 +64,14 @@ def text(i):
     return TYPES["std_msgs/msg/String"](data="x")
 
 
-def save(path, plugin=StoragePlugin.MCAP, late=3_000_000, **topics):
-    """Write topics, each a maker of messages; received `late` ns after they are stamped."""
-    with Writer(path, version=9, storage_plugin=plugin) as writer:
-        for topic, make in topics.items():
-            kind = make(0).__msgtype__
-            connection = writer.add_connection(f"/{topic}", kind, typestore=STORE)
-            for i in range(COUNT):
-                data = STORE.serialize_cdr(make(i), kind)
-                writer.write(connection, BEGIN + i * STEP + late, data)
-    return path
+def save(path, plugin=StoragePlugin.MCAP, **topics):
+    """Write topics, each a maker of messages; received 3 ms after they are stamped."""
+    sent = (
+        (BEGIN + i * STEP + 3_000_000, f"/{topic}", make(i))
+        for topic, make in topics.items()
+        for i in range(COUNT)
+    )
+    return write_bag(path, sent, plugin)
 
 
 @pytest.mark.parametrize("plugin", list(StoragePlugin), ids=lambda plugin: plugin.name)

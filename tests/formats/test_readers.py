@@ -8,7 +8,6 @@ import pytest
 
 from seakeep.campaign import read_campaign, read_table
 from seakeep.errors import MissingFileError
-from seakeep.formats import Columns
 
 
 def test_each_file_is_parsed_once_in_a_preparation(tmp_path, monkeypatch):
@@ -27,27 +26,13 @@ def test_each_file_is_parsed_once_in_a_preparation(tmp_path, monkeypatch):
     assert len(parsed) == 2
 
 
-def test_columns_are_found_by_name_or_header():
-    table = Columns({"heave": np.zeros(2)}, headers={"heave": "heave [mm]"})
-    assert table.find("heave [mm]") == table.find("heave") == "heave"
-    assert table.find("pitch") is None
-
-
-class TestPaths:
-    """Whatever a path names, the error says it with its reason."""
-
-    def refused(self, path, reason):
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no FIFO")
+def test_whatever_a_path_names_the_error_says_its_reason(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "run.csv").write_text("t,h\n")
+    for name, reason in {
+        "run.csv/more.csv": "does not exist: there is no folder",
+        "pipe.csv": r"pipe\.csv is a pipe or a device, and only regular",
+    }.items():
         with pytest.raises(MissingFileError, match=reason):
-            read_table(path)
-
-    def test_a_home_that_is_unknown(self):
-        self.refused("~nobody-of-this-name/run.csv", "cannot be read: Could not determine home")
-
-    def test_a_file_in_the_place_of_a_folder(self, tmp_path):
-        (tmp_path / "run.csv").write_text("t,h\n")
-        self.refused(tmp_path / "run.csv" / "more.csv", "does not exist: there is no folder")
-
-    @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no FIFO")
-    def test_a_pipe(self, tmp_path):
-        os.mkfifo(tmp_path / "pipe.csv")
-        self.refused(tmp_path / "pipe.csv", r"pipe\.csv is a pipe or a device, and only regular")
+            read_table(tmp_path / name)

@@ -2,8 +2,7 @@
 
 import numpy as np
 import xarray as xr
-
-from seakeep.waves import wavenumber
+from seas import Sea
 
 DT, DEPTH = 0.1, 3.6
 POSITIONS = {"eta_fwd": 48.42, "eta_cog": 52.09}
@@ -22,26 +21,20 @@ def drifting_run(seed=0, samples=1500, moved=0.0, name="run"):
     """
     rng = np.random.default_rng(seed)
     time = DT * np.arange(samples)
-    omega = 2 * np.pi * rng.uniform(0.3, 0.9, 40)
-    amplitude = 0.02 * np.exp(-((omega / (2 * np.pi) - 0.5) ** 2) / 0.02)
-    phase, k = rng.uniform(0, 2 * np.pi, 40), wavenumber(omega, DEPTH)
+    f = rng.uniform(0.3, 0.9, 40)
+    amplitude = 0.02 * np.exp(-((f - 0.5) ** 2) / 0.02)
+    waves = Sea(f, amplitude, rng.uniform(0, 2 * np.pi, 40), DEPTH)
     surge = 0.6 * np.sin(2 * np.pi * time / 25 + rng.uniform(0, 6.28))
 
-    def waves(x, lag=0.0):
-        place = np.broadcast_to(x, time.shape)
-        return (amplitude * np.cos(np.outer(time - lag, omega) - np.outer(place, k) + phase)).sum(
-            axis=1
-        )
-
     vessel = POSITIONS["eta_cog"] + surge
-    heave = 0.8 * waves(vessel, 0.2) + 0.4 * waves(vessel, 0.5)
+    heave = 0.8 * waves.at(time - 0.2, vessel) + 0.4 * waves.at(time - 0.5, vessel)
     noise, spread = 1e-4, np.sqrt(np.sum(amplitude**2) / 2)
     load = 30.0 - 2.0 * surge + 5.0 * heave
-    load += 200.0 * np.maximum(waves(POSITIONS["eta_cog"] + LINE) - 0.5 * spread, 0.0)
+    load += 200.0 * np.maximum(waves.at(time, POSITIONS["eta_cog"] + LINE) - 0.5 * spread, 0.0)
     channels = {
         "surge": surge + noise * rng.standard_normal(samples),
         "heave": heave + noise * rng.standard_normal(samples),
-        **{key: waves(x + moved) for key, x in POSITIONS.items()},
+        **{key: waves.at(time, x + moved) for key, x in POSITIONS.items()},
         "mooring_bow": load + LOAD_NOISE * rng.standard_normal(samples),
     }
     run = xr.Dataset(

@@ -23,11 +23,14 @@ class Sea:
         return np.cos(turn + self.phase) @ self.amplitude
 
 
-def sea(seed=0, band=(0.28, 1.13), peak=2.05, components=100):
-    """Pierson and Moskowitz' spectrum in the paper's band, SD 1: a component in each part of it."""
+def sea(seed=0, band=(0.28, 1.13), peak=2.05, components=100, jitter=1.0):
+    """Pierson and Moskowitz' spectrum in the paper's band, SD 1: a component in each part of it.
+
+    Without jitter each stands in the middle of its part.
+    """
     rng = np.random.default_rng(seed)
     edges = np.linspace(*band, components + 1)
-    f = rng.uniform(edges[:-1], edges[1:])
+    f = edges[:-1] + np.diff(edges) * (0.5 + jitter * rng.uniform(-0.5, 0.5, components))
     amplitude = np.sqrt(f**-5 * np.exp(-1.25 * (peak * f) ** -4))
     amplitude /= np.sqrt(0.5 * np.sum(amplitude**2))
     return Sea(f, amplitude, rng.uniform(0, 2 * np.pi, components))

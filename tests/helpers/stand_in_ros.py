@@ -4,10 +4,9 @@ import sys
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
+from bags import STORE
 from rosbags.rosbag2 import Reader
-from rosbags.typesys import Stores, get_typestore
 
-STORE = get_typestore(Stores.ROS2_HUMBLE)
 SECOND = 1_000_000_000  # ns
 
 

@@ -4,18 +4,67 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 from seakeep.models.labelled import nearest_sample
 
 TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
+STUDY = """
+[study]
+campaign = "campaign.toml"
+preset = "recommended"
+seed = 3
+
+[training]
+windows = 2
+
+[models.deterministic]
+ridge = 0.15
+observables = []
+readouts = {}
+
+[models.bayesian]
+kind = "bayesian_hankel_dmdc"
+n_members = 4
+ridge = { log_uniform = [0.05, 0.5] }
+observables = []
+readouts = {}
+window = { uniform = ["10 T", "20 T"] }
+
+[tests.unseen]
+runs = ["unseen"]
+windows = 3
+length = 6
+
+[statistics]
+n_series = 8
+"""
+"""Seconds, and all parts of a study."""
 
 
-def put_tutorial(folder: Path, study: str) -> None:
+def put_tutorial(folder: Path, study: str = STUDY) -> None:
     """Put the tutorial's campaign and a study of it into a folder."""
     for path in TUTORIAL.glob("*"):
         if path.suffix in (".toml", ".csv"):
             shutil.copy(path, folder)
     (folder / "study.toml").write_text(study, encoding="utf-8")
+
+
+def edit(path: Path, *pairs: tuple[str, str]) -> Path:
+    """Replace texts of a file, which must stand in it."""
+    text = path.read_text("utf-8")
+    for old, new in pairs:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text, "utf-8")
+    return path
+
+
+def assert_same(first, second) -> None:
+    """Compare the results of a study array by array."""
+    assert first.groups.keys() == second.groups.keys()
+    for name, group in first.groups.items():
+        xr.testing.assert_identical(group, second.groups[name])
 
 
 def assert_cells_are_what_the_models_say(found, plan, **near) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from seas import sea
+from small_tank import write_csv
 
 CAMPAIGN = """
 [campaign]
@@ -141,26 +143,18 @@ inputs = ["eta_fwd"]
 
 
 def _write_raw(folder: Path, run: str, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    frequency, phase = rng.uniform(0.4, 0.9, 12), rng.uniform(0, 2 * np.pi, 12)
+    waves, rng = sea(seed, (0.4, 0.9), components=12).at, np.random.default_rng(seed)
 
-    def sea(t: np.ndarray, lag: float = 0.0) -> np.ndarray:
-        return np.cos(2 * np.pi * np.outer(t - lag, frequency) + phase).sum(axis=1)
+    def noisy(t: np.ndarray, size: float, lag: float) -> np.ndarray:
+        return 2.5 * size * waves(t - lag) + 0.02 * rng.standard_normal(t.size)
 
-    def rows(path: Path, header: str, *columns: np.ndarray) -> None:
-        np.savetxt(path, np.column_stack(columns), "%.5f", ",", header=header, comments="")
-
-    def pulses(t: np.ndarray) -> np.ndarray:
-        return 5.0 * (np.mod(t - 3.0, 10.0) < 0.55)
-
-    t = np.arange(0.0, 60.0, 0.1)
-    noise = rng.standard_normal((6, 2 * t.size)) * 0.02
-    rows(folder / f"{run}_probes.csv", "t [s],p1,p2,trigger", t, sea(t) + noise[0, : t.size],
-         sea(t, 0.6) + noise[1, : t.size], pulses(t))  # fmt: skip
-    t = np.arange(0.0, 60.0, 0.05)
-    rows(folder / f"{run}_mru.csv", "t [s],heave,pitch,surge,trigger", t,
-         0.3 * sea(t, 0.9) + noise[2], sea(t, 0.5) + noise[3], 0.1 * sea(t, 1.0) + noise[4],
-         pulses(t))  # fmt: skip
+    probes = {"p1": (1.0, 0.0), "p2": (1.0, 0.6)}
+    motions = {"heave": (0.3, 0.9), "pitch": (1.0, 0.5), "surge": (0.1, 1.0)}
+    for logger, step, columns in (("probes", 0.1, probes), ("mru", 0.05, motions)):
+        t = np.arange(0.0, 60.0, step)
+        pulses = 5.0 * (np.mod(t - 3.0, 10.0) < 0.55)
+        series = {name: noisy(t, *of) for name, of in columns.items()}
+        write_csv(folder / f"{run}_{logger}.csv", {"t [s]": t, **series, "trigger": pulses})
 
 
 def write(folder: Path) -> Path:

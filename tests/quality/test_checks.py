@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 import pytest
 import xarray as xr
+from records import record
 from seas import sea
 
 from seakeep.errors import SeakeepWarning
@@ -26,8 +27,7 @@ def waves(shift=0.0, seed=0):
 def against(series, trusted=None, step=np.nan, window=None):
     """Findings against a sensor beside a trusted one."""
     trusted = waves() if trusted is None else trusted
-    channels = {"one": trusted, "two": series}
-    run = xr.Dataset({n: ("time", x, {"units": "m"}) for n, x in channels.items()}, {"time": T})
+    run = record(DT, one=trusted, two=series)
     run["two"].attrs["reading_step"] = step
     return list(redundant(Record("r", run, redundant={("one", "two"): window})))
 

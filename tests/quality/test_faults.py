@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import xarray as xr
+from records import record
 
 from seakeep.campaign.pipeline import flag_samples
 from seakeep.campaign.settings import PreparationSettings
@@ -15,10 +15,10 @@ T = DT * np.arange(3000)
 PERIOD = 1.6
 
 
-def waves(shift=0.0):
+def waves():
     frequency = np.linspace(0.4, 0.9, 20)
     phase = np.random.default_rng(0).uniform(0, 6.28, 20)
-    return np.cos(2 * np.pi * np.outer(T - shift, frequency) + phase).sum(axis=1)
+    return np.cos(2 * np.pi * np.outer(T, frequency) + phase).sum(axis=1)
 
 
 @pytest.fixture
@@ -29,9 +29,9 @@ def noisy():
 
 def reported(x):
     """Kinds of findings about samples."""
-    group = xr.Dataset({"x": ("time", x, {"units": "m"})}, {"time": T})
-    record = Record("r", group, {"": flag_samples(group, PreparationSettings())})
-    return {found.kind.name for check in (flagged, constant, noise) for found in check(record)}
+    group = record(DT, x=x)
+    run = Record("r", group, {"": flag_samples(group, PreparationSettings())})
+    return {found.kind.name for check in (flagged, constant, noise) for found in check(run)}
 
 
 def faulty(x, kind, length, place):
@@ -92,10 +92,10 @@ def test_a_probe_that_dies_has_no_drift_besides():
     x = waves()
     dead = 1500 + int(np.argmax(x[1500:1600]))
     x[dead:] = x[dead]
-    group = xr.Dataset({"eta": ("time", x, {"units": "m"})}, {"time": T})
-    group = flag_samples(group, PreparationSettings())
-    assert list(levels(Record("r", group, {"": group}))) == []
-    assert [each.kind.name for each in flagged(Record("r", group, {"": group}))] == ["STUCK"]
+    group = flag_samples(record(DT, eta=x), PreparationSettings())
+    run = Record("r", group, {"": group})
+    assert list(levels(run)) == []
+    assert [each.kind.name for each in flagged(run)] == ["STUCK"]
 
 
 def test_at_rest_around_the_waves_is_not_held(noisy):

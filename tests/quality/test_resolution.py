@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from seas import sea
 
 from seakeep.quality.faults import reading_step
 
 T = np.arange(0, 100, 0.005)
 RNG = np.random.default_rng(3)
-SEA = np.cos(2 * np.pi * np.outer(T, np.linspace(0.4, 0.9, 20)) + RNG.uniform(0, 6.28, 20)).sum(
-    axis=1
-)
-SEA /= SEA.std()
+SEA = sea(3, (0.4, 0.9), peak=1.6, components=20).at(T)
 
 
 @given(

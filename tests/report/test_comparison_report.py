@@ -1,11 +1,11 @@
 """The comparison's tables, files and figures."""
 
-import csv
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
+from tables import rows_of
 
 from seakeep.files import check_output
 from seakeep.report.comparison import (
@@ -31,7 +31,7 @@ TIME = np.arange(1, 401) * 0.1
 UNITS = {"heave": "m", "pitch": "rad", "mooring_stern": "N"}
 
 
-def comparison(factor=0.9, status="ok", slack=False, size=1.0):
+def comparison(factor=0.9, slack=False, size=1.0):
     """A forecast that is a factor times the measurement, of loads of a size."""
     load = (1e-6 if slack else size) * np.sin(3 * TIME)
     values = {"heave": np.sin(TIME), "pitch": 0.1 * np.cos(TIME), "mooring_stern": load}
@@ -46,22 +46,22 @@ def comparison(factor=0.9, status="ok", slack=False, size=1.0):
         )
         for scale in (1.0, factor)
     )
-    forecast.attrs = {"start": 0.0, "status": status}
+    forecast.attrs = {"start": 0.0, "status": "ok"}
     inputs = xr.Dataset({"eta_fwd": measured["heave"].assign_attrs(training_std=1.0)})
     return Comparison("r1", "calm", forecast, measured, inputs)
 
 
-def ensemble(half=0.2, diverged=1, slack=False):
+def ensemble(slack=False):
     """The mean of an ensemble with a band of known width around it."""
     single = comparison(factor=1.0, slack=slack)
     mean = single.forecast.assign_attrs(
-        status=f"{diverged} of 5 members diverged", members=5, diverged=diverged, level=0.9
+        status="1 of 5 members diverged", members=5, diverged=1, level=0.9
     )
-    band = xr.concat([mean - half, mean + half], "statistic")
+    band = xr.concat([mean - 0.2, mean + 0.2], "statistic")
     band = band.assign_coords(statistic=["lower", "upper"])
     for name in band.data_vars:
         band[name].attrs = mean[name].attrs
-    # A sinusoid beside the mean: it leaves the band where its modulus is above `half`.
+    # A sinusoid beside the mean: it leaves the band where its modulus is above 0.2.
     measured = single.measured.copy()
     measured["heave"] = mean["heave"] + 0.4 * np.sin(7 * mean["time"])
     measured["heave"].attrs = mean["heave"].attrs
@@ -72,42 +72,38 @@ def row_of(compared):
     return comparison_table([compared]).isel(run=0)
 
 
-def lines_of(path):
-    return list(csv.DictReader(path.read_text().splitlines()))
-
-
 def test_errors_are_those_that_can_be_computed_by_hand_in_any_unit():
     radians, degrees = (row_of(each) for each in (comparison(), in_degrees(comparison())))
     # Prediction is 0.9 times the measurement: the error is a tenth of it, about zero mean.
     spread = np.sin(TIME).std(ddof=1)
     expected = 0.1 * np.sqrt(np.mean(np.sin(TIME) ** 2)) / spread
     heave = radians.sel(channel="heave")
-    assert float(heave["nrmse"]) == pytest.approx(expected, rel=1e-12)  # rounding of sums
-    assert float(heave["training_nrmse"]) == pytest.approx(expected * spread / 0.7, rel=1e-12)
+    assert heave["nrmse"] == pytest.approx(expected, rel=1e-12)  # rounding of sums
+    assert heave["training_nrmse"] == pytest.approx(expected * spread / 0.7, rel=1e-12)
     fit = 100 * (1 - expected * np.sqrt(TIME.size / (TIME.size - 1)))
-    assert float(heave["fit"]) == pytest.approx(fit, rel=1e-12)
-    assert float(radians["sd_ratio"].sel(channel="pitch")) == pytest.approx(0.9, rel=1e-12)
+    assert heave["fit"] == pytest.approx(fit, rel=1e-12)
+    assert radians["sd_ratio"].sel(channel="pitch") == pytest.approx(0.9, rel=1e-12)
     for measure in ("nrmse", "training_nrmse"):
         np.testing.assert_allclose(radians[measure], degrees[measure], rtol=1e-12)
     pitch = degrees.sel(channel="pitch")
     assert str(pitch["channel_units"].values) == "deg"
-    assert float(pitch["measured_max"]) == pytest.approx(np.degrees(0.1 * np.cos(TIME).max()))
+    assert pitch["measured_max"] == pytest.approx(np.degrees(0.1 * np.cos(TIME).max()))
 
 
 def test_the_band_of_an_ensemble_is_judged_by_hand():
     table, outside = row_of(ensemble()), np.mean(np.abs(0.4 * np.sin(7 * TIME)) > 0.2)
     heave, spread = table.sel(channel="heave"), float(ensemble().measured["heave"].std(ddof=1))
-    assert float(heave["coverage"]) == pytest.approx(100 * (1 - outside), rel=1e-12)
-    assert float(heave["band_width"]) == pytest.approx(0.4, rel=1e-12)
-    assert float(heave["relative_band_width"]) == pytest.approx(0.4 / spread, rel=1e-12)
-    assert (int(table["members"]), int(table["diverged"]), float(table["level"])) == (5, 1, 0.9)
+    assert heave["coverage"] == pytest.approx(100 * (1 - outside), rel=1e-12)
+    assert heave["band_width"] == pytest.approx(0.4, rel=1e-12)
+    assert heave["relative_band_width"] == pytest.approx(0.4 / spread, rel=1e-12)
+    assert (table["members"], table["diverged"], table["level"]) == (5, 1, 0.9)
     assert ensemble().complete
     for judged, names in ((table, UNITS), (row_of(ensemble(slack=True)), ["heave", "pitch"])):
         mean = judged["coverage"].sel(channel=list(names)).mean()  # without a slack line
-        assert float(judged["mean_coverage"]) == pytest.approx(float(mean), rel=1e-12)
+        assert judged["mean_coverage"] == pytest.approx(float(mean), rel=1e-12)
     degrees = row_of(in_degrees(ensemble()))
     np.testing.assert_array_equal(table["coverage"], degrees["coverage"])
-    assert float(degrees["band_width"].sel(channel="pitch")) == pytest.approx(np.degrees(0.4))
+    assert degrees["band_width"].sel(channel="pitch") == pytest.approx(np.degrees(0.4))
 
 
 def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path):
@@ -120,7 +116,7 @@ def test_models_stand_beside_each_other_and_beside_what_they_must_beat(tmp_path)
     low, high = (float(tables["ours"][f"anrmse_{each}"][0]) for each in ("lower", "upper"))
     assert averages.rows[0][:3] == ("ours", "0.100", f"{low:.3f} to {high:.3f}")
     assert channels.rows[0] == ("heave", "0.100", "0.200", "0.050", "0.300")
-    rows = lines_of(write_comparison(tables, tmp_path / "t.csv"))
+    rows = rows_of(write_comparison(tables, tmp_path / "t.csv"))
     assert [row["model"] for row in rows[::3]] == list(tables)
 
 
@@ -150,12 +146,10 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
     turned = difference_table(dict(reversed(found.items())))
     told = winner(turned, {})
     assert told == "Least error: ours, ANRMSE 0.100, −50 % [−50 to −50 %] from theirs."
-    assert "[models.fir]" in winner(turned, {"ours": "fir"})
     unsure = turned.assign(all_upper=abs(turned["all_upper"]))
     told = winner(unsure, {"ours": "fir"})
     assert told.endswith("from theirs: no model is surely better. Keep theirs.")
-    assert told.startswith("Least error: ours, ANRMSE 0.100, −50 % [−50 to +50 %]")
-    rows = lines_of(write_differences(table, tmp_path / "d.csv"))
+    rows = rows_of(write_differences(table, tmp_path / "d.csv"))
     assert [row["run"] for row in rows] == [*runs, *runs, "", ""]
     (only,) = difference_blocks(difference_table({k: each[:1] for k, each in found.items()}))
     assert only.title == "long: change of ANRMSE from ours"
@@ -193,10 +187,6 @@ def overlay_figure(compared):
     return draw({"": compared})
 
 
-def words_of(legend):
-    return [text.get_text() for text in legend.get_texts()]
-
-
 def test_the_figure_judges_as_the_table_does_where_loads_have_a_prefix(tmp_path):
     judged = comparison(size=5000.0)
     judged.forecast["heave"] = 0.5 * judged.forecast["heave"]  # errors differ between channels
@@ -214,10 +204,10 @@ def test_the_figure_judges_as_the_table_does_where_loads_have_a_prefix(tmp_path)
     assert figure.axes[2].get_ylabel().endswith("[MN]")
     assert values.max() == pytest.approx(1e-6 * 120**3 * small.measured["mooring_stern"].max())
     table = comparison_table([large])
-    rows = lines_of(write_comparison({"m": table}, tmp_path / "t.csv"))
+    rows = rows_of(write_comparison({"m": table}, tmp_path / "t.csv"))
     assert {(row["scale"], row["scale_factor"]) for row in rows} == {("full", "120.0")}
     assert "full scale (1:120)" in next(comparison_blocks(table)).title
-    rows = lines_of(write_forecast(large.forecast, tmp_path / "f.csv"))
+    rows = rows_of(write_forecast(large.forecast, tmp_path / "f.csv"))
     assert {row["scale_factor"] for row in rows} == {"120.0"}
     assert "scale" not in write_forecast(small.forecast, tmp_path / "s.csv").read_text()
 
@@ -225,27 +215,23 @@ def test_the_figure_judges_as_the_table_does_where_loads_have_a_prefix(tmp_path)
 def test_each_channel_has_a_panel_and_inputs_share_one_with_those_of_their_unit():
     judged = comparison()
     words = "Bow line LC-1 (FWD), 2 $ shackles, 1 $ pin"
-    names = {"pitch": "Trim angle (MRU-5)", "mooring_stern": words, "heave": "heave"}
-    for name, long_name in names.items():
-        judged.measured[name].attrs["long_name"] = long_name
+    judged.measured["pitch"].attrs["long_name"] = "Trim angle (MRU-5)"
+    judged.measured["mooring_stern"].attrs["long_name"] = words
     wave = judged.inputs["eta_fwd"]
     many = {f"eta_{k + 1}": wave for k in range(9)}
     angle = wave.assign_attrs(units="deg")
     inputs = judged.inputs.assign(rudder=angle, fin=angle, **many)
     inputs["eta_fwd"].attrs["long_name"] = "probe ahead of the bow"
     figure = overlay_figure(replace(in_degrees(judged), inputs=inputs))
-    heave, pitch, load, waves, angles = figure.axes
-    assert heave.get_ylabel() == "heave\n$z$ [m]"
+    _, pitch, load, waves, angles = figure.axes
     assert pitch.get_ylabel() == "Trim angle (MRU-5)\n$\\theta$ [deg]"
     lines = load.get_ylabel().replace(r"\$", "$").split("\n")
     assert " ".join(lines[:-1]) == words
     assert lines[-1] == "$M_\\mathrm{stern}$ [N]"
     assert waves.get_ylabel() == "wave elevations\n[m]"
     assert angles.get_ylabel() == "inputs\n[deg]"
-    assert words_of(waves.get_legend()) == ["probe ahead of the bow", *many]
-    assert words_of(angles.get_legend()) == ["rudder", "fin"]
-    assert len({line.get_color() for line in waves.lines[:10]}) == 9  # then colours come again
-    assert angles.get_xlabel() == "time [s]"
+    for axes, words in ((waves, ["probe ahead of the bow", *many]), (angles, ["rudder", "fin"])):
+        assert [text.get_text() for text in axes.get_legend().get_texts()] == words
     figure.draw_without_rendering()
     for axes in figure.axes:  # no label reaches beyond its panel
         label = axes.yaxis.label.get_window_extent()

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from cells import cells
 
 from seakeep.report.sections.data import chosen
 from seakeep.report.sections.results import bands, regular, scales
 from seakeep.study import StudyResult
-from seakeep.study.judge import MEASURES, band_tables, box_table
+from seakeep.study.judge import band_tables, box_table
 
 
 @pytest.fixture
@@ -19,23 +20,13 @@ def result():
     time, names = np.arange(1, 13), ["heave", "load"]
     wave = np.where(time % 2, 2.0, -2.0) * np.sqrt(11 / 12)  # SD 2 with ddof = 1
     measured = np.stack([wave, np.full(12, 5.0)], axis=1)[None]
-    dims = ("training", "window", "time", "channel")
     lower, upper = np.full((1, 1, 12, 2), -10.0), np.full((1, 1, 12, 2), 10.0)
     upper[..., :4, 0] = -9.0  # the first third of the horizon misses the wave
     errors = [[[[0.3, np.nan]]], [[[0.3, np.nan]]], [[[0.075, 1.525]]]]
-    test = xr.Dataset(
-        {
-            "measured": (dims[1:], measured),
-            "judged": (("training", "window"), [[True]]),
-            "training_std": (("training", "channel"), [[8.0, 0.5]]),
-            "lower": (("ensemble", *dims), lower[None]),
-            "upper": (("ensemble", *dims), upper[None]),
-            "error": (("model", "measure", "training", "window", "channel"), [errors]),
-            "run": ("window", ["short"]),
-        },
-        coords={"channel": names, "time": time, "model": ["m"], "ensemble": ["m"]}
-        | {"measure": list(MEASURES)},
-    )
+    test = cells(
+        names, time, measured=measured, judged=[[True]], training_std=[[8.0, 0.5]],
+        lower=lower[None], upper=upper[None], error=[errors], run=["short"],
+    )  # fmt: skip
     settings = {"tests": {"t": {"label": "regular, λ/L 1.5"}}, "statistics": {"level": 0.95}}
     channels = xr.Dataset(
         {"units": ("name", ["m", "N"]), "long_name": ("name", ["heave", "stern line"])},
@@ -53,9 +44,8 @@ def result():
     return StudyResult(None, attrs, groups)
 
 
-def with_group(result, **groups):
-    named = {name.replace("__", "/"): group for name, group in groups.items()}
-    return replace(result, groups={**result.groups, **named})
+def with_group(result, name, group):
+    return replace(result, groups={**result.groups, name: group})
 
 
 def test_errors_stand_in_both_standard_deviations(result):
@@ -92,7 +82,7 @@ def test_errors_in_regular_waves_are_taken_apart_and_a_slack_line_is_named(resul
         {key: (("test", "model", "channel"), np.full((1, 1, 2), x)) for key, x in values.items()},
         coords={"test": ["t"], "model": ["m"], "channel": result.channels},
     )
-    section = regular(with_group(result, statistics__response=response))
+    section = regular(with_group(result, "statistics/response", response))
     (table,) = section.tables
     assert table.columns[2:] == (
         "λ/L 1.5: amplitude", "λ/L 1.5: phase [°]", "λ/L 1.5: offset [SD]", "λ/L 1.5: share"
@@ -107,7 +97,7 @@ def test_choices_stand_with_the_look_ahead(result):
         {"words": ("training", [tried, ""]), "look_ahead": ("training", [1.5, 0.0])},
         coords={"training": ["a", "b"]},
     ).expand_dims(model=["m"])
-    (table,) = chosen(with_group(result, chosen=group)).tables
+    (table,) = chosen(with_group(result, "chosen", group)).tables
     words = "ridge 0.001: the best; 0.3 ridge 0.001, observables none"
     assert table.rows == [("m", "a", "1.50", words)]
-    assert chosen(with_group(result, chosen=group.isel(training=[1]))).is_empty
+    assert chosen(with_group(result, "chosen", group.isel(training=[1]))).is_empty

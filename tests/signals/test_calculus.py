@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from seakeep.signals import (
     band_pass,
-    complementary_filter,
     differentiate,
     envelope_squared,
     integrate,
@@ -58,12 +57,3 @@ def test_envelope_of_a_group():
     # The kernel of the Hilbert transform falls as 1/(π t): a kink at an end, 25 s away, leaks
     # about 1/(π ω t) = 0.002 of its size, twice an amplitude of 1.4, into a square of 2.
     np.testing.assert_allclose(out[INNER], (slow**2)[INNER], atol=0.03)
-
-
-def test_a_complementary_rate_keeps_the_steady_drift():
-    dt, t = 0.05, 0.05 * np.arange(2000)
-    position = 0.3 * t + np.sin(2 * np.pi * 0.6 * t)
-    acceleration = -((2 * np.pi * 0.6) ** 2) * np.sin(2 * np.pi * 0.6 * t)
-    rate = complementary_filter(position, acceleration, dt, 0.1, times=1)
-    # Ends are extended by prediction; the middle holds the drift to a thousandth.
-    assert rate[200:-200].mean() == pytest.approx(0.3, abs=5e-3)

@@ -40,7 +40,7 @@ def test_the_bound_keeps_the_peak_of_the_next_period_out():
     wide, _ = correlation_peak(upstream, downstream, DT, (0.0, 8.0))
     # The paper's unbounded peak sits a period late, below every phase speed of the band.
     assert wide - bounded.lag > 1.0
-    assert APART / wide < float(phase_speed(2 * np.pi * 1.13, DEPTH))
+    assert APART / wide < phase_speed(2 * np.pi * 1.13, DEPTH)
 
 
 @pytest.mark.parametrize("frequency", [0.4, 0.5, 0.7])

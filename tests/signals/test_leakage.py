@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import seas
 
 from seakeep.signals import find_leakage
 
@@ -10,20 +11,15 @@ TIME = DT * np.arange(4096)
 HALF = 2048
 
 
-def sea(seed=0, jitter=0.0, noise=0.0):
+def sea(seed=0, jitter=0.0):
     """The paper's 100 components over 0.28–1.13 Hz, equally spaced or jittered within bins."""
-    rng = np.random.default_rng(seed)
-    spacing = 0.85 / 99
-    frequency = 0.28 + spacing * (np.arange(100) + jitter * rng.uniform(-0.5, 0.5, 100))
-    density = frequency**-5 * np.exp(-1.25 * (1 / (2.05 * frequency)) ** 4)
-    phase = rng.uniform(0, 2 * np.pi, 100)
-    waves = (np.sqrt(density) * np.cos(2 * np.pi * np.outer(TIME, frequency) + phase)).sum(axis=1)
-    return waves + noise * waves.std() * rng.standard_normal(TIME.size)
+    half = 0.5 * 0.85 / 99
+    return seas.sea(seed, (0.28 - half, 1.13 + half), jitter=jitter).at(TIME)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_equally_spaced_components_come_back_after_116_5_seconds(seed):
-    record = sea(seed, noise=0.03)
+    record = sea(seed) + 0.03 * np.random.default_rng(seed).standard_normal(TIME.size)
     found = find_leakage([sea(9)[:HALF], record[:HALF]], record[HALF:], DT)
     assert found is not None
     assert (found.training, found.share > 0.6) == (1, True)

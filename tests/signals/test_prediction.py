@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+import seas
 from scipy.signal import lfilter
 
 from seakeep.signals import predict_waves
 from seakeep.signals.prediction import Foreseen, fill_future, foresee, predictable_time
-from seakeep.waves import wavenumber
 
 
 def test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on():
@@ -61,16 +61,13 @@ def test_columns_are_continued_alone_and_a_still_one_stays():
 @pytest.fixture(scope="module")
 def sea():
     """Elevations at 0, 2 and 4 m, 90 s and the 6 s after them, with 2 % of noise."""
-    rng = np.random.default_rng(4)
-    omega = 2 * np.pi * rng.uniform(0.4, 0.9, 400)
-    turned = np.outer(0.1 * np.arange(960), omega) + rng.uniform(0, 2 * np.pi, 400)
-    k = wavenumber(omega, 3.6)
-    waves = np.stack([np.cos(turned - k * x).sum(axis=1) for x in (0.0, 2.0, 4.0)], axis=1)
-    return waves + 0.02 * waves.std() * rng.standard_normal(waves.shape)
+    made, time = seas.sea(4, (0.4, 0.9), peak=1.0, components=400), 0.1 * np.arange(960)
+    waves = np.stack([made.at(time, x) for x in (0.0, 2.0, 4.0)], axis=1)
+    return waves + 0.02 * np.random.default_rng(4).standard_normal(waves.shape)
 
 
-def foreseen(sea, positions, count=60):
-    return foresee(sea[:900], count, dt=0.1, positions=positions, depth=3.6)
+def foreseen(sea, positions):
+    return foresee(sea[:900], 60, dt=0.1, positions=positions, depth=3.6)
 
 
 def test_waves_that_a_probe_has_seen_are_foreseen_at_those_after_it(sea):

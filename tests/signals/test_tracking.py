@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from small_tank import write_csv
 
 from seakeep import cli
 from seakeep.campaign import read_table
@@ -37,7 +38,7 @@ def lit_frame(t, lamp=0.0, light=None):
     return cv2.multiply(frame.astype(np.float32), tank_video._light() if light is None else light)
 
 
-def render(path, hook=None, frames=FRAMES, skip=()):
+def render(path, hook=None, frames=FRAMES):
     """Write a video with noise; return the panel's place in pixels, frame by frame."""
     rng = np.random.default_rng(1)
     light, stock = tank_video._light(), tank_video._noise(cv2, rng)
@@ -46,8 +47,7 @@ def render(path, hook=None, frames=FRAMES, skip=()):
         lit = lit_frame(i / RATE, float(20 <= i < 30), light)
         lit = hook(i, lit) if hook else lit
         lit += np.roll(stock[i % len(stock)], rng.integers(1280), axis=1)[:, :, None]
-        if i not in skip:
-            writer.write(np.clip(lit, 0, 255).astype(np.uint8))
+        writer.write(np.clip(lit, 0, 255).astype(np.uint8))
     writer.release()
     surge, heave, pitch = motion(np.arange(frames) / RATE)
     return tank_video.pixel_of(
@@ -112,25 +112,18 @@ def test_centroid_and_pitch_of_every_frame(tracked, plain):
     assert np.rad2deg(rms(tracked["panel_angle"] - pitch)) < 0.05
 
 
-def test_motions_of_the_centre_of_gravity(tracked):
-    time = tracked.time
-    np.testing.assert_allclose(time, np.arange(FRAMES) / RATE, rtol=1e-12)
-    inner = slice(8, -8)  # half a filter length, where its end conditions show
-    for name, true, limit in zip(
-        ("surge", "heave", "pitch"), motion(time), (1e-3, 1e-3, np.deg2rad(0.05)), strict=True
-    ):
-        error = (tracked[name] - true)[inner]
-        # Surge and heave count from their means over the first second. 1 mm is 0.4 pixel.
-        error = error if name == "pitch" else error - error.mean()
-        assert rms(error) < limit, name
-
-
-def test_a_stated_origin_gives_absolute_motions(plain):
+def test_motions_of_the_centre_of_gravity(plain, tracked):
+    """Absolute by a stated origin; else surge and heave count from their means over a second."""
     x, y = tank_video.pixel_of(0.0, COG + tank_video.PANEL_HEIGHT)
     how = TrackingSettings(metres_per_pixel=0.0025, origin=(float(x), float(y)), lamp=(40, 40, 8))
     out = track_video(plain[0], how)
-    for name, true in zip(("surge", "heave"), motion(out.time), strict=False):
-        assert rms((out[name] - true)[8:-8]) < 1e-3  # m; 0.4 pixel
+    np.testing.assert_allclose(tracked.time, np.arange(FRAMES) / RATE, rtol=1e-12)
+    limits = {"surge": 1e-3, "heave": 1e-3, "pitch": np.deg2rad(0.05)}  # 1 mm is 0.4 pixel
+    for (name, limit), true in zip(limits.items(), motion(out.time), strict=True):
+        # Without half a filter length, where its end conditions show.
+        absolute, error = ((track[name] - true)[8:-8] for track in (out, tracked))
+        assert rms(absolute) < limit, name
+        assert rms(error - error.mean() * (name != "pitch")) < limit, name
     on = (np.arange(FRAMES) >= 20) & (np.arange(FRAMES) < 30)
     assert np.all(out["lamp"][on] > 2 * out["lamp"][~on].max())
 
@@ -138,16 +131,11 @@ def test_a_stated_origin_gives_absolute_motions(plain):
 def hide_corner(i, lit, corner, leg):
     """A dark triangle of two legs along the panel's sides (pixels), over one of its corners."""
     surge, heave, pitch = motion(i / RATE)
-    half = 0.5 * np.array(tank_video.PANEL)
-    panel = half * [[-1, 1], [1, 1], [1, -1], [-1, -1]] + [0, tank_video.PANEL_HEIGHT]
-    places = tank_video._turned(panel, (surge, heave + COG), pitch)
-    here = places[corner]
-    along, across = (
-        (places[(corner + step) % 4] - here) / np.hypot(*(places[(corner + step) % 4] - here))
-        for step in (1, -1)
-    )
-    out = here - 2 * (along + across)
-    points = np.array([out, out + (leg + 4) * along, out + (leg + 4) * across])
+    beyond = tank_video.METRES_PER_PIXEL * np.array([[2, 2], [-leg - 2, 2], [2, -leg - 2]])
+    side = [(-1, 1), (1, 1), (1, -1), (-1, -1)][corner]
+    triangle = side * (0.5 * np.array(tank_video.PANEL) + beyond)
+    triangle[:, 1] += tank_video.PANEL_HEIGHT
+    points = tank_video._turned(triangle, (surge, heave + COG), pitch)
     hidden = np.ascontiguousarray(lit)
     cv2.fillPoly(
         hidden, [tank_video._corners(points)], (60, 60, 60), cv2.LINE_AA, tank_video.FRACTION_BITS
@@ -210,18 +198,6 @@ def test_flags_of_bad_frames(disturbed, flagged):
     assert not out["bridged"].any()
     # The asked 0.5 pixel holds for the frames that count.
     assert rms(centroid_error(out, place)[~bad]) < 0.2
-
-
-def test_gaps_are_bridged_only_when_asked_and_only_short_ones(disturbed):
-    out = track_video(disturbed[0], TrackingSettings(bridge=4 / RATE))
-    short = np.zeros(FRAMES, dtype=bool)
-    short[[*OCCLUDED, *BURNT, *WASHED]] = True
-    np.testing.assert_array_equal(out["bridged"], short)
-    assert np.all(np.isnan(out["heave"][list(DARK)]))
-    assert np.isfinite(out["heave"]).sum() == FRAMES - len(DARK)
-    _, _, pitch = motion(out.time)
-    # Four frames of a 1.67 s period, by cubics whose slope is estimated from one side.
-    assert np.rad2deg(rms((out["pitch"] - pitch)[short])) < 0.5
 
 
 @pytest.mark.parametrize("region", [(1, 2), (1000, 0, 400, 100), (-1, 0, 40, 100)])
@@ -288,50 +264,47 @@ def test_the_command_writes_what_a_campaign_reads(plain, tracked, tmp_path, monk
     assert cv2.imread("sheet.png").shape[1] == 1440
 
 
-def test_the_command_compares_bridges_and_writes_netcdf(disturbed, tmp_path, capsys):
+def test_the_command_compares_bridges_short_gaps_and_writes_netcdf(disturbed, tmp_path, capsys):
     time = np.arange(0, 5, 0.02) - 0.5
     _, heave, pitch = motion(time)
-    rows = np.column_stack([time, heave, np.rad2deg(pitch)])
-    np.savetxt(tmp_path / "mru.csv", rows, delimiter=",", header="time [s],heave [m],pitch [deg]",
-               comments="")  # fmt: skip
+    columns = {"time [s]": time, "heave [m]": heave, "pitch [deg]": np.rad2deg(pitch)}
+    mru = write_csv(tmp_path / "mru.csv", columns)
     out = tmp_path / "track.nc"
-    words = ["track", str(disturbed[0]), "-o", str(out), "--bridge", "0.2", "--mru"]
-    assert cli.main([*words, str(tmp_path / "mru.csv"), "--max-lag", "0.4"]) == 0
+    words = ["track", disturbed[0], "-o", out, "--bridge", 0.2, "--mru", mru, "--max-lag", 0.4]
+    assert cli.main(list(map(str, words))) == 0
     err = capsys.readouterr().err
     assert "flagged: 10 lost, 4 occluded, 6 overexposed (10 bridged)" in err
     assert "pitch against the MRU: correlation 1.0" in err
     assert "Note: pitch: the lags searched (within 0.4 s) do not reach a wave period (1." in err
-    with xr.open_dataset(out, engine="h5netcdf") as stored:
-        assert stored["bridged"].sum() == 10
-        assert '"bridge": 0.2' in stored.attrs["settings"]
-
-
-def opened(monkeypatch, **changes):
-    """Let OpenCV's videos answer otherwise: `changes` are methods of the capture."""
-    real = cv2.VideoCapture
-
-    class Capture:
-        def __init__(self, path):
-            self.inner, self.count = real(path), -1
-
-        def __getattr__(self, name):
-            return getattr(self.inner, name)
-
-    for name, method in changes.items():
-        setattr(Capture, name, method)
-    monkeypatch.setattr(cv2, "VideoCapture", Capture)
+    stored = xr.load_dataset(out)
+    assert '"bridge": 0.2' in stored.attrs["settings"]
+    short = np.isin(np.arange(FRAMES), [*OCCLUDED, *BURNT, *WASHED])
+    np.testing.assert_array_equal(stored["bridged"], short)
+    np.testing.assert_array_equal(np.isnan(stored["heave"]), np.isin(np.arange(FRAMES), DARK))
+    _, _, pitch = motion(stored["time"])
+    # Four frames of a 1.67 s period, by cubics whose slope is estimated from one side.
+    assert np.rad2deg(rms((stored["pitch"] - pitch)[short])) < 0.5
 
 
 def test_frames_that_the_camera_dropped(plain, monkeypatch):
     """Time stamps that skip a step leave a gap in the record, not a shorter record."""
 
-    def read(self):
-        self.count += 1
-        if self.count == 10:
-            self.inner.read()
-        return self.inner.read()
+    class Dropping:
+        """A video whose tenth frame was lost."""
 
-    opened(monkeypatch, read=read)
+        def __init__(self, path, opened=cv2.VideoCapture):
+            self.inner, self.count = opened(path), -1
+
+        def __getattr__(self, name):
+            return getattr(self.inner, name)
+
+        def read(self):
+            self.count += 1
+            if self.count == 10:
+                self.inner.read()
+            return self.inner.read()
+
+    monkeypatch.setattr(cv2, "VideoCapture", Dropping)
     out = track_video(plain[0])
     assert out.time.size == FRAMES
     assert list(np.flatnonzero(out["flag"] == FLAGS["dropped"])) == [10]

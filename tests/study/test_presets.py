@@ -98,18 +98,14 @@ def paper(found):
     return out
 
 
-def same_in_both(row):
-    first, second = ROWS[row]
-    return second.startswith(("the same", first))
-
-
 @pytest.mark.parametrize("door", ["fit", "study", "reproduce"])
 def test_the_papers_column_is_taken_in_every_row(tank, door):
     taken = found(tank, "paper", door)
     assert sorted(ROWS) == list(range(1, 32))
     checked = paper(taken)
     assert checked == dict.fromkeys(checked, True)
-    left = set(ROWS) - set(checked) - {row for row in ROWS if same_in_both(row)}
+    same = {row for row, (theirs, ours) in ROWS.items() if ours.startswith(("the same", theirs))}
+    left = set(ROWS) - set(checked) - same
     elsewhere = OF_TRAINING | OF_JUDGEMENT if door == "fit" else set()
     assert left <= elsewhere
     assert not elsewhere & set(checked)

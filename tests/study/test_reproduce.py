@@ -35,27 +35,25 @@ def record(name, seconds, rng):
     omega = 2 * np.pi * np.array(regular.get(name, [0.4, 0.5, 0.57, 0.66, 0.75, 0.9]))
     turn = omega * t[:, None] + rng.uniform(0, 2 * np.pi, omega.size)
 
-    def waves(lag, power=0, amplitude=1.0):
-        return amplitude * (omega**power * np.cos(turn - lag + 0.5 * np.pi * power)).sum(axis=1)
-
     drift = np.sin(2 * np.pi * t / 29.9) + 0.3 * np.sin(2 * np.pi * t / 47.0)
-    values = {
-        "kn_fwd": ("mm", waves(0.0, amplitude=20.0)),
-        "kn_cog": ("mm", waves(omega**2 * 3.67 / 9.81, amplitude=20.0)),
-        "heave": ("m", waves(2.0, amplitude=0.01)),
-        "pitch": ("deg", waves(1.0)),
-        "rate_y": ("deg/s", waves(1.0, 1)),
-        "acceleration_x": ("m/s^2", waves(2.5, 2, 0.008)),
-        "acceleration_z": ("m/s^2", waves(2.0, 2, 0.01)),
-        "surge": ("m", waves(2.5, amplitude=0.008) + 0.25 * drift),
-        "mooring_bow": ("N", 2 + waves(2.5, amplitude=0.1) + 0.4 * drift),
-        "mooring_stern": ("N", 2 - waves(2.5, amplitude=0.1) - 0.4 * drift),
-    }
-    noisy = {
-        key: ("time", x + 0.01 * x.std() * rng.standard_normal(x.size), {"units": unit})
-        for key, (unit, x) in values.items()
-    }
-    return xr.Dataset(noisy, coords={"time": ("time", t, {"units": "s"})})
+    made = {}
+    for key, unit, amplitude, lag, power, drifts in (
+        ("kn_fwd", "mm", 20.0, 0.0, 0, 0.0),
+        ("kn_cog", "mm", 20.0, omega**2 * 3.67 / 9.81, 0, 0.0),
+        ("heave", "m", 0.01, 2.0, 0, 0.0),
+        ("pitch", "deg", 1.0, 1.0, 0, 0.0),
+        ("rate_y", "deg/s", 1.0, 1.0, 1, 0.0),
+        ("acceleration_x", "m/s^2", 0.008, 2.5, 2, 0.0),
+        ("acceleration_z", "m/s^2", 0.01, 2.0, 2, 0.0),
+        ("surge", "m", 0.008, 2.5, 0, 0.25),
+        ("mooring_bow", "N", 0.1, 2.5, 0, 0.4),
+        ("mooring_stern", "N", -0.1, 2.5, 0, -0.4),
+    ):
+        waves = omega**power * np.cos(turn - lag + 0.5 * np.pi * power)
+        x = 2.0 * (unit == "N") + amplitude * waves.sum(axis=1) + drifts * drift
+        noise = 0.01 * x.std() * rng.standard_normal(x.size)
+        made[key] = ("time", x + noise, {"units": unit})
+    return xr.Dataset(made, coords={"time": ("time", t, {"units": "s"})})
 
 
 def play_small(settings, out, executor, progress):
@@ -81,12 +79,8 @@ def results(tmp_path_factory):
         return reproduce(folder, "paper", size=SMALL)
 
 
-@pytest.fixture(scope="module")
-def played(results):
-    return results["paper"].folder.parent
-
-
-def test_what_was_played_and_computed_is_taken_as_it_is(played, results, monkeypatch):
+def test_what_was_played_and_computed_is_taken_as_it_is(results, monkeypatch):
+    played = results["paper"].folder.parent
     monkeypatch.setattr("seakeep.tank.play.play", None)
     told = []
     again = reproduce(played, "paper", size=SMALL, progress=lambda *each: told.append(each[2]))
@@ -96,30 +90,26 @@ def test_what_was_played_and_computed_is_taken_as_it_is(played, results, monkeyp
     xr.testing.assert_identical(again["raw"].tests["irregular"], results["raw"].tests["irregular"])
 
 
-def test_the_acts_of_the_paper_have_the_same_windows(results):
-    assert list(results) == ["paper", "raw"]
-    paper, raw = results.values()
-    for name, data in raw.tests.items():
-        assert paper.tests[name]["run"].values.tolist() == data["run"].values.tolist()
-        np.testing.assert_array_equal(paper.tests[name]["start"], data["start"])
-    stops = [result.groups["training"]["stop"].values for result in (paper, raw)]
-    np.testing.assert_array_equal(*stops)
-    # The waves are carried to where the vessel is, drift included.
-    assert paper.attrs["conditional_on"] == "surge_with_drift"
-    assert raw.attrs["conditional_on"] == "surge"
-
-
-def test_the_recommended_model_is_tested_in_the_same_windows_and_learns_from_other_runs(
-    played, results, tmp_path
+def test_all_acts_have_the_same_windows_and_the_recommended_model_learns_from_other_runs(
+    results, tmp_path
 ):
-    text = study_text(ACTS[2], SMALL, 0).replace("../campaign", str(played / "campaign"))
+    folder = results["paper"].folder.parent
+    text = study_text(ACTS[2], SMALL, 0).replace("../campaign", str(folder / "campaign"))
     (tmp_path / "study.toml").write_text(text, "utf-8")
     plan = make_plan(read_study(tmp_path / "study.toml"))
-    for name, data in results["raw"].tests.items():
-        windows = [(each.run, each.start) for each in plan.tests[name]]
-        assert windows == list(zip(data["run"].values, data["start"].values, strict=True))
     for each in plan.training:
         assert not set(each.left_out) & set(each.runs)
+    assert list(results) == ["paper", "raw"]
+    for name, planned in plan.tests.items():
+        windows = [(each.run, each.start) for each in planned]
+        for result in results.values():
+            data = result.tests[name]
+            assert list(zip(data["run"].values, data["start"].values, strict=True)) == windows
+    stops = [result.groups["training"]["stop"].values for result in results.values()]
+    np.testing.assert_array_equal(*stops)
+    # The waves are carried to where the vessel is, drift included.
+    assert results["paper"].attrs["conditional_on"] == "surge_with_drift"
+    assert results["raw"].attrs["conditional_on"] == "surge"
 
 
 def test_the_first_act_alone_has_lost_the_drift_and_keeps_the_waves(results):

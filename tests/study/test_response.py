@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from cells import cells
 
 from seakeep.study.judge import is_regular, regular_response
 
@@ -10,22 +11,16 @@ DT, FREQUENCY = 0.05, 0.86
 TIME = DT * np.arange(1, 161)
 
 
-def groups(shift=0.9, offset=0.3, ratio=0.8, lead=40.0):
+def groups():
     """Two training sets, three windows, of one channel named surge."""
     turn = 2 * np.pi * FREQUENCY * TIME + np.array([0.0, 1.0, 2.0])[:, None]
-    measured = shift + 0.1 * np.cos(turn)
-    forecast = shift + offset + 0.1 * ratio * np.cos(turn + np.radians(lead))
-    over = ("training", "window", "time", "channel")
-    test = xr.Dataset(
-        {
-            "measured": (over[1:], measured[..., None]),
-            "judged": (over[:2], np.ones((2, 3), dtype=bool)),
-            "run": ("window", ["wave"] * 3),
-            "mean": (("model", *over), np.tile(forecast[..., None], (1, 2, 1, 1, 1))),
-            "error": (("model", "measure", *over[:2], "channel"), np.ones((1, 1, 2, 3, 1))),
-        },
-        coords={"time": TIME, "channel": ["surge"], "model": ["m"], "measure": ["nrmse"]},
-    )
+    measured = 0.9 + 0.1 * np.cos(turn)
+    forecast = 0.9 + 0.3 + 0.08 * np.cos(turn + np.radians(40.0))
+    test = cells(
+        ["surge"], TIME, measured=measured[..., None], judged=np.ones((2, 3), bool),
+        run=["wave"] * 3, mean=np.tile(forecast[..., None], (1, 2, 1, 1, 1)),
+        error=np.ones((1, 3, 2, 3, 1)),
+    )  # fmt: skip
     frequencies = ("run", [FREQUENCY, np.nan])
     runs = xr.Dataset({"wave_frequency": frequencies}, {"run": ["wave", "sea"]})
     return {"tests/t": test, "runs": runs}
@@ -37,10 +32,10 @@ def test_the_parts_are_what_the_forecast_was_made_of():
     own = groups()["tests/t"]["measured"].std("time", ddof=1).values[:, 0]
     offset = np.sqrt(np.mean((0.3 / own) ** 2))
     # The offset and the wave are not quite orthogonal over 6.9 periods: 1 % of the offset.
-    assert float(found["error_offset"]) == pytest.approx(offset, rel=0.01)
-    assert float(found["amplitude_ratio"]) == pytest.approx(0.8, rel=1e-9)
-    assert float(found["phase_lead"]) == pytest.approx(40.0, abs=1e-6)
-    assert float(found["error_rest"]) < 1e-6
+    assert found["error_offset"] == pytest.approx(offset, rel=0.01)
+    assert found["amplitude_ratio"] == pytest.approx(0.8, rel=1e-9)
+    assert found["phase_lead"] == pytest.approx(40.0, abs=1e-6)
+    assert found["error_rest"] < 1e-6
 
 
 def test_the_squares_add_up_to_that_of_the_error():

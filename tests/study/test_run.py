@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from tutorial_study import assert_cells_are_what_the_models_say, put_tutorial
+from tutorial_study import assert_cells_are_what_the_models_say, assert_same, put_tutorial
 
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.executor import processes
@@ -21,23 +21,10 @@ from seakeep.study.store import LOCK, UNITS, UnitFolder
 CELL = {"cell": xr.Dataset({"mean": ("time", np.arange(3.0)), "words": "Åsgård"})}
 
 
-def change(folder, old, new):
-    path = folder / "study.toml"
-    text = path.read_text("utf-8")
-    assert old in text
-    path.write_text(text.replace(old, new), "utf-8")
-
-
-def same(first, second):
-    assert first.groups.keys() == second.groups.keys()
-    for name, group in first.groups.items():
-        xr.testing.assert_identical(group, second.groups[name])
-
-
 @pytest.fixture(scope="module")
-def finished_once(tmp_path_factory, put_study):
+def finished_once(tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
-    put_study(folder)
+    put_tutorial(folder)
     with processes(1) as pool:
         return run_study(read_study(folder / "study.toml"), folder / "out", executor=pool)
 
@@ -79,7 +66,7 @@ def test_the_error_over_time_is_kept_in_bands_and_its_growth_is_that_of_each_cha
 
 def test_arrays_do_not_depend_on_workers(study_folder, finished):
     study = read_study(study_folder / "study.toml")
-    same(finished, run_study(study, study_folder / "alone"))
+    assert_same(finished, run_study(study, study_folder / "alone"))
 
 
 def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, finished):
@@ -93,11 +80,13 @@ def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, fin
         run_study(study, out, progress=stop)
     assert len(list((out / UNITS).iterdir())) == 3
     assert not (out / "study.nc").exists()
-    (out / UNITS / ".half.nc.tmp").write_bytes(b"\x89H")
+    for name in (f"{UNITS}/.half.nc.tmp", "notes.tmp"):
+        (out / name).write_bytes(b"\x89H")
     with pytest.warns(SeakeepWarning, match=r"removed 1 unfinished file\(s\) of a killed run"):
         again = run_study(study, out, progress=lambda *each: told.append(each))
+    assert (out / "notes.tmp").exists()
     assert next(each[0] for each in told if each[2].startswith("fitting and forecasting, ")) == 3
-    same(finished, again)
+    assert_same(finished, again)
 
 
 def test_one_process_works_in_a_folder_and_who_waited_takes_its_result(
@@ -115,10 +104,10 @@ def test_one_process_works_in_a_folder_and_who_waited_takes_its_result(
 
     def overtaken(plan):
         monkeypatch.setattr(run, "warn_of_slow_study", usual)
-        same(finished, run_study(study, out, progress=third))
+        assert_same(finished, run_study(study, out, progress=third))
 
     monkeypatch.setattr(run, "warn_of_slow_study", overtaken)
-    same(finished, run_study(study, out, progress=lambda *each: told.append(each[2])))
+    assert_same(finished, run_study(study, out, progress=lambda *each: told.append(each[2])))
     assert refused
     assert not (out / LOCK).exists()
     assert told[-1] == "finished before"
@@ -134,23 +123,6 @@ def test_a_damaged_unit_is_computed_again(change, tmp_path):
     path = tmp_path / UNITS / "one.nc"
     path.write_bytes(change(path.read_bytes()))
     assert units.read("one") is None
-
-
-def test_a_finished_study_is_not_run_again(study_folder, finished):
-    told = []
-    again = run_study(
-        read_study(study_folder / "study.toml"),
-        study_folder / "out",
-        progress=lambda *words: told.append(words),
-    )
-    assert told == [(1, 1, "finished before")]
-    same(finished, again)
-
-
-def test_a_folder_of_another_study_is_refused(study_folder, finished):
-    change(study_folder, "seed = 3", "seed = 4")
-    with pytest.raises(RequestError, match=r"holds the results of another study.*-o"):
-        run_study(read_study(study_folder / "study.toml"), study_folder / "out")
 
 
 def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):

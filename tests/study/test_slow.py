@@ -1,6 +1,7 @@
 """The commands tell where training windows hold too few periods of a slow motion."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from seakeep import SeakeepWarning
@@ -15,14 +16,11 @@ DRIFT = 60.0
 def drifting_folder(study_folder):
     """The tutorial's runs, their heave on a slow drift three times as large as the waves."""
     for path in study_folder.glob("*.csv"):
-        lines = path.read_text(encoding="utf-8").splitlines()
-        names = lines[0].split(";")
-        table = np.array([[float(x) for x in line.split(";")] for line in lines[1:]])
-        heave = next(i for i, name in enumerate(names) if "heave" in name.lower())
-        size = 3 * np.sqrt(2) * table[:, heave].std()
-        table[:, heave] += size * np.sin(2 * np.pi * table[:, 0] / DRIFT)
-        rows = [";".join(f"{x:.6g}" for x in row) for row in table]
-        path.write_text("\n".join([lines[0], *rows]) + "\n", encoding="utf-8")
+        table = pd.read_csv(path, sep=";")
+        time, heave = table.iloc[:, 0], table.filter(like="HEAVE").columns
+        size = 3 * np.sqrt(2) * table[heave].std()
+        table[heave] += np.outer(np.sin(2 * np.pi * time / DRIFT), size)
+        table.to_csv(path, sep=";", index=False, float_format="%.6g")
     return study_folder
 
 

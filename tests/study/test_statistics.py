@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from cells import cells
+from tutorial_study import STUDY, put_tutorial
 
 from seakeep import statistics
 from seakeep.core import embed
@@ -27,17 +29,15 @@ from seakeep.study.plan import make_plan, random_stream
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory, put_study):
+def place(tmp_path_factory):
     """A study whose truth is known: the measurement of heave, half a centimetre higher."""
     folder = tmp_path_factory.mktemp("study")
-    text = put_study(folder).replace("seed = 3", 'seed = 3\ntruth = "truth"')
-    (folder / "study.toml").write_text(text, encoding="utf-8")
-    runs = make_plan(read_study(folder / "study.toml")).runs
+    put_tutorial(folder, STUDY.replace("seed = 3", 'seed = 3\ntruth = "truth"'))
+    run = make_plan(read_study(folder / "study.toml")).runs["unseen"]
     (folder / "truth").mkdir()
-    true = xr.Dataset({"heave": runs["unseen"]["heave"] + 0.005}).drop_vars(
-        [name for name in runs["unseen"].coords if name != "time"]
+    true = xr.Dataset(
+        {"heave": ("time", run["heave"].values + 0.005)}, {"time": run["time"].values}
     )
-    true.attrs, true["heave"].attrs = {}, {}
     true.to_netcdf(folder / "truth" / "unseen.nc", engine="h5netcdf")
     return folder
 
@@ -73,8 +73,8 @@ def test_divergences_are_those_of_the_joined_windows(found, variant, block, band
                 )
             row = table.sel(model=model, variant=variant, channel=channel)
             for key in ("mean", "lower", "upper", "uncertainty", "noise_floor", "block_length"):
-                assert float(row[key]) == getattr(alone, key)
-            assert float(row["noise_floor"]) > 0
+                assert row[key] == getattr(alone, key)
+            assert row["noise_floor"] > 0
 
 
 def test_the_truth_is_read_at_the_instants_of_the_windows(found):
@@ -89,42 +89,27 @@ def test_the_truth_is_read_at_the_instants_of_the_windows(found):
         band = heave.sel(ensemble="bayesian")
         inside = (band["lower"] <= heave[side]) & (heave[side] <= band["upper"])
         row = table.sel(against=side, channel="heave")
-        assert float(row["inside"]) == pytest.approx(float(inside.mean()), abs=1e-12)
+        assert row["inside"] == pytest.approx(float(inside.mean()), abs=1e-12)
     # Half a centimetre is a tenth of the wave height: the coverages differ.
     assert table["inside"].sel(channel="heave").diff("against").item() != 0
 
 
-def cells(inside=0.5):
+def four():
     """Two training sets and two windows of two channels; the last pair is not judged."""
     time = np.arange(8)
     measured = np.where(time % 2, 1.0, -1.0)[None, :, None] * [[[1.0, 10.0]], [[2.0, 20.0]]]
-    lower = np.broadcast_to(np.where(time % 4 < 4 * inside, -30.0, 25.0)[:, None], (2, 2, 8, 2))
-    upper = np.full((2, 2, 8, 2), 30.0)
-    lower, upper = lower.copy(), upper.copy()
+    lower = np.tile(np.where(time % 4 < 2, -30.0, 25.0)[:, None], (2, 2, 1, 2))
+    upper = np.full(lower.shape, 30.0)
     lower[1, 1], upper[1, 1] = np.nan, np.nan
     errors = np.array([[[0.1, 0.3], [0.2, np.nan]], [[0.4, 0.8], [9.0, 9.0]]])
-    return xr.Dataset(
-        {
-            "measured": (("window", "time", "channel"), measured),
-            "judged": (("training", "window"), [[True, True], [True, False]]),
-            "lower": (("ensemble", "training", "window", "time", "channel"), lower[None]),
-            "upper": (("ensemble", "training", "window", "time", "channel"), upper[None]),
-            "error": (
-                ("model", "measure", "training", "window", "channel"),
-                np.stack([errors, 2 * errors, 3 * errors])[None],
-            ),
-        },
-        coords={
-            "channel": ["heave", "pitch"],
-            "model": ["m"],
-            "ensemble": ["m"],
-            "measure": list(MEASURES),
-        },
-    )
+    return cells(
+        ["heave", "pitch"], time, measured=measured, judged=[[True, True], [True, False]],
+        lower=lower[None], upper=upper[None], error=[[errors, 2 * errors, 3 * errors]],
+    )  # fmt: skip
 
 
 def test_coverage_by_hand():
-    row = band_tables(cells(), None, 0.95)["coverage"].sel(
+    row = band_tables(four(), None, 0.95)["coverage"].sel(
         model="m", band="members", against="measured"
     )
     np.testing.assert_allclose(row["inside"], 0.5, rtol=1e-15)
@@ -137,7 +122,7 @@ def test_coverage_by_hand():
 
 
 def test_boxes_are_those_of_the_judged_cells():
-    table = box_table(cells()).sel(model="m", measure="nrmse")
+    table = box_table(four()).sel(model="m", measure="nrmse")
     expected = {
         "heave": [0.1, 0.2, 0.4],
         "pitch": [0.3, 0.8],  # one cell is slack, and left out
@@ -147,8 +132,8 @@ def test_boxes_are_those_of_the_judged_cells():
         row = table.sel(channel=channel)
         box = statistics.box_statistics(values)
         for key in ("median", "upper_quartile", "lower_whisker", "mean", "count"):
-            assert float(row[key]) == pytest.approx(getattr(box, key), rel=1e-12), key
-    assert int(table["left_out"].sel(channel="pitch")) == 1
+            assert row[key] == pytest.approx(getattr(box, key), rel=1e-12), key
+    assert table["left_out"].sel(channel="pitch") == 1
 
 
 WILD = """
@@ -163,14 +148,12 @@ ridge_scale = "absolute"
 """
 
 
-def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study):
-    text = put_study(tmp_path)
-    path = tmp_path / "study.toml"
-    path.write_text(text.replace("length = 6", "length = 20") + WILD, "utf-8")
+def test_forecasts_that_diverge_are_named_and_left_out(tmp_path):
+    put_tutorial(tmp_path, STUDY.replace("length = 6", "length = 20") + WILD)
     with pytest.warns(SeakeepWarning, match=r"^6 forecast\(s\) diverged and are left out: model "
         r"'wild', training set 't00', window 0 of 'unseen' \(unseen from .* and 1 more"
     ):  # fmt: skip
-        found = run_study(read_study(path), tmp_path / "out")
+        found = run_study(read_study(tmp_path / "study.toml"), tmp_path / "out")
     lost = found.groups["statistics/lost"]
     assert set(lost["model"].values) == {"wild"}
     boxes = found.groups["statistics/boxes"].sel(test="unseen", channel="average", measure="nrmse")
@@ -179,25 +162,15 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path, put_study):
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
 
 
-def crossed(rng, levels, cells=10):
-    """Errors of models in cells that share training sets and windows."""
-    rows, columns = 0.1 * rng.standard_normal((cells, 1)), 0.1 * rng.standard_normal(cells)
+def crossed(rng, levels):
+    """Errors of models in 100 cells that share training sets and windows."""
+    rows, columns = 0.1 * rng.standard_normal((10, 1)), 0.1 * rng.standard_normal(10)
     shared = (1.0 + rows + columns)[..., None] * [1.0, 2.0]
     errors = np.multiply.outer(np.outer(list(levels.values()), np.ones(len(MEASURES))), shared)
-    return xr.Dataset(
-        {
-            "error": (("model", "measure", "training", "window", "channel"), errors),
-            "judged": (("training", "window"), np.ones((cells, cells), dtype=bool)),
-            "run": ("window", ["r"] * cells),
-            "start": ("window", 10.0 * np.arange(cells)),
-        },
-        coords={
-            "model": list(levels),
-            "measure": list(MEASURES),
-            "channel": ["heave", "pitch"],
-            "time": [0.1, 10.0],
-        },
-    )
+    return cells(
+        ["heave", "pitch"], [0.1, 10.0], levels, error=errors, judged=np.ones((10, 10), bool),
+        run=["r"] * 10, start=10.0 * np.arange(10),
+    )  # fmt: skip
 
 
 def test_differences_between_models_have_intervals_and_verdicts():
@@ -217,7 +190,7 @@ def test_differences_between_models_have_intervals_and_verdicts():
     }
     for (model, other), words in pairs.items():
         at = found.sel(model=model, other=other, channel="average")
-        assert verdict(float(at["lower"]), float(at["upper"])) == words
+        assert verdict(at["lower"], at["upper"]) == words
     assert verdict(np.nan, np.nan) == "cannot tell"
 
 
@@ -239,7 +212,7 @@ def test_growth_is_pooled_over_cells_and_its_interval_holds_it():
         ).assign_coords(band=["all"])
         training = xr.Dataset({"begin": ("training", np.zeros(10))})
         at = trend_table(test, training, rng).sel(model="m", band="all")
-        inside += bool(at["lower"] <= growth <= at["upper"])
+        inside += at["lower"] <= growth <= at["upper"]
         changes.append(float(at["change"]))
     assert np.mean(changes) == pytest.approx(growth, abs=0.03)  # a standard error of 0.01
     # Nominally 95: 100 tables have a standard error of 2.2.
@@ -267,16 +240,15 @@ regularisation = true
 """
 
 
-def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path, put_study):
-    text = put_study(tmp_path)
-    path = tmp_path / "study.toml"
-    path.write_text(text + REGULARISED, "utf-8")
-    found = run_study(read_study(path), tmp_path / "out")
+def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path):
+    put_tutorial(tmp_path, STUDY + REGULARISED)
+    study = read_study(tmp_path / "study.toml")
+    found = run_study(study, tmp_path / "out")
     assert [name for name in found.groups if name.startswith("regularisation/")] == [
         "regularisation/printed"  # neither exact delay rows nor an ensemble
     ]
     at = found.groups["regularisation/printed"].isel(training=1)
-    plan = make_plan(read_study(path))
+    plan = make_plan(study)
     parts, *channels = plan.taught(plan.training[1].spans)
     spec = plan.specs["printed"]
     fitted = spec.fit(parts, *channels)
@@ -292,11 +264,11 @@ def test_a_model_is_identified_without_ridge_and_truncated_too(tmp_path, put_stu
     )
     gram = regressors @ regressors.T
     freedom = np.trace(np.linalg.solve(gram + 3 * np.eye(size), gram))
-    assert int(at["rank"]) == round(freedom)
+    assert at["rank"] == round(freedom)
     truncated = replace(spec, ridge=0.0, rank=round(freedom)).fit(parts, *channels)
     for name, model in {"ridge": fitted, "truncated": truncated}.items():
         radius = at["radius"].sel(variant=name)
-        assert float(radius) == pytest.approx(model.spectral_radius, rel=1e-12)
+        assert radius == pytest.approx(model.spectral_radius, rel=1e-12)
     window = plan.tests["unseen"][2]
     forecast = truncated.forecast(plan.runs[window.run], window.start, window.steps)
     error = nrmse(predicted=forecast, measured=plan.runs[window.run])

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from tutorial_study import assert_cells_are_what_the_models_say
+from seas import Sea
+from small_tank import write_csv
+from tutorial_study import assert_cells_are_what_the_models_say, edit
 
 from seakeep.study import read_study, run_study
 from seakeep.study.plan import make_plan
-from seakeep.waves import wavenumber
 
 # The runs are short, for speed: their windows hold two periods of the slow surge of 17 s.
 pytestmark = pytest.mark.filterwarnings("ignore:the training windows:seakeep.SeakeepWarning")
@@ -81,21 +82,14 @@ eigenvalues = false
 def write_run(path, seed, seconds, frequencies, grows=0.0):
     """A vessel that surges slowly and heaves with the wave where it is."""
     rng = np.random.default_rng(seed)
-    time = np.arange(round(seconds * RATE) + 1) / RATE
-    omega = 2 * np.pi * np.asarray(frequencies)
-    k, phase = wavenumber(omega, DEPTH), rng.uniform(0, 2 * np.pi, omega.size)
+    time, f = np.arange(round(seconds * RATE) + 1) / RATE, np.asarray(frequencies)
+    sea = Sea(f, 0.02 * np.ones(f.size), rng.uniform(0, 2 * np.pi, f.size), DEPTH)
     surge = 0.4 * np.sin(2 * np.pi * time / 17)
     envelope = np.clip(time / grows, 0, 1) if grows else 1.0
-
-    def waves(place):
-        at = np.broadcast_to(place, time.shape)
-        angle = np.outer(time, omega) - np.outer(at, k) + phase
-        return 0.02 * envelope * np.cos(angle).sum(axis=1)
-
     noise = 1e-4 * rng.standard_normal((2, time.size))
-    columns = [time, waves(PROBE), surge + noise[0], 0.8 * waves(surge) + noise[1]]
-    header = "t [s],eta [m],x [m],z [m]"
-    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="")
+    heave = 0.8 * envelope * sea.at(time, surge) + noise[1]
+    eta = envelope * sea.at(time, PROBE)
+    write_csv(path, {"t [s]": time, "eta [m]": eta, "x [m]": surge + noise[0], "z [m]": heave})
 
 
 @pytest.fixture
@@ -119,15 +113,14 @@ def test_cells_by_predicted_surge_are_what_the_models_say(folder):
 
 
 def test_every_test_set_has_its_statistics_and_its_start_up_is_cut(folder):
-    path = folder / "study.toml"
-    path.write_text(path.read_text("utf-8").replace('"predicted"', '"none"'), "utf-8")
+    path = edit(folder / "study.toml", ('"predicted"', '"none"'))
     found = run_study(read_study(path), folder / "out")
     for test, windows, seconds in (("later", 2, 12.8), ("regular", 3, 8.0)):
         assert found.tests[test].sizes["window"] == windows
-        assert float(found.tests[test]["time"][-1]) == pytest.approx(seconds)
+        assert found.tests[test]["time"][-1] == pytest.approx(seconds)
         for table in ("boxes", "coverage", "trend"):
             assert test in found.groups[f"statistics/{table}"]["test"].values
-    assert float(found.tests["regular"]["start"].min()) >= 12.0
+    assert found.tests["regular"]["start"].min() >= 12.0
     assert set(found.tests["regular"]["run"].values) == {"wave"}
     # The error in regular waves alone is taken apart.
     assert list(found.groups["statistics/response"]["test"].values) == ["regular"]

@@ -5,18 +5,17 @@ import pytest
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.models.settings import periods_to_samples
-from seakeep.study.plan import Needs, choose_tests, choose_training, training_samples
+from seakeep.study.plan import Needs, choose_tests, choose_training
 from seakeep.study.settings import StudySettings
 from seakeep.toml import validated
 
 DT = 0.1
 
 
-def recorded(samples, *, waves="irregular", sea_state="", first=0.0, **spans):
+def recorded(samples, *, waves="irregular", sea_state="", **spans):
     """A run as preparation leaves it: the windows look at its clock and its attributes alone."""
     return xr.Dataset(
-        coords={"time": ("time", first + DT * np.arange(samples))},
+        coords={"time": ("time", DT * np.arange(samples))},
         attrs={"dt": DT, "waves": waves, "sea_state": sea_state, **spans},
     )
 
@@ -33,19 +32,19 @@ def samples_of(run, start, stop):
 
 RUNS = {
     "a": recorded(1000, train_span=(10.0, 60.0), test_span=(60.1, 99.9)),
-    "b": recorded(800, train_span=(0.0, 40.0), test_span=(40.1, 79.9), first=0.0),
+    "b": recorded(800, train_span=(0.0, 40.0), test_span=(40.1, 79.9)),
 }
 NEEDS = Needs(snapshots=120, history=30)
 
 
-def training(needs=NEEDS, runs=RUNS, inputs=(), **table):
-    return choose_training(settings(training=table), runs, list(runs), needs, inputs)
+def training(runs=RUNS, inputs=(), **table):
+    return choose_training(settings(training=table), runs, list(runs), NEEDS, inputs)
 
 
-def windows_of(runs=RUNS, name="set", steps=50, needs=NEEDS, whole=False, **table):
+def windows_of(runs=RUNS, name="set", steps=50, **table):
     chosen = settings(tests={name: table}).tests[name]
     return choose_tests(
-        name, chosen, runs, list(runs), steps=steps, needs=needs, whole=whole, seed=5
+        name, chosen, runs, list(runs), steps=steps, needs=NEEDS, whole=False, seed=5
     )
 
 
@@ -153,9 +152,3 @@ def test_leaving_out_a_run_leaves_out_those_that_repeat_its_waves():
     del runs["b"]
     with pytest.raises(RequestError, match="a run with its repetitions of a, a_2 leaves no run"):
         training(runs=runs, inputs=inputs, scheme="leave_out")
-
-
-def test_the_papers_windows_hold_37_5_periods():
-    # 30 periods of 32 samples, and the longest delay of 7.5 before them.
-    needs = Needs(periods_to_samples(30, 1.64, 1.64 / 32), periods_to_samples(7.5, 1.64, 1.64 / 32))
-    assert training_samples(needs) == 37.5 * 32

@@ -9,6 +9,7 @@ from filelock import FileLock
 from seakeep.campaign import load_prepared, write_prepared
 from seakeep.tank.dynamics import assemble_rig
 from seakeep.tank.hydrodynamics import load_hydrodynamics
+from seakeep.tank.play import play_run
 from seakeep.tank.seas import Sea
 from seakeep.tank.settings import DriftSettings, default_settings
 
@@ -50,6 +51,22 @@ def ideal_rig(linear_rig):
         pool=linear_rig.pool * [1.0, 0.0, 0.0],
         lines=lines,
     )
+
+
+@pytest.fixture(scope="session")
+def short(settings):
+    """One irregular and one regular run, half a minute each."""
+    runs = {
+        name: settings.runs[name].model_copy(update={"startup": 10.0, "duration": 20.0})
+        for name in ("irregular_1", "regular_2")
+    }
+    return settings.model_copy(update={"runs": runs})
+
+
+@pytest.fixture(scope="session")
+def played(short, rig):
+    """The irregular one."""
+    return play_run(short, "irregular_1", rig)
 
 
 @pytest.fixture(scope="session")

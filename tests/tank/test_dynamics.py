@@ -238,18 +238,15 @@ def test_divergence_names_time_and_degree_of_freedom(rig):
         simulate(rig, sea, 60.0)
 
 
-def with_settings(settings, **tables):
-    changed = {
-        name: getattr(settings, name).model_copy(update=update) for name, update in tables.items()
-    }
-    return settings.model_copy(update=changed)
-
-
-def test_depth_and_density_must_be_those_of_the_file(settings, hydro):
-    with pytest.raises(RequestError, match=r"water_depth is 2 and the .* made for 3\.6\. Set"):
-        assemble_rig(with_settings(settings, facility={"water_depth": 2.0}), hydro)
-    with pytest.raises(RequestError, match=r"density is 1025 .* made for 1000\."):
-        assemble_rig(with_settings(settings, facility={"density": 1025.0}), hydro)
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [("water_depth", 2.0, r"water_depth is 2 and the .* made for 3\.6\. Set"),
+     ("density", 1025.0, r"density is 1025 .* made for 1000\.")],
+)  # fmt: skip
+def test_depth_and_density_must_be_those_of_the_file(settings, hydro, key, value, words):
+    facility = settings.facility.model_copy(update={key: value})
+    with pytest.raises(RequestError, match=words):
+        assemble_rig(settings.model_copy(update={"facility": facility}), hydro)
 
 
 def test_other_vessels_need_no_code(settings, hydro):

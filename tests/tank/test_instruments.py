@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,21 +14,6 @@ from seakeep.tank.play import generator, play_run, truth
 from seakeep.tank.settings import SlapSettings
 
 pytest.importorskip("numba", reason="needs the extra tank")
-
-
-@pytest.fixture(scope="module")
-def short(settings):
-    """One irregular and one regular run, half a minute each."""
-    runs = {
-        name: settings.runs[name].model_copy(update={"startup": 10.0, "duration": 30.0})
-        for name in ("irregular_1", "regular_2")
-    }
-    return settings.model_copy(update={"runs": runs})
-
-
-@pytest.fixture(scope="module")
-def played(short, rig):
-    return play_run(short, "irregular_1", rig)
 
 
 @pytest.fixture(scope="module")
@@ -60,8 +47,6 @@ def test_noise_is_what_is_stated(records, played, short):
         # A sample deviation scatters by 1/√(2n); four of these.
         assert error.std() == pytest.approx(sigma, rel=4 / np.sqrt(2 * n))
         assert abs(error.mean()) < 4 * sigma / np.sqrt(n)
-    assert np.rad2deg(noise.rate_noise) == pytest.approx(0.15, rel=1e-4)
-    assert np.rad2deg(noise.angle_noise) == pytest.approx(0.05, rel=1e-4)
 
 
 def test_second_order_crest_of_a_regular_wave(settings, rig):
@@ -90,12 +75,9 @@ def test_slap_is_on_the_measured_load_alone(records, played, short):
     _, t = clock_instants(short.instruments.clocks["loads"], played.length)
     error = records["loads"]["mooring_bow"].values - played.loads(t)[0]
     assert error.std() > 1.2 * short.instruments.load_noise
-    quiet = short.model_copy(
-        update={"instruments": short.instruments.model_copy(update={"slap": {}})}
-    )
-    again = record_run(play_run(quiet, "irregular_1", played.rig), np.random.default_rng(1))[
-        "loads"
-    ]
+    instruments = short.instruments.model_copy(update={"slap": {}})
+    quiet = replace(played, settings=short.model_copy(update={"instruments": instruments}))
+    again = record_run(quiet, np.random.default_rng(1))["loads"]
     error = again["mooring_bow"].values - played.loads(t)[0]
     assert error.std() == pytest.approx(short.instruments.load_noise, rel=0.02)
 
@@ -118,11 +100,9 @@ def test_truth_holds_what_the_chain_is_judged_against(played, short):
     assert {"surge", "heave_rate", "pitch_acceleration", "mooring_bow", "eta_vessel"} <= set(data)
     assert data.attrs["clock_mru_offset"] == 0.370
     assert data.attrs["clock_video_drift_ppm"] == -40.0
-    assert data.attrs["startup"] == 10.0
     time = data["time"].values
     place = 52.09 + data["surge"].values
     assert data["eta_vessel"].values == pytest.approx(played.elevation(place, time), abs=1e-12)
-    assert data["eta_kn_fwd"].attrs["x_position"] == 48.42
     # The state is consistent: rates are the motions' derivatives.
     slope = np.gradient(data["heave"].values, time)
     assert slope[5:-5] == pytest.approx(data["heave_rate"].values[5:-5], abs=1e-3)

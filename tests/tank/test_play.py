@@ -7,19 +7,10 @@ import pytest
 
 from seakeep.campaign import read_campaign
 from seakeep.errors import RequestError
-from seakeep.tank.play import check_settings, play, play_run, truth
+from seakeep.tank.play import check_settings, play, truth
 from seakeep.tank.settings import SpectrumSettings
 
 pytest.importorskip("numba", reason="needs the extra tank")
-
-
-@pytest.fixture(scope="module")
-def short(settings):
-    runs = {
-        name: settings.runs[name].model_copy(update={"startup": 10.0, "duration": 20.0})
-        for name in ("irregular_1", "regular_2")
-    }
-    return settings.model_copy(update={"runs": runs})
 
 
 def digests(folder):
@@ -43,7 +34,7 @@ def test_same_seed_same_bytes(short, tmp_path, kind):
     }
 
 
-def test_raw_csv_reads_back(short, tmp_path):
+def test_raw_csv_reads_back(short, played, tmp_path):
     files = play(short, tmp_path, names=["irregular_1"])["irregular_1"]
     probes = pd.read_csv(files["wave_probes"])
     assert list(probes.columns) == [
@@ -54,19 +45,14 @@ def test_raw_csv_reads_back(short, tmp_path):
     video = pd.read_csv(files["video"])
     # Six decimals hold a thirtieth of a second to half a microsecond.
     assert video["time [s]"].to_numpy() == pytest.approx(np.arange(901) / 30.0, abs=6e-7)
-    played = play_run(short, "irregular_1")
     true = truth(played, "irregular_1", 0.002)
     error = 1e-3 * probes["kn_cog [mm]"].to_numpy() - true["eta_kn_cog"] - true["eta_kn_cog_crest"]
-    assert float(error.std()) == pytest.approx(6e-4, rel=0.03)
+    assert error.std() == pytest.approx(6e-4, rel=0.03)
 
 
 def test_campaign_file_lists_all_files_clocks_and_spans(short, tmp_path):
     play(short, tmp_path)
     table = tomllib.loads((tmp_path / "campaign.toml").read_text(encoding="utf-8"))
-    assert table["campaign"]["scale_factor"] == 50
-    assert table["rig"]["water_depth"] == 3.6
-    assert table["rig"]["positions"]["eta_fwd"] == 48.42
-    assert table["instruments"]["reference"] == "wave_probes"
     assert table["instruments"]["video"]["trigger"] == "lamp"
     run = table["runs"]["irregular_1"]
     assert (run["train"], run["test"]) == ([10, 20], [20, 30])
@@ -83,19 +69,18 @@ def test_campaign_file_lists_all_files_clocks_and_spans(short, tmp_path):
     }  # fmt: skip
 
 
-def test_one_loggers_campaign_can_be_prepared(short, tmp_path):
+def test_one_loggers_campaign_can_be_prepared(short, played, tmp_path):
     play(short, tmp_path, one_logger=True)
     campaign = read_campaign(tmp_path / "campaign.toml")
     run = campaign.prepare()["irregular_1"]
     assert {"surge", "heave_rate", "pitch_acceleration", "mooring_stern", "eta_cog"} <= set(run)
-    true = truth(play_run(short, "irregular_1"), "irregular_1")
+    true = truth(played, "irregular_1")
     heave = np.interp(run["time"], true["time"], true["heave"])
     # Noise of 0.8 mm, most of it above the new Nyquist frequency.
-    assert float((run["heave"] - heave).std()) < 1e-3
+    assert (run["heave"] - heave).std() < 1e-3
     rate = np.interp(run["time"], true["time"], true["heave_rate"])
     middle = slice(100, -100)
-    assert float((run["heave_rate"] - rate)[middle].std()) < 0.15 * float(rate[middle].std())
-    assert run["eta_fwd"].attrs["x_position"] == 48.42
+    assert (run["heave_rate"] - rate)[middle].std() < 0.15 * rate[middle].std()
 
 
 def test_nothing_that_the_tank_has_not_written_is_replaced(short, tmp_path):

@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
-from seakeep.tank.delivery import METRES_PER_PIXEL, PANEL, PANEL_HEIGHT, pixel_of, render_side_view
+from seakeep.signals import TrackingSettings, track_video
+from seakeep.tank.delivery import PANEL_HEIGHT, pixel_of, render_side_view
 from seakeep.tank.instruments import clock_instants
 from seakeep.tank.play import play, play_run
 
-cv2 = pytest.importorskip("cv2", reason="needs the extra video")
+pytest.importorskip("cv2", reason="needs the extra video")
 pytest.importorskip("numba", reason="needs the extra tank")
 
 
@@ -30,41 +31,21 @@ def video(played, tmp_path_factory):
     return render_side_view(played, path, np.random.default_rng(0), length=10.0)
 
 
-def frames(path, wanted):
-    reader = cv2.VideoCapture(str(path))
-    for index in range(int(reader.get(cv2.CAP_PROP_FRAME_COUNT))):
-        good, frame = reader.read()
-        assert good
-        if index in wanted:
-            yield index, frame
-    reader.release()
-
-
-def test_white_panel_is_where_the_vessel_is(video, played):
-    _, instants = clock_instants(played.settings.instruments.clocks["video"], 10.0)
-    position, _, _ = played.states(instants)
-    for index, frame in frames(video, {0, 40, 55, 70, 99}):
-        white = (frame.min(axis=2) > 150).astype(np.uint8)
-        count, _, stats, centres = cv2.connectedComponentsWithStats(white)
-        largest = 1 + np.argmax(stats[1:, cv2.CC_STAT_AREA])
-        assert count >= 2
-        surge, heave, pitch = position[:3, index]
-        centre = pixel_of(
-            surge + PANEL_HEIGHT * np.sin(pitch), 0.03 + heave + PANEL_HEIGHT * np.cos(pitch)
-        )
-        # The edge of a thresholded, compressed panel: a pixel is 2.5 mm.
-        assert centres[largest] == pytest.approx(centre, abs=1.5)
-        area = PANEL[0] * PANEL[1] / METRES_PER_PIXEL**2
-        assert stats[largest, cv2.CC_STAT_AREA] == pytest.approx(area, rel=0.08)
-
-
-def test_lamp_shows_the_trigger(video, played):
+def test_the_track_of_a_film_is_the_motion_and_its_lamp_the_trigger(video, played):
     clock = played.settings.instruments.clocks["video"]
-    readings, _ = clock_instants(clock, 10.0)
+    readings, instants = clock_instants(clock, 10.0)
+    surge, heave, pitch = played.states(instants)[0][:3]
+    found = track_video(video, TrackingSettings(lamp=(40, 40, 8), passband=None))
+    place = pixel_of(
+        surge + PANEL_HEIGHT * np.sin(pitch), 0.03 + heave + PANEL_HEIGHT * np.cos(pitch)
+    )
+    # A pixel is 2.5 mm.
+    np.testing.assert_allclose(found["centroid_x"], place[:, 0], atol=0.5)
+    np.testing.assert_allclose(found["centroid_y"], place[:, 1], atol=0.5)
+    np.testing.assert_allclose(found["panel_angle"], pitch, atol=np.deg2rad(0.2))
     lit = round((10.0 + clock.offset) * clock.rate)  # the pulse at 10 s of the reference clock
-    level = {i: f[30:50, 30:50, 2].mean() for i, f in frames(video, {lit, lit - 10, lit + 10})}
     assert readings[lit] == pytest.approx(8.8, abs=0.05)
-    assert level[lit] > 2.5 * max(level[lit - 10], level[lit + 10])
+    assert found["lamp"][lit] > 2.5 * max(found["lamp"][[lit - 10, lit + 10]])
 
 
 # The camera starts late by more than a twentieth of this short run, which is told.
