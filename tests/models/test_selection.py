@@ -10,6 +10,8 @@ from drifting import INPUTS as PROBES
 from drifting import STATES as DRIFTING
 from drifting import drifting_run
 from free_runs import loop_score
+from records import record
+from squared import DT, INPUTS, PERIOD, STATES, runs
 
 from seakeep import (
     DataError,
@@ -19,44 +21,6 @@ from seakeep import (
 )
 from seakeep.models.labelled import mean_period
 from seakeep.models.selection import RIDGES, default_observables, groups_of, select
-
-DT, PERIOD = 0.1, 10  # s, samples
-STATES, INPUTS = ["heave", "drift"], ["eta"]
-
-
-def sea(
-    seed: int, samples: int = 700, noise: float = 0.3, frequency: float | None = None
-) -> xr.Dataset:
-    """A heave that is linear in the wave, and a drift that goes with its slow square.
-
-    The wave is irregular, or regular of a `frequency` (Hz).
-    """
-    rng = np.random.default_rng(seed)
-    t = np.arange(samples) * DT
-    eta = np.zeros(samples)
-    for _ in range(12 if frequency is None else 1):
-        omega = 2 * np.pi * (rng.uniform(0.7, 1.3) if frequency is None else frequency)
-        eta += (0.1 if frequency is None else 0.3) * np.cos(omega * t + rng.uniform(0, 2 * np.pi))
-    heave, drift = np.zeros(samples), np.zeros(samples)
-    square = np.convolve(eta**2, np.hanning(31) / np.hanning(31).sum(), "same")
-    for k in range(2, samples):
-        heave[k] = 1.5 * heave[k - 1] - 0.8 * heave[k - 2] + 0.2 * eta[k - 1]
-        drift[k] = 0.97 * drift[k - 1] + 0.5 * square[k - 1]
-    channels = {"eta": eta, "heave": heave, "drift": drift}
-    return xr.Dataset(
-        {
-            name: ("time", values + noise * 0.1 * values.std() * rng.normal(size=samples))
-            for name, values in channels.items()
-        },
-        coords={"time": t},
-        attrs={"encounter_period": PERIOD * DT},
-    ).map(lambda variable: variable.assign_attrs(units="m"), keep_attrs=True)
-
-
-def runs(count: int = 3, **more) -> dict[str, xr.Dataset]:
-    made = {f"run{number}": sea(number, **more) for number in range(count)}
-    return {name: run.assign_attrs(encounter_period=PERIOD * DT) for name, run in made.items()}
-
 
 SPEC = HankelDMDc(6, 12, "rollout", delay_rows="exact")
 
@@ -86,15 +50,13 @@ def test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forec
 def test_periods_are_counted_in_the_first_elevation():
     t = np.arange(600) * DT
     waves = {
-        "wind": (4.0 + np.sin(2 * np.pi * t / 5), "m/s"),
-        "eta_fwd_rate": (np.sin(2 * np.pi * t / 3), "m/s"),
-        "gauge": (np.sin(2 * np.pi * t / 2.5), "m"),
-        "eta_fwd": (np.sin(2 * np.pi * t / 2), "m"),
+        "wind": 4.0 + np.sin(2 * np.pi * t / 5),
+        "eta_fwd_rate": np.sin(2 * np.pi * t / 3),
+        "gauge": np.sin(2 * np.pi * t / 2.5),
+        "eta_fwd": np.sin(2 * np.pi * t / 2),
     }
-    run = xr.Dataset(
-        {name: ("time", x, {"units": units}) for name, (x, units) in waves.items()},
-        coords={"time": t},
-    )
+    run = record(DT, **waves)
+    run["wind"].attrs["units"] = "m/s"
     still = run.assign(eta_fwd=0 * run["eta_fwd"])
     # Crossings of a sine between samples are linear to a thousandth of a step.
     assert mean_period({"a": run}, list(waves)) == pytest.approx(2 / DT, rel=1e-3)
@@ -194,11 +156,7 @@ def growing(seed: int, samples: int = 120) -> xr.Dataset:
     heave[0] = 1.0
     for k in range(samples - 1):
         heave[k + 1] = 1.005 * heave[k] + 0.5 * eta[k]
-    return xr.Dataset(
-        {"heave": ("time", heave, {"units": "m"}), "eta": ("time", eta, {"units": "m"})},
-        coords={"time": DT * np.arange(samples)},
-        attrs={"encounter_period": PERIOD * DT},
-    )
+    return record(DT, {"encounter_period": PERIOD * DT}, heave=heave, eta=eta)
 
 
 def test_what_grows_is_never_chosen():
@@ -239,9 +197,8 @@ def test_a_vessel_that_drifts_gets_an_alignment_and_the_measured_surge_is_no_cho
     assert [key for key in one if one[key][1]] == [key for key in other if other[key][1]]
     assert again.settings.alignment == found.settings.alignment
     # Without positions and depth there is nothing to carry by.
-    bare = {name: run.drop_attrs() for name, run in given.items()}
-    for name, run in bare.items():
-        bare[name] = run.assign_attrs(encounter_period=given[name].attrs["encounter_period"])
-    assert {row["alignment"] for row in select(spec, bare, DRIFTING, PROBES, **options).rows} == {
-        "none"
+    bare = {
+        name: run.drop_attrs().assign_attrs(encounter_period=1.5) for name, run in given.items()
     }
+    left = select(spec, bare, DRIFTING, PROBES, **options)
+    assert {row["alignment"] for row in left.rows} == {"none"}
