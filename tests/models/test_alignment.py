@@ -66,10 +66,8 @@ def test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for(drifts)
 
 
 def test_an_ensemble_and_a_single_model_take_the_celerity_from_the_same_span(drifts):
-    alignment, cut = (
-        ProbeAlignment(mode="effective"),
-        [run.sel(time=slice(0, 100)) for run in drifts],
-    )
+    alignment = ProbeAlignment(mode="effective")
+    cut = [run.sel(time=slice(0, 100)) for run in drifts]
     alone = replace(spec(alignment), window=300).fit(drifts, STATES, INPUTS, stop=100.0)
     ensemble = few(window=Uniform("18 T", "30 T"), alignment=alignment).fit(cut, STATES, INPUTS)
     assert ensemble.alignment.celerity == alone.alignment.celerity
