@@ -2,15 +2,14 @@
 
 import json
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
-from typing import ClassVar
 
 import numpy as np
 import pytest
-import xarray as xr
-from drifting import INPUTS, STATES, drifting_run
+from drifting import INPUTS, STATES
 from ensembles import few
+from records import record
 
 import seakeep
 from seakeep import BayesianHankelDMDc, DataError, HankelDMDc, RequestError, SeakeepWarning, Uniform
@@ -21,33 +20,16 @@ from seakeep.models import (
     outside_training,
 )
 from seakeep.models.draws import Draw
-from seakeep.models.engine import member_series, read_groups
-from seakeep.models.labelled import ChannelLabel
-from seakeep.models.observables import OBSERVABLES
-from seakeep.models.terms import Bound
 
 DT = 0.1
-PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
 
 
-def sea(samples=600, seed=0, ahead=0, **attrs):
+def sea(samples=600, seed=0, ahead=0):
     """Heave answers the wave `ahead` samples later; the wave is white enough to tell them apart."""
     rng = np.random.default_rng(seed)
     eta = rng.standard_normal(samples + ahead + 3)
     heave = 0.5 * eta[ahead : ahead + samples] - 0.2 * eta[ahead + 1 : ahead + 1 + samples]
-    return xr.Dataset(
-        {
-            "heave": ("time", np.r_[0.0, heave[:-1]], {"units": "m"}),
-            "eta": ("time", eta[:samples], {"units": "m"}),
-        },
-        coords={"time": DT * np.arange(samples)},
-        attrs=attrs,
-    )
-
-
-@pytest.fixture(scope="module")
-def drifting():
-    return [drifting_run(seed) for seed in (1, 2)], drifting_run(7)
+    return record(DT, heave=np.r_[0.0, heave[:-1]], eta=eta[:samples])
 
 
 class TestLead:
@@ -68,61 +50,12 @@ class TestLead:
         assert "lead          5 samples: a step is driven by waves up to 0.4 s" in seeing.summary()
 
 
-@dataclass(frozen=True)
-class Half:
-    """An observable of somebody else: half of the first input, two samples before."""
-
-    kind: ClassVar[str] = "half"
-
-    def bind(self, inputs, period, dt):
-        def columns(values):
-            out = np.full((len(values), 1), np.nan)
-            out[2:, 0] = 0.5 * values[:-2, 0]
-            return out
-
-        label = ChannelLabel("half", inputs[0].units, "half of the wave, two before")
-        return Bound((label,), delayed=False, before=2, ahead=0, columns=columns)
-
-    def reach(self, dt):
-        return 2, 0
-
-
-class TestObservableOfAnother:
-    """One file and one line add an observable."""
-
-    def test_it_drives_models_ensembles_arrays_and_files(self, monkeypatch, tmp_path):
-        monkeypatch.setitem(OBSERVABLES, "half", Half)
-        run = sea()
-        run["heave"] = ("time", np.r_[np.zeros(3), run.eta.values[:-3]], {"units": "m"})
-        # x_{j+1} = u_{j−2}: without input delays only the direct regressor holds it.
-        spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Half(),))
-        model = spec.fit(run, ["heave"], ["eta"])
-        assert model.regressors == ["eta", "half"]
-        assert model.history_samples == 3
-        forecast = model.forecast(run, start=20.0, steps=40)
-        # Means of the window differ by what its first samples leave out: 2 / 600 of a deviation.
-        np.testing.assert_allclose(forecast.heave, run.heave.sel(time=forecast.time), atol=5e-3)
-        x, u = run.heave.values[:, None], run.eta.values[:, None]
-        arrays = model.forecast_arrays(x[:201], u[:201], u[201:240], steps=40)
-        np.testing.assert_allclose(arrays[:, 0], forecast.heave, atol=1e-12)
-        back = load_model(model.save(tmp_path / "m.nc"))
-        xr.testing.assert_identical(back.forecast(run, start=20.0, steps=40), forecast)
-        assert "observable    half: 1 column at lags" in back.summary()
-        many = few(observables=(Half(),), n_members=2).fit(run, ["heave"], ["eta"])
-        summary = many.forecast_summary(run, start=20.0, steps=40)
-        again = load_model(many.save(tmp_path / "e.nc"))
-        xr.testing.assert_identical(again.forecast_summary(run, start=20.0, steps=40), summary)
-        with pytest.raises(RequestError, match=r"driven by observables too \(half\)"):
-            model.to_state_space()
-
-
 class TestOneEngine:
     """Windows, members and executors share one reading of each run."""
 
-    def test_each_probe_is_carried_once_per_run(self, drifting, monkeypatch):
-        runs, test = drifting
-        measured = replace(PREDICTED, surge="measured")
-        fitted = few(alignment=measured).fit(runs, STATES, INPUTS)
+    def test_each_probe_is_carried_once_per_run(self, drifts, drift, monkeypatch):
+        measured = seakeep.ProbeAlignment(mode="dispersion", surge="measured")
+        fitted = few(alignment=measured).fit(drifts, STATES, INPUTS)
         carries = []
         real = alignment.carry_by_dispersion
 
@@ -131,23 +64,15 @@ class TestOneEngine:
             return real(*arguments)
 
         monkeypatch.setattr(alignment, "carry_by_dispersion", counting)
-        fitted.forecast_windows(test, [20.0, 25.0, 30.0], steps=20)
+        fitted.forecast_windows(drift, [20.0, 25.0, 30.0], steps=20)
         assert len(carries) == len(INPUTS)
-        carries.clear()
-        places = [("a", 20.0), ("b", 21.0), ("a", 30.0)]
-        groups = [(places, 20), (places[:1], 30)]
-        windows = read_groups(fitted.signature, {"a": test, "b": runs[0]}, groups)
-        with member_series(fitted, windows) as found:
-            assert [series.shape for series, _ in found] == [(4, 3, 20, 2), (4, 1, 30, 2)]
-        assert len(carries) == 2 * len(INPUTS)
 
-    def test_a_forecast_upstream_says_how_far_ahead_it_reads(self, drifting):
-        runs, test = drifting
+    def test_a_forecast_upstream_says_how_far_ahead_it_reads(self, drifts, drift):
         here = seakeep.ProbeAlignment(mode="effective", surge="none", celerity=2.0)
         for offset, ahead in ((0.0, 0.0), (-3.0, 1.5)):
             spec = HankelDMDc(2, 8, 1.0, alignment=replace(here, offset=offset))
-            model = spec.fit(runs, STATES, INPUTS)
-            attrs = model.forecast(test, 20.0, 30).attrs
+            model = spec.fit(drifts, STATES, INPUTS)
+            attrs = model.forecast(drift, 20.0, 30).attrs
             assert attrs["reads_input_until"] == pytest.approx(ahead - model.dt)
             assert ("upstream" in model.summary()) == (offset < 0)
 
@@ -190,7 +115,7 @@ class TestWaves:
         time = DT * np.arange(samples)
         eta = sum(np.cos(2 * np.pi * time / period) for period in periods)
         heave = np.r_[0.0, eta[:-1]]
-        return xr.Dataset({"heave": ("time", heave), "eta": ("time", eta)}, coords={"time": time})
+        return record(DT, heave=heave, eta=eta)
 
     @pytest.mark.parametrize(
         ("period", "words"),
@@ -213,7 +138,7 @@ class TestWaves:
         model = load_model(model.save(tmp_path / "m.nc"))
         # A regular wave is two amplitudes high; g T²/2π is 6.25 m.
         assert outside_training(model, 1.5 * run, 20.0, 600) == [
-            "eta: a height of 3, trained up to 2",
+            "eta: a height of 3 m, trained up to 2 m",
             "eta: a steepness in deep water of 0.48, trained up to 0.32",
         ]
         (told,) = outside_training(model, run.assign(surge=run.surge - 3), 20.0, 600)
@@ -224,7 +149,7 @@ class TestWaves:
         run = self.regular(2.0).rename(heave="surge")
         high = 1.5 * run
         high["surge"].values[high["time"].values > 20.0] = np.nan
-        words = "eta: a height of 3, trained up to 2; eta: a steepness in deep water of 0.48, "
+        words = "eta: a height of 3 m, trained up to 2 m; eta: a steepness in deep water of 0.48, "
         for spec in (HankelDMDc(2, 8, 1.0), few(window=None)):
             model = spec.fit(run, ["surge"], ["eta"])
             forecasts = [model.forecast(high, 20.0, 600)]
