@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from records import record, table
 
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.models import HankelDMDc
@@ -11,6 +12,7 @@ from seakeep.models.labelled import Span, channel_labels
 from seakeep.models.observables import Powers, SlowSquares
 
 DT, PERIOD = 0.1, 16  # s, samples
+PROBES = {"eta_fwd": 0.0, "eta_cog": 2.0}
 
 
 def irregular(seed: int = 0, samples: int = 900) -> xr.Dataset:
@@ -19,23 +21,20 @@ def irregular(seed: int = 0, samples: int = 900) -> xr.Dataset:
     t = np.arange(samples) * DT
     omega = 2 * np.pi * rng.uniform(0.45, 0.8, 12)
     phase = rng.uniform(0, 2 * np.pi, 12)
-    channels = {
-        name: (
-            "time",
-            sum(
-                0.01 * np.cos(w * t - w**2 / 9.81 * x + p)
-                for w, p in zip(omega, phase, strict=True)
-            ),
-            {"units": "m", "x_position": x},
+    waves = {
+        name: sum(
+            0.01 * np.cos(w * t - w**2 / 9.81 * x + p) for w, p in zip(omega, phase, strict=True)
         )
-        for name, x in (("eta_fwd", 0.0), ("eta_cog", 2.0))
+        for name, x in PROBES.items()
     }
-    channels["surge"] = ("time", 0.3 + 0.2 * np.sin(2 * np.pi * t / 40), {"units": "m"})
     attrs = {"water_depth": np.inf, "encounter_period": PERIOD * DT}
-    return xr.Dataset(channels, coords={"time": t}, attrs=attrs)
+    run = record(DT, attrs, surge=0.3 + 0.2 * np.sin(2 * np.pi * t / 40), **waves)
+    for name, x in PROBES.items():
+        run[name].attrs["x_position"] = x
+    return run
 
 
-INPUTS = ["eta_fwd", "eta_cog"]
+INPUTS = [*PROBES]
 CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3)))
 
 
@@ -46,7 +45,7 @@ def fitted(run, lead=12, chosen=CHOSEN) -> InputMap:
 
 def rows(chain, run, first, stop) -> Regressors:
     span = Span(first, first, stop)
-    values = np.stack([run[name].values for name in INPUTS], axis=-1)
+    values = table(run, INPUTS)
     read = chain.reads(span)
     drive = chain.drive(values[read.first : read.stop], [span], run=run, first=read.first)
     return drive.rows(first, stop)
@@ -77,19 +76,6 @@ def test_slow_squares_are_the_sums_that_they_stand_for():
                 expected = sum(w * derivative(middle - 6 + i) ** 2 for i, w in enumerate(kernel))
                 # Rounding of thirteen squares of second differences.
                 assert found[order][row, column] == pytest.approx(expected, rel=1e-12)
-
-
-def test_slow_squares_of_a_regular_wave_weigh_the_amplitude_by_the_frequency():
-    amplitude, omega = 0.05, 2 * np.pi / (PERIOD * DT)
-    series = amplitude * np.cos(omega * DT * np.arange(400))
-    kernel, x = slow_kernel(1 / (3 * PERIOD), 24), omega * DT
-    found = [slow_squares(series, order, kernel, (0,), DT)[200, 0] for order in (0, 1, 2)]
-    # A central difference multiplies by sin(x)/x, and the second by (sin(x/2)/(x/2))^2.
-    gains = [1.0, np.sin(x) / x, (np.sin(x / 2) / (x / 2)) ** 2]
-    for order, gain in enumerate(gains):
-        expected = 0.5 * (amplitude * omega**order * gain) ** 2
-        # What the filter leaves of the wave at twice the frequency.
-        assert found[order] == pytest.approx(expected, rel=0.01)
 
 
 def test_columns_are_named_with_units_and_stand_in_two_groups():
@@ -136,10 +122,10 @@ def test_powers_grow_like_the_input_far_out():
 def test_slow_squares_above_those_of_training_grow_by_seven_tenths():
     run = irregular()
     chain = fitted(run, chosen=(SlowSquares("eta_cog", orders=(0,), lags=(0,)),))
-    record = np.stack([run[name].values for name in INPUTS], axis=1)
-    inside = chain.observed.direct(record)[:, 0]
+    waves = table(run, INPUTS)
+    inside = chain.observed.direct(waves)[:, 0]
     top = np.nanmax(inside)
-    twice = chain.observed.direct(np.sqrt(2.0) * record)[:, 0]
+    twice = chain.observed.direct(np.sqrt(2.0) * waves)[:, 0]
     expected = np.where(2 * inside > top, top + 0.7 * (2 * inside - top), 2 * inside)
     np.testing.assert_allclose(twice, expected, rtol=1e-12)
     assert (2 * inside > top).any()
