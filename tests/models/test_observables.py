@@ -22,9 +22,7 @@ def irregular(seed: int = 0, samples: int = 900) -> xr.Dataset:
     omega = 2 * np.pi * rng.uniform(0.45, 0.8, 12)
     phase = rng.uniform(0, 2 * np.pi, 12)
     waves = {
-        name: sum(
-            0.01 * np.cos(w * t - w**2 / 9.81 * x + p) for w, p in zip(omega, phase, strict=True)
-        )
+        name: 0.01 * np.cos(np.outer(t, omega) - omega**2 / 9.81 * x + phase).sum(axis=1)
         for name, x in PROBES.items()
     }
     attrs = {"water_depth": np.inf, "encounter_period": PERIOD * DT}
