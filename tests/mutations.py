@@ -282,6 +282,7 @@ CHANGES = (
     ("check/parts.py", "max(history - 1, _waves_come(run, names))", "history - 1", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),
     ("check/parts.py", "replace(input_map, reference=0))", "input_map)", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
     ("check/parts.py", "model.at(parameter=varies.centre)", "model.at(parameter=varies.low)", "models/test_parametric.py::test_a_check_takes_the_middle_of_the_training"),
+    ("models/inputs.py", "squared = (here - place.centre) ** 2", "squared = here**2", "models/test_following.py::test_training_is_the_recursion_on_the_measured_surge"),
     ("models/inputs.py", "self.rows(span.known + 1 - self.input_map.reference, span.known + 1)", "self.rows(span.known + 2 - self.input_map.reference, span.known + 1)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
     ("models/inputs.py", "return self._departing(rows, 1)", "return rows", "models/test_centre.py::test_regressors_depart_from_their_means_over_the_reference_period"),
     ("models/inputs.py", "return self._departing(out, 0)", "return out", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),

@@ -69,18 +69,18 @@ def test_a_ridge_weighs_a_hundred_times_on_powers(models):
 
 
 def test_training_is_the_recursion_on_the_measured_surge(models, drift):
-    model, run = models["ahead"], drift
-    surge = run["surge"].values
+    input_map, surge = models["ahead"].signature.input_map, drift["surge"].values
     later = surge.copy()
     later[560:] = 9.0
-    found, other = (
-        model.signature.input_map.drive(
-            table(run, INPUTS), [Span(500, 500, 600)], run=run, surge=each
-        ).rows(500, 600)
+    drives = [
+        input_map.drive(table(drift, INPUTS), [Span(500, 500, 600)], run=drift, surge=each)
         for each in (surge, later)
-    )
+    ]
+    found, other = (drive.rows(500, 600) for drive in drives)
     np.testing.assert_array_equal(other.delayed[:60], found.delayed[:60])
     assert not np.allclose(other.delayed[60:], found.delayed[60:])
+    away = drives[0].places(500, 600) - input_map.follows.place.centre
+    np.testing.assert_array_equal(found.direct[:, -1], away**2)
 
 
 def test_models_and_windows_side_by_side_are_each_alone():
