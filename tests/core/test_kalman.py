@@ -55,16 +55,6 @@ def test_it_is_the_textbook_filter_with_rows_missing():
         np.testing.assert_allclose(covariance, textbook.P, rtol=0, atol=1e-10)
 
 
-def test_a_state_measured_without_noise_is_known():
-    filter_ = DelayFilter(A, PROCESS, np.zeros(N), np.eye(SIZE))
-    y = np.array([[1.5, np.nan], [np.nan, 0.25]])
-    (first, _), (state, covariance) = played(filter_, y)
-    assert first[-N] == pytest.approx(1.5, rel=1e-15)
-    assert state[-1] == pytest.approx(0.25, rel=1e-15)
-    assert not covariance[-1].any()
-    assert covariance[-2, -2] > 0
-
-
 def test_errors_of_today_are_carried_as_the_model_carries_them():
     covariance = np.diag(np.arange(1.0, SIZE + 1))
     found = DelayFilter(A, PROCESS, np.zeros(N), covariance).ahead(5)

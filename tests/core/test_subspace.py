@@ -112,21 +112,10 @@ def test_an_input_that_tells_its_own_future_needs_a_ridge_and_forecasts_with_it(
     assert error < 0.02
 
 
-def test_another_package_finds_the_same_system():
-    pytest.importorskip("nfoursid", reason="dependency group bench")
-    import pandas as pd
-    from nfoursid.nfoursid import NFourSID
-
+def test_noise_moves_eigenvalues_little():
     system = plant(seed=4, outputs=1, inputs=1)
     u = np.random.default_rng(5).normal(size=(1500, 1))
-    y = simulate(system, u, noise=0.02)
-    table = pd.DataFrame({"u": u[:, 0], "y": y[:, 0]})
-    other = NFourSID(table, output_columns=["y"], input_columns=["u"], num_block_rows=12)
-    other.subspace_identification()
-    space, _ = other.system_identification(rank=4)
-    truth = by_modulus(np.linalg.eigvals(system[0]))
-    theirs = np.abs(by_modulus(np.linalg.eigvals(space.a)) - truth).max()
-    ours = np.abs(by_modulus(np.linalg.eigvals(fitted([y], [u]).A)) - truth).max()
-    # Both are consistent; with this noise their eigenvalues are within a hundredth of the truth.
-    assert max(ours, theirs) < 0.01
-    assert ours < 2.0 * theirs + 1e-3
+    found = fitted([simulate(system, u, noise=0.02)], [u])
+    values, truth = (by_modulus(np.linalg.eigvals(a)) for a in (found.A, system[0]))
+    # 3e-5 to 1.2e-4, by the seed of the inputs.
+    assert np.abs(values - truth).max() < 2e-4
