@@ -1,11 +1,12 @@
 """The estimator in C is the live model of Python, sample by sample."""
 
 import ctypes
-import shutil
 import subprocess
 
+import compiled
 import numpy as np
 import pytest
+from compiled import pointer
 
 from seakeep import HankelDMDc
 from seakeep.hosts import write_estimator
@@ -15,7 +16,6 @@ from seakeep.signals.prediction import foresee
 
 STATES, INPUTS = ["heave", "pitch"], ["eta_fwd", "eta_cog"]
 COUNT = 700
-FLAGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"]
 ROLES = {"eta_cog": "constant"}
 NOISES = {"exact": {}, "noisy": {"heave": 0.02}}
 
@@ -27,8 +27,6 @@ def model(make_run):
 
 @pytest.fixture(scope="module")
 def sources(model, tmp_path_factory):
-    if shutil.which("cc") is None:
-        pytest.skip("there is no C compiler")
     folder = tmp_path_factory.mktemp("estimators")
     for name, noise in NOISES.items():
         write_estimator(model, folder, name, noise)
@@ -37,9 +35,7 @@ def sources(model, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def library(sources):
-    files = sorted(path.name for path in sources.glob("*.c"))
-    subprocess.run(["cc", *FLAGS, "-o", "all.so", *files, "-lm"], cwd=sources, check=True)
-    return ctypes.CDLL(str(sources / "all.so"))
+    return compiled.library(sources)
 
 
 @pytest.fixture
@@ -51,14 +47,8 @@ def errors_of_training(monkeypatch):
 
 def built(model, folder, **settings):
     """Library of an estimator named rom."""
-    files = [str(each) for each in write_estimator(model, folder, "rom", **settings)]
-    written = [each for each in files if each.endswith(".c")]
-    subprocess.run(["cc", *FLAGS, "-o", folder / "rom.so", *written, "-lm"], check=True)
-    return ctypes.CDLL(str(folder / "rom.so"))
-
-
-def pointer(values):
-    return np.ascontiguousarray(values, dtype=float).ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+    write_estimator(model, folder, "rom", **settings)
+    return compiled.library(folder)
 
 
 class Estimator:
@@ -199,7 +189,7 @@ def test_a_bad_sample_leaves_the_estimator_as_it_was(library):
     assert bytes(found.memory) == before
 
 
-def test_it_runs_clean_under_sanitizers_without_a_heap(sources, model, make_run):
+def test_it_runs_clean_under_sanitizers_without_a_heap(sources, library, make_run):
     try_out = ["cc", "-fsanitize=address,undefined", "-xc", "-o", "/dev/null", "-"]
     if subprocess.run(try_out, input=b"int main(void){return 0;}", capture_output=True).returncode:
         pytest.skip("the compiler has no sanitizers")
@@ -271,8 +261,8 @@ def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
     """Look-ahead, observables, carried waves and read-outs, with samples lost."""
     model = cases[name].model
     noises = {model.states[-1]: noise} if noise else {}
-    compiled = built(model, tmp_path, noise=noises)
-    found, live = Estimator(compiled, "rom", len(model.states)), model.live(noise=noises)
+    library = built(model, tmp_path, noise=noises)
+    found, live = Estimator(library, "rom", len(model.states)), model.live(noise=noises)
     if "following" in name:  # from probe to probe for the look-ahead, and on from each record
 
         def foreseen(known, count):
