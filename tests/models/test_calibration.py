@@ -53,10 +53,9 @@ def test_the_calibrated_band_covers_unseen_windows_as_it_says(bands, run, scale)
     for start in np.arange(112.0, 155.0, 4.0):
         for band, found in inside.items():
             summary = bands[scale].forecast_summary(run, start, 40, band=band)
-            for name in STATES:
-                measured = run[name].sel(time=summary["time"], method="nearest")
-                low, high = (summary[name].sel(statistic=key) for key in ("lower", "upper"))
-                found.append(float(((low <= measured) & (measured <= high)).mean()))
+            _, _, low, high = table(summary, STATES)
+            measured = table(run.sel(time=summary["time"], method="nearest"), STATES)
+            found.append(((low <= measured) & (measured <= high)).mean())
     assert np.mean(inside["members"]) < 0.6
     # 880 instants, nearly independent noise: a standard error of 0.007, and 0.01 of the margin.
     assert np.mean(inside["calibrated"]) == pytest.approx(0.95, abs=0.036)
@@ -67,12 +66,11 @@ def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run
     plain = ensemble.forecast_summary(run, 120.0, 30)
     wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
     found = calibrated.calibration
-    for k, name in enumerate(STATES):
-        mean, std = (plain[name].sel(statistic=key).values for key in ("mean", "std"))
-        assert 4 * found.floor[k] > 1.5  # the noise alone
-        half = found.conformal.margin[k] * np.sqrt(std**2 + found.floor[k] ** 2)
-        for key, bound in (("mean", mean), ("lower", mean - half), ("upper", mean + half)):
-            np.testing.assert_allclose(wide[name].sel(statistic=key), bound, rtol=0, atol=1e-12)
+    mean, std, *_ = table(plain, STATES)
+    assert np.all(4 * found.floor > 1.5)  # the noise alone
+    half = found.conformal.margin * np.sqrt(std**2 + found.floor**2)
+    expected = [mean, mean - half, mean + half]
+    np.testing.assert_allclose(table(wide, STATES)[[0, 2, 3]], expected, rtol=0, atol=1e-12)
     assert "calibrated factor times the root" in wide["statistic"].attrs["comment"]
 
 
@@ -82,11 +80,10 @@ def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(bands, ensemble,
     wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
     margin = calibrated.calibration.conformal.margin
     assert (margin > 0).all()
-    for k, name in enumerate(STATES):
-        for key, side in (("mean", 0), ("std", 0), ("lower", -1), ("upper", 1)):
-            moved = wide[name].sel(statistic=key) - plain[name].sel(statistic=key)
-            # One addition: rounding of numbers of about ten.
-            np.testing.assert_allclose(moved, side * margin[k], rtol=0, atol=1e-14 * 10)
+    sides = np.array([0, 0, -1, 1])[:, None, None] + np.zeros((30, 1))
+    moved = table(wide, STATES) - table(plain, STATES)
+    # One addition: rounding of numbers of about ten.
+    np.testing.assert_allclose(moved, sides * margin, rtol=0, atol=1e-14 * 10)
     assert wide.attrs["band"] == "calibrated"
     xr.testing.assert_identical(plain, calibrated.forecast_summary(run, 120.0, 30))
     with pytest.raises(RequestError, match=r"not calibrated"):
@@ -110,7 +107,7 @@ def test_no_window_touches_what_a_member_has_read(ensemble, bands, run):
     scores = []
     for window, start in enumerate(starts):
         at, here = round(start / DT), found.isel(window=window)
-        low, high = (table(here.sel(statistic=side), STATES) for side in ("lower", "upper"))
+        _, _, low, high = table(here, STATES)
         scores.append(band_scores(low, high, table(run, STATES)[at + 1 : at + 41]))
     expected = conformal_margin(np.stack(scores), 0.95)
     np.testing.assert_allclose(calibrated.calibration.conformal.margin, expected.margin, rtol=1e-12)
@@ -122,12 +119,11 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(band
     several = learnt.summarize_windows(run, [115.0, 120.0], 30, band="calibrated")
     x, u = table(run, STATES), table(run, INPUTS)
     arrays = learnt.hold().forecast_arrays(x[:1201], u[:1201], u[1201:1230], 30, band="calibrated")
-    half = (one["heave"].sel(statistic="upper") - one["heave"].sel(statistic="mean")).values
-    assert np.ptp(half) > 0.01 * half.mean()  # the scale is no constant
-    for k, name in enumerate(STATES):
-        # Products of matrices of other sizes: other roundings.
-        np.testing.assert_allclose(several[name][1], one[name], rtol=0, atol=1e-9)
-        np.testing.assert_allclose(arrays.upper[:, k], one[name].sel(statistic="upper"), atol=1e-9)
+    mean, _, _, upper = found = table(one, STATES)
+    assert np.all(np.ptp(upper - mean, axis=0) > 0.01 * (upper - mean).mean(axis=0))  # no constant
+    # Products of matrices of other sizes: other roundings.
+    np.testing.assert_allclose(table(several, STATES)[1], found, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(arrays.upper, upper, atol=1e-9)
     assert "learnt from the members' spread" in one["statistic"].attrs["comment"]
     assert "times a learnt scale and a floor of" in learnt.summary()
 
@@ -187,10 +183,8 @@ def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
     kept = [number for number, draw in enumerate(ensemble.members) if draw.run == 1]
     assert 0 < without.n_members == len(kept) < 6
     run = sea(3, 300, "other")
-    np.testing.assert_array_equal(
-        without.forecast(run, 10.0, 40)["heave"],
-        ensemble.forecast(run, 10.0, 40)["heave"].isel(member=kept),
-    )
+    found, every = (table(each.forecast(run, 10.0, 40), STATES) for each in (without, ensemble))
+    np.testing.assert_array_equal(found, every[kept])
 
 
 def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
@@ -215,7 +209,5 @@ def test_members_whose_windows_reach_into_a_third_do_not_forecast_it():
     free = [number for number, (first, last) in enumerate(spans) if last < 300 or first >= 600]
     assert 0 < len(free) < 6
     other = sea(3, 300, "other")
-    np.testing.assert_array_equal(
-        kept.forecast(other, 10.0, 40)["heave"],
-        ensemble.forecast(other, 10.0, 40)["heave"].isel(member=free),
-    )
+    found, every = (table(each.forecast(other, 10.0, 40), STATES) for each in (kept, ensemble))
+    np.testing.assert_array_equal(found, every[free])

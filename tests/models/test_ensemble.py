@@ -82,16 +82,14 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     single = dataclasses.replace(settings, window=None).fit(runs, STATES, INPUTS)
     apart = spec.fit(runs, STATES, INPUTS)
     centred = dataclasses.replace(spec, centred=True).fit(runs, STATES, INPUTS)
-    expected, tolerance = single.forecast(unseen, 65.0, 120), 1e-12  # rounding of the sums
-    ways = {
-        "anew": centred.forecast_summary(unseen, 65.0, 120),
-        "held": centred.hold().forecast_summary(unseen, 65.0, 120),
-        "file": seakeep.load_model(centred.save(tmp_path / "c.nc")).forecast_summary(
-            unseen, 65.0, 120
-        ),
-        "members": seakeep.summarize(centred.forecast(unseen, 65.0, 120)),
-        "windows": centred.summarize_windows(unseen, [60.0, 65.0], 120).isel(window=1),
-    }
+    expected = table(single.forecast(unseen, 65.0, 120), STATES)
+    close = {"rtol": 0, "atol": 1e-12}  # rounding of the sums
+    again = seakeep.load_model(centred.save(tmp_path / "c.nc"))
+    ways = (
+        *(each.forecast_summary(unseen, 65.0, 120) for each in (centred, centred.hold(), again)),
+        seakeep.summarize(centred.forecast(unseen, 65.0, 120)),
+        centred.summarize_windows(unseen, [60.0, 65.0], 120).isel(window=1),
+    )
     x, u = table(unseen, STATES), table(unseen, INPUTS)
     now = round(65.0 / DT) + 1
     from_arrays = centred.forecast_arrays(x[:now], u[:now], u[now:], 120)
@@ -99,32 +97,27 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     for service in (live, alone_live):
         for at in range(now):
             service.step(u[at], x[at])
-    served, alone_served = (each.forecast(120, u[now:]) for each in (live, alone_live))
-    far = apart.forecast_summary(unseen, 65.0, 120)
-    for column, name in enumerate(STATES):
-        mean, std, lower, upper = far[name].values
-        moved = expected[name].values - mean
-        assert np.abs(moved).max() > 1e-3
-        wanted = [mean + moved, std, lower + moved, upper + moved]
-        for found in ways.values():
-            np.testing.assert_allclose(found[name], wanted, rtol=0, atol=tolerance)
-        np.testing.assert_allclose(
-            [part[:, column] for part in from_arrays[:4]], wanted, rtol=0, atol=tolerance
-        )
-        np.testing.assert_allclose(served[name][0], expected[name], rtol=0, atol=tolerance)
-        assert np.all(served[name][1] > alone_served[name][1])  # the members' spread comes on top
-    left = centred.without("b").forecast_summary(unseen, 65.0, 120)
-    two = dataclasses.replace(settings, window=None).fit(
-        {name: runs[name] for name in "ac"}, STATES, INPUTS
+    served, alone_served = (
+        table(each.forecast(120, u[now:]), STATES) for each in (live, alone_live)
     )
-    found = table(left.sel(statistic="mean"), STATES)
+    mean, std, lower, upper = table(apart.forecast_summary(unseen, 65.0, 120), STATES)
+    moved = expected - mean
+    assert np.abs(moved).max() > 1e-3
+    wanted = [mean + moved, std, lower + moved, upper + moved]
+    for found in (*(table(each, STATES) for each in ways), from_arrays[:4]):
+        np.testing.assert_allclose(found, wanted, **close)
+    np.testing.assert_allclose(served[0], expected, **close)
+    assert np.all(served[1] > alone_served[1])  # the members' spread comes on top
+    left = centred.without("b").forecast_summary(unseen, 65.0, 120)
+    both = {name: runs[name] for name in "ac"}
+    two = dataclasses.replace(settings, window=None).fit(both, STATES, INPUTS)
     expected_left = table(two.forecast(unseen, 65.0, 120), STATES)
-    np.testing.assert_allclose(found, expected_left, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(table(left, STATES)[0], expected_left, **close)
     band = centred.calibrate(wave_run(9), 100, 0.9).forecast_summary(
         unseen, 65.0, 100, 0.9, band="calibrated"
     )
-    middle = 0.5 * (band.heave.sel(statistic="lower") + band.heave.sel(statistic="upper"))
-    np.testing.assert_allclose(middle, expected.heave[:100], rtol=0, atol=tolerance)
+    _, _, lower, upper = table(band, STATES)
+    np.testing.assert_allclose(0.5 * (lower + upper), expected[:100], **close)
 
 
 def test_draws_are_rounded_to_the_nearest_sample(run):
@@ -183,20 +176,15 @@ def test_the_seed_may_be_a_sequence_or_a_generator(run):
 def test_the_summary_is_that_of_the_members(run, monkeypatch):
     ensemble = fitted(run, ridge=STABLE)
     members = ensemble.forecast(run, start=65.0, steps=77)
-    expected = seakeep.summarize(members, level=0.9)
-    values = table(members, STATES)
-    for statistic, of_members in (
-        ("lower", np.quantile(values, 0.05, axis=0)),
-        ("std", values.std(axis=0, ddof=1)),
-    ):
-        found = table(expected.sel(statistic=statistic), STATES)
-        np.testing.assert_allclose(found, of_members, rtol=1e-12)
+    expected, values = seakeep.summarize(members, level=0.9), table(members, STATES)
+    _, std, lower, _ = table(expected, STATES)
+    np.testing.assert_allclose(lower, np.quantile(values, 0.05, axis=0), rtol=1e-12)
+    np.testing.assert_allclose(std, values.std(axis=0, ddof=1), rtol=1e-12)
     for held, chunk in ((2**25, 2**23), (0, 1500)):
         monkeypatch.setattr(engine, "HELD", held)
         monkeypatch.setattr(summaries, "CHUNK", chunk)
         found = ensemble.forecast_summary(run, start=65.0, steps=77, level=0.9)
-        for name in STATES:
-            np.testing.assert_array_equal(found[name], expected[name])
+        np.testing.assert_array_equal(table(found, STATES), table(expected, STATES))
     assert (found.members, found.diverged, found.level) == (6, 0, 0.9)
 
 
@@ -207,13 +195,12 @@ def test_windows_side_by_side_equal_single_forecasts(run):
     assert dict(together.sizes) == {"window": 2, "member": 6, "lead": 60}
     for window, start in enumerate(starts):
         single = ensemble.forecast(run, start=start, steps=60)
-        for name in STATES:
-            # Two windows are one product: other roundings.
-            np.testing.assert_allclose(together[name][window], single[name], atol=1e-10)
+        # Two windows are one product: other roundings.
+        found = table(together, STATES)[window]
+        np.testing.assert_allclose(found, table(single, STATES), atol=1e-10)
     summary = ensemble.summarize_windows(run, starts, steps=60)
     expected = seakeep.summarize(together)
-    for name in STATES:
-        np.testing.assert_array_equal(summary[name], expected[name])
+    np.testing.assert_array_equal(table(summary, STATES), table(expected, STATES))
 
 
 def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):

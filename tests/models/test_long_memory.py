@@ -29,16 +29,13 @@ def model():
     return SPEC.fit([remembering(1), remembering(2)], ["heave"], ["eta"])
 
 
-def test_a_sparse_memory_is_recovered_and_one_of_another_length_is_not(model):
+def test_a_sparse_memory_is_recovered(model):
     # Exact data: what is left is rounding times the condition number, below 1e3.
     np.testing.assert_allclose(model.A[0], WEIGHTS, rtol=0, atol=1e-10)
     np.testing.assert_allclose(model.B[0], [0.7], rtol=0, atol=1e-10)
     run = remembering(7)
     forecast = model.forecast(run, start=5.0, steps=200)
     np.testing.assert_allclose(forecast.heave, run.heave[51:251], rtol=0, atol=1e-9)
-    cut = HankelDMDc(4, 0, 0.0, standardize=False, delay_rows="exact", memory=12)
-    other = cut.fit(remembering(1), ["heave"], ["eta"])
-    assert np.abs(other.A[0] - WEIGHTS[:13]).max() > 1e-3
 
 
 @pytest.mark.parametrize("more", [{"delay_rows": "ridge"}, {"stable": True}])
