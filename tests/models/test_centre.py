@@ -152,12 +152,6 @@ def test_a_surge_that_is_followed_stays_as_it_is(tmp_path):
     assert first.read_windows({"run": run}, [("run", 80.0)], 1).zero[0, 0] == 0.0
     assert first.state_mean[0] == pooled.state_mean[0]
     assert first.signature.direct_scale.mean[-1] == pooled.signature.direct_scale.mean[-1]
-    errors = [
-        float(((each["heave"] - run["heave"]) ** 2).mean() ** 0.5)
-        for each in (before, pooled.forecast(run, 80.0, 200))
-    ]
-    # The runs share their zeros: what is lost is that means of 45 s are not those of the runs.
-    assert errors[0] < 1.5 * errors[1] < 0.15 * run["heave"].std()
     assert before.attrs["status"] == "ok"
     again = load_model(first.save(tmp_path / "model.nc"))
     xr.testing.assert_identical(again.forecast(run, 80.0, 200), before)

@@ -104,18 +104,14 @@ def test_a_table_by_wave_height_and_horizon_by_hand():
         "first third": np.arange(30) < 10 + 0 * waves,
         "last third": np.arange(30) >= 20 + 0 * waves,
     }
+    spread = y.reshape(-1, 2).std(axis=0, ddof=1)
     for part, place in places.items():
         row, each = table.parts.index(part), y[place]
+        found = table.inside[row], table.winkler[row], table.crps[row], table.relative_width[row]
         inside = (each >= -1) & (each <= 2)
-        np.testing.assert_allclose(table.inside[row], inside.mean(axis=0), rtol=1e-12)
-        np.testing.assert_allclose(
-            table.winkler[row], winkler_score(-1, 2, each, 0.9).mean(axis=0), rtol=1e-12
-        )
-        np.testing.assert_allclose(
-            table.crps[row], band_crps(-1, 2, each, 0.9).mean(axis=0), rtol=1e-12
-        )
-        spread = y.reshape(-1, 2).std(axis=0, ddof=1)
-        np.testing.assert_allclose(table.relative_width[row], 3 / spread, rtol=1e-12)
+        scores = inside, winkler_score(-1, 2, each, 0.9), band_crps(-1, 2, each, 0.9)
+        expected = *(score.mean(axis=0) for score in scores), 3 / spread
+        np.testing.assert_allclose(found, expected, rtol=1e-12)
     without = coverage_table(lower, upper, np.where(np.isnan(lower), 0, lower), 0.9)
     assert without.parts == ("all", "first third", "middle third", "last third")
 
