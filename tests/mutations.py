@@ -193,7 +193,7 @@ CHANGES = (
     ("models/live.py", "wider = np.where(worst > ALARM, worst, 1.0)", "wider = worst", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
     ("models/live.py", "conditions.beyond**2)", "conditions.beyond)", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
     ("models/live.py", "whole[np.maximum.accumulate(at)][1:]", "whole[np.maximum.accumulate(at)][:-1]", "models/test_live.py::test_a_known_actuator_follows_its_plan_whatever_the_probe_does"),
-    ("models/live.py", "self._known_inputs(), self.signature, self._surge, waves=self._waves", "self._known_inputs(), self.signature, self._surge", "models/test_live.py::test_a_known_actuator_follows_its_plan_whatever_the_probe_does"),
+    ("models/live.py", "self._known_inputs(), self.signature, self._surge, waves=self._waves", "self._known_inputs(), self.signature, self._surge", "hosts/test_estimator.py::test_an_input_that_is_no_wave_is_not_judged"),
     ("models/live.py", "return outside | Validity.CONSISTENCY if alarm else outside", "return outside", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
     ("models/terms.py", "calm = u / np.sqrt(1.0 + u * u / limits", "calm = u / np.sqrt(1.0 + 0.0 * u / limits", "models/test_observables.py::test_powers_grow_like_the_input_far_out"),
     ("models/observables.py", "reach = len(kernel) // 2 + (max(self.orders) > 0)", "reach = len(kernel) // 2", "models/test_observables.py::test_columns_are_named_with_units_and_stand_in_two_groups"),

@@ -507,12 +507,6 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does(thrusted):
     with pytest.raises(RequestError, match="roles names 'eat', which the model does not know"):
         model.live(roles={"eat": "known"})
     # A constant stays; waves that are given count though the other column is not.
-    constant, wave = model.live(roles={"thrust": "constant"}), model.live()
-    for at in range(300):
-        for each in (constant, wave):
-            each.step([u[at, 0], 9 * np.sin(0.3 * at)], y[at])  # a thrust as none in training
-    assert Validity.HEIGHT in wave.conditions.validity
-    assert not constant.conditions.validity
     constant = model.live(roles={"thrust": "constant"})
     for at in range(300):
         constant.step(u[at], y[at])

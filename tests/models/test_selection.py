@@ -17,7 +17,6 @@ from seakeep import (
     DataError,
     HankelDMDc,
     ProbeAlignment,
-    SlowSquares,
 )
 from seakeep.models.labelled import mean_period
 from seakeep.models.selection import RIDGES, default_observables, groups_of, select
@@ -48,22 +47,17 @@ def test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forec
 
 
 def test_periods_are_counted_in_the_first_elevation():
-    t = np.arange(600) * DT
-    waves = {
-        "wind": 4.0 + np.sin(2 * np.pi * t / 5),
-        "eta_fwd_rate": np.sin(2 * np.pi * t / 3),
-        "gauge": np.sin(2 * np.pi * t / 2.5),
-        "eta_fwd": np.sin(2 * np.pi * t / 2),
-    }
-    run = record(DT, **waves)
+    periods = {"wind": 5, "eta_fwd_rate": 3, "gauge": 2.5, "eta_fwd": 2}
+    angles = 2 * np.pi * DT * np.arange(600)
+    run = record(DT, **{name: np.sin(angles / period) for name, period in periods.items()})
     run["wind"].attrs["units"] = "m/s"
     still = run.assign(eta_fwd=0 * run["eta_fwd"])
     # Crossings of a sine between samples are linear to a thousandth of a step.
-    assert mean_period({"a": run}, list(waves)) == pytest.approx(2 / DT, rel=1e-3)
-    assert mean_period({"still": still, "a": run}, list(waves)) == pytest.approx(2 / DT, rel=1e-3)
+    assert mean_period({"a": run}, [*periods]) == pytest.approx(2 / DT, rel=1e-3)
+    assert mean_period({"still": still, "a": run}, [*periods]) == pytest.approx(2 / DT, rel=1e-3)
     assert mean_period({"a": run}, ["wind", "gauge"]) == pytest.approx(2.5 / DT, rel=1e-3)
     stated = run.assign_attrs(encounter_period=1.5)
-    assert mean_period({"still": still, "b": stated}, list(waves)) == pytest.approx(15)
+    assert mean_period({"still": still, "b": stated}, [*periods]) == pytest.approx(15)
     with pytest.raises(DataError, match=r"no input \(wind\) is a wave elevation, eta_…\. Set run"):
         mean_period({"a": run}, ["wind"])
 
@@ -81,20 +75,6 @@ def test_runs_that_repeat_the_wave_are_one_group_whatever_stands_first():
     assert len(set(groups_of(given, "run", ["eta"]).values())) == 3
     # Nothing tells of waves, so that nothing is held out together.
     assert len(set(groups_of({"again": again, "b": again}, "auto", ["wind"]).values())) == 2
-
-
-def test_squares_are_chosen_where_the_drift_goes_with_them_and_not_without_it():
-    spec = replace(SPEC, observables=[SlowSquares("eta", orders=(0,), lags=(0, 1))])
-    found = select(spec, runs(), STATES, INPUTS, vary=("observables",), horizon=(15.0,))
-    assert [each.kind for each in found.settings.observables] == ["slow_squares"]
-    scores = {
-        kind: min(row["score"] for row in found.rows if row["observables"] == kind)
-        for kind in ("none", "slow_squares")
-    }
-    assert scores["slow_squares"] < 0.7 * scores["none"]
-    assert sum(row["chosen"] for row in found.rows) == 1
-    for row in found.rows:
-        assert row["lower"] <= row["score"] <= row["upper"]
 
 
 def test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone():
