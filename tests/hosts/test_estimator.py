@@ -7,6 +7,7 @@ import compiled
 import numpy as np
 import pytest
 from compiled import pointer
+from records import table
 
 from seakeep import HankelDMDc
 from seakeep.hosts import write_estimator
@@ -83,7 +84,7 @@ class Estimator:
 
 def moments(forecast, states):
     """Mean and standard deviation of a forecast in Python, shape (2, steps, N)."""
-    return np.stack([forecast[each].values[:2] for each in states], axis=-1)
+    return table(forecast, states)[:2]
 
 
 def measured(run, model, lost_inputs=True):

@@ -58,16 +58,14 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
     expected = model.forecast(long, START, STEPS)
     # So far they err little, and weigh one; squares of what they err by move the surge.
     near = 1e-9 if len(model.regressors) == len(INPUTS) else 1e-3
-    for state in STATES:
-        np.testing.assert_allclose(found[state].values, expected[state].values, atol=near)
+    np.testing.assert_allclose(table(found, STATES), table(expected, STATES), atol=near)
     # What is missing counts as not there, and what lies beyond it is not read.
     gone = drift.copy(deep=True)
     for name in INPUTS:
         gone[name].values[last + 1 : reads_until(model, drift) + 1] = np.nan
         gone[name].values[reads_until(model, drift) + 1 :] = 1e9
     again = model.forecast(gone, START, STEPS, ahead="predict")
-    for state in STATES:
-        np.testing.assert_array_equal(again[state].values, found[state].values)
+    np.testing.assert_array_equal(table(again, STATES), table(found, STATES))
     assert again.attrs["status"] == found.attrs["status"]
 
 
@@ -81,10 +79,8 @@ def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift
     assert since == pytest.approx(float(whole.time[STEPS - 10]))
     assert found.attrs["status"] == f"ok, input predicted from t = {since:g} s"
     same = found.time.values < since - 1e-9
-    for state in STATES:
-        one, other = found[state].values, whole[state].values
-        np.testing.assert_array_equal(one[same], other[same])
-        assert not np.any(one[~same] == other[~same])
+    is_equal = table(found, STATES) == table(whole, STATES)
+    np.testing.assert_array_equal(is_equal, np.stack([same, same], axis=1))
 
 
 def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
@@ -111,11 +107,10 @@ def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
     x, u = table(short, STATES), table(short, INPUTS)
     given = (x[: at + 1], u[: at + 1], u[at + 1 :], STEPS)
     band = ensemble.hold().forecast_arrays(*given, ahead="predict")
-    np.testing.assert_allclose(band.mean[:, 0], summary[STATES[0]].sel(statistic="mean"), rtol=1e-9)
-    one = ensemble.member(1).forecast_arrays(*given, ahead="predict")
-    own = members[STATES[0]].sel(member=1).values
-    np.testing.assert_allclose(one[:, 0], own, rtol=1e-9)
-    assert np.ptp(members[STATES[0]].values[:, -1]) > 0  # a band stays where waves are predicted
+    np.testing.assert_allclose(band.mean, table(summary, STATES)[0], rtol=1e-9)
+    one, every = ensemble.member(1).forecast_arrays(*given, ahead="predict"), table(members, STATES)
+    np.testing.assert_allclose(one, every[1], rtol=1e-9)
+    assert np.all(np.ptp(every[:, -1], axis=0) > 0)  # a band stays where waves are predicted
 
 
 @pytest.mark.parametrize("positions", [True, False])

@@ -57,12 +57,11 @@ def test_the_system_is_recovered_from_runs_whose_zeros_differ():
     np.testing.assert_allclose(a, np.hstack(A), rtol=0, atol=1e-6)
     run = vessel(9, 50.0)
     forecast = model.forecast(run, start=DT * (PERIOD + 20), steps=400)
-    for name in CHANNELS[0]:
-        expected = run[name][PERIOD + 21 : PERIOD + 421]
-        np.testing.assert_allclose(forecast[name], expected, rtol=0, atol=1e-6)
     (x, u), at = (table(run, names) for names in CHANNELS), PERIOD + 21
+    found = table(forecast, CHANNELS[0])
+    np.testing.assert_allclose(found, x[at : at + 400], rtol=0, atol=1e-6)
     values = model.forecast_arrays(x[:at], u[:at], u[at:], 400)
-    np.testing.assert_allclose(values[:, 0], forecast["heave"], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(values, found, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -98,10 +97,9 @@ def test_a_zero_moves_the_forecast_and_changes_nothing_else(spec):
             else model.forecast(each, start, 100, ahead="predict")
             for model, each in pairs
         )
-        for name in CHANNELS[0]:
-            change = other[name] - one[name]
-            # Differences of numbers of a hundred, through regressions of condition 1e4.
-            np.testing.assert_allclose(change, 20.0 * OFFSETS[name], rtol=0, atol=1e-7)
+        change = table(other, CHANNELS[0]) - table(one, CHANNELS[0])
+        # Differences of numbers of a hundred, through regressions of condition 1e4.
+        np.testing.assert_allclose(change - [60.0, -8.0], 0.0, atol=1e-7)
     first, second = (getattr(model, "selection", "") for model in models)
     assert first == second
 
@@ -144,10 +142,8 @@ def test_a_surge_that_is_followed_stays_as_it_is(tmp_path):
     first, second = (spec.fit(runs, states, inputs) for runs in (plain, there))
     run = moved(4, 0.0)
     before, after = first.forecast(run, 80.0, 200), second.forecast(moved(4, 5.0), 80.0, 200)
-    for name in states:
-        # Loads of 30 N through ridge regressions.
-        change = 5.0 * moves.get(name, 0.0) + np.zeros(200)
-        np.testing.assert_allclose(after[name] - before[name], change, rtol=0, atol=1e-7)
+    change = table(after - before, states) - [5.0 * moves.get(name, 0.0) for name in states]
+    np.testing.assert_allclose(change, 0.0, atol=1e-7)  # loads of 30 N, by ridge regressions
     pooled = replace(spec, centre="pooled").fit(plain, states, inputs)
     assert first.read_windows({"run": run}, [("run", 80.0)], 1).zero[0, 0] == 0.0
     assert first.state_mean[0] == pooled.state_mean[0]
