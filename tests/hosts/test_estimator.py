@@ -147,7 +147,6 @@ def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
         live.step(u[at], y[at])
     plan = np.full((29, 2), np.nan)
     plan[3:, 1] = np.linspace(0, 1, 26)
-    plan[:, 0] = plan[:3, 1] = np.nan
     expected = moments(live.forecast(30, {"eta_cog": plan[:, 1]}), STATES)
     np.testing.assert_allclose(found.forecast(30, plan)[1], expected, rtol=1e-7, atol=1e-9)
 

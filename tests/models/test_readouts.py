@@ -133,14 +133,6 @@ class TestFloor:
         unknown = replace(spec, centre="run").fit(moored_runs(), MOORED, ETA)
         assert not any(each.acts for each in unknown.signature.readouts)  # on which zero?
 
-    def test_a_line_that_is_seldom_slack_rests_on_its_floor_too(self):
-        low = -8.5  # N, of 2 % of the samples
-        given = {f"run{seed}": moored_run(seed, samples=2000, floor=low) for seed in range(3)}
-        share = np.mean([np.mean(run["mooring_stern"] < low + NOISE) for run in given.values()])
-        assert 0.01 < share < 0.04
-        model = replace(PLAIN, readouts="auto").fit(given, MOORED, ETA)
-        assert low - 3 * NOISE < model.signature.readouts[1].floor < low
-
     def test_no_linear_system_stands_for_it(self, tmp_path):
         model = replace(PLAIN, readouts="auto").fit(moored_runs(), MOORED, ETA)
         for export in (model.to_state_space, lambda: model.to_mat(tmp_path / "m.mat")):
