@@ -188,7 +188,7 @@ CHANGES = (
     ("models/growth.py", "np.clip(trust, 0.0, 1.0)", "np.clip(trust, 1.0, 1.0)", "models/test_ahead.py::test_no_lead_errs_more_than_the_mean"),
     ("models/growth.py", "np.where(known, mean, shrunk)", "shrunk", "models/test_ahead.py::test_where_waves_are_known_nothing_is_weighed"),
     ("models/growth.py", "errors = learnt.of_forecast(windows.steps)", "errors = 0.0", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),
-    ("models/growth.py", "scale.centre + zero", "scale.centre", "models/test_centre.py::test_a_zero_moves_the_forecast_and_changes_nothing_else"),
+    ("models/growth.py", "scale.centre + zero", "scale.centre", "models/test_ahead.py::test_where_waves_are_known_nothing_is_weighed"),
     ("models/engine.py", "foresight(signature, self.run))", "foresight(signature))", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),
     ("models/live.py", "wider = np.where(worst > ALARM, worst, 1.0)", "wider = worst", "models/test_live.py::test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides"),
     ("models/live.py", "conditions.beyond**2)", "conditions.beyond)", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),

@@ -133,7 +133,8 @@ def test_no_lead_errs_more_than_the_mean(drifts, drift, positions):
 
 def test_where_waves_are_known_nothing_is_weighed(model):
     scale, runs = model.state_scale, 9.0 * np.random.default_rng(0).standard_normal((1, 5, 4, 2))
-    known = np.array([True, True, False, False])
-    mean, _, weight = weighed(runs, 0.0, scale, known)
-    np.testing.assert_array_equal(mean, np.where(known[:, None], runs[0, 0], scale.centre))
+    known, zero = np.array([True, True, False, False]), np.array([[2.0, -3.0]])
+    mean, _, weight = weighed(runs, 0.0, scale, known, zero)
+    expected = np.where(known[:, None], runs[0, 0], scale.centre + zero)
+    np.testing.assert_array_equal(mean, expected)
     np.testing.assert_array_equal(weight, np.repeat(known[:, None], 2, axis=1))
