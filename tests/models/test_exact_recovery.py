@@ -37,7 +37,7 @@ def test_with_redundant_delays_forecasts_are_right(oscillator, s, z, delay_rows)
     np.testing.assert_allclose(forecast.heave, other.heave[11:161], rtol=0, atol=EXACT)
 
 
-def test_pooled_runs_identify_what_none_of_them_can_alone(oscillator):
+def test_no_snapshot_pair_crosses_a_joint(oscillator):
     # Two columns a run and four unknowns: one run leaves the system open, three close it.
     runs = [oscillator.run(samples=4, seed=seed) for seed in (4, 5, 6)]
     spec = HankelDMDc(1, 1, 0.0, standardize=False)

@@ -83,7 +83,8 @@ def test_training_is_the_recursion_on_the_measured_surge(models, drift):
     np.testing.assert_array_equal(found.direct[:, -1], away**2)
 
 
-def test_models_and_windows_side_by_side_are_each_alone():
+def test_a_step_is_the_equation():
+    """x' = A x̂ + B û + D v, of models and windows side by side and of one alone."""
     rng = np.random.default_rng(0)
     N, s, n, z, P, places, steps = 2, 3, 2, 4, 5, 9, 30
     place = Place(np.full(P, 1 / P), -1.0, 0.25, places, 0.1)

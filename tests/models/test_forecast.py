@@ -22,7 +22,7 @@ def test_run(make_run):
     return make_run(samples=300, seed=5)
 
 
-def test_the_state_at_the_next_instant_comes_from_states_and_inputs_up_to_this_one(model, test_run):
+def test_states_are_read_up_to_the_start_and_inputs_up_to_the_last_instant_but_one(model, test_run):
     k = 50
     x = (table(test_run, model.states) - model.state_mean) / model.state_std
     u = (table(test_run, model.inputs) - model.input_mean) / model.input_std

@@ -32,7 +32,7 @@ def test_carlstein_finds_the_closed_form_of_an_autoregression(phi):
     assert found == pytest.approx(expected, rel=0.06)
 
 
-def test_the_lag_one_correlation_is_the_printed_sum_with_its_square_without_joins():
+def test_the_lag_one_correlation_is_the_printed_sum_with_its_square():
     x = np.concatenate([autoregressive(0.9, 200, 3), 50 + autoregressive(0.9, 200, 4)])
     centred = x - x.mean()
     pairs = [i for i in range(399) if i != 199]

@@ -15,7 +15,7 @@ from seakeep.models.calibration import Judged, learn_margin
 from seakeep.statistics import band_scores, conformal_margin, coverage
 
 
-def test_the_margin_of_exchangeable_scores_is_an_order_statistic():
+def test_the_coverage_of_exchangeable_scores_is_that_of_the_order_statistic():
     """Rank ⌈0.9 · 40⌉ of 39: a new score is below it with probability 36/40."""
     scores = np.arange(1.0, 40.0).reshape(1, 39, 1)
     assert conformal_margin(scores, 0.9, block_length=1).margin[0] == 36.0
