@@ -35,13 +35,12 @@ SETTINGS = {
 }
 
 
-def spec(**settings):
-    return HankelDMDc(4, 12, **{"ridge": 1.0, "delay_rows": "exact", **settings})
-
-
 @pytest.fixture(scope="module")
 def models(drifts):
-    return {key: spec(**each).fit(drifts, STATES, INPUTS) for key, each in SETTINGS.items()}
+    return {
+        key: HankelDMDc(4, 12, 1.0, **{"delay_rows": "exact"} | each).fit(drifts, STATES, INPUTS)
+        for key, each in SETTINGS.items()
+    }
 
 
 @pytest.fixture(scope="module")
