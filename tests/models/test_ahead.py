@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from drifting import DEPTH, INPUTS, POSITIONS, STATES
 from ensembles import few
 from records import table
@@ -74,7 +75,8 @@ def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift
     last = reads_until(model, drift) - 10
     short = drift.isel(time=slice(0, last + 1))
     found = model.forecast(short, START, STEPS, ahead="predict")
-    whole = model.forecast(drift, START, STEPS)
+    whole = model.forecast(drift, START, STEPS, ahead="predict")
+    xr.testing.assert_identical(whole, model.forecast(drift, START, STEPS))  # nothing is missing
     since = found.attrs["input_predicted_from"]
     assert since == pytest.approx(float(whole.time[STEPS - 10]))
     assert found.attrs["status"] == f"ok, input predicted from t = {since:g} s"
