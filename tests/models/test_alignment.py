@@ -35,9 +35,8 @@ def test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is(models, dr
     assert errors["predicted"] < 0.12  # and what the forecast of surge is off
     assert errors["effective"] < 0.5 * errors["none"]
     assert errors["none"] > 0.4
-    assert (
-        0.5 < models["dispersion"].alignment.highest_frequency < 1.0
-    )  # waves are of 0.3 to 0.9 Hz
+    # Waves are of 0.3 to 0.9 Hz.
+    assert 0.5 < models["dispersion"].alignment.highest_frequency < 1.0
     # With no surge and no offset the elevation stays where it is, to a transform's rounding.
     assert errors["rest"] == pytest.approx(errors["none"], rel=1e-6)
 
