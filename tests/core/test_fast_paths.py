@@ -9,15 +9,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from matrices import Problem
 
-from seakeep.core import rollout
+from seakeep.core import embed, rollout
 from seakeep.core.embedding import TrainingWindow
-from seakeep.core.gram import (
-    gram_trace,
-    lagged_response,
-    lagged_sums,
-    primal_system,
-    snapshot_gram,
-)
+from seakeep.core.gram import gram_trace, lagged_sums
 
 ROLLOUT = sys.modules["seakeep.core.rollout"]
 
@@ -47,27 +41,6 @@ def problems(draw):
         made.direct.append(d)
         made.windows.append(TrainingWindow(first, first + count, first))
     return made
-
-
-@settings(deadline=None)
-@given(problems())
-def test_the_displaced_gram_is_the_gram(problem):
-    regressors, targets = problem.matrices(all_rows=False)
-    system = primal_system(problem.pieces, problem.delays)
-    np.testing.assert_allclose(
-        np.triu(system.gram), np.triu(regressors @ regressors.T), atol=TIGHT, rtol=TIGHT
-    )
-    np.testing.assert_allclose(system.right, targets @ regressors.T, atol=TIGHT, rtol=TIGHT)
-
-
-@settings(deadline=None)
-@given(problems())
-def test_the_diagonal_sums_are_the_gram_of_the_snapshots(problem):
-    regressors, _ = problem.matrices()
-    gram = snapshot_gram(problem.pieces, problem.delays)
-    np.testing.assert_allclose(
-        np.triu(gram), np.triu(regressors.T @ regressors), atol=TIGHT, rtol=TIGHT
-    )
 
 
 @settings(deadline=None)
@@ -116,33 +89,18 @@ def test_a_rank_is_that_of_the_truncated_matrix(problem, rank):
 )
 def test_lagged_sums_are_products_with_a_hankel_matrix(seed, count, channels, lags, rows):
     rng = np.random.default_rng(seed)
-    series = rng.normal(size=(count + lags + 2, channels))
-    first = max(lags - 1, 0) + 1
+    series = rng.normal(size=(count + lags + 1, channels))
     left = rng.normal(size=(count, rows))
-    hankel = np.concatenate(
-        [
-            np.zeros((0, count)),
-            *(series[first - lag : first - lag + count].T for lag in range(lags)),
-        ]
-    )
-    np.testing.assert_allclose(
-        lagged_sums(left, series, first, lags), left.T @ hankel.T, atol=TIGHT
-    )
-    weights = rng.normal(size=lags * channels)
-    np.testing.assert_allclose(
-        lagged_response(series, weights, first, count), weights @ hankel, atol=10 * TIGHT
-    )
+    hankel = embed(series, lags - 1, lags, count)
+    np.testing.assert_allclose(lagged_sums(left, series, lags, lags), left.T @ hankel.T, atol=TIGHT)
 
 
-def stepwise(a, b, state, inputs, delays, steps, count, direct=None):
+def stepwise(a, b, state, inputs, delays, direct, count):
     """The loop of the paper over the extended state."""
-    out = np.empty((steps, count))
-    for k in range(steps):
-        extended = inputs[k : k + delays + 1][::-1].ravel()
-        if direct is not None:
-            extended = np.concatenate([extended, direct[k]])
-        state = a @ state + b @ extended
-        out[k] = state[:count]
+    out = []
+    for k, beside in enumerate(direct):
+        state = a @ state + b @ np.append(inputs[k : k + delays + 1][::-1], beside)
+        out.append(state[:count])
     return out
 
 
@@ -172,7 +130,7 @@ def free_runs(draw):
 def test_free_runs_are_the_loop_over_the_extended_state(case, piece):
     a, b, rows, histories, inputs, direct, z, steps, N = case
     expected = [
-        stepwise(a, b, history[::-1].ravel(), series, z, steps, N, beside)
+        stepwise(a, b, history[::-1].ravel(), series, z, beside, N)
         for history, series, beside in zip(histories, inputs, direct, strict=True)
     ]
     driving = inputs if inputs.shape[2] else np.zeros((len(histories), steps, 0))

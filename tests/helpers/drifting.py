@@ -1,7 +1,7 @@
 """A synthetic run of a vessel that drifts in irregular waves, past two probes."""
 
 import numpy as np
-import xarray as xr
+from records import record
 from seas import Sea
 
 DT, DEPTH = 0.1, 3.6
@@ -37,14 +37,16 @@ def drifting_run(seed=0, samples=1500, moved=0.0, name="run"):
         **{key: waves.at(time, x + moved) for key, x in POSITIONS.items()},
         "mooring_bow": load + LOAD_NOISE * rng.standard_normal(samples),
     }
-    run = xr.Dataset(
-        {
-            key: ("time", values, {"units": "N" if key == "mooring_bow" else "m"})
-            for key, values in channels.items()
-        },
-        coords={"time": ("time", time, {"units": "s"})},
-        attrs={"water_depth": DEPTH, "run": name, "encounter_period": 1.5},
-    )
+    attrs = {"water_depth": DEPTH, "run": name, "encounter_period": 1.5}
+    run = record(DT, attrs, **channels)
+    run["mooring_bow"].attrs["units"] = "N"
     for key, x in POSITIONS.items():
         run[key].attrs["x_position"] = x
     return run
+
+
+def heave_error(model, run):
+    """Error of the heave of a forecast of 300 steps, of the SD of what was measured."""
+    forecast = model.forecast(run, start=60.0, steps=300)
+    measured = run["heave"].sel(time=forecast["time"])
+    return float(np.sqrt(np.mean((forecast["heave"] - measured) ** 2)) / measured.std())

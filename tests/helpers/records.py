@@ -1,4 +1,6 @@
-"""Runs made of arrays, in metres."""
+"""Runs made of arrays, in metres, and arrays of runs."""
+
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -15,3 +17,8 @@ def record(step: float, /, attrs: dict | None = None, **channels: np.ndarray) ->
         {"time": step * np.arange(samples)},
         attrs,
     )
+
+
+def table(run: xr.Dataset, names: Sequence[str]) -> np.ndarray:
+    """Values of channels side by side, on the last axis."""
+    return np.stack([run[name].values for name in names], axis=-1)

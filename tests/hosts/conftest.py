@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from drifting import drifting_run
+from records import record, table
 
 from seakeep import (
     Expression,
@@ -37,12 +38,8 @@ def sea_run(seed, samples=400):
     for k in range(1, samples + 1):
         surge[k + 1] = 1.6 * surge[k] - 0.7 * surge[k - 1] + 0.3 * eta[k] + probe[k] * eta[k]
     load = np.maximum(2.0, 5.0 + 8.0 * surge) + 0.1 * rng.standard_normal(samples + 2)
-    channels = {"eta": (eta, "m"), "wave probe": (probe, "m"), "surge": (surge, "m")}
-    channels["load"] = (load, "N")
-    return xr.Dataset(
-        {name: ("time", values[2:], {"units": unit}) for name, (values, unit) in channels.items()},
-        coords={"time": DT * np.arange(samples)},
-    )
+    channels = {"eta": eta, "wave probe": probe, "surge": surge, "load": load}
+    return record(DT, **{name: values[2:] for name, values in channels.items()})
 
 
 @dataclass(frozen=True)
@@ -63,8 +60,8 @@ class Case:
 
 def case_of(model, steps=60, start=200, run=None):
     run = sea_run(9) if run is None else run
-    x = run[model.states].to_array().values.T
-    u = run[model.inputs].to_array().values.T if model.inputs else np.zeros((len(run.time), 0))
+    x = table(run, model.states)
+    u = table(run, model.inputs) if model.inputs else np.zeros((len(run.time), 0))
     now, end = start + 1, start + steps + model.lead_samples
     expected = model.forecast_arrays(x[:now], u[:now], u[now:end], steps)
     x_history, u_history = start_rows(model, run, start * DT)

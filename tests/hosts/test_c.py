@@ -1,12 +1,12 @@
 """The C of a model computes what Python does, in one program with the C of other models."""
 
 import ctypes
-import shutil
-import subprocess
 from dataclasses import replace
 
+import compiled
 import numpy as np
 import pytest
+from compiled import pointer
 
 from seakeep import ProbeAlignment
 from seakeep.hosts import write_c
@@ -15,9 +15,6 @@ from seakeep.models import HankelDMDc
 
 NAMES = ["full", "short", "arx", "autonomous", "unstable", "following", "following_now"]
 FINITE, REFUSED, LOST = 0, 1, 2
-
-
-DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
 class Host:
@@ -33,25 +30,15 @@ class Host:
         return np.array(self.memory[: self.states])
 
 
-def pointer(values):
-    return np.ascontiguousarray(values).ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-
-
-def compiled(models, folder):
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("there is no C compiler")
-    files = [path for name, model in models.items() for path in write_c(model, folder, name)]
-    sources = [path.name for path in files if path.suffix == ".c"]
-    flags = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
-    command = [compiler, *flags, "-o", "models.so", *sources, "-lm"]
-    subprocess.run(command, cwd=folder, check=True)
-    return ctypes.CDLL(str(folder / "models.so"))
+def written(models, folder):
+    for name, model in models.items():
+        write_c(model, folder, name)
+    return compiled.library(folder)
 
 
 @pytest.fixture(scope="module")
 def library(cases, tmp_path_factory):
-    return compiled({name: cases[name].model for name in NAMES}, tmp_path_factory.mktemp("library"))
+    return written({name: cases[name].model for name in NAMES}, tmp_path_factory.mktemp("library"))
 
 
 @pytest.fixture
@@ -77,36 +64,13 @@ def test_each_step_is_that_of_forecast_arrays(name, host, cases):
         np.testing.assert_allclose(run.x, expected, rtol=1e-12, atol=1e-12)
 
 
-def test_one_of_these_models_diverges(cases):
-    lost = {name: bool(np.isnan(case.expected).any()) for name, case in cases.items()}
-    assert [name for name in NAMES if lost[name]] == ["unstable"]
-
-
-def test_what_is_copied_goes_on_as_the_original_to_the_last_bit(host, cases):
-    case, run = cases["full"], host("full")
-    for row in case.u[case.rows :][:20]:
-        run.step(run.memory, pointer(row))
-    kept = bytes(run.memory)
-    once = []
-    for row in case.u[case.rows :][20:]:
-        run.step(run.memory, pointer(row))
-        once.append(run.x)
-    run.memory[:] = [0.0] * len(run.memory)
-    ctypes.memmove(run.memory, kept, len(kept))
-    for row, expected in zip(case.u[case.rows :][20:], once, strict=True):
-        run.step(run.memory, pointer(row))
-        np.testing.assert_array_equal(run.x, expected)
-
-
 @pytest.mark.parametrize("name", ["full", "short", "following"])
 def test_the_derivative_of_a_step_is_that_of_the_jacobian(name, host, library, cases):
     case, run = cases[name], host(name)
     _, on_inputs = case.model.jacobian(case.x_history, case.u[: case.rows + 1])
     change, found = np.array([0.3, -0.7]), np.empty(len(case.model.states))
-    derivative = getattr(library, f"{name}_derivative")
-    derivative(
-        run.memory, pointer(case.u[case.rows]), pointer(change), found.ctypes.data_as(DOUBLES)
-    )
+    given = pointer(case.u[case.rows]), pointer(change)
+    getattr(library, f"{name}_derivative")(run.memory, *given, pointer(found))
     # Differences of numbers of the order of ten over 1e-3, which cubes of waves bend by 1e-6.
     np.testing.assert_allclose(found, on_inputs[:, -1] @ change, rtol=1e-5, atol=1e-9)
 
@@ -143,7 +107,7 @@ def test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python(tmp_path, 
     last = int(np.argmax(1.001 ** (since + 1) > limit))
     assert 3500 < last < 4500  # 6910 where the spike is never forgotten
     assert int(np.argmax(np.isnan(expected[:, 0]))) == last
-    run = Host(compiled({"rom": model}, tmp_path), "rom", 1)
+    run = Host(written({"rom": model}, tmp_path), "rom", 1)
     assert run.start(run.memory, pointer(start), pointer(u[:0])) == FINITE
     statuses = [run.step(run.memory, pointer(row)) for row in u[: last + 1]]
     assert statuses == [FINITE] * last + [LOST]

@@ -39,6 +39,8 @@ def test_a_mat_file_with_observables_computes_the_forecast(cases, tmp_path, name
     assert ("Function" in content) == (name == "full")
     r, z, lead = case.u, case.model.input_delays, content["Lead"].item()
     if name == "full":
+        with pytest.raises(RequestError, match="driven by observables too"):
+            case.model.to_state_space()
         n = content["Delayed"].item()
         q = evaluated(content["Function"].item(), filtered(content, "Filter", r))
         c, top = filtered(content, "Slow", q[:, n:]), content["Top"][:, 0]

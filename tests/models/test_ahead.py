@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import DEPTH, INPUTS, POSITIONS, STATES, drifting_run
+from drifting import DEPTH, INPUTS, POSITIONS, STATES
 from ensembles import few
+from records import table
 
 import seakeep
 from seakeep import HankelDMDc, RequestError
@@ -16,29 +17,19 @@ SQUARES = seakeep.SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
 START, STEPS, LEAD = 20.0, 40, 6
 
 
-def model_of(runs, **settings):
+def model_of(drifts, **settings):
     spec = HankelDMDc(4, 12, 1.0, delay_rows="exact", lead=LEAD, **settings)
-    return spec.fit(runs, STATES, INPUTS)
-
-
-@pytest.fixture(scope="module")
-def runs():
-    return [drifting_run(seed) for seed in (1, 2)]
-
-
-@pytest.fixture(scope="module")
-def test_run():
-    return drifting_run(7)
+    return spec.fit(drifts, STATES, INPUTS)
 
 
 @pytest.fixture(scope="module", params=["plain", "aligned", "observed"])
-def model(request, runs):
+def model(request, drifts):
     settings = {
         "plain": {},
         "aligned": {"alignment": PREDICTED},
         "observed": {"alignment": PREDICTED, "observables": (SQUARES,)},
     }
-    return model_of(runs, **settings[request.param])
+    return model_of(drifts, **settings[request.param])
 
 
 def reads_until(model, run):
@@ -47,29 +38,17 @@ def reads_until(model, run):
     return start + STEPS - 1 + model.lead_samples
 
 
-def test_waves_that_are_there_are_not_predicted_and_none_beyond_is_read(model, test_run):
-    expected = model.forecast(test_run, START, STEPS)
-    poisoned = test_run.copy(deep=True)
-    for name in INPUTS:
-        poisoned[name].values[reads_until(model, test_run) + 1 :] = 1e9
-    for state in STATES:
-        poisoned[state].values[poisoned.time.values > START + 1e-9] = np.nan
-    found = model.forecast(poisoned, START, STEPS, ahead="predict")
-    xr.testing.assert_identical(found, expected)
-    assert found.attrs["status"] == "ok"
-
-
-def test_missing_waves_are_those_of_a_record_that_was_continued(model, test_run):
-    last = reads_until(model, test_run) - 10
-    short = test_run.isel(time=slice(0, last + 1))
+def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
+    last = reads_until(model, drift) - 10
+    short = drift.isel(time=slice(0, last + 1))
     with pytest.raises(RequestError, match="ahead = 'predict' continues the input"):
         model.forecast(short, START, STEPS)
     found = model.forecast(short, START, STEPS, ahead="predict")
     assert found.sizes["time"] == STEPS
     # By hand: the probes continued, everything after the start but waves thrown away.
-    long = test_run.isel(time=slice(0, last + 11)).copy(deep=True)
+    long = drift.isel(time=slice(0, last + 11)).copy(deep=True)
     waves = foresee(
-        np.stack([short[name].values for name in INPUTS], axis=1),
+        table(short, INPUTS),
         10,
         dt=model.dt,
         positions=[POSITIONS[name] for name in INPUTS],
@@ -80,55 +59,36 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, test_run)
     expected = model.forecast(long, START, STEPS)
     # So far they err little, and weigh one; squares of what they err by move the surge.
     near = 1e-9 if len(model.regressors) == len(INPUTS) else 1e-3
-    for state in STATES:
-        np.testing.assert_allclose(found[state].values, expected[state].values, atol=near)
+    np.testing.assert_allclose(table(found, STATES), table(expected, STATES), atol=near)
     # What is missing counts as not there, and what lies beyond it is not read.
-    gone = test_run.copy(deep=True)
+    gone = drift.copy(deep=True)
     for name in INPUTS:
-        gone[name].values[last + 1 : reads_until(model, test_run) + 1] = np.nan
-        gone[name].values[reads_until(model, test_run) + 1 :] = 1e9
+        gone[name].values[last + 1 : reads_until(model, drift) + 1] = np.nan
+        gone[name].values[reads_until(model, drift) + 1 :] = 1e9
     again = model.forecast(gone, START, STEPS, ahead="predict")
-    for state in STATES:
-        np.testing.assert_array_equal(again[state].values, found[state].values)
+    np.testing.assert_array_equal(table(again, STATES), table(found, STATES))
     assert again.attrs["status"] == found.attrs["status"]
 
 
-def test_the_status_says_from_when_and_before_that_nothing_changes(runs, test_run):
-    model = model_of(runs)
-    last = reads_until(model, test_run) - 10
-    short = test_run.isel(time=slice(0, last + 1))
+def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift):
+    model = model_of(drifts)
+    last = reads_until(model, drift) - 10
+    short = drift.isel(time=slice(0, last + 1))
     found = model.forecast(short, START, STEPS, ahead="predict")
-    whole = model.forecast(test_run, START, STEPS)
+    whole = model.forecast(drift, START, STEPS, ahead="predict")
+    xr.testing.assert_identical(whole, model.forecast(drift, START, STEPS))  # nothing is missing
     since = found.attrs["input_predicted_from"]
     assert since == pytest.approx(float(whole.time[STEPS - 10]))
     assert found.attrs["status"] == f"ok, input predicted from t = {since:g} s"
     same = found.time.values < since - 1e-9
-    for state in STATES:
-        one, other = found[state].values, whole[state].values
-        np.testing.assert_array_equal(one[same], other[same])
-        assert not np.any(one[~same] == other[~same])
+    is_equal = table(found, STATES) == table(whole, STATES)
+    np.testing.assert_array_equal(is_equal, np.stack([same, same], axis=1))
 
 
-def test_predicted_waves_are_better_than_none(runs, test_run):
-    model = model_of(runs)
-    at = round((START - float(test_run.time[0])) / model.dt)
-    found = model.forecast(test_run.isel(time=slice(0, at + 1)), START, STEPS, ahead="predict")
-    assert found.attrs["input_predicted_from"] == float(found.time[0])
-    calm = test_run.copy(deep=True)
-    for name in INPUTS:
-        calm[name].values[at + 1 :] = calm[name].values[: at + 1].mean()
-    true = test_run.sel(time=found.time, method="nearest")
-    errors = [
-        float(np.sqrt(np.mean((forecast.heave.values - true.heave.values)[:8] ** 2)))
-        for forecast in (found, model.forecast(calm, START, STEPS))
-    ]
-    assert errors[0] < 0.5 * errors[1]
-
-
-def test_ensembles_windows_and_arrays_predict_alike(runs, test_run):
-    ensemble = few(n_members=3, lead=LEAD).fit(runs, STATES, INPUTS)
-    last = reads_until(ensemble, test_run) - 4
-    short = test_run.isel(time=slice(0, last + 1)).copy()
+def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
+    ensemble = few(n_members=3, lead=LEAD).fit(drifts, STATES, INPUTS)
+    last = reads_until(ensemble, drift) - 4
+    short = drift.isel(time=slice(0, last + 1)).copy()
     for name in INPUTS:  # arrays do not say where their probes stand
         del short[name].attrs["x_position"]
     members = ensemble.forecast(short, START, STEPS, ahead="predict")
@@ -137,9 +97,6 @@ def test_ensembles_windows_and_arrays_predict_alike(runs, test_run):
     assert list(members["status"].values) == [words] * 3
     summary = ensemble.forecast_summary(short, START, STEPS, ahead="predict")
     assert summary.attrs["status"] == words
-    np.testing.assert_allclose(
-        summary["heave"].sel(statistic="mean"), members["heave"].mean("member"), rtol=1e-12
-    )
     for made in (ensemble, ensemble.member(0)):
         windows = made.forecast_windows(short, [10.0, START], STEPS, ahead="predict")
         assert np.isnan(windows["input_predicted_from"][0])
@@ -148,22 +105,21 @@ def test_ensembles_windows_and_arrays_predict_alike(runs, test_run):
         assert set(windows["status"].values[1].ravel()) == {words}
     reduced = ensemble.summarize_windows(short, [10.0, START], STEPS, ahead="predict")
     np.testing.assert_array_equal(reduced["input_predicted_from"], windows["input_predicted_from"])
-    at = round((START - float(test_run.time[0])) / ensemble.dt)
-    x, u = (np.stack([short[n].values for n in names], axis=1) for names in (STATES, INPUTS))
+    at = round((START - float(drift.time[0])) / ensemble.dt)
+    x, u = table(short, STATES), table(short, INPUTS)
     given = (x[: at + 1], u[: at + 1], u[at + 1 :], STEPS)
     band = ensemble.hold().forecast_arrays(*given, ahead="predict")
-    np.testing.assert_allclose(band.mean[:, 0], summary[STATES[0]].sel(statistic="mean"), rtol=1e-9)
-    one = ensemble.member(1).forecast_arrays(*given, ahead="predict")
-    own = members[STATES[0]].sel(member=1).values
+    np.testing.assert_allclose(band.mean, table(summary, STATES)[0], rtol=1e-9)
+    one, every = ensemble.member(1).forecast_arrays(*given, ahead="predict"), table(members, STATES)
     # The mean of the ensemble is weighed where its waves are predicted; a member alone is not.
-    np.testing.assert_allclose(one[:-4, 0], own[:-4], rtol=1e-9)
-    assert np.ptp(members[STATES[0]].values[:, -1]) > 0  # a band stays where waves are predicted
+    np.testing.assert_allclose(one[:-4], every[1, :-4], rtol=1e-9)
+    assert np.all(np.ptp(every[:, -1], axis=0) > 0)  # a band stays where waves are predicted
 
 
 @pytest.mark.parametrize("positions", [True, False])
-def test_no_lead_errs_more_than_the_mean(runs, test_run, positions):
-    model, steps = model_of(runs), 150
-    run = test_run.copy(deep=True)
+def test_no_lead_errs_more_than_the_mean(drifts, drift, positions):
+    model, steps = model_of(drifts), 150
+    run = drift.copy(deep=True)
     for name in INPUTS * (not positions):
         del run[name].attrs["x_position"]
     squares, mean = np.zeros((2, steps)), model.state_scale.centre[1]
@@ -193,22 +149,20 @@ def test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises(model):
     np.testing.assert_allclose(weight[:, 0], [1.0, 0.75, 0.25, 0.25, 0.0], atol=1e-12)
 
 
-def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(runs, test_run):
-    model, at, steps = model_of(runs), 400, 250
+def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, drift):
+    model, at, steps = model_of(drifts), 400, 250
     # Waves are known for longer than a forecast without them is trusted.
-    start, last = float(test_run.time[at]), at + 100
-    short = test_run.isel(time=slice(0, last + 1)).copy()
+    start, last = float(drift.time[at]), at + 100
+    short = drift.isel(time=slice(0, last + 1)).copy()
     for name in INPUTS:  # arrays do not say where their probes stand
         del short[name].attrs["x_position"]
-    x, u = (np.stack([short[n].values for n in names], axis=1) for names in (STATES, INPUTS))
+    x, u = table(short, STATES), table(short, INPUTS)
     found = model.forecast_arrays(x[: at + 1], u[: at + 1], u[at + 1 :], steps, ahead="predict")
-    known = model.forecast(test_run, start, steps)
+    known = table(model.forecast(drift, start, steps), STATES)
     given = last - at + 1 - LEAD
-    for column, name in enumerate(STATES):
-        np.testing.assert_allclose(found[:given, column], known[name][:given], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found[:given], known[:given], rtol=0, atol=1e-9)
     np.testing.assert_allclose(found[-20:, 1], model.state_scale.centre[1], atol=1e-12)
     windows = model.forecast_windows(short, [10.0, start], steps, ahead="predict")
-    whole = model.forecast(test_run, 10.0, steps)  # all waves of that window were measured
-    for column, name in enumerate(STATES):
-        np.testing.assert_allclose(windows[name].values[1], found[:, column], rtol=0, atol=1e-9)
-        np.testing.assert_allclose(windows[name].values[0], whole[name].values, rtol=0, atol=1e-9)
+    whole = model.forecast(drift, 10.0, steps)  # all waves of that window were measured
+    both = np.stack([table(whole, STATES), found])
+    np.testing.assert_allclose(table(windows, STATES), both, rtol=0, atol=1e-9)

@@ -5,36 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import DEPTH, INPUTS, POSITIONS, STATES, drifting_run
+from drifting import INPUTS, POSITIONS, STATES, drifting_run, heave_error
+from ensembles import few
+from records import table
 
-from seakeep import (
-    BayesianHankelDMDc,
-    DataError,
-    Fixed,
-    HankelDMDc,
-    ProbeAlignment,
-    Uniform,
-    estimate_probe_offset,
-)
+from seakeep import DataError, HankelDMDc, ProbeAlignment, Uniform, estimate_probe_offset
 
 
 def spec(alignment):
     return HankelDMDc(10, 40, 1e-3, delay_rows="exact", alignment=alignment)
 
 
-def heave_error(model, run, start=60.0, steps=300):
-    forecast = model.forecast(run, start=start, steps=steps)
-    measured = run["heave"].sel(time=forecast["time"])
-    return float(np.sqrt(np.mean((forecast["heave"] - measured) ** 2)) / measured.std())
-
-
 @pytest.fixture(scope="module")
-def runs():
-    return [drifting_run(seed, name=f"run {seed}") for seed in (1, 2)]
-
-
-@pytest.fixture(scope="module")
-def models(runs):
+def models(drifts):
     settings = {
         "none": None,
         "rest": ProbeAlignment(mode="dispersion", surge="none"),
@@ -42,59 +25,33 @@ def models(runs):
         "effective": ProbeAlignment(mode="effective", surge="measured"),
         "predicted": ProbeAlignment(mode="dispersion", surge="predicted"),
     }
-    return {key: spec(each).fit(runs, STATES, INPUTS) for key, each in settings.items()}
+    return {key: spec(each).fit(drifts, STATES, INPUTS) for key, each in settings.items()}
 
 
-def test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is(models):
-    run = drifting_run(7)
-    errors = {key: heave_error(model, run) for key, model in models.items()}
+def test_alignment_makes_one_linear_model_hold_wherever_the_vessel_is(models, drift):
+    errors = {key: heave_error(model, drift) for key, model in models.items()}
     # Heave is linear in the elevation at the vessel: dispersion leaves the noise and the ridge.
     assert errors["dispersion"] < 0.06
     assert errors["predicted"] < 0.12  # and what the forecast of surge is off
     assert errors["effective"] < 0.5 * errors["none"]
     assert errors["none"] > 0.4
+    # Waves are of 0.3 to 0.9 Hz.
+    assert 0.5 < models["dispersion"].alignment.highest_frequency < 1.0
     # With no surge and no offset the elevation stays where it is, to a transform's rounding.
     assert errors["rest"] == pytest.approx(errors["none"], rel=1e-6)
 
 
-def test_a_shorter_forecast_is_the_start_of_a_longer_one(models):
-    run = drifting_run(7)
-    # Where the surge is measured, the shorter one reads no wave beyond its end and continues the
-    # record by prediction: 3 % of the heave there. A recursion reads the same.
-    for key, part in (("dispersion", 0.03), ("predicted", 1e-12)):
-        long = models[key].forecast(run, start=60.0, steps=200)
-        short = models[key].forecast(run, start=60.0, steps=50)
-        sd = float(long["heave"].std())
-        np.testing.assert_allclose(short["heave"], long["heave"][:50], atol=part * sd)
-
-
-def test_arrays_take_what_the_model_aligned(models):
-    run = drifting_run(7)
+def test_a_linear_system_takes_what_the_model_aligned(models, drift):
     model = models["effective"]
-    forecast = model.forecast(run, start=60.0, steps=100)
-    u = model.aligned_inputs(run)
-    u = np.column_stack([u[name] for name in model.inputs])
-    x = np.column_stack([run[name] for name in model.states])
-    arrays = model.forecast_arrays(x[:601], u[:601], u[601:], 100)
-    np.testing.assert_allclose(arrays[:, 1], forecast["heave"], atol=1e-7)
-    system, state = model.to_state_space(), model.initial_state(run, 60.0)
-    state = system.A @ state + system.B @ (u[600] - model.input_mean)
-    first = system.C @ state + model.state_mean
-    np.testing.assert_allclose(first, arrays[0], atol=1e-7)
+    now = model.aligned_inputs(drift).isel(time=600)
+    system, state = model.to_state_space(), model.initial_state(drift, 60.0)
+    state = system.A @ state + system.B @ (table(now, INPUTS) - model.input_mean)
+    expected = table(model.forecast(drift, start=60.0, steps=1), STATES)
+    np.testing.assert_allclose(system.C @ state + model.state_mean, expected[0], atol=1e-7)
 
 
-def test_fit_estimates_and_keeps_what_the_alignment_needs(models):
-    fitted = models["effective"].alignment
-    assert fitted.positions == (48.42, 52.09)
-    assert fitted.carried == (True, True)
-    # Phase speeds of 0.3 to 0.9 Hz run from 4.4 to 1.7 m/s, 3.0 at the peak.
-    assert 2.3 < fitted.celerity < 3.3
-    assert models["dispersion"].alignment.water_depth == DEPTH
-    assert 0.5 < models["dispersion"].alignment.highest_frequency < 1.0
-
-
-def test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for(runs):
-    own = [run.assign_attrs(celerity=c) for run, c in zip(runs, (2.5, 3.0), strict=True)]
+def test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for(drifts):
+    own = [run.assign_attrs(celerity=c) for run, c in zip(drifts, (2.5, 3.0), strict=True)]
     slow = drifting_run(7).assign_attrs(celerity=2.0)
     model = spec(ProbeAlignment(mode="effective")).fit(own, STATES, INPUTS)
     common = spec(ProbeAlignment(mode="effective", celerity="common")).fit(own, STATES, INPUTS)
@@ -110,12 +67,12 @@ def test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for(runs):
     assert model.alignment.celerity_of(drifting_run(8)) == pytest.approx(mean)
 
 
-def test_an_ensemble_and_a_single_model_take_the_celerity_from_the_same_span(runs):
-    alignment = {"mode": "effective"}
-    single = replace(spec(ProbeAlignment(**alignment)), window=300)
-    cut = [run.sel(time=slice(0, 100)) for run in runs]
-    alone = single.fit(runs, STATES, INPUTS, stop=100.0).alignment.celerity
-    assert aligned_ensemble(cut, **alignment).alignment.celerity == alone
+def test_an_ensemble_and_a_single_model_take_the_celerity_from_the_same_span(drifts):
+    alignment = ProbeAlignment(mode="effective")
+    cut = [run.sel(time=slice(0, 100)) for run in drifts]
+    alone = replace(spec(alignment), window=300).fit(drifts, STATES, INPUTS, stop=100.0)
+    ensemble = few(window=Uniform("18 T", "30 T"), alignment=alignment).fit(cut, STATES, INPUTS)
+    assert ensemble.alignment.celerity == alone.alignment.celerity
 
 
 def test_a_probe_that_was_moved_and_says_so_changes_nothing(models):
@@ -145,25 +102,3 @@ def test_a_gap_in_the_surge_is_named_in_a_forecast(models):
     with pytest.raises(DataError, match=r"channel 'surge' of run has 1 missing .* at t = 70 s"):
         models["dispersion"].forecast(run, start=60.0, steps=300)
     models["dispersion"].forecast(run, start=60.0, steps=50)
-
-
-def aligned_ensemble(runs, **alignment):
-    return BayesianHankelDMDc(
-        encounter_period=2.0,
-        window=Uniform("15 T", "25 T"),
-        state_delays=Uniform("0.4 T", "0.8 T"),
-        input_delays=Uniform("1 T", "3 T"),
-        ridge=Fixed(1e-3),
-        n_members=3,
-        delay_rows="exact",
-        alignment=ProbeAlignment(**alignment),
-    ).fit(runs, STATES, INPUTS)
-
-
-def test_the_celerity_is_that_of_the_mean_slowness():
-    speeds = (2.0, 2.2, 2.7)
-    given = {f"run{c}": drifting_run(seed).assign_attrs(celerity=c)
-             for seed, c in enumerate(speeds)}  # fmt: skip
-    alignment = ProbeAlignment(mode="effective", surge="none")
-    model = HankelDMDc(2, 4, 1.0, alignment=alignment).fit(given, ["heave"], INPUTS)
-    assert model.alignment.celerity == pytest.approx(3 / sum(1 / c for c in speeds), rel=1e-12)

@@ -15,46 +15,19 @@ def model(run, channels):
     return SPEC.fit(run, **channels)
 
 
-def with_times(run, time):
-    return run.assign_coords(time=("time", np.asarray(time, dtype=float)))
+T = DT * np.arange(400)
+WRONG_TIMES = {
+    r"times of .* repeat: 2\.45 s stands at samples 49 and 50": np.r_[T[:50], T[49:-1]],
+    r"times of .* are not sorted: .* Sort the rows": np.r_[T[:50], T[59:49:-1], T[60:]],
+    r"1 gap\(s\): after t = 2\.45 s, 7 sample\(s\) of 0\.05 s": np.r_[T[:50], T[50:] + 7 * DT],
+    r"are not uniform: steps run from 0\.05 to 0\.06 s": np.r_[T[:200], 1.2 * T[200:] - 2.0],
+    r"a value that is not finite at sample 50": np.where(T[50] == T, np.nan, T),
+}
 
 
-def broken_times():
-    """(what, times from good ones, message) of the ways a time axis is wrong."""
-
-    def repeated(t):
-        return np.concatenate([t[:50], [t[49]], t[50:-1]])
-
-    def unsorted(t):
-        return np.concatenate([t[:50], t[50:60][::-1], t[60:]])
-
-    def gap(t):
-        return np.where(np.arange(t.size) < 50, t, t + 7 * DT)
-
-    def stretched(t):
-        return np.where(np.arange(t.size) < 200, t, t[200] + 1.2 * (t - t[200]))
-
-    def missing(t):
-        return np.where(np.arange(t.size) == 50, np.nan, t)
-
-    return [
-        pytest.param(
-            repeated, r"times of .* repeat: 2\.45 s stands at samples 49 and 50", id="repeated"
-        ),
-        pytest.param(unsorted, r"times of .* are not sorted: .* Sort the rows", id="unsorted"),
-        pytest.param(
-            gap, r"1 gap\(s\): after t = 2\.45 s, 7 sample\(s\) of 0\.05 s are missing", id="gap"
-        ),
-        pytest.param(
-            stretched, r"are not uniform: steps run from 0\.05 to 0\.06 s", id="stretched"
-        ),
-        pytest.param(missing, r"a value that is not finite at sample 50", id="missing"),
-    ]
-
-
-@pytest.mark.parametrize(("spoil", "message"), broken_times())
-def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run, channels, spoil, message):
-    bad = with_times(run, spoil(run.time.values))
+@pytest.mark.parametrize("message", WRONG_TIMES)
+def test_wrong_times_are_refused_in_training_and_in_forecasts(model, run, channels, message):
+    bad = run.assign_coords(time=WRONG_TIMES[message])
     with pytest.raises(DataError, match=message):
         SPEC.fit(bad, **channels)
     with pytest.raises(DataError, match=message):
@@ -127,7 +100,6 @@ def test_arrays_of_another_shape_are_refused_and_never_turned(model, name, shape
     ("settings", "samples", "missing"),
     [
         ({}, 9, "10 samples are needed .*, 9 were received, 1 are missing"),
-        ({}, 4, "10 samples are needed .*, 4 were received, 6 are missing"),
         ({"window": 4}, 8, "10 samples are needed .*, 8 were received, 2 are missing"),
         (
             {"window": 7, "history": "inside"},
@@ -135,7 +107,6 @@ def test_arrays_of_another_shape_are_refused_and_never_turned(model, name, shape
             "10 samples are needed .*, 7 were received, 3 are missing.* longer window",
         ),
         ({"window": 120}, 100, "has 100 samples up to .* asks for 120: 20 are missing"),
-        ({"window": 120, "history": "inside"}, 100, "asks for 120: 20 are missing"),
     ],
 )
 def test_a_run_that_is_too_short_is_told_how_many_samples_are_missing(
@@ -213,10 +184,7 @@ def test_another_unit_than_trained_is_refused(model, run, channels):
         ({"runs": []}, "no run was given"),
         ({"runs": np.zeros((3, 4))}, r"is a ndarray; a run is an xarray\.Dataset"),
         ({"runs": {"a": None}}, r"a is a NoneType; a run is an xarray\.Dataset"),
-        (
-            {"runs": xr.Dataset({"heave": ("sample", np.zeros(9))})},
-            "has no coordinate 'time' .*sample",
-        ),
+        ({"runs": xr.Dataset({"heave": ("sample", [0.0])})}, "has no coordinate 'time' .*sample"),
     ],
 )
 def test_what_fit_refuses(run, channels, changes, message):
@@ -229,11 +197,9 @@ def test_what_fit_refuses(run, channels, changes, message):
     [
         (0.25, 5, r"6 samples of history .* needs 9 .*: 3 are missing\. Start at 0\.4 s"),
         (-1.0, 5, "start = .* s is outside the run, which runs from 0 to"),
-        (np.nan, 5, "start = .* s is outside the run, which runs from 0 to"),
         ("a", 5, "start must be an instant in seconds; received 'a'"),
         (10.0, 201, r"201 steps from 10 s need the input up to 20 s .* 19\.95 s\. At most 200"),
         (5.0, 0, "steps must be an integer of at least 1; received"),
-        (5.0, 2.0, "steps must be an integer of at least 1; received"),
         ([5.0, 6.0], None, r"steps is None, .* from each of the 2 starts\. Give the number"),
         ([], 5, "starts is empty"),
         ({5.0}, 5, r"starts must be a list of instants; received \{5\.0\}"),
@@ -250,11 +216,8 @@ def test_what_a_forecast_refuses(model, run, start, steps, message):
     ("settings", "message"),
     [
         ({"state_delays": -1}, "state_delays must be an integer of at least 0; received -1"),
-        ({"state_delays": 3.0}, r"state_delays must be an integer .* 3\.0"),
         ({"input_delays": True}, "input_delays must be an integer .* received True"),
-        ({"input_delays": None}, "input_delays must be an integer .* received None"),
         ({"window": 1}, "window must be an integer of at least 2; received 1"),
-        ({"window": 20.5}, r"window must be an integer .* received 20.5"),
         ({"rank": 0, "ridge": 0}, "rank must be an integer of at least 1"),
         ({"ridge": -1.0}, r"ridge must be a number, zero or positive, or .*; received -1\.0"),
         ({"ridge": np.nan}, "ridge must be a number, .* or the word rollout; received nan"),

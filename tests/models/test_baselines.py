@@ -4,13 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-import xarray as xr
 from free_runs import loop_score
+from records import record, table
 
-import seakeep
 from seakeep.baselines import ARX, FIR, HoldLast, Mean, Subspace
+from seakeep.core import embed
 from seakeep.errors import RequestError
-from seakeep.models import KINDS
 from seakeep.models.selection import select
 
 DT = 0.1
@@ -34,18 +33,8 @@ def linear_run(seed, samples=600, noise=0.0):
     for j in range(2, samples - 1):
         x[j + 1] = a @ np.r_[x[j], x[j - 1]] + b @ np.r_[u[j], u[j - 1]]
     x += noise * rng.normal(size=x.shape)
-    variables = {
-        name: ("time", values + offset, {"units": unit, "long_name": name})
-        for name, values, unit, offset in zip(
-            STATES + INPUTS,
-            np.c_[x, u].T,
-            ["m", "rad", "m", "m"],
-            [3.0, -1.0, 0.5, 0.0],
-            strict=True,
-        )
-    }
-    time = ("time", np.arange(samples) * DT, {"units": "s"})
-    return xr.Dataset(variables, coords={"time": time}, attrs={"run": f"run {seed}"})
+    channels = (np.c_[x, u] + [3.0, -1.0, 0.5, 0.0]).T
+    return record(DT, {"run": f"run {seed}"}, **dict(zip(STATES + INPUTS, channels, strict=True)))
 
 
 @pytest.fixture(scope="module")
@@ -53,57 +42,37 @@ def runs():
     return [linear_run(1), linear_run(2)]
 
 
-def values(dataset, names=STATES):
-    return np.stack([dataset[name].values for name in names], axis=-1)
-
-
 @pytest.mark.parametrize("kind", SPECS)
-def test_each_is_registered_forecasts_windows_and_comes_back_from_its_file(kind, runs, tmp_path):
+def test_windows_are_forecasts_and_a_history_is_what_the_settings_say(kind, runs):
     spec, test = SPECS[kind], linear_run(3)
-    assert KINDS[kind] is type(spec)
-    assert type(spec).from_json(spec.to_json()) == spec
     model = spec.fit(runs, STATES, INPUTS, stop=50.0)
-    assert (model.kind, model.n_members) == (kind, 1)
     assert model.history_samples == spec.needs(DT).history + 1
     one = model.forecast(test, start=20.0, steps=40)
-    assert one.attrs["status"] == "ok"
-    assert one.heave.attrs["units"] == "m"
     several = model.forecast_windows(test, [20.0, 30.0], 40)
-    np.testing.assert_allclose(values(several)[0], values(one), atol=1e-10)
-    loaded = seakeep.load_model(model.save(tmp_path / "model.nc"))
-    assert type(loaded) is type(model)
-    np.testing.assert_array_equal(values(loaded.forecast(test, 20.0, 40)), values(one))
-    assert "run 1: " in model.summary()
+    np.testing.assert_allclose(table(several, STATES)[0], table(one, STATES), atol=1e-10)
 
 
 def test_mean_and_hold_last_are_what_they_say_and_read_no_input(runs):
     test = linear_run(3)
     model = Mean().fit(runs, STATES, INPUTS, stop=50.0)
-    pooled = np.concatenate([values(run)[:501] for run in runs])
+    pooled = np.concatenate([table(run, STATES)[:501] for run in runs])
     forecast = model.forecast(test.drop_vars(INPUTS), start=20.0, steps=5)
-    np.testing.assert_allclose(values(forecast), np.tile(pooled.mean(axis=0), (5, 1)), rtol=1e-12)
+    np.testing.assert_allclose(table(forecast, STATES), [pooled.mean(axis=0)] * 5, rtol=1e-12)
     assert "reads_input_until" not in forecast.attrs
     held = HoldLast().fit(runs, STATES, INPUTS).forecast(test.drop_vars(INPUTS), 20.0, 5)
-    np.testing.assert_allclose(values(held), np.tile(values(test)[200], (5, 1)), rtol=1e-12)
+    np.testing.assert_allclose(table(held, STATES), [table(test, STATES)[200]] * 5, rtol=1e-12)
 
 
-def hankel(run, names, delays, columns):
-    rows = values(run, names)
-    return np.concatenate([rows[columns - lag] for lag in range(delays + 1)], axis=1)
-
-
-def test_arx_is_the_least_squares_of_another_package():
-    sm = pytest.importorskip("statsmodels.api", reason="a test dependency")
+def test_arx_is_least_squares():
     runs = [linear_run(1, noise=0.05), linear_run(2, noise=0.05)]
     model = ARX(state_delays=3, input_delays=4, standardize=False).fit(runs, STATES, INPUTS)
-    columns = np.arange(4, 599)
-    known = np.concatenate(
-        [np.c_[hankel(r, STATES, 3, columns), hankel(r, INPUTS, 4, columns)] for r in runs]
-    )
-    after = np.concatenate([values(run)[columns + 1] for run in runs])
-    for state in range(2):
-        expected = sm.OLS(after[:, state], known).fit().params
-        np.testing.assert_allclose(model.coefficients[state], expected, atol=1e-9)
+    known, after = [], []
+    for run in runs:
+        x, u = table(run, STATES), table(run, INPUTS)
+        known.append(np.concatenate([embed(x, 3, 4, 595), embed(u, 4, 4, 595)]).T)
+        after.append(x[5:])
+    expected = np.linalg.lstsq(np.concatenate(known), np.concatenate(after))[0].T
+    np.testing.assert_allclose(model.coefficients, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["arx", "subspace"])
@@ -113,24 +82,7 @@ def test_a_linear_vessel_is_forecast_to_rounding(kind, runs):
     change = {"ridge": 0.0} | ({"order": 5} if kind == "subspace" else {})
     spec = dataclasses.replace(SPECS[kind], **change)
     forecast = spec.fit(runs, STATES, INPUTS).forecast(test, start=20.0, steps=300)
-    np.testing.assert_allclose(values(forecast), values(test)[201:501], atol=1e-7)
-
-
-def test_the_ridge_of_an_arx_model_is_that_of_the_chosen_free_runs(runs):
-    """The recommended λ is one of the settings', and as good as any on what was held out."""
-    spec = dataclasses.replace(SPECS["arx"], ridge="rollout", ridge_scale="per_snapshot")
-    noisy = [linear_run(seed, noise=0.3) for seed in (1, 2, 3)]
-    model = spec.fit(noisy, STATES, INPUTS)
-    test = linear_run(4, noise=0.3)
-
-    def error(ridge):
-        fitted = dataclasses.replace(spec, ridge=ridge).fit(noisy, STATES, INPUTS)
-        forecast = fitted.forecast(test, start=20.0, steps=300)
-        return np.std(values(forecast) - values(test)[201:501])
-
-    # λ that is far too large forgets the states, and what was chosen does not.
-    assert error(model.settings.ridge) < 0.9 * error(10.0)
-    assert "free runs on 3 parts held out in turn" in model.selection
+    np.testing.assert_allclose(table(forecast, STATES), table(test, STATES)[201:501], atol=1e-7)
 
 
 def test_fir_finds_a_known_impulse_response():
@@ -138,13 +90,7 @@ def test_fir_finds_a_known_impulse_response():
     response, u = rng.normal(size=(2, 12)), rng.normal(size=(2000, 1))
     x = np.stack([np.convolve(u[:, 0], h)[:2000] for h in response], axis=1)
     x = np.concatenate([np.zeros((1, 2)), x[:-1]])  # x at j + 1 comes from u at j and before
-    run = xr.Dataset(
-        {
-            n: ("time", v, {"units": "m"})
-            for n, v in zip([*STATES, "eta"], np.c_[x, u].T, strict=True)
-        },
-        coords={"time": ("time", np.arange(2000) * DT, {"units": "s"})},
-    )
+    run = record(DT, heave=x[:, 0], pitch=x[:, 1], eta=u[:, 0])
     model = FIR(input_delays=15, ridge=0.0, standardize=False).fit(run, STATES, ["eta"])
     found = model.coefficients[:, 2:]
     np.testing.assert_allclose(found, np.c_[response, np.zeros((2, 4))], atol=1e-10)
@@ -193,19 +139,16 @@ def test_length_and_ridge_of_a_filter_are_those_that_forecast_runs_held_out_best
 
 @pytest.mark.parametrize("kind", ["fir", "arx", "subspace"])
 def test_waves_that_have_not_arrived_drive_where_a_lead_is_set(kind, runs):
-    spec = dataclasses.replace(SPECS[kind], lead=3)
-    late = [
-        run.assign({name: run[name].roll(time=3, roll_coords=False) for name in INPUTS})
-        for run in runs
-    ]
-    model = spec.fit([run.isel(time=slice(3, None)) for run in late], STATES, INPUTS)
-    plain = SPECS[kind].fit([run.isel(time=slice(3, None)) for run in runs], STATES, INPUTS)
-    test = linear_run(3)
-    shifted = test.assign({name: test[name].roll(time=3, roll_coords=False) for name in INPUTS})
-    found = model.forecast(shifted, start=20.0, steps=40)
+    def late(run):
+        return run.assign({name: run[name].roll(time=3, roll_coords=False) for name in INPUTS})
+
+    spec, whole, test = dataclasses.replace(SPECS[kind], lead=3), slice(3, None), linear_run(3)
+    model = spec.fit([late(run).isel(time=whole) for run in runs], STATES, INPUTS)
+    plain = SPECS[kind].fit([run.isel(time=whole) for run in runs], STATES, INPUTS)
+    found = model.forecast(late(test), start=20.0, steps=40)
     expected = plain.forecast(test, start=20.0, steps=40)
     # The last three pairs of each training run have no look-ahead left.
-    np.testing.assert_allclose(values(found), values(expected), atol=0.02)
+    np.testing.assert_allclose(table(found, STATES), table(expected, STATES), atol=0.02)
     assert found.attrs["reads_input_until"] == pytest.approx(2 * DT)
 
 

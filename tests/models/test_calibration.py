@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from ensembles import few
+from records import record, table
 
 import seakeep
 from seakeep.core.calibration import band_scores, conformal_margin
@@ -23,11 +24,7 @@ def sea(seed, samples=1600, name="sea"):
     channels = {key: each.sum(axis=1) for key, each in waves.items()}
     for key in STATES:
         channels[key] = channels[key] + 1.5 * rng.standard_normal(samples)
-    return xr.Dataset(
-        {key: ("time", values, {"units": "m"}) for key, values in channels.items()},
-        coords={"time": ("time", time, {"units": "s"})},
-        attrs={"run": name},
-    )
+    return record(DT, {"run": name}, **channels)
 
 
 @pytest.fixture(scope="module")
@@ -41,77 +38,60 @@ def ensemble(run):
     return spec.fit(run, STATES, INPUTS, stop=60.0)
 
 
-@pytest.fixture(scope="module")
-def calibrated(ensemble, run):
-    return ensemble.calibrate(run.sel(time=slice(None, 110.0)), steps=40)
+SCALES = ["spread", "constant", "learnt"]
 
 
 @pytest.fixture(scope="module")
-def moved(ensemble, run):
-    return ensemble.calibrate(run.sel(time=slice(None, 110.0)), steps=40, scale="constant")
+def bands(ensemble, run):
+    part = run.sel(time=slice(None, 110.0))
+    return {scale: ensemble.calibrate(part, steps=40, scale=scale) for scale in SCALES}
 
 
-@pytest.fixture(scope="module")
-def learnt(ensemble, run):
-    return ensemble.calibrate(run.sel(time=slice(None, 110.0)), steps=40, scale="learnt")
-
-
-@pytest.mark.parametrize("scale", ["spread", "constant", "learnt"])
-def test_the_calibrated_band_covers_unseen_windows_as_it_says(
-    calibrated, moved, learnt, run, scale
-):
-    calibrated = {"spread": calibrated, "constant": moved, "learnt": learnt}[scale]
+@pytest.mark.parametrize("scale", SCALES)
+def test_the_calibrated_band_covers_unseen_windows_as_it_says(bands, run, scale):
     inside = {"members": [], "calibrated": []}
     for start in np.arange(112.0, 155.0, 4.0):
         for band, found in inside.items():
-            summary = calibrated.forecast_summary(run, start, 40, band=band)
-            for name in STATES:
-                measured = run[name].sel(time=summary["time"], method="nearest")
-                low, high = (summary[name].sel(statistic=key) for key in ("lower", "upper"))
-                found.append(float(((low <= measured) & (measured <= high)).mean()))
+            summary = bands[scale].forecast_summary(run, start, 40, band=band)
+            _, _, low, high = table(summary, STATES)
+            measured = table(run.sel(time=summary["time"], method="nearest"), STATES)
+            found.append(((low <= measured) & (measured <= high)).mean())
     assert np.mean(inside["members"]) < 0.6
     # 880 instants, nearly independent noise: a standard error of 0.007, and 0.01 of the margin.
     assert np.mean(inside["calibrated"]) == pytest.approx(0.95, abs=0.036)
 
 
-def test_the_band_is_a_factor_times_the_spread_with_a_floor(calibrated, ensemble, run):
+def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run):
+    calibrated = bands["spread"]
     plain = ensemble.forecast_summary(run, 120.0, 30)
     wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
     found = calibrated.calibration
-    for k, name in enumerate(STATES):
-        mean, std = (plain[name].sel(statistic=key).values for key in ("mean", "std"))
-        assert 4 * found.floor[k] > 1.5  # the noise alone
-        half = found.conformal.margin[k] * np.sqrt(std**2 + found.floor[k] ** 2)
-        for key, bound in (("mean", mean), ("lower", mean - half), ("upper", mean + half)):
-            np.testing.assert_allclose(wide[name].sel(statistic=key), bound, rtol=0, atol=1e-12)
+    mean, std, *_ = table(plain, STATES)
+    assert np.all(4 * found.floor > 1.5)  # the noise alone
+    half = found.conformal.margin * np.sqrt(std**2 + found.floor**2)
+    expected = [mean, mean - half, mean + half]
+    np.testing.assert_allclose(table(wide, STATES)[[0, 2, 3]], expected, rtol=0, atol=1e-12)
     assert "calibrated factor times the root" in wide["statistic"].attrs["comment"]
 
 
-def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(moved, ensemble, run):
-    calibrated = moved
+def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(bands, ensemble, run):
+    calibrated = bands["constant"]
     plain = ensemble.forecast_summary(run, 120.0, 30)
     wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
     margin = calibrated.calibration.conformal.margin
     assert (margin > 0).all()
-    for k, name in enumerate(STATES):
-        for key, side in (("mean", 0), ("std", 0), ("lower", -1), ("upper", 1)):
-            moved = wide[name].sel(statistic=key) - plain[name].sel(statistic=key)
-            # One addition: rounding of numbers of about ten.
-            np.testing.assert_allclose(moved, side * margin[k], rtol=0, atol=1e-14 * 10)
+    sides = np.array([0, 0, -1, 1])[:, None, None] + np.zeros((30, 1))
+    moved = table(wide, STATES) - table(plain, STATES)
+    # One addition: rounding of numbers of about ten.
+    np.testing.assert_allclose(moved, sides * margin, rtol=0, atol=1e-14 * 10)
     assert wide.attrs["band"] == "calibrated"
-    assert "margin" in wide["statistic"].attrs["comment"]
     xr.testing.assert_identical(plain, calibrated.forecast_summary(run, 120.0, 30))
-    windows = calibrated.summarize_windows(run, [120.0, 130.0], 30, band="calibrated")
-    for name in STATES:
-        # Two windows are one product: other roundings.
-        np.testing.assert_allclose(windows[name][0], wide[name], rtol=0, atol=1e-9)
-    assert windows.attrs["band"] == "calibrated"
     with pytest.raises(RequestError, match=r"not calibrated"):
         ensemble.summarize_windows(run, [120.0], 30, band="calibrated")
 
 
-def test_no_window_touches_what_a_member_has_read(ensemble, moved, run):
-    calibrated = moved
+def test_no_window_touches_what_a_member_has_read(ensemble, bands, run):
+    calibrated = bands["constant"]
     (first, last) = ensemble.read_spans["sea"]
     # The longest draw with its delay history, up to stop.
     needed = max(draw.needed(ensemble.signature.input_map) for draw in ensemble.members)
@@ -122,59 +102,52 @@ def test_no_window_touches_what_a_member_has_read(ensemble, moved, run):
     after = (1100 - 600) // 40
     assert calibrated.calibration.windows == {"sea": before + after}
     # The scores are those of these windows, the first of them by hand.
-    starts = [reach * DT + 40 * DT * k for k in range(before)] + [
-        60.0 + 4.0 * k for k in range(after)
-    ]
+    starts = [*(reach * DT + 4.0 * np.arange(before)), *(60.0 + 4.0 * np.arange(after))]
     found = ensemble.summarize_windows(run, starts, 40)
     scores = []
     for window, start in enumerate(starts):
-        at = round(start / DT)
-        columns = [
-            band_scores(
-                found[name].isel(window=window).sel(statistic="lower").values[:, None],
-                found[name].isel(window=window).sel(statistic="upper").values[:, None],
-                run[name].values[at + 1 : at + 41, None],
-            )
-            for name in STATES
-        ]
-        scores.append(np.concatenate(columns, axis=1))
+        at, here = round(start / DT), found.isel(window=window)
+        _, _, low, high = table(here, STATES)
+        scores.append(band_scores(low, high, table(run, STATES)[at + 1 : at + 41]))
     expected = conformal_margin(np.stack(scores), 0.95)
     np.testing.assert_allclose(calibrated.calibration.conformal.margin, expected.margin, rtol=1e-12)
 
 
-def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(learnt, run):
+def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(bands, run):
+    learnt = bands["learnt"]
     one = learnt.forecast_summary(run, 120.0, 30, band="calibrated")
     several = learnt.summarize_windows(run, [115.0, 120.0], 30, band="calibrated")
-    x, u = (np.stack([run[n].values for n in names], axis=1) for names in (STATES, INPUTS))
+    x, u = table(run, STATES), table(run, INPUTS)
     arrays = learnt.hold().forecast_arrays(x[:1201], u[:1201], u[1201:1230], 30, band="calibrated")
-    half = (one["heave"].sel(statistic="upper") - one["heave"].sel(statistic="mean")).values
-    assert np.ptp(half) > 0.01 * half.mean()  # the scale is no constant
-    for k, name in enumerate(STATES):
-        # Products of matrices of other sizes: other roundings.
-        np.testing.assert_allclose(several[name][1], one[name], rtol=0, atol=1e-9)
-        np.testing.assert_allclose(arrays.upper[:, k], one[name].sel(statistic="upper"), atol=1e-9)
+    mean, _, _, upper = found = table(one, STATES)
+    assert np.all(np.ptp(upper - mean, axis=0) > 0.01 * (upper - mean).mean(axis=0))  # no constant
+    # Products of matrices of other sizes: other roundings.
+    np.testing.assert_allclose(table(several, STATES)[1], found, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(arrays.upper, upper, atol=1e-9)
     assert "learnt from the members' spread" in one["statistic"].attrs["comment"]
     assert "times a learnt scale and a floor of" in learnt.summary()
 
 
-@pytest.mark.parametrize("scale", ["spread", "constant", "learnt"])
-def test_a_file_keeps_the_calibration(calibrated, moved, learnt, ensemble, run, tmp_path, scale):
-    calibrated = {"spread": calibrated, "constant": moved, "learnt": learnt}[scale]
-    calibrated.save(tmp_path / "ensemble.nc")
-    kept = seakeep.load_model(tmp_path / "ensemble.nc")
-    xr.testing.assert_identical(
-        kept.forecast_summary(run, 120.0, 30, band="calibrated"),
-        calibrated.forecast_summary(run, 120.0, 30, band="calibrated"),
+@pytest.mark.parametrize("scale", SCALES)
+def test_a_file_keeps_the_calibration(bands, run, tmp_path, scale):
+    kept = seakeep.load_model(bands[scale].save(tmp_path / "ensemble.nc"))
+    one, other = (
+        each.forecast_summary(run, 120.0, 30, band="calibrated") for each in (kept, bands[scale])
     )
-    assert kept.calibration.windows == calibrated.calibration.windows
-    assert kept.calibration.scale == scale
-    ensemble.save(tmp_path / "plain.nc")
-    assert seakeep.load_model(tmp_path / "plain.nc").calibration is None
+    xr.testing.assert_identical(one, other)
+    assert kept.calibration.windows == bands[scale].calibration.windows
 
 
 def pooled(train_on, runs, window=None):
     spec = few(window=window, n_members=6, train_on=train_on, **NOISY)
     return spec.fit(runs, STATES, INPUTS)
+
+
+def assert_learnt(found, judged):
+    """Margin and floor are those of errors that were judged by hand."""
+    expected, floor, _ = learn_margin(judged, 0.95, "spread")
+    np.testing.assert_allclose(found.conformal.margin, expected.margin, rtol=1e-9)  # rounding
+    np.testing.assert_allclose(found.floor, floor, rtol=1e-9)
 
 
 def test_folds_are_forecast_by_what_the_other_runs_teach():
@@ -193,9 +166,7 @@ def test_folds_are_forecast_by_what_the_other_runs_teach():
         )[name]
         for name, run in runs.items()
     ]
-    expected, floor, _ = learn_margin(judged, 0.95, "spread")
-    np.testing.assert_allclose(found.conformal.margin, expected.margin, rtol=1e-9)
-    np.testing.assert_allclose(found.floor, floor, rtol=1e-9)
+    assert_learnt(found, judged)
     assert found.folds == "run"
     assert found.windows == dict.fromkeys(runs, (500 - ensemble.history_samples) // 40)
     # A run that none has read is forecast by all.
@@ -212,15 +183,8 @@ def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
     kept = [number for number, draw in enumerate(ensemble.members) if draw.run == 1]
     assert 0 < without.n_members == len(kept) < 6
     run = sea(3, 300, "other")
-    np.testing.assert_array_equal(
-        without.forecast(run, 10.0, 40)["heave"],
-        ensemble.forecast(run, 10.0, 40)["heave"].isel(member=kept),
-    )
-    told = []
-    ensemble.calibrate(runs, 40, folds="run", progress=lambda *each: told.append(each))
-    assert [(done, total) for done, total, _ in told] == [(k, 6) for k in range(1, 7)]
-    with pytest.raises(RequestError, match="no run 'c' trains"):
-        ensemble.without("c")
+    found, every = (table(each.forecast(run, 10.0, 40), STATES) for each in (without, ensemble))
+    np.testing.assert_array_equal(found, every[kept])
 
 
 def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
@@ -232,9 +196,7 @@ def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
         ensemble = pooled("all", {name: each for name, each in rest.items() if each.sizes["time"]})
         part = {"part": run.isel(time=slice(begin, end))}
         judged.append(held_out({"part": ensemble}, part, 40, 0.95)["part"])
-    expected, floor, _ = learn_margin(judged, 0.95, "spread")
-    np.testing.assert_allclose(found.conformal.margin, expected.margin, rtol=1e-9)  # rounding
-    np.testing.assert_allclose(found.floor, floor, rtol=1e-9)
+    assert_learnt(found, judged)
     count = (300 - ensemble.history_samples) // 40
     assert found.windows == {f"a, part {number}": count for number in (1, 2, 3)}
 
@@ -247,7 +209,5 @@ def test_members_whose_windows_reach_into_a_third_do_not_forecast_it():
     free = [number for number, (first, last) in enumerate(spans) if last < 300 or first >= 600]
     assert 0 < len(free) < 6
     other = sea(3, 300, "other")
-    np.testing.assert_array_equal(
-        kept.forecast(other, 10.0, 40)["heave"],
-        ensemble.forecast(other, 10.0, 40)["heave"].isel(member=free),
-    )
+    found, every = (table(each.forecast(other, 10.0, 40), STATES) for each in (kept, ensemble))
+    np.testing.assert_array_equal(found, every[free])

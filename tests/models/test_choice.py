@@ -1,20 +1,14 @@
 """Which candidate is taken: the simplest within the noise, and a start unless it is beaten."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from squared import DT, INPUTS, PERIOD, STATES, runs, sea
 
-from seakeep import HankelDMDc, ProbeAlignment, Select, SlowSquares, tune
+from seakeep import HankelDMDc, ProbeAlignment, Select, SlowSquares
 from seakeep.models import selection
 from seakeep.models.selection import Trial, groups_of, select, simplest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from test_long_memory import remembering
-from test_selection import DT, INPUTS, PERIOD, STATES, runs, sea
 
 T = PERIOD * DT
 OPEN = Select(True, True, True, True, period=T, horizon=10)
@@ -127,36 +121,6 @@ def test_what_brings_nothing_is_not_recommended():
     assert model.lead_samples == spec.fit(given, ["heave"], INPUTS).lead_samples == 0
 
 
-def test_squares_that_bring_much_are_recommended_without_a_look_ahead_that_brings_none():
-    settings = SPEC.fit(runs(), STATES, INPUTS).settings
-    assert "slow_squares" in [each.kind for each in settings.observables]
-    assert settings.memory == 0
-
-
-def test_a_memory_is_recommended_where_the_vessel_has_one_and_kept_in_the_file():
-    given = {f"run{seed}": remembering(seed, samples=500) for seed in range(3)}
-    given = {name: run.assign_attrs(encounter_period=0.2) for name, run in given.items()}
-    spec = HankelDMDc(
-        2, 0, "rollout", delay_rows="exact", select=Select(memory=True, period=0.2, horizon=(20,))
-    )
-    assert spec.needs(0.1).history == 16
-    model = spec.fit(given, ["heave"], ["eta"])
-    assert (model.settings.memory, model.settings.state_delays) == (16, 2)
-    assert "memory 16  (chosen)" in model.selection
-    tuned = tune(
-        replace(spec, select=None), given, ["heave"], ["eta"], vary=["memory"], horizon=[20.0]
-    )
-    # Of the same windows, and without a period of its own.
-    assert tuned.spec.memory == round(8 * 0.2 / 0.1)
-    single = replace(model.settings, memory=0).fit(given, ["heave"], ["eta"])
-    run = remembering(9)
-    errors = [
-        float(np.abs(each.forecast(run, 5.0, 100).heave - run.heave[51:151].values).mean())
-        for each in (model, single)
-    ]
-    assert errors[0] < 0.7 * errors[1]
-
-
 def test_a_start_is_left_only_for_what_is_better_beyond_the_noise():
     given = {name: run.drop_vars("drift") for name, run in runs().items()}
     start = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot")
@@ -184,6 +148,5 @@ def test_regular_waves_are_held_out_by_period_and_others_are_said_to_be_extrapol
 def test_stated_squares_are_no_look_ahead_that_is_left_out():
     squares = SlowSquares("eta", orders=(0,), lags=(0, 1))
     spec = replace(SPEC, observables=(squares,))
-    assert SlowSquares("eta", orders=(0,), lags=(0, 1)) == squares
     chosen = spec.fit(runs(), STATES, INPUTS).settings.observables
     assert set(chosen) <= {squares}

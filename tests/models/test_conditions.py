@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from drifting import drifting_run
+from records import record
 
 from seakeep import HankelDMDc
 from seakeep.models.conditions import disagreements
@@ -25,23 +25,19 @@ def vessel(seed, stiffness=0.16, factor=1.0, offset=0.0, samples=1200):
         heave[k + 1] = (1.75 - stiffness) * heave[k] - 0.75 * heave[k - 1] + stiffness * eta[k]
         pitch[k + 1] = 1.6 * pitch[k] - 0.75 * pitch[k - 1] + 0.1 * eta[k - 1]
     channels = {"heave": factor * heave + offset, "pitch": pitch, "eta": eta}
-    return xr.Dataset(
-        {
-            name: ("time", x + 0.01 * x.std() * rng.standard_normal(samples), {"units": "m"})
-            for name, x in channels.items()
-        },
-        coords={"time": time},
-        attrs={"encounter_period": 1.25},
-    )
+    for x in channels.values():
+        x += 0.01 * x.std() * rng.standard_normal(samples)
+    return record(DT, {"encounter_period": 1.25}, **channels)
 
 
-def found(last, states=("heave", "pitch"), **more):
+def found(last, spec=SPEC, **attrs):
     runs = {"a": vessel(1), "b": vessel(2), "c": vessel(3), "odd": vessel(4, **last)}
-    return {each.run: each for each in disagreements(SPEC, runs | more, [*states], ["eta"])}
+    runs = {name: run.assign_attrs(attrs) for name, run in runs.items()}
+    return disagreements(spec, runs, ["heave", "pitch"], ["eta"])
 
 
 def test_runs_of_one_condition_agree_and_one_alone_has_nothing_to_disagree_with():
-    assert found({}) == {}
+    assert found({}) == []
     assert disagreements(SPEC, {"a": vessel(1)}, ["heave"], ["eta"]) == []
 
 
@@ -54,7 +50,7 @@ def test_runs_of_one_condition_agree_and_one_alone_has_nothing_to_disagree_with(
     ],
 )
 def test_a_run_of_another_condition_is_named_with_what_sets_it_apart(last, reason, channel, value):
-    (each,) = found(last).values()
+    (each,) = found(last)
     assert each.run == "odd"
     assert (each.reason, each.channel) == (reason, channel)
     assert each.own < 0.8 * each.pooled
@@ -78,9 +74,8 @@ def test_of_two_runs_either_may_be_wrong():
 
 def test_an_offset_is_named_also_for_a_model_with_a_memory():
     offset = 1.3 * float(vessel(4)["heave"].std())
-    runs = {"a": vessel(1), "b": vessel(2), "odd": vessel(4, offset=offset)}
-    spec = replace(SPEC, memory=100)  # eight periods, whose means learn the offset of each run
-    (each,) = disagreements(spec, runs, ["heave", "pitch"], ["eta"])
+    # Eight periods, whose means learn the offset of each run.
+    (each,) = found({"offset": offset}, replace(SPEC, memory=100))
     assert (each.run, each.reason, each.channel) == ("odd", "offset", "heave")
     # Estimated from a minute of free runs, by a model of noisy data.
     np.testing.assert_allclose(each.value, offset, rtol=0.1)
@@ -99,7 +94,5 @@ def test_a_probe_that_was_moved_is_found_with_its_distance():
 
 
 def test_the_place_of_a_probe_explains_no_other_dynamics_where_the_depth_is_stated():
-    runs = {"a": vessel(1), "b": vessel(2), "c": vessel(3), "odd": vessel(4, stiffness=0.6)}
-    deep = {name: run.assign_attrs(water_depth=np.inf) for name, run in runs.items()}
-    (each,) = disagreements(SPEC, deep, ["heave", "pitch"], ["eta"])
+    (each,) = found({"stiffness": 0.6}, water_depth=np.inf)
     assert "no offset, scale or place of a probe explains it" in each.describe()

@@ -2,15 +2,15 @@
 
 import json
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
-from typing import ClassVar
+from unittest.mock import patch
 
 import numpy as np
 import pytest
-import xarray as xr
-from drifting import INPUTS, STATES, drifting_run
+from drifting import INPUTS, STATES
 from ensembles import few
+from records import record
 
 import seakeep
 from seakeep import BayesianHankelDMDc, DataError, HankelDMDc, RequestError, SeakeepWarning, Uniform
@@ -20,134 +20,50 @@ from seakeep.models import (
     load_model,
     outside_training,
 )
+from seakeep.models.alignment import carry_by_dispersion
 from seakeep.models.draws import Draw
-from seakeep.models.engine import member_series, read_groups
-from seakeep.models.labelled import ChannelLabel
-from seakeep.models.observables import OBSERVABLES
-from seakeep.models.terms import Bound
 
 DT = 0.1
-PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
 
 
-def sea(samples=600, seed=0, ahead=0, **attrs):
+def sea(samples=600, seed=0, ahead=0):
     """Heave answers the wave `ahead` samples later; the wave is white enough to tell them apart."""
     rng = np.random.default_rng(seed)
     eta = rng.standard_normal(samples + ahead + 3)
     heave = 0.5 * eta[ahead : ahead + samples] - 0.2 * eta[ahead + 1 : ahead + 1 + samples]
-    return xr.Dataset(
-        {
-            "heave": ("time", np.r_[0.0, heave[:-1]], {"units": "m"}),
-            "eta": ("time", eta[:samples], {"units": "m"}),
-        },
-        coords={"time": DT * np.arange(samples)},
-        attrs=attrs,
-    )
-
-
-@pytest.fixture(scope="module")
-def drifting():
-    return [drifting_run(seed) for seed in (1, 2)], drifting_run(7)
+    return record(DT, heave=np.r_[0.0, heave[:-1]], eta=eta[:samples])
 
 
 class TestLead:
     """The input up to j + lead drives the step from j."""
 
     def test_a_known_lead_is_learnt_and_forecast(self):
-        run, spec = sea(ahead=4), HankelDMDc(0, 8, 1e-9, delay_rows="exact")
-        blind = spec.fit(run, ["heave"], ["eta"])
-        seeing = replace(spec, lead=5).fit(run, ["heave"], ["eta"])
-        test = sea(seed=1, ahead=4)
-        errors = []
-        for model in (blind, seeing):
-            found = model.forecast(test, start=10.0, steps=300)
-            errors.append(float(np.abs(found.heave - test.heave.sel(time=found.time)).max()))
-        assert errors[0] > 0.5
-        assert errors[1] < 1e-6  # a linear law without noise, to the ridge
-        assert (seeing.lead_samples, seeing.history_samples) == (5, 9)
-        assert "lead          5 samples: a step is driven by waves up to 0.4 s" in seeing.summary()
-
-
-@dataclass(frozen=True)
-class Half:
-    """An observable of somebody else: half of the first input, two samples before."""
-
-    kind: ClassVar[str] = "half"
-
-    def bind(self, inputs, period, dt):
-        def columns(values):
-            out = np.full((len(values), 1), np.nan)
-            out[2:, 0] = 0.5 * values[:-2, 0]
-            return out
-
-        label = ChannelLabel("half", inputs[0].units, "half of the wave, two before")
-        return Bound((label,), delayed=False, before=2, ahead=0, columns=columns)
-
-    def reach(self, dt):
-        return 2, 0
-
-
-class TestObservableOfAnother:
-    """One file and one line add an observable."""
-
-    def test_it_drives_models_ensembles_arrays_and_files(self, monkeypatch, tmp_path):
-        monkeypatch.setitem(OBSERVABLES, "half", Half)
-        run = sea()
-        run["heave"] = ("time", np.r_[np.zeros(3), run.eta.values[:-3]], {"units": "m"})
-        # x_{j+1} = u_{j−2}: without input delays only the direct regressor holds it.
-        spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Half(),))
-        model = spec.fit(run, ["heave"], ["eta"])
-        assert model.regressors == ["eta", "half"]
-        assert model.history_samples == 3
-        forecast = model.forecast(run, start=20.0, steps=40)
-        # Means of the window differ by what its first samples leave out: 2 / 600 of a deviation.
-        np.testing.assert_allclose(forecast.heave, run.heave.sel(time=forecast.time), atol=5e-3)
-        x, u = run.heave.values[:, None], run.eta.values[:, None]
-        arrays = model.forecast_arrays(x[:201], u[:201], u[201:240], steps=40)
-        np.testing.assert_allclose(arrays[:, 0], forecast.heave, atol=1e-12)
-        back = load_model(model.save(tmp_path / "m.nc"))
-        xr.testing.assert_identical(back.forecast(run, start=20.0, steps=40), forecast)
-        assert "observable    half: 1 column at lags" in back.summary()
-        many = few(observables=(Half(),), n_members=2).fit(run, ["heave"], ["eta"])
-        summary = many.forecast_summary(run, start=20.0, steps=40)
-        again = load_model(many.save(tmp_path / "e.nc"))
-        xr.testing.assert_identical(again.forecast_summary(run, start=20.0, steps=40), summary)
-        with pytest.raises(RequestError, match=r"driven by observables too \(half\)"):
-            model.to_state_space()
+        run, test = sea(ahead=4), sea(seed=1, ahead=4)
+        model = HankelDMDc(0, 8, 1e-9, delay_rows="exact", lead=5).fit(run, ["heave"], ["eta"])
+        found = model.forecast(test, start=10.0, steps=300)
+        # A linear law without noise, to the ridge.
+        assert np.abs(found.heave - test.heave.sel(time=found.time)).max() < 1e-6
+        assert (model.lead_samples, model.history_samples) == (5, 9)
+        assert "lead          5 samples: a step is driven by waves up to 0.4 s" in model.summary()
 
 
 class TestOneEngine:
     """Windows, members and executors share one reading of each run."""
 
-    def test_each_probe_is_carried_once_per_run(self, drifting, monkeypatch):
-        runs, test = drifting
-        measured = replace(PREDICTED, surge="measured")
-        fitted = few(alignment=measured).fit(runs, STATES, INPUTS)
-        carries = []
-        real = alignment.carry_by_dispersion
+    def test_each_probe_is_carried_once_per_run(self, drifts, drift):
+        measured = seakeep.ProbeAlignment(mode="dispersion", surge="measured")
+        fitted = few(alignment=measured).fit(drifts, STATES, INPUTS)
+        carry = patch.object(alignment, "carry_by_dispersion", wraps=carry_by_dispersion)
+        with carry as carries:
+            fitted.forecast_windows(drift, [20.0, 25.0, 30.0], steps=20)
+        assert carries.call_count == len(INPUTS)
 
-        def counting(*arguments):
-            carries.append(1)
-            return real(*arguments)
-
-        monkeypatch.setattr(alignment, "carry_by_dispersion", counting)
-        fitted.forecast_windows(test, [20.0, 25.0, 30.0], steps=20)
-        assert len(carries) == len(INPUTS)
-        carries.clear()
-        places = [("a", 20.0), ("b", 21.0), ("a", 30.0)]
-        groups = [(places, 20), (places[:1], 30)]
-        windows = read_groups(fitted.signature, {"a": test, "b": runs[0]}, groups)
-        with member_series(fitted, windows) as found:
-            assert [series.shape for series, _ in found] == [(4, 3, 20, 2), (4, 1, 30, 2)]
-        assert len(carries) == 2 * len(INPUTS)
-
-    def test_a_forecast_upstream_says_how_far_ahead_it_reads(self, drifting):
-        runs, test = drifting
+    def test_a_forecast_upstream_says_how_far_ahead_it_reads(self, drifts, drift):
         here = seakeep.ProbeAlignment(mode="effective", surge="none", celerity=2.0)
         for offset, ahead in ((0.0, 0.0), (-3.0, 1.5)):
             spec = HankelDMDc(2, 8, 1.0, alignment=replace(here, offset=offset))
-            model = spec.fit(runs, STATES, INPUTS)
-            attrs = model.forecast(test, 20.0, 30).attrs
+            model = spec.fit(drifts, STATES, INPUTS)
+            attrs = model.forecast(drift, 20.0, 30).attrs
             assert attrs["reads_input_until"] == pytest.approx(ahead - model.dt)
             assert ("upstream" in model.summary()) == (offset < 0)
 
@@ -158,8 +74,6 @@ class TestRegistry:
     @pytest.mark.parametrize(
         "spec",
         [
-            HankelDMDc(3, np.int64(8), 1.0, lead=2, alignment={"mode": "dispersion"}),
-            HankelDMDc.recommended(1.6, 0.1),
             few(seed=np.random.default_rng(3), lead="0.5 T", ridge=seakeep.Fixed(2.0)),
             BayesianHankelDMDc.paper(1.6, n_members=3, seed=np.random.SeedSequence(5).spawn(2)[1]),
         ],
@@ -168,10 +82,8 @@ class TestRegistry:
         kept = json.loads(json.dumps(spec.to_json()))
         back = KINDS[spec.kind].from_json(kept)
         assert back.to_json() == spec.to_json()
-        assert type(back) is type(spec)
-        if spec.is_ensemble:
-            assert back.seed_sequence.entropy == spec.seed_sequence.entropy
-            assert back.seed_sequence.spawn_key == spec.seed_sequence.spawn_key
+        assert back.seed_sequence.entropy == spec.seed_sequence.entropy
+        assert back.seed_sequence.spawn_key == spec.seed_sequence.spawn_key
         with pytest.raises(RequestError, match=r"unknown key 'rigde'\. Did you mean 'ridge'"):
             KINDS[spec.kind].from_json(kept | {"rigde": 1})
 
@@ -190,7 +102,7 @@ class TestWaves:
         time = DT * np.arange(samples)
         eta = sum(np.cos(2 * np.pi * time / period) for period in periods)
         heave = np.r_[0.0, eta[:-1]]
-        return xr.Dataset({"heave": ("time", heave), "eta": ("time", eta)}, coords={"time": time})
+        return record(DT, heave=heave, eta=eta)
 
     @pytest.mark.parametrize(
         ("period", "words"),
@@ -213,7 +125,7 @@ class TestWaves:
         model = load_model(model.save(tmp_path / "m.nc"))
         # A regular wave is two amplitudes high; g T²/2π is 6.25 m.
         assert outside_training(model, 1.5 * run, 20.0, 600) == [
-            "eta: a height of 3, trained up to 2",
+            "eta: a height of 3 m, trained up to 2 m",
             "eta: a steepness in deep water of 0.48, trained up to 0.32",
         ]
         (told,) = outside_training(model, run.assign(surge=run.surge - 3), 20.0, 600)
@@ -224,7 +136,7 @@ class TestWaves:
         run = self.regular(2.0).rename(heave="surge")
         high = 1.5 * run
         high["surge"].values[high["time"].values > 20.0] = np.nan
-        words = "eta: a height of 3, trained up to 2; eta: a steepness in deep water of 0.48, "
+        words = "eta: a height of 3 m, trained up to 2 m; eta: a steepness in deep water of 0.48, "
         for spec in (HankelDMDc(2, 8, 1.0), few(window=None)):
             model = spec.fit(run, ["surge"], ["eta"])
             forecasts = [model.forecast(high, 20.0, 600)]
@@ -244,8 +156,6 @@ class TestUnitsAndNumbers:
         plain, centimetres = sea(), sea(seed=1)
         del plain["heave"].attrs["units"]
         centimetres["heave"].attrs["units"] = "cm"
-        with pytest.raises(DataError, match=r"'heave' is in 'm' in run 1 and in 'cm' in run 3"):
-            HankelDMDc(1, 4, 1.0).fit([sea(), plain, centimetres], ["heave"], ["eta"])
         with pytest.raises(DataError, match=r"'heave' is in 'cm' in run 2 and in 'm' in run 3"):
             HankelDMDc(1, 4, 1.0).fit([plain, centimetres, sea()], ["heave"], ["eta"])
 

@@ -4,6 +4,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 import xarray as xr
+from ensembles import few
+from records import record, table
 from scipy import stats
 
 import seakeep
@@ -39,11 +41,7 @@ def wave_run(seed=0, samples=900, name="irregular"):
     }
     for key in STATES:
         series[key] += 0.02 * rng.normal(size=samples)
-    return xr.Dataset(
-        {key: ("time", values, {"units": "m"}) for key, values in series.items()},
-        coords={"time": ("time", time, {"units": "s"})},
-        attrs={"run": name},
-    )
+    return record(DT, {"run": name}, **series)
 
 
 @pytest.fixture(scope="module")
@@ -52,16 +50,8 @@ def run():
 
 
 def small(**changes):
-    settings = {
-        "encounter_period": PERIOD,
-        "window": Uniform("8 T", "14 T"),
-        "state_delays": Uniform("0.2 T", "0.6 T"),
-        "input_delays": Uniform("0.5 T", "1.5 T"),
-        "ridge": Uniform(0.5, 5),
-        "n_members": 6,
-        "seed": 3,
-    }
-    return BayesianHankelDMDc(**(settings | changes))
+    settings = {"window": Uniform("8 T", "14 T"), "ridge": Uniform(0.5, 5), "delay_rows": "ridge"}
+    return few(**settings | {"n_members": 6, "seed": 3} | changes)
 
 
 def fitted(run, **changes):
@@ -72,23 +62,6 @@ STABLE = Uniform(200, 400)
 """λ at which all members of these tests are stable."""
 
 
-def alone(ensemble, number, **shared):
-    """The single model with the settings of a member."""
-    draw = ensemble.draws.isel(member=number)
-    window = int(draw.window_samples)
-    return HankelDMDc(
-        state_delays=int(draw.state_delays_samples),
-        input_delays=int(draw.input_delays_samples),
-        ridge=float(draw.ridge),
-        window=None if window < 0 else window,
-        **shared,
-    )
-
-
-def arrays(forecast):
-    return np.stack([forecast[name].values for name in STATES], axis=-1)
-
-
 def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays(tmp_path):
     runs, unseen = {name: wave_run(seed) for seed, name in enumerate("abc")}, wave_run(7)
     spec = small(train_on="windows", ridge=LogUniform(1, 100), delay_rows="exact", lead=4)
@@ -96,49 +69,42 @@ def test_the_mean_of_a_centred_ensemble_is_the_single_model_and_its_spread_stays
     single = dataclasses.replace(settings, window=None).fit(runs, STATES, INPUTS)
     apart = spec.fit(runs, STATES, INPUTS)
     centred = dataclasses.replace(spec, centred=True).fit(runs, STATES, INPUTS)
-    expected, tolerance = single.forecast(unseen, 65.0, 120), 1e-12  # rounding of the sums
-    ways = {
-        "anew": centred.forecast_summary(unseen, 65.0, 120),
-        "held": centred.hold().forecast_summary(unseen, 65.0, 120),
-        "file": seakeep.load_model(centred.save(tmp_path / "c.nc")).forecast_summary(
-            unseen, 65.0, 120
-        ),
-        "members": seakeep.summarize(centred.forecast(unseen, 65.0, 120)),
-        "windows": centred.summarize_windows(unseen, [60.0, 65.0], 120).isel(window=1),
-    }
-    x, u = (np.stack([unseen[n].values for n in names], axis=1) for names in (STATES, INPUTS))
+    expected = table(single.forecast(unseen, 65.0, 120), STATES)
+    close = {"rtol": 0, "atol": 1e-12}  # rounding of the sums
+    again = seakeep.load_model(centred.save(tmp_path / "c.nc"))
+    ways = (
+        *(each.forecast_summary(unseen, 65.0, 120) for each in (centred, centred.hold(), again)),
+        seakeep.summarize(centred.forecast(unseen, 65.0, 120)),
+        centred.summarize_windows(unseen, [60.0, 65.0], 120).isel(window=1),
+    )
+    x, u = table(unseen, STATES), table(unseen, INPUTS)
     now = round(65.0 / DT) + 1
-    table = centred.forecast_arrays(x[:now], u[:now], u[now:], 120)
+    from_arrays = centred.forecast_arrays(x[:now], u[:now], u[now:], 120)
     live, alone_live = centred.live(), single.live()
     for service in (live, alone_live):
         for at in range(now):
             service.step(u[at], x[at])
-    served, alone_served = (each.forecast(120, u[now:]) for each in (live, alone_live))
-    far = apart.forecast_summary(unseen, 65.0, 120)
-    for column, name in enumerate(STATES):
-        mean, std, lower, upper = far[name].values
-        moved = expected[name].values - mean
-        assert np.abs(moved).max() > 1e-3
-        wanted = [mean + moved, std, lower + moved, upper + moved]
-        for found in ways.values():
-            np.testing.assert_allclose(found[name], wanted, rtol=0, atol=tolerance)
-        np.testing.assert_allclose(
-            [part[:, column] for part in table[:4]], wanted, rtol=0, atol=tolerance
-        )
-        np.testing.assert_allclose(served[name][0], expected[name], rtol=0, atol=tolerance)
-        assert np.all(served[name][1] > alone_served[name][1])  # the members' spread comes on top
+    served, alone_served = (
+        table(each.forecast(120, u[now:]), STATES) for each in (live, alone_live)
+    )
+    mean, std, lower, upper = table(apart.forecast_summary(unseen, 65.0, 120), STATES)
+    moved = expected - mean
+    assert np.abs(moved).max() > 1e-3
+    wanted = [mean + moved, std, lower + moved, upper + moved]
+    for found in (*(table(each, STATES) for each in ways), from_arrays[:4]):
+        np.testing.assert_allclose(found, wanted, **close)
+    np.testing.assert_allclose(served[0], expected, **close)
+    assert np.all(served[1] > alone_served[1])  # the members' spread comes on top
     left = centred.without("b").forecast_summary(unseen, 65.0, 120)
-    two = dataclasses.replace(settings, window=None).fit(
-        {name: runs[name] for name in "ac"}, STATES, INPUTS
-    )
-    np.testing.assert_allclose(
-        arrays(left.sel(statistic="mean")), arrays(two.forecast(unseen, 65.0, 120)), atol=tolerance
-    )
+    both = {name: runs[name] for name in "ac"}
+    two = dataclasses.replace(settings, window=None).fit(both, STATES, INPUTS)
+    expected_left = table(two.forecast(unseen, 65.0, 120), STATES)
+    np.testing.assert_allclose(table(left, STATES)[0], expected_left, **close)
     band = centred.calibrate(wave_run(9), 100, 0.9).forecast_summary(
         unseen, 65.0, 100, 0.9, band="calibrated"
     )
-    middle = 0.5 * (band.heave.sel(statistic="lower") + band.heave.sel(statistic="upper"))
-    np.testing.assert_allclose(middle, expected.heave[:100], rtol=0, atol=tolerance)
+    _, _, lower, upper = table(band, STATES)
+    np.testing.assert_allclose(0.5 * (lower + upper), expected[:100], **close)
 
 
 def test_draws_are_rounded_to_the_nearest_sample(run):
@@ -153,11 +119,11 @@ def test_draws_are_rounded_to_the_nearest_sample(run):
 
 @pytest.mark.parametrize("sampling", ["monte_carlo", "sobol"])
 def test_a_member_does_not_depend_on_the_number_of_members(run, sampling):
-    few = fitted(run, sampling=sampling).draws
+    six = fitted(run, sampling=sampling).draws
     many = fitted(run, sampling=sampling, n_members=8).draws
     kept = many.isel(member=slice(6))
-    xr.testing.assert_equal(few, kept)
-    assert not np.allclose(few.ridge, fitted(run, sampling=sampling, seed=4).draws.ridge)
+    xr.testing.assert_equal(six, kept)
+    assert not np.allclose(six.ridge, fitted(run, sampling=sampling, seed=4).draws.ridge)
 
 
 def test_sobol_points_fill_the_prior_evenly(run):
@@ -197,24 +163,15 @@ def test_the_seed_may_be_a_sequence_or_a_generator(run):
 def test_the_summary_is_that_of_the_members(run, monkeypatch):
     ensemble = fitted(run, ridge=STABLE)
     members = ensemble.forecast(run, start=65.0, steps=77)
-    expected = seakeep.summarize(members, level=0.9)
-    values = arrays(members)
-    np.testing.assert_allclose(
-        np.stack([expected[name].sel(statistic="lower") for name in STATES], axis=-1),
-        np.quantile(values, 0.05, axis=0),
-        rtol=1e-12,
-    )
-    np.testing.assert_allclose(
-        np.stack([expected[name].sel(statistic="std") for name in STATES], axis=-1),
-        values.std(axis=0, ddof=1),
-        rtol=1e-12,
-    )
+    expected, values = seakeep.summarize(members, level=0.9), table(members, STATES)
+    _, std, lower, _ = table(expected, STATES)
+    np.testing.assert_allclose(lower, np.quantile(values, 0.05, axis=0), rtol=1e-12)
+    np.testing.assert_allclose(std, values.std(axis=0, ddof=1), rtol=1e-12)
     for held, chunk in ((2**25, 2**23), (0, 1500)):
         monkeypatch.setattr(engine, "HELD", held)
         monkeypatch.setattr(summaries, "CHUNK", chunk)
         found = ensemble.forecast_summary(run, start=65.0, steps=77, level=0.9)
-        for name in STATES:
-            np.testing.assert_array_equal(found[name], expected[name])
+        np.testing.assert_array_equal(table(found, STATES), table(expected, STATES))
     assert (found.members, found.diverged, found.level) == (6, 0, 0.9)
 
 
@@ -225,18 +182,12 @@ def test_windows_side_by_side_equal_single_forecasts(run):
     assert dict(together.sizes) == {"window": 2, "member": 6, "lead": 60}
     for window, start in enumerate(starts):
         single = ensemble.forecast(run, start=start, steps=60)
-        for name in STATES:
-            # Two windows are one product: other roundings.
-            np.testing.assert_allclose(together[name][window], single[name], atol=1e-10)
-    told = []
-    summary = ensemble.summarize_windows(
-        run, starts, steps=60, progress=lambda *each: told.append(each)
-    )
-    assert told == [(k, 6, f"member {k}") for k in range(1, 7)]
+        # Two windows are one product: other roundings.
+        found = table(together, STATES)[window]
+        np.testing.assert_allclose(found, table(single, STATES), atol=1e-10)
+    summary = ensemble.summarize_windows(run, starts, steps=60)
     expected = seakeep.summarize(together)
-    for name in STATES:
-        np.testing.assert_array_equal(summary[name], expected[name])
-    np.testing.assert_allclose(together.lead, DT * np.arange(1, 61))
+    np.testing.assert_array_equal(table(summary, STATES), table(expected, STATES))
 
 
 def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
@@ -252,8 +203,7 @@ def test_the_frequentist_ensemble_differs_in_its_windows_alone(run):
     assert draws.last_sample.min() >= 160 + 16 - 1
     assert draws.last_sample.max() <= 600
     last = float(run.time[int(draws.last_sample[1])])
-    assert alone(ensemble, 1) == HankelDMDc(8, 16, 1.0, window=160)
-    expected = alone(ensemble, 1).fit(run, STATES, INPUTS, stop=last)
+    expected = HankelDMDc(8, 16, 1.0, window=160).fit(run, STATES, INPUTS, stop=last)
     np.testing.assert_allclose(ensemble.member(1).A, expected.A, atol=1e-10)
     assert ensemble.member(1).training.stop == pytest.approx((last,))
     shortest = run.isel(time=slice(0, 160 + 16))  # which leaves one place for the window
@@ -266,14 +216,9 @@ def test_members_that_diverge_say_when():
     rng = np.random.default_rng(0)
     time = DT * np.arange(300)
     growth = np.exp(2.5 * time) * np.cos(5 * time) * 1e-9
-    run = xr.Dataset(
-        {
-            "heave": ("time", growth + 1e-12 * rng.normal(size=300)),
-            "pitch": ("time", rng.normal(size=300)),
-            "eta": ("time", rng.normal(size=300)),
-        },
-        coords={"time": time},
-    )
+    heave = growth + 1e-12 * rng.normal(size=300)
+    pitch, eta = rng.normal(size=(2, 300))
+    run = record(DT, heave=heave, pitch=pitch, eta=eta)
     spec = small(window=Fixed("10 T"), ridge=Fixed(1e-3))
     ensemble = spec.fit(run, STATES, INPUTS, stop=20.0)
     forecast = ensemble.forecast(run, start=20.0, steps=99)
@@ -290,23 +235,16 @@ def test_members_that_diverge_say_when():
     assert f"({np.sum(radii >= 1)} of 6 UNSTABLE: their long forecasts" in ensemble.summary()
 
 
-def test_spectral_radii_are_those_of_the_members_for_any_workers(run, tmp_path):
-    radii = fitted(run, ridge=STABLE).spectral_radii()
+def test_spectral_radii_are_those_of_the_members(run):
     ensemble = fitted(run, ridge=STABLE)
-    for number in range(6):
-        # The same matrix through the same routine; memory may lie otherwise.
-        expected = ensemble.member(number).spectral_radius
-        assert radii[number] == pytest.approx(expected, rel=1e-12)
+    # The same matrix through the same routine; memory may lie otherwise.
+    expected = [ensemble.member(number).spectral_radius for number in range(6)]
     told = []
-    again = ensemble.spectral_radii(
+    found = ensemble.spectral_radii(
         executor=ThreadPoolExecutor(2), progress=lambda *step: told.append(step)
     )
-    np.testing.assert_array_equal(again, radii)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
     assert told == [(k, 6, f"member {k}") for k in range(1, 7)]
-    ensemble.spectral_radii(progress=lambda *step: told.append(step))
-    assert len(told) == 6  # found once
-    back = seakeep.load_model(ensemble.save(tmp_path / "e.nc"))
-    np.testing.assert_array_equal(back.spectral_radii(), radii)
 
 
 def test_training_spans_are_those_of_the_members(run):

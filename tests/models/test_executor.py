@@ -15,6 +15,7 @@ import pytest
 import side_work
 import xarray as xr
 from ensembles import few
+from records import record
 
 import seakeep
 from seakeep import executor as executors
@@ -35,14 +36,8 @@ def ensemble_and_run():
     rng = np.random.default_rng(0)
     time = 0.1 * np.arange(500)
     eta = np.cos(np.outer(time, rng.uniform(2, 6, 20)) + rng.uniform(0, 6, 20)).sum(axis=1)
-    run = xr.Dataset(
-        {
-            "heave": ("time", np.convolve(eta, [0.1, 0.3, 0.2], "same")),
-            "pitch": ("time", np.convolve(eta, [0.3, -0.1, -0.2], "same")),
-            "eta": ("time", eta),
-        },
-        coords={"time": time},
-    )
+    heave, pitch = (np.convolve(eta, taps, "same") for taps in ([0.1, 0.3, 0.2], [0.3, -0.1, -0.2]))
+    run = record(0.1, heave=heave, pitch=pitch, eta=eta)
     spec = few(window=seakeep.Uniform("6 T", "12 T"), n_members=9, delay_rows="ridge")
     return spec.fit(run, ["heave", "pitch"], ["eta"], stop=30.0), run
 

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import DT, INPUTS, STATES, drifting_run
+from drifting import INPUTS, STATES, heave_error
+from records import table
 
 from seakeep import (
     HankelDMDc,
     Powers,
     ProbeAlignment,
-    RequestError,
     SlowSquares,
 )
 from seakeep.core.recursion import Place, Recursion, recursion
@@ -28,10 +28,9 @@ SPEC = HankelDMDc(
 
 
 @pytest.fixture(scope="module")
-def models():
-    runs = [drifting_run(seed) for seed in (1, 2)]
+def models(drifts):
     return {
-        name: each.fit(runs, STATES, INPUTS)
+        name: each.fit(drifts, STATES, INPUTS)
         for name, each in {
             "ahead": SPEC,
             "now": replace(SPEC, lead=0, observables=()),
@@ -40,67 +39,20 @@ def models():
     }
 
 
-def table_of(run, names):
-    return np.stack([run[name].values for name in names], axis=1)
-
-
-def heave_error(model, run):
-    forecast = model.forecast(run, start=60.0, steps=300)
-    measured = run["heave"].sel(time=forecast["time"])
-    return float(np.sqrt(np.mean((forecast["heave"] - measured) ** 2)) / measured.std())
-
-
-def test_the_wave_is_read_where_the_vessel_goes(models):
-    errors = {name: heave_error(model, drifting_run(7)) for name, model in models.items()}
+def test_the_wave_is_read_where_the_vessel_goes(models, drift):
+    errors = {name: heave_error(model, drift) for name, model in models.items()}
     assert errors["ahead"] < 0.12  # what the forecast of surge is off
     assert errors["now"] < 0.2  # and what a probe 3.7 m up-wave does not tell
     assert errors["rest"] > 0.35
 
 
-def test_settings_know_the_history_that_carriers_read(models):
-    model, period = models["now"], drifting_run(7).attrs["encounter_period"]
-    assert model.history_samples == model.settings.needs(DT, period).history + 1
+def test_settings_know_the_history_that_carriers_read(models, drift):
+    model, period = models["now"], drift.attrs["encounter_period"]
+    assert model.history_samples == model.settings.needs(model.dt, period).history + 1
 
 
-def test_a_step_is_the_equation(models):
-    """x' = A x̂ + B û + D v with each part computed by itself, as a host does."""
-    model, run, start = models["ahead"], drifting_run(7), 600
-    signature, x, u = model.signature, table_of(run, STATES), table_of(run, INPUTS)
-    follows, observed = signature.input_map.follows, signature.input_map.observed
-    z, taps = signature.input_delays, follows.place.taps
-    rows = []
-    for at in range(start - z, start + 1):
-        surge = x[at - taps.size + 1 : at + 1, 0][::-1]
-        place = float(np.clip(taps @ surge, follows.place.grid[0], follows.place.grid[-1]))
-        on_grid = (place - follows.place.lowest) / follows.place.spacing
-        below = int(on_grid)
-        sides = []
-        for side in (below, below + 1):
-            wave = [
-                np.sum(
-                    bank.taps[side] * u[at - follows.back : at + follows.ahead + 1, bank.columns].T
-                )
-                for bank in follows.banks(None)
-            ]
-            sides.append(observed.with_delayed(np.array([wave]))[0])
-        part = on_grid - below
-        rows.append((1 - part) * sides[0] + part * sides[1])
-    direct = observed.direct(u)[start]
-    direct = np.append(direct, (place - follows.place.centre) ** 2)
-    regressors = np.concatenate(
-        [
-            signature.state_scale.deviations(x[start - 10 : start + 1])[::-1].ravel(),
-            signature.input_scale.deviations(np.array(rows))[::-1].ravel(),
-            signature.direct_scale.deviations(direct),
-        ]
-    )
-    expected = signature.state_scale.physical(model.coefficients @ regressors)
-    found = model.forecast(run, start=start * DT, steps=1)
-    np.testing.assert_allclose([found[each].values[0] for each in STATES], expected, atol=1e-12)
-
-
-def test_bands_take_the_waves_at_the_place_of_the_start(models):
-    model, run = models["ahead"], drifting_run(7)
+def test_bands_take_the_waves_at_the_place_of_the_start(models, drift):
+    model, run = models["ahead"], drift
     windows = model.read_windows({"a": run}, [("a", 60.0), ("a", 80.0)], 50)
     assert windows.delayed.shape == (2, 40 + 50, 6)
     found = envelope_of(model.signature, windows)
@@ -109,8 +61,6 @@ def test_bands_take_the_waves_at_the_place_of_the_start(models):
     assert found.shape == (2, 50)
     assert np.all((found > 0.2) & (found < 3))  # SD of the waves of training
     assert not np.allclose(found[0], other[0], rtol=1e-3)
-    with pytest.raises(RequestError, match="where its own surge takes it, which no linear system"):
-        model.initial_state(run, 60.0)
 
 
 def test_a_ridge_weighs_a_hundred_times_on_powers(models):
@@ -118,22 +68,23 @@ def test_a_ridge_weighs_a_hundred_times_on_powers(models):
     np.testing.assert_allclose(scale.std / scale.spread, [1, 1, 10, 10, 10, 10])  # √100
 
 
-def test_training_is_the_recursion_on_the_measured_surge(models):
-    model, run = models["ahead"], drifting_run(1)
-    surge = run["surge"].values
+def test_training_is_the_recursion_on_the_measured_surge(models, drift):
+    input_map, surge = models["ahead"].signature.input_map, drift["surge"].values
     later = surge.copy()
     later[560:] = 9.0
-    found, other = (
-        model.signature.input_map.drive(
-            table_of(run, INPUTS), [Span(500, 500, 600)], run=run, surge=each
-        ).rows(500, 600)
+    drives = [
+        input_map.drive(table(drift, INPUTS), [Span(500, 500, 600)], run=drift, surge=each)
         for each in (surge, later)
-    )
+    ]
+    found, other = (drive.rows(500, 600) for drive in drives)
     np.testing.assert_array_equal(other.delayed[:60], found.delayed[:60])
     assert not np.allclose(other.delayed[60:], found.delayed[60:])
+    away = drives[0].places(500, 600) - input_map.follows.place.centre
+    np.testing.assert_array_equal(found.direct[:, -1], away**2)
 
 
-def test_models_and_windows_side_by_side_are_each_alone():
+def test_a_step_is_the_equation():
+    """x' = A x̂ + B û + D v, of models and windows side by side and of one alone."""
     rng = np.random.default_rng(0)
     N, s, n, z, P, places, steps = 2, 3, 2, 4, 5, 9, 30
     place = Place(np.full(P, 1 / P), -1.0, 0.25, places, 0.1)

@@ -1,24 +1,20 @@
 """Other kinds of models beside a Hankel model, by free runs on the same windows."""
 
-import sys
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from free_runs import loop_score
+from records import record
+from squared import INPUTS, PERIOD, STATES, runs
 
 from seakeep import HankelDMDc, Select, tune
 from seakeep.baselines import ARX, FIR, Subspace
 from seakeep.campaign.settings import ModelSettings
 from seakeep.study.resolve import resolve_model
 from seakeep.tuning import tuned_campaign
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from test_selection import INPUTS, PERIOD, STATES, runs
 
 SPEC = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot", lead=3)
 
@@ -28,9 +24,7 @@ def filtered(seed: int, samples: int = 200) -> xr.Dataset:
     rng = np.random.default_rng(seed)
     eta = rng.standard_normal(samples)
     heave = np.convolve(eta, [0.0, 1.0, -0.5, 0.3])[:samples] + rng.standard_normal(samples)
-    variables = {"heave": ("time", heave, {"units": "m"}), "eta": ("time", eta, {"units": "m"})}
-    time = 0.1 * np.arange(samples)
-    return xr.Dataset(variables, coords={"time": time}, attrs={"encounter_period": 0.4})
+    return record(0.1, {"encounter_period": 0.4}, heave=heave, eta=eta)
 
 
 def test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts():

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-import xarray as xr
+from drifting import DT, INPUTS
+from records import table
 
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.models import HankelDMDc
@@ -10,32 +11,7 @@ from seakeep.models.inputs import InputMap, Regressors
 from seakeep.models.labelled import Span, channel_labels
 from seakeep.models.observables import Powers, SlowSquares
 
-DT, PERIOD = 0.1, 16  # s, samples
-
-
-def irregular(seed: int = 0, samples: int = 900) -> xr.Dataset:
-    """Two probes 2 m apart in deep water, and a surge that wanders."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(samples) * DT
-    omega = 2 * np.pi * rng.uniform(0.45, 0.8, 12)
-    phase = rng.uniform(0, 2 * np.pi, 12)
-    channels = {
-        name: (
-            "time",
-            sum(
-                0.01 * np.cos(w * t - w**2 / 9.81 * x + p)
-                for w, p in zip(omega, phase, strict=True)
-            ),
-            {"units": "m", "x_position": x},
-        )
-        for name, x in (("eta_fwd", 0.0), ("eta_cog", 2.0))
-    }
-    channels["surge"] = ("time", 0.3 + 0.2 * np.sin(2 * np.pi * t / 40), {"units": "m"})
-    attrs = {"water_depth": np.inf, "encounter_period": PERIOD * DT}
-    return xr.Dataset(channels, coords={"time": t}, attrs=attrs)
-
-
-INPUTS = ["eta_fwd", "eta_cog"]
+PERIOD = 15  # samples
 CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3)))
 
 
@@ -46,7 +22,7 @@ def fitted(run, lead=12, chosen=CHOSEN) -> InputMap:
 
 def rows(chain, run, first, stop) -> Regressors:
     span = Span(first, first, stop)
-    values = np.stack([run[name].values for name in INPUTS], axis=-1)
+    values = table(run, INPUTS)
     read = chain.reads(span)
     drive = chain.drive(values[read.first : read.stop], [span], run=run, first=read.first)
     return drive.rows(first, stop)
@@ -79,53 +55,31 @@ def test_slow_squares_are_the_sums_that_they_stand_for():
                 assert found[order][row, column] == pytest.approx(expected, rel=1e-12)
 
 
-def test_slow_squares_of_a_regular_wave_weigh_the_amplitude_by_the_frequency():
-    amplitude, omega = 0.05, 2 * np.pi / (PERIOD * DT)
-    series = amplitude * np.cos(omega * DT * np.arange(400))
-    kernel, x = slow_kernel(1 / (3 * PERIOD), 24), omega * DT
-    found = [slow_squares(series, order, kernel, (0,), DT)[200, 0] for order in (0, 1, 2)]
-    # A central difference multiplies by sin(x)/x, and the second by (sin(x/2)/(x/2))^2.
-    gains = [1.0, np.sin(x) / x, (np.sin(x / 2) / (x / 2)) ** 2]
-    for order, gain in enumerate(gains):
-        expected = 0.5 * (amplitude * omega**order * gain) ** 2
-        # What the filter leaves of the wave at twice the frequency.
-        assert found[order] == pytest.approx(expected, rel=0.01)
-
-
-def test_columns_are_named_with_units_and_stand_in_two_groups():
-    run = irregular()
-    chain = fitted(run)
-    delayed, direct = chain.regressors(channel_labels(run, INPUTS))
-    assert {label.name: label.units for label in delayed} == {
-        "eta_fwd": "m",
-        "eta_cog": "m",
-        "eta_fwd_power_2": "m^2",
-        "eta_cog_power_2": "m^2",
-        "eta_fwd_power_3": "m^3",
-        "eta_cog_power_3": "m^3",
-    }
+def test_columns_are_named_with_units_and_stand_in_two_groups(drift):
+    chain = fitted(drift)
+    delayed, direct = chain.regressors(channel_labels(drift, INPUTS))
+    expected = dict.fromkeys(INPUTS, "m")
+    expected |= {f"{name}_power_{q}": f"m^{q}" for q in (2, 3) for name in INPUTS}
+    assert {label.name: label.units for label in delayed} == expected
     assert len(direct) == 18
     assert direct[6].units == "(m/s)^2"
     # The squares look two periods ahead, which is more than the lead of the waves.
     assert chain.lead_samples == 2 * PERIOD
     # Five periods of lags and twice the filter's half width less the look-ahead.
-    assert chain.history(3 * PERIOD) == 5 * PERIOD + 2 * (24 + 1) - 2 * PERIOD
+    assert chain.history(3 * PERIOD) == 5 * PERIOD + 2 * (22 + 1) - 2 * PERIOD
 
 
-def test_the_lead_shifts_the_inputs_and_not_the_squares():
-    run = irregular()
-    ahead = rows(fitted(run), run, 200, 300)
-    plain = rows(fitted(run, lead=0), run, 200, 300)
-    np.testing.assert_array_equal(ahead.delayed[:, 0], run["eta_fwd"].values[212:312])
+def test_the_lead_shifts_the_inputs_and_not_the_squares(drift):
+    ahead, plain = (rows(fitted(drift, lead=lead), drift, 200, 300) for lead in (12, 0))
+    np.testing.assert_array_equal(ahead.delayed[:, 0], drift["eta_fwd"].values[212:312])
     # The same sums, started at another sample of the convolution.
     np.testing.assert_allclose(ahead.direct, plain.direct, rtol=1e-10)
     assert np.isfinite(ahead.direct).all()
 
 
-def test_powers_grow_like_the_input_far_out():
-    run = irregular()
-    chain = fitted(run, chosen=(Powers("eta_cog", (2, 3)),))
-    sigma = float(run["eta_cog"].std())
+def test_powers_grow_like_the_input_far_out(drift):
+    chain = fitted(drift, chosen=(Powers("eta_cog", (2, 3)),))
+    sigma = float(drift["eta_cog"].std())
     u = sigma * np.array([0.01, 2.0, 60.0])
     found = chain.observed.with_delayed(np.stack([0 * u, u], axis=1))[:, 2:]
     expected = np.stack([u**q / (1 + u**2 / (36 * sigma**2)) ** ((q - 1) / 2) for q in (2, 3)], 1)
@@ -133,13 +87,12 @@ def test_powers_grow_like_the_input_far_out():
     np.testing.assert_allclose(found[2] / u[2], [6 * sigma, 36 * sigma**2], rtol=0.01)  # 36/60²
 
 
-def test_slow_squares_above_those_of_training_grow_by_seven_tenths():
-    run = irregular()
-    chain = fitted(run, chosen=(SlowSquares("eta_cog", orders=(0,), lags=(0,)),))
-    record = np.stack([run[name].values for name in INPUTS], axis=1)
-    inside = chain.observed.direct(record)[:, 0]
+def test_slow_squares_above_those_of_training_grow_by_seven_tenths(drift):
+    chain = fitted(drift, chosen=(SlowSquares("eta_cog", orders=(0,), lags=(0,)),))
+    waves = table(drift, INPUTS)
+    inside = chain.observed.direct(waves)[:, 0]
     top = np.nanmax(inside)
-    twice = chain.observed.direct(np.sqrt(2.0) * record)[:, 0]
+    twice = chain.observed.direct(np.sqrt(2.0) * waves)[:, 0]
     expected = np.where(2 * inside > top, top + 0.7 * (2 * inside - top), 2 * inside)
     np.testing.assert_allclose(twice, expected, rtol=1e-12)
     assert (2 * inside > top).any()

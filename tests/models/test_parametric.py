@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from records import record, table
 
 from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning, check, load_model, tune
 from seakeep.hosts.program import exportable
@@ -15,6 +16,9 @@ ON_STATE = np.array([1.5, -0.9]), np.array([0.2, -0.03])
 """Of x(k) and x(k − 1): at a draught of zero, and their change per unit."""
 ON_WAVE = 0.5, 0.4
 SPEC = HankelDMDc(1, 0, 0.0, standardize=False, delay_rows="exact", parameter="rig.draught")
+CHOSEN = HankelDMDc(
+    2, 1, "rollout", delay_rows="exact", ridge_scale="per_snapshot", parameter="rig.draught"
+)
 
 
 def vessel(draught: float, seed: int, samples: int = 400, noise: float = 0.0) -> xr.Dataset:
@@ -25,11 +29,20 @@ def vessel(draught: float, seed: int, samples: int = 400, noise: float = 0.0) ->
     for k in range(1, samples - 1):
         heave[k + 1] = a @ heave[k - 1 : k + 1][::-1] + b * eta[k]
     heave += noise * rng.standard_normal(samples)
-    return xr.Dataset(
-        {"heave": ("time", heave, {"units": "m"}), "eta": ("time", eta, {"units": "m"})},
-        coords={"time": DT * np.arange(samples)},
-        attrs={"encounter_period": 0.4, "rig": {"draught": draught}},
-    )
+    attrs = {"encounter_period": 0.4, "rig": {"draught": draught}}
+    return record(DT, attrs, heave=heave, eta=eta)
+
+
+@pytest.fixture(scope="module")
+def family():
+    """Noisy runs at four draughts."""
+    return [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
+
+
+def error(model) -> float:
+    """Of a forecast at a draught between those of the family."""
+    run = vessel(0.45, 40, 800)
+    return float(np.sqrt(((model.forecast(run, 5.0, 200).heave - run.heave[51:251]) ** 2).mean()))
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +65,8 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
     np.testing.assert_allclose(model.errors.rms, 0.0, rtol=0, atol=1e-6)
     served = [each.at(parameter=0.7).live().errors for each in (model, again)]
     np.testing.assert_array_equal(served[0].rms, served[1].rms)
-    arrays = at.forecast_arrays(run[["heave"]].to_array().T[:51], run[["eta"]].to_array().T[:51],
-                                run[["eta"]].to_array().T[51:251], 200)  # fmt: skip
+    x, u = table(run, ["heave"]), table(run, ["eta"])
+    arrays = at.forecast_arrays(x[:51], u[:51], u[51:251], 200)
     np.testing.assert_allclose(arrays[:, 0], forecast.heave, rtol=0, atol=1e-9)
 
 
@@ -95,49 +108,32 @@ def test_means_follow_the_parameter():
     assert mean == pytest.approx(2.25, abs=0.3)
 
 
-def test_free_runs_choose_between_the_parameter_and_one_pooled_model():
-    spec = HankelDMDc(
-        2, 1, "rollout", delay_rows="exact", ridge_scale="per_snapshot", parameter="rig.draught"
-    )
-    draughts = (0.0, 0.3, 0.6, 1.0)
-    runs = [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate(draughts)]
-    varying = spec.fit(runs, ["heave"], ["eta"])
+def test_free_runs_choose_between_the_parameter_and_one_pooled_model(family):
+    varying = CHOSEN.fit(family, ["heave"], ["eta"])
     assert varying.settings.parameter == "rig.draught"
-    pooled = replace(spec, parameter="").fit(runs, ["heave"], ["eta"])
-    nearest = replace(spec, parameter="").fit(runs[1], ["heave"], ["eta"])
-    run = vessel(0.45, 40, 800)
-    errors = [
-        float(np.sqrt(((each.forecast(run, 5.0, 200).heave - run.heave[51:251]) ** 2).mean()))
-        for each in (varying, pooled, nearest)
-    ]
-    assert errors[0] < 0.5 * min(errors[1:])
+    fixed = replace(CHOSEN, parameter="")
+    pooled, nearest = (fixed.fit(runs, ["heave"], ["eta"]) for runs in (family, family[1]))
+    assert error(varying) < 0.5 * min(error(pooled), error(nearest))
     alike = [
-        vessel(0.5, 50 + n, 800, 0.05).assign_attrs(rig={"draught": p})
-        for n, p in enumerate(draughts)
+        vessel(0.5, 50 + n, 800, 0.05).assign_attrs(rig=run.attrs["rig"])
+        for n, run in enumerate(family)
     ]
-    same = spec.fit(alike, ["heave"], ["eta"])
+    same = CHOSEN.fit(alike, ["heave"], ["eta"])
     assert same.settings.parameter == ""
     assert "a pooled one" in same.selection
-    assert tune(spec, alike, ["heave"], ["eta"]).spec.parameter == ""
+    assert tune(CHOSEN, alike, ["heave"], ["eta"]).spec.parameter == ""
 
 
-def test_a_search_keeps_what_varies_better_and_ends_no_worse_than_it_started():
-    start = HankelDMDc(
-        2, 1, 1e-6, delay_rows="exact", ridge_scale="per_snapshot", parameter="rig.draught"
-    )
-    runs = [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
-    result = tune(start, runs, ["heave"], ["eta"], vary=["state_delays"])
+def test_a_search_keeps_what_varies_better_and_ends_no_worse_than_it_started(family):
+    start = replace(CHOSEN, ridge=1e-6)
+    result = tune(start, family, ["heave"], ["eta"], vary=["state_delays"])
     assert result.spec.parameter == "rig.draught"
     assert result.note.startswith("on runs of inner values that are held out, a model that varies")
-    run = vessel(0.45, 40, 800)
-    errors = [
-        float(np.sqrt(((each.forecast(run, 5.0, 200).heave - run.heave[51:251]) ** 2).mean()))
-        for each in (s.fit(runs, ["heave"], ["eta"]) for s in (start, result.spec))
-    ]
-    assert errors[1] < 1.01 * errors[0]
+    before, after = (error(spec.fit(family, ["heave"], ["eta"])) for spec in (start, result.spec))
+    assert after < 1.01 * before
 
 
-def test_what_grows_in_the_trained_range_is_passed_over(model, monkeypatch):
+def test_what_grows_in_the_trained_range_is_passed_over(model, family, monkeypatch):
     wide = replace(model, variation=replace(model.variation, high=3.3))
     a = ON_STATE[0] + 3.3 * ON_STATE[1]
     radius = np.abs(np.roots([1.0, *-a])).max()
@@ -147,8 +143,7 @@ def test_what_grows_in_the_trained_range_is_passed_over(model, monkeypatch):
     largest = specs.largest_radius
     monkeypatch.setattr(specs, "largest_radius", lambda m: 1.0 if m.variation else largest(m))
     spec = replace(SPEC, ridge="rollout", ridge_scale="per_snapshot", standardize=True)
-    runs = [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
-    assert spec.fit(runs, ["heave"], ["eta"]).settings.parameter == ""
+    assert spec.fit(family, ["heave"], ["eta"]).settings.parameter == ""
 
 
 def test_a_check_takes_the_middle_of_the_training(model):

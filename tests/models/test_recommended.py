@@ -2,12 +2,11 @@
 
 import dataclasses
 import pickle
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from squared import DT, INPUTS, PERIOD, STATES, runs, sea
 
 from seakeep import (
     BayesianHankelDMDc,
@@ -20,10 +19,6 @@ from seakeep import (
     load_model,
 )
 from seakeep.models.alignment import FittedAlignment
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from test_selection import DT, INPUTS, PERIOD, STATES, runs, sea
 
 T = PERIOD * DT
 SHORT = Select(observables=True, horizon=10, period=T)
@@ -52,19 +47,6 @@ def test_columns_and_ridge_are_chosen_and_the_model_says_from_what(tmp_path):
     np.testing.assert_array_equal(same.coefficients, model.coefficients)
     assert model.history_samples <= SPEC.needs(DT).history + 1
     assert model.lead_samples <= SPEC.needs(DT).lead
-
-
-def test_the_note_counts_the_ridge_as_the_settings_do():
-    stated = dataclasses.replace(SPEC, ridge=0.5, ridge_scale="absolute")
-    assert stated.fit(runs(), STATES, INPUTS).selection.startswith("ridge 0.5: out of 4 settings")
-
-
-def test_where_nothing_can_be_held_out_the_ridge_is_a_default():
-    short = sea(0, samples=200).assign_attrs(encounter_period=T)
-    model = SPEC.fit(short, STATES, INPUTS)
-    assert (model.settings.ridge, model.settings.ridge_scale) == (1e-3, "per_snapshot")
-    assert model.settings.observables == ()
-    assert "can be held out of runs of at most 200" in model.selection
 
 
 def test_an_ensemble_draws_around_what_was_chosen(tmp_path):

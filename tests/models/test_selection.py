@@ -10,53 +10,16 @@ from drifting import INPUTS as PROBES
 from drifting import STATES as DRIFTING
 from drifting import drifting_run
 from free_runs import loop_score
+from records import record
+from squared import DT, INPUTS, PERIOD, STATES, runs
 
 from seakeep import (
     DataError,
     HankelDMDc,
     ProbeAlignment,
-    SlowSquares,
 )
 from seakeep.models.labelled import mean_period
 from seakeep.models.selection import RIDGES, default_observables, groups_of, select
-
-DT, PERIOD = 0.1, 10  # s, samples
-STATES, INPUTS = ["heave", "drift"], ["eta"]
-
-
-def sea(
-    seed: int, samples: int = 700, noise: float = 0.3, frequency: float | None = None
-) -> xr.Dataset:
-    """A heave that is linear in the wave, and a drift that goes with its slow square.
-
-    The wave is irregular, or regular of a `frequency` (Hz).
-    """
-    rng = np.random.default_rng(seed)
-    t = np.arange(samples) * DT
-    eta = np.zeros(samples)
-    for _ in range(12 if frequency is None else 1):
-        omega = 2 * np.pi * (rng.uniform(0.7, 1.3) if frequency is None else frequency)
-        eta += (0.1 if frequency is None else 0.3) * np.cos(omega * t + rng.uniform(0, 2 * np.pi))
-    heave, drift = np.zeros(samples), np.zeros(samples)
-    square = np.convolve(eta**2, np.hanning(31) / np.hanning(31).sum(), "same")
-    for k in range(2, samples):
-        heave[k] = 1.5 * heave[k - 1] - 0.8 * heave[k - 2] + 0.2 * eta[k - 1]
-        drift[k] = 0.97 * drift[k - 1] + 0.5 * square[k - 1]
-    channels = {"eta": eta, "heave": heave, "drift": drift}
-    return xr.Dataset(
-        {
-            name: ("time", values + noise * 0.1 * values.std() * rng.normal(size=samples))
-            for name, values in channels.items()
-        },
-        coords={"time": t},
-        attrs={"encounter_period": PERIOD * DT},
-    ).map(lambda variable: variable.assign_attrs(units="m"), keep_attrs=True)
-
-
-def runs(count: int = 3, **more) -> dict[str, xr.Dataset]:
-    made = {f"run{number}": sea(number, **more) for number in range(count)}
-    return {name: run.assign_attrs(encounter_period=PERIOD * DT) for name, run in made.items()}
-
 
 SPEC = HankelDMDc(6, 12, "rollout", delay_rows="exact")
 
@@ -84,24 +47,17 @@ def test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forec
 
 
 def test_periods_are_counted_in_the_first_elevation():
-    t = np.arange(600) * DT
-    waves = {
-        "wind": (4.0 + np.sin(2 * np.pi * t / 5), "m/s"),
-        "eta_fwd_rate": (np.sin(2 * np.pi * t / 3), "m/s"),
-        "gauge": (np.sin(2 * np.pi * t / 2.5), "m"),
-        "eta_fwd": (np.sin(2 * np.pi * t / 2), "m"),
-    }
-    run = xr.Dataset(
-        {name: ("time", x, {"units": units}) for name, (x, units) in waves.items()},
-        coords={"time": t},
-    )
+    periods = {"wind": 5, "eta_fwd_rate": 3, "gauge": 2.5, "eta_fwd": 2}
+    angles = 2 * np.pi * DT * np.arange(600)
+    run = record(DT, **{name: np.sin(angles / period) for name, period in periods.items()})
+    run["wind"].attrs["units"] = "m/s"
     still = run.assign(eta_fwd=0 * run["eta_fwd"])
     # Crossings of a sine between samples are linear to a thousandth of a step.
-    assert mean_period({"a": run}, list(waves)) == pytest.approx(2 / DT, rel=1e-3)
-    assert mean_period({"still": still, "a": run}, list(waves)) == pytest.approx(2 / DT, rel=1e-3)
+    assert mean_period({"a": run}, [*periods]) == pytest.approx(2 / DT, rel=1e-3)
+    assert mean_period({"still": still, "a": run}, [*periods]) == pytest.approx(2 / DT, rel=1e-3)
     assert mean_period({"a": run}, ["wind", "gauge"]) == pytest.approx(2.5 / DT, rel=1e-3)
     stated = run.assign_attrs(encounter_period=1.5)
-    assert mean_period({"still": still, "b": stated}, list(waves)) == pytest.approx(15)
+    assert mean_period({"still": still, "b": stated}, [*periods]) == pytest.approx(15)
     with pytest.raises(DataError, match=r"no input \(wind\) is a wave elevation, eta_…\. Set run"):
         mean_period({"a": run}, ["wind"])
 
@@ -119,20 +75,6 @@ def test_runs_that_repeat_the_wave_are_one_group_whatever_stands_first():
     assert len(set(groups_of(given, "run", ["eta"]).values())) == 3
     # Nothing tells of waves, so that nothing is held out together.
     assert len(set(groups_of({"again": again, "b": again}, "auto", ["wind"]).values())) == 2
-
-
-def test_squares_are_chosen_where_the_drift_goes_with_them_and_not_without_it():
-    spec = replace(SPEC, observables=[SlowSquares("eta", orders=(0,), lags=(0, 1))])
-    found = select(spec, runs(), STATES, INPUTS, vary=("observables",), horizon=(15.0,))
-    assert [each.kind for each in found.settings.observables] == ["slow_squares"]
-    scores = {
-        kind: min(row["score"] for row in found.rows if row["observables"] == kind)
-        for kind in ("none", "slow_squares")
-    }
-    assert scores["slow_squares"] < 0.7 * scores["none"]
-    assert sum(row["chosen"] for row in found.rows) == 1
-    for row in found.rows:
-        assert row["lower"] <= row["score"] <= row["upper"]
 
 
 def test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone():
@@ -194,11 +136,7 @@ def growing(seed: int, samples: int = 120) -> xr.Dataset:
     heave[0] = 1.0
     for k in range(samples - 1):
         heave[k + 1] = 1.005 * heave[k] + 0.5 * eta[k]
-    return xr.Dataset(
-        {"heave": ("time", heave, {"units": "m"}), "eta": ("time", eta, {"units": "m"})},
-        coords={"time": DT * np.arange(samples)},
-        attrs={"encounter_period": PERIOD * DT},
-    )
+    return record(DT, {"encounter_period": PERIOD * DT}, heave=heave, eta=eta)
 
 
 def test_what_grows_is_never_chosen():
@@ -239,9 +177,8 @@ def test_a_vessel_that_drifts_gets_an_alignment_and_the_measured_surge_is_no_cho
     assert [key for key in one if one[key][1]] == [key for key in other if other[key][1]]
     assert again.settings.alignment == found.settings.alignment
     # Without positions and depth there is nothing to carry by.
-    bare = {name: run.drop_attrs() for name, run in given.items()}
-    for name, run in bare.items():
-        bare[name] = run.assign_attrs(encounter_period=given[name].attrs["encounter_period"])
-    assert {row["alignment"] for row in select(spec, bare, DRIFTING, PROBES, **options).rows} == {
-        "none"
+    bare = {
+        name: run.drop_attrs().assign_attrs(encounter_period=1.5) for name, run in given.items()
     }
+    left = select(spec, bare, DRIFTING, PROBES, **options)
+    assert {row["alignment"] for row in left.rows} == {"none"}

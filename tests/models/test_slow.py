@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-import xarray as xr
+from records import record
 
 from seakeep import SeakeepWarning
 from seakeep.models.validity import slow_motions, warn_of_slow_motions
@@ -23,10 +23,7 @@ def run_of(seed, seconds, slow_period=30.0, slow=1.0, regular=False):
 
     f0 = 1.0 / slow_period
     drift = sum_of(0.8 * f0, 1.2 * f0) if not regular else np.cos(2 * np.pi * f0 * t)
-    values = {"surge": slow * drift + 0.3 * sum_of(0.4, 0.9), "heave": sum_of(0.4, 0.9)}
-    return xr.Dataset(
-        {name: ("time", x, {"units": "m"}) for name, x in values.items()}, coords={"time": t}
-    )
+    return record(DT, surge=slow * drift + 0.3 * sum_of(0.4, 0.9), heave=sum_of(0.4, 0.9))
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from records import record
 
 from seakeep import HankelDMDc, SlowSquares, tune
 from seakeep.core.observables import slow_kernel, slow_squares
@@ -13,15 +14,7 @@ from seakeep.models.selection import select
 DT, PERIOD = 0.1, 10  # s, samples
 KERNEL = slow_kernel(1 / (3 * PERIOD), 15)
 NOISE = 0.02
-
-
-def dataset(**channels: np.ndarray) -> xr.Dataset:
-    time = DT * np.arange(len(next(iter(channels.values()))))
-    return xr.Dataset(
-        {name: ("time", values, {"units": "m"}) for name, values in channels.items()},
-        coords={"time": time},
-        attrs={"encounter_period": PERIOD * DT},
-    )
+ATTRS = {"encounter_period": PERIOD * DT}
 
 
 def drifting(seed: int, samples: int = 1500) -> tuple[xr.Dataset, np.ndarray]:
@@ -36,7 +29,7 @@ def drifting(seed: int, samples: int = 1500) -> tuple[xr.Dataset, np.ndarray]:
     for k in range(samples - 1):
         surge[k + 1] = 0.95 * surge[k] + (0.05 * square[k] if known[k] else 0.01)
     noise = NOISE * surge.std() * rng.standard_normal(samples)
-    return dataset(eta=eta, surge=surge + noise), surge
+    return record(DT, ATTRS, eta=eta, surge=surge + noise), surge
 
 
 def test_a_quadratic_drift_is_recovered_to_its_noise():
@@ -83,7 +76,7 @@ def test_the_best_ridge_is_that_of_the_noise():
         for k in range(delays, 89):
             states[:, k + 1] += weights @ eta[k - delays : k + 1][::-1]
         named = {f"x{row}": values for row, values in enumerate(states)}
-        runs[f"run{number}"] = dataset(eta=eta, **named)
+        runs[f"run{number}"] = record(DT, ATTRS, eta=eta, **named)
     spec = HankelDMDc(0, delays, "rollout", delay_rows="exact")
     found = select(spec, runs, [f"x{row}" for row in range(channels)], ["eta"], horizon=(4.0,))
     scores = {row["ridge"]: row["score"] for row in found.rows}

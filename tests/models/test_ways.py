@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from drifting import DT, INPUTS, drifting_run
+from records import table
 
 from seakeep import (
     BayesianHankelDMDc,
@@ -73,10 +74,6 @@ def expected(model, run):
     return model.forecast(run, START * DT, STEPS)
 
 
-def table_of(dataset, names=STATES):
-    return np.stack([dataset[name].values for name in names], axis=-1)
-
-
 def reads_surge(model):
     """Whether a forecast is conditional on a surge that was measured."""
     alignment = model.settings.alignment
@@ -87,19 +84,19 @@ def test_windows_arrays_and_service_are_the_forecast(model, run, expected):
     # The same sums in another order, of loads of 30 N.
     close = {"rtol": 0, "atol": 1e-11}
     several = model.forecast_windows(run, [START * DT, 50.0], STEPS)
-    np.testing.assert_allclose(table_of(several)[0], table_of(expected), **close)
+    np.testing.assert_allclose(table(several, STATES)[0], table(expected, STATES), **close)
     carried = reads_surge(model)
-    x, u = table_of(run), table_of(model.aligned_inputs(run) if carried else run, INPUTS)
+    x, u = table(run, STATES), table(model.aligned_inputs(run) if carried else run, INPUTS)
     if carried:  # as a whole record, and not up to the end of the forecast
         close["atol"] = 1e-6
     arrays = model.forecast_arrays(x[: START + 1], u[: START + 1], u[START + 1 :], STEPS)
-    np.testing.assert_allclose(arrays, table_of(expected), **close)
+    np.testing.assert_allclose(arrays, table(expected, STATES), **close)
     if not carried:
         live = model.live(like=run)
         for at in range(START + 1):
             live.step(u[at], x[at])
         served = live.forecast(STEPS, u[START + 1 :]).isel(statistic=0)
-        np.testing.assert_allclose(table_of(served), table_of(expected), **close)
+        np.testing.assert_allclose(table(served, STATES), table(expected, STATES), **close)
 
 
 def test_members_are_the_models_of_their_settings(key, runs, run, model, expected, tmp_path):
@@ -114,17 +111,12 @@ def test_members_are_the_models_of_their_settings(key, runs, run, model, expecte
     ensemble = spec.fit(runs, STATES, INPUTS, stop=110.0)
     found = ensemble.forecast(run, START * DT, STEPS)
     for number, draw in enumerate(ensemble.members):
-        alone = replace(model.settings, ridge=draw.settings.ridge).fit(
-            runs, STATES, INPUTS, stop=110.0
-        )
-        for each in (
-            found.isel(member=number),
-            ensemble.member(number).forecast(run, START * DT, STEPS),
-        ):
-            # One arithmetic in another order.
-            np.testing.assert_allclose(
-                table_of(each), table_of(alone.forecast(run, START * DT, STEPS)), atol=1e-9
-            )
+        spec = replace(model.settings, ridge=draw.settings.ridge)
+        alone, member = spec.fit(runs, STATES, INPUTS, stop=110.0), ensemble.member(number)
+        wanted, own = (table(m.forecast(run, START * DT, STEPS), STATES) for m in (alone, member))
+        # One arithmetic in another order.
+        for each in (table(found.isel(member=number), STATES), own):
+            np.testing.assert_allclose(each, wanted, atol=1e-9)
     again = load_model(ensemble.save(tmp_path / "e.nc"))
     for same in (again, ensemble.hold()):
         xr.testing.assert_identical(same.forecast(run, START * DT, STEPS), found)

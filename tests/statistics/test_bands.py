@@ -7,7 +7,6 @@ from seakeep import statistics
 
 DT, SPLIT = 0.05, 0.2
 TIME = np.arange(480) * DT
-INNER = slice(200, -200)  # two periods of the split frequency from either end
 
 
 def test_the_parts_add_up_to_the_series():

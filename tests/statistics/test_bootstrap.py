@@ -33,19 +33,11 @@ def test_carlstein_finds_the_closed_form_of_an_autoregression(phi):
 
 
 def test_the_lag_one_correlation_is_the_printed_sum_with_its_square():
-    x = np.random.default_rng(2).standard_normal(50).cumsum()
-    centred = x - x.mean()
-    by_hand = 50 * sum(centred[i + 1] * centred[i] for i in range(49))
-    by_hand /= 49 * sum(centred**2)
-    # Two orders of summation of fifty terms.
-    assert lag_one_correlation(x) == pytest.approx(by_hand, rel=1e-12)
-
-
-def test_a_join_is_no_neighbour():
     x = np.concatenate([autoregressive(0.9, 200, 3), 50 + autoregressive(0.9, 200, 4)])
     centred = x - x.mean()
     pairs = [i for i in range(399) if i != 199]
     by_hand = 400 * sum(centred[i + 1] * centred[i] for i in pairs) / (398 * sum(centred**2))
+    # Two orders of summation.
     assert lag_one_correlation(x, [200, 200]) == pytest.approx(by_hand, rel=1e-12)
 
 
@@ -92,15 +84,6 @@ def test_length_and_values_are_kept_and_blocks_run_on(samples, data, n_series, s
     assert np.array_equal(drawn, again)
     inner = np.arange(1, samples) % length != 0
     assert np.all(np.diff(drawn, axis=1)[:, inner] == 1)
-
-
-def test_channels_keep_step():
-    x = np.random.default_rng(0).standard_normal(50)
-    drawn = moving_block_bootstrap(np.stack([x, -x], 1), 7, 6, np.random.default_rng(1))
-    assert drawn.shape == (7, 50, 2)
-    assert np.array_equal(drawn[..., 0], -drawn[..., 1])
-    alone = moving_block_bootstrap(x, 7, 6, np.random.default_rng(1))
-    assert np.array_equal(alone, drawn[..., 0])
 
 
 def test_no_block_crosses_a_join_of_segments():
