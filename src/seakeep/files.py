@@ -18,12 +18,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from seakeep.arrays import Datasets, Groups
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
 
 if TYPE_CHECKING:
     import h5py
     import xarray as xr
+
+    from seakeep.arrays import Datasets, Groups
 
 FORMAT = 9
 """Format of sealed files; one of another format is refused, and made again."""

@@ -9,7 +9,9 @@ from records import table
 
 import seakeep
 from seakeep import HankelDMDc, RequestError
-from seakeep.models.growth import weighed
+from seakeep.models.engine import Windows
+from seakeep.models.growth import LeadErrors, weigh_members, weighed
+from seakeep.models.interface import Scale
 from seakeep.signals.prediction import foresee
 
 PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
@@ -140,6 +142,35 @@ def test_where_waves_are_known_nothing_is_weighed(model):
     mean, _, weight = weighed(runs, 0.0, scale, known)
     np.testing.assert_array_equal(mean, np.where(known[:, None], runs[0, 0], scale.centre))
     np.testing.assert_array_equal(weight, np.repeat(known[:, None], 2, axis=1))
+
+
+@pytest.mark.parametrize("lost", [None, 0, 1])
+def test_a_run_that_is_lost_at_last_is_weighed_before(lost):
+    one, zero = np.ones(1), np.zeros(1)
+    scale, errors = Scale(zero, one, one, zero, one), LeadErrors(np.eye(1), np.full((9, 1), 9.0))
+    windows = Windows((), 9, (), *np.zeros((3, 1, 1, 1)), predicted=(3,))
+    parts = np.full((3, 2, 1, 9, 1), 5.0)  # of two members, the last one's departure
+    parts[:, 0] = -3.0
+    if lost is None:  # a member whose departure is lost counts with the others
+        parts[1, 0, :, -1] = np.nan
+        weigh_members(windows, parts, errors, scale)
+        np.testing.assert_allclose(parts[0, :, 0, :, 0].mean(axis=0), [1.0] * 3 + [0.0] * 6)
+        np.testing.assert_allclose(np.ptp(parts[0], axis=0), 8.0)
+        return
+    parts = parts[:, :1]
+    parts[lost, :, :, -1] = np.nan
+    weigh_members(windows, parts, errors, scale)
+    expected = [-3.0] * 3 + [0.0] * 5 + [0.0 if lost else np.nan]
+    np.testing.assert_allclose(parts[0, 0, 0, :, 0], expected)
+
+
+def test_errors_of_several_models_are_known_as_far_as_those_of_any():
+    parts = [
+        LeadErrors(n * np.eye(1), np.array(x)[:, None]) for n, x in ((1, [3.0]), (3, [1, 1, 4.0]))
+    ]
+    both = LeadErrors.together(parts)
+    np.testing.assert_allclose(both.residual, [[2.0]])
+    np.testing.assert_allclose(both.rms[:, 0] ** 2, [5.0, 5.0, 16.0])  # and never fall
 
 
 def test_the_weight_of_a_forecast_falls_with_its_error_and_never_rises(model):

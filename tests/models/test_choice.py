@@ -110,6 +110,25 @@ def test_the_ridges_about_the_best_of_what_is_taken_are_tried(monkeypatch):
     assert [*levels.values()] == [every[::4]] * 3
 
 
+def test_windows_of_few_runs_stay_in_memory_and_are_read_once(monkeypatch):
+    made = []
+    read_groups, problem = selection.read_groups, selection._problem
+    monkeypatch.setattr(selection, "read_groups", lambda *a: made.append(1) or read_groups(*a))
+    kept = []
+    monkeypatch.setattr(selection, "_problem", lambda *a: kept.append(problem(*a)) or kept[-1])
+    given = {f"{n}": next(iter(runs().values())).assign_attrs(run=f"{n}") for n in range(5)}
+    choice = {"vary": ("observables",), "folds": "run", "horizon": (10.0,)}
+    select(replace(SPEC, select=None), given, ["heave"], INPUTS, **choice)
+    (one,) = kept
+    assert len(one.read) == selection.LAST
+    # Rounds go back and forth, and the runs where they turn are read once.
+    assert len(made) < 2 * 5 + 5
+    for each in one.read.values():
+        for steps, (starts, windows) in each.items():
+            assert len(windows) == len(starts)
+            assert windows.steps == steps
+
+
 def test_what_brings_nothing_is_not_recommended():
     given = {name: run.drop_vars("drift") for name, run in runs().items()}
     model = SPEC.fit(given, ["heave"], INPUTS)

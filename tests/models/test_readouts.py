@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from drifting import DT, INPUTS, LINE, LOAD_NOISE, drifting_run
 from drifting import STATES as MOTIONS
+from ensembles import few
 from moored import FLOOR, NOISE, moored_run, moored_runs
 from moored import INPUTS as ETA
 from moored import STATES as MOORED
@@ -17,6 +18,7 @@ from seakeep import (
     ProbeAlignment,
     RequestError,
 )
+from seakeep.models import ensemble as ensembles
 from seakeep.models.selection import select
 
 STATES = [*MOTIONS, "mooring_bow"]
@@ -112,7 +114,7 @@ class TestTruth:
 class TestFloor:
     """A channel that rests on a floor in training, whether waves are carried or not."""
 
-    def test_a_floor_is_never_undercut_and_a_taut_line_has_none(self):
+    def test_a_floor_is_never_undercut_and_a_taut_line_has_none(self, monkeypatch):
         high = moored_run(9)
         high["eta"] = 2 * high["eta"]
         spec = replace(PLAIN, readouts="auto")
@@ -130,6 +132,10 @@ class TestFloor:
         xr.testing.assert_identical(load["mooring_bow"], linear["mooring_bow"])
         taut = spec.fit(moored_runs(slack=False), MOORED, ETA)
         assert not any(each.acts for each in taut.signature.readouts)
+        ensemble = few(readouts="auto").fit(moored_runs(), MOORED, ETA)
+        monkeypatch.setattr(ensembles, "weigh_members", lambda _, parts, *__: parts[0].fill(-9.0))
+        found = ensemble.forecast(high[{"time": slice(0, 300)}], 20.0, 400, ahead="predict")
+        assert np.all(found["mooring_stern"] == ensemble.signature.readouts[1].floor)
         unknown = replace(spec, centre="run").fit(moored_runs(), MOORED, ETA)
         assert not any(each.acts for each in unknown.signature.readouts)  # on which zero?
 

@@ -408,11 +408,16 @@ class HankelEnsemble(Model):
         self, windows: Windows, executor: Executor | None, progress: Progress | None
     ) -> Iterator[Series]:
         """Series of the members, weighed where waves are predicted, as :func:`member_series`."""
-        every = [windows, *windows.departures]
-        with member_series(self, every, executor, progress) as parts:
+        held = self
+        if windows.departures and not self.identified:  # weights take errors of all members
+            held = self.hold(executor=executor, progress=progress)
+        with member_series(held, [windows, *windows.departures], executor, progress) as parts:
             if windows.departures:
-                runs = [series for series, _ in parts]
-                weigh_members(windows, runs, self.errors, self.signature.state_scale)
+                runs, signature = [series for series, _ in parts], self.signature
+                weigh_members(windows, runs, held.errors, signature.state_scale)
+                for each in signature.readouts:  # what moved the members ends at a floor
+                    load = runs[0][..., each.column]
+                    np.maximum(load, each.floor, out=load)
             yield parts[0]
 
     def forecast_summary(

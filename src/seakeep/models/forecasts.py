@@ -231,8 +231,8 @@ class Model:
             ``live().forecast`` does, from its record by linear prediction
             (:func:`seakeep.signals.predict_waves`), and from what probes up-wave have seen where
             positions and depth are known. Samples missing after `start` count as not recorded.
-            As the error that is expected comes near the SD of training, the forecast, or the
-            mean of an ensemble, tends to the mean there, unless ``centre = "run"``.
+            As the error that is expected comes near the SD of training, the forecast of a model
+            that holds its errors, or the mean of an ensemble, tends to the mean there.
 
         Returns
         -------

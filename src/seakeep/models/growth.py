@@ -52,10 +52,14 @@ class LeadErrors:
 
     @classmethod
     def together(cls, parts: Sequence[LeadErrors]) -> LeadErrors:
-        """Errors of several models that count alike, as far as all of them are known."""
-        steps = min(len(each.rms) for each in parts)
-        squares = np.mean([each.rms[:steps] ** 2 for each in parts], axis=0)
-        return cls(np.mean([each.residual for each in parts], axis=0), np.sqrt(squares))
+        """Errors of several models, which count alike at each lead that they are known at."""
+        steps = max(len(each.rms) for each in parts)
+        residual = np.mean([each.residual for each in parts], axis=0)
+        reached = [
+            np.mean([each.rms[at] ** 2 for each in parts if at < len(each.rms)], axis=0)
+            for at in range(steps)
+        ]
+        return cls(residual, np.sqrt(np.maximum.accumulate(reached)))
 
     def of_forecast(self, steps: int, since: int = 0) -> FloatArray:
         """Mean squares over a forecast, shape (steps, N), `since` samples after measured states."""
@@ -249,10 +253,12 @@ def weighed(
     low, high = DOUBTED
     # A state that never moved is as it is.
     claimed = (spread + errors) / np.maximum(scale.spread**2, np.finfo(float).tiny)
-    trust = (high - claimed) / (high - low)
+    # Where a departure is lost, nothing of the forecast is trusted.
+    trust = np.nan_to_num((high - claimed) / (high - low), nan=0.0)
     lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)
     known, mean, centre = given[..., None], middle.mean(axis=0), scale.centre
-    shrunk = centre + lasting * (mean + np.cumsum(moved.mean(axis=0), axis=-2) - centre)
+    away = np.nan_to_num(np.cumsum(moved.mean(axis=0), axis=-2))
+    shrunk = centre + lasting * (mean + away - centre)
     return np.where(known, mean, shrunk), spread, np.where(known, 1.0, lasting)
 
 
@@ -267,7 +273,7 @@ def weigh_members(
         With their departures.
     parts : sequence of ndarray, each of shape (member, window, steps, N)
         Runs over the windows, which are changed, and over the departures. A member that is lost in
-        any of a window does not count there.
+        a window does not count there, unless all are.
     errors : LeadErrors
         Errors of the members' mean.
     scale : Scale
@@ -275,8 +281,10 @@ def weigh_members(
     """
     steps, squares = np.arange(windows.steps), errors.of_forecast(windows.steps)
     for number, first in enumerate(windows.predicted):
-        runs = np.stack([each[:, number] for each in parts], axis=1)
-        runs = runs[np.isfinite(runs).all(axis=(1, 2, 3))]
-        if first >= 0 and len(runs):
-            mean, *_ = weighed(runs, squares, scale, steps < first)
-            parts[0][:, number] += mean - runs[:, 0].mean(axis=0)
+        whole = np.isfinite(parts[0][:, number]).all(axis=(1, 2))
+        whole |= not whole.any()
+        for column in range(squares.shape[1] if first >= 0 else 0):  # one by one, for memory
+            at = slice(column, column + 1)
+            runs = np.stack([each[whole, number, :, at] for each in parts], axis=1)
+            mean, *_ = weighed(runs, squares[:, at], scale.part(at), steps < first)
+            parts[0][:, number, :, at] += mean - runs[:, 0].mean(axis=0)

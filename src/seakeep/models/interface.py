@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
 
 import numpy as np
 
@@ -42,6 +42,10 @@ class Scale:
     def bound(self) -> FloatArray:
         """Largest deviation in training, infinite for a channel that was constant there."""
         return np.where(self.reach > 0, self.reach, np.inf)
+
+    def part(self, channels: Any) -> Scale:
+        """Moments of some channels: an index of arrays."""
+        return Scale(*(getattr(self, each.name)[channels] for each in fields(self)))
 
     def deviations(self, values: FloatArray) -> FloatArray:
         """Standardised deviations of physical values, shape (…, channel)."""

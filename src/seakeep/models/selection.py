@@ -24,7 +24,7 @@ from collections.abc import (
     Sequence,
 )
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 import numpy as np
@@ -74,8 +74,8 @@ COARSE = 4
 """Every so-many-th λ is tried first."""
 NEAR = 1.5
 """Error, in parts of the best, above which the other λ of a candidate are left."""
-LAST = 4
-"""Runs whose windows stay in memory."""
+LAST = 3
+"""Runs whose windows each problem keeps in memory: the next round begins with them."""
 ALIKE = 0.03
 """Part of the lowest error by which the chosen λ may be worse.
 
@@ -147,9 +147,9 @@ class Trial:
         """λ that were not tried, up to the next that is worse on either side of the best."""
         tried = np.isfinite(self.means)
         near = np.flatnonzero(self.means <= (1.0 + ALIKE) * self.best)
-        worse = np.flatnonzero(tried)
-        low = worse[worse < near[0]].max(initial=-1)
-        high = worse[worse > near[-1]].min(initial=len(tried))
+        places = np.flatnonzero(tried)
+        low = places[places < near[0]].max(initial=-1)
+        high = places[places > near[-1]].min(initial=len(tried))
         return [self.levels[at] for at in range(low + 1, high) if not tried[at]]
 
     def level(self, alike: float, stated: float | None = None) -> float:
@@ -221,8 +221,7 @@ class Problem:
     horizons : tuple of int
         Lengths of the windows that are judged, samples.
     read : dict
-        Windows of the ``LAST`` runs that were read, by run and lengths: candidates are judged on
-        one run after the other, and the best on all again.
+        What :meth:`windows` gave last, by run and lengths, of ``LAST`` of them at most.
     taught : dict
         By the runs that teach, the normal equations of all columns that were made last, which
         candidates share.
@@ -234,7 +233,7 @@ class Problem:
     widest: HankelSettings
     ridges: tuple[float, ...]
     horizons: tuple[int, ...]
-    read: dict[tuple[int, tuple[int, ...]], dict[int, Windows]] = field(
+    read: dict[tuple[int, tuple[int, ...]], dict[int, tuple[list[int], Windows]]] = field(
         default_factory=dict, init=False, repr=False
     )
     taught: dict[tuple[int, ...], tuple[Any, list[Scale], PrimalSystem]] = field(
@@ -284,10 +283,8 @@ class Problem:
         path = spread_means(path, count, candidate.state_delays, blocks)
         if candidate.is_filter:
             path = np.pad(path, ((0, 0), (0, 0), (count, 0)))
-        x, u, w = (
-            Scale(*(getattr(scale, each.name)[part] for each in fields(scale)))
-            for scale, part in zip(scales, (slice(None), delayed, direct), strict=True)
-        )
+        parts = zip(scales, (slice(None), delayed, direct), strict=True)
+        x, u, w = (scale.part(part) for scale, part in parts)
         reach = candidate.state_reach, candidate.input_delays
         return Dynamics(path[0], *reach, x, u, w, data.signature.input_map.follows), path
 
@@ -334,25 +331,27 @@ class Problem:
         first = window.first_column + self.widest.centre
         return np.arange(first, window.last - steps + 1, steps)
 
-    def windows(self, run: int, horizons: Sequence[int]) -> dict[int, Windows]:
-        """What free runs of all candidates on a run read, by length.
+    def windows(self, run: int, horizons: Sequence[int]) -> dict[int, tuple[list[int], Windows]]:
+        """By length, new samples from which a run is forecast, and what is read from there.
 
-        A longer free run begins with the shorter one from the same sample, which is left out.
+        A longer free run begins with the shorter one from the same sample.
         """
         key = run, tuple(horizons)
-        if key not in self.read:
+        if (found := self.read.get(key)) is None:
             begin, dt, known = self.data.begin(run), self.data.signature.dt, set[int]()
-            groups = []
+            new: dict[int, list[int]] = {}
             for steps in sorted(horizons, reverse=True):
-                new = [at for at in self.starts(run, steps).tolist() if at not in known]
-                known.update(new)
-                places = [(self.data.names[run], begin + at * dt) for at in new]
-                groups += [(places, steps)] * bool(new)
-            if len(self.read) == LAST:
-                self.read.pop(next(iter(self.read)))
-            windows = read_groups(self.reader, self.runs, groups)
-            self.read[key] = {each.steps: each for each in windows}
-        return self.read[key]
+                starts = [at for at in self.starts(run, steps).tolist() if at not in known]
+                known.update(starts)
+                new |= {steps: starts} if starts else {}
+            name = self.data.names[run]
+            places = [([(name, begin + at * dt) for at in new[steps]], steps) for steps in new]
+            read = read_groups(self.reader, self.runs, places)
+            found = {each.steps: (new[each.steps], each) for each in read}
+            for old in list(self.read)[: len(self.read) - LAST + 1]:
+                self.read.pop(old, None)
+            self.read[key] = found
+        return found
 
     def folds(self) -> list[int]:
         """Runs in which a window of some length fits: each is held out once."""
@@ -388,9 +387,8 @@ class Problem:
         read = self.windows(run, horizons)
         for steps in sorted(horizons, reverse=True):
             starts = self.starts(run, steps).tolist()
-            new = [at for at in starts if at not in known]
-            if new:
-                windows = read[steps]
+            if steps in read:
+                new, windows = read[steps]
                 last = windows.delayed.shape[1] - self.ahead(candidate)
                 windows = replace(
                     windows,
@@ -524,7 +522,10 @@ class _Trials:
         self.try_more([each for each in new if self.made[each].best <= least], later)
 
     def try_more(self, candidates: Sequence[HankelSettings], later: int = 0) -> None:
-        """Try every ``COARSE``-th λ of candidates, or those next to the best of what was tried."""
+        """Try every ``COARSE``-th λ of candidates, or those next to the best of what was tried.
+
+        The second round begins with the runs that the first one read last.
+        """
         problem = next(iter(self.problems.values()))
         folds, firsts = problem.folds(), list(dict.fromkeys(problem.groups))
         again = sum(each in self.made for each in candidates)  # each has two parts
@@ -542,7 +543,7 @@ class _Trials:
             left |= {each: new} if new else {}
         keys = {
             (each, fold, tuple(new)): json.dumps([each.to_json(), fold, new], sort_keys=True)
-            for fold in folds
+            for fold in (folds[::-1] if again else folds)
             for each, new in left.items()
         }
         units = [unit for unit, key in keys.items() if key not in self.known]
