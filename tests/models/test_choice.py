@@ -129,6 +129,13 @@ def test_windows_of_few_runs_stay_in_memory_and_are_read_once(monkeypatch):
             assert windows.steps == steps
 
 
+def test_squares_are_tried_with_the_look_ahead_of_each_candidate():
+    start = replace(SPEC, select=None, lead=6)
+    found = select(start, runs(), STATES, INPUTS, vary=("lead", "observables"))
+    squared = {row["lead"] for row in found.rows if "slow_squares" in row["observables"]}
+    assert len(squared) > 1
+
+
 def test_what_brings_nothing_is_not_recommended():
     given = {name: run.drop_vars("drift") for name, run in runs().items()}
     model = SPEC.fit(given, ["heave"], INPUTS)

@@ -900,7 +900,7 @@ class _Search:
         if aligned is not None and aligned.surge == "predicted":
             lead = int(candidate.lead)
         every = default_observables(self.given[2], self.period * self.step, self.unseen, lead)
-        if lead is None and candidate.lead < self.base.lead and not candidate.lead:
+        if lead is None and "lead" in self.opened and candidate.lead == 0 < self.base.lead:
             every = tuple(replace(o, lead=0.0) if isinstance(o, SlowSquares) else o for o in every)
         return every[self.cut :]
 
