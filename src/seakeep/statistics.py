@@ -21,7 +21,6 @@ import xarray as xr
 from seakeep.arrays import finite
 from seakeep.core import bootstrap, density
 from seakeep.core import coverage as of_arrays
-from seakeep.core.bands import split_bands
 from seakeep.core.bootstrap import (
     BlockRule,
     block_length,
@@ -45,6 +44,7 @@ from seakeep.core.density import (
     kernel_bandwidth,
     kernel_density,
 )
+from seakeep.core.spectra import split_bands
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.pairing import channel_names, pair
 

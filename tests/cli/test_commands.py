@@ -351,7 +351,7 @@ def test_commands_report_what_prepare_finds(run, place, tmp_path, monkeypatch):
     assert found in run(f"compare {folder}/m.nc {campaign}")[1]
     steps = f"{campaign} --run unseen --steps"
     # The note comes before the work.
-    monkeypatch.setattr(importlib.import_module("seakeep.study.nowcast"), "nowcast", None)
+    monkeypatch.setattr(importlib.import_module("seakeep.study.comparison"), "nowcast", None)
     monkeypatch.setattr(seakeep.HankelEnsemble, "calibrate", None)
     monkeypatch.setattr("seakeep.study.fit_baselines", None)
     for command in (

@@ -15,7 +15,7 @@ from seakeep import HankelDMDc, ProbeAlignment, RequestError, load_live
 from seakeep.models.live import LEAST_RECORD
 from seakeep.models.validity import Validity
 from seakeep.signals import predict_waves
-from seakeep.study.nowcast import nowcast
+from seakeep.study.comparison import nowcast
 from seakeep.waves import group_speed
 
 START, STEPS = 500, 60  # the record that is kept holds all samples up to there

@@ -229,7 +229,7 @@ def compare(
         write_differences,
     )
     from seakeep.study import compare_models, comparison_table, difference_table
-    from seakeep.study.nowcast import served
+    from seakeep.study.comparison import served
 
     make_folder(out)
     names = _named(model)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg
 
-from seakeep.arrays import BoolArray, FloatArray
+from seakeep.arrays import TINY, BoolArray, FloatArray
 
 
 class DelayFilter:
@@ -65,7 +65,7 @@ class DelayFilter:
         """
         newest = slice(len(self.covariance) - len(variances), None)
         variance = np.diagonal(self.covariance)[newest]
-        factor = np.sqrt(variances / np.maximum(variance, np.finfo(float).tiny))
+        factor = np.sqrt(variances / np.maximum(variance, TINY))
         if not exactly:
             factor = np.minimum(factor, 1.0)
         rows = self.covariance[newest] * factor[:, None]
@@ -108,7 +108,7 @@ class DelayFilter:
         count = len(self.a)
         out = np.empty((steps, count))
         values, vectors = linalg.eigh(self.covariance)
-        significant = values > 1e-14 * max(float(values[-1]), np.finfo(float).tiny)
+        significant = values > 1e-14 * max(float(values[-1]), TINY)
         root = vectors[:, significant] * np.sqrt(values[significant])
         for row in out:
             newest = self.a @ root
@@ -138,7 +138,7 @@ def process_noise(residual: FloatArray, a: FloatArray, noise: FloatArray) -> Flo
         Q; directions that the measurement noise would make negative are kept at 1e-6 of the
         residual's largest variance.
     """
-    spread = np.sqrt(np.maximum(np.diagonal(residual), np.finfo(float).tiny))
+    spread = np.sqrt(np.maximum(np.diagonal(residual), TINY))
     every = np.tile(noise, a.shape[1] // a.shape[0])
     left = (residual - np.diag(noise) - (a * every) @ a.T) / np.outer(spread, spread)
     values, vectors = linalg.eigh(left)

@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
 from seakeep.conventions import is_elevation
-from seakeep.core.bands import PER_OCTAVE
 from seakeep.core.readouts import SOFT
+from seakeep.core.spectra import PER_OCTAVE
 from seakeep.files import MARK, check_output, make_folder, write_text
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model

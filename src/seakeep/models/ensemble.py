@@ -285,7 +285,14 @@ class HankelEnsemble(Model):
             radii = np.array(list(values))
             radii.flags.writeable = False
             self._radii.append(radii)
-            _warn_of_unstable(radii)
+            if unstable := int(np.count_nonzero(radii >= 1.0)):
+                warn(
+                    f"{unstable} of {counted(radii.size, 'member')} have a spectral radius of one "
+                    f"or more (up to {radii.max():.6f}): a free run of theirs grows, and once it "
+                    "is lost it is left out of mean and band. Raise the ridge, train on more "
+                    "data, use shorter state delays, or look for transients at the ends of the "
+                    "training runs."
+                )
         return self._radii[0]
 
     @cached_property
@@ -859,17 +866,6 @@ def spectral_radius(dynamics: Dynamics) -> float:
     size, states = top.shape[1], len(dynamics.state_scale.mean)
     square = top if len(top) == size else np.concatenate([top, np.eye(size - states, size)])
     return float(np.abs(np.linalg.eigvals(square)).max())
-
-
-def _warn_of_unstable(radii: FloatArray) -> None:
-    """Warn of members whose spectral radius is one or more, with what to do."""
-    if unstable := int(np.count_nonzero(radii >= 1.0)):
-        warn(
-            f"{unstable} of {counted(radii.size, 'member')} have a spectral radius of one or more "
-            f"(up to {radii.max():.6f}): a free run of theirs grows, and once it is lost it is "
-            "left out of mean and band. Raise the ridge, train on more data, use shorter state "
-            "delays, or look for transients at the ends of the training runs."
-        )
 
 
 def _range(values: Sequence[float] | FloatArray, form: str) -> str:

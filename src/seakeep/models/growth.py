@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.optimize import isotonic_regression
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray
+from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_windows
 from seakeep.models.interface import Scale, Signature
 from seakeep.models.readouts import FittedReadOut
@@ -252,7 +252,7 @@ def weighed(
         spread += middle.var(axis=0, ddof=1)
     low, high = DOUBTED
     # A state that never moved is as it is.
-    claimed = (spread + errors) / np.maximum(scale.spread**2, np.finfo(float).tiny)
+    claimed = (spread + errors) / np.maximum(scale.spread**2, TINY)
     # Where a departure is lost, nothing of the forecast is trusted.
     trust = np.nan_to_num((high - claimed) / (high - low), nan=0.0)
     lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)

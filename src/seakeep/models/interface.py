@@ -35,8 +35,8 @@ class Scale:
     reach: FloatArray
 
     def __post_init__(self) -> None:
-        for array in (self.mean, self.std, self.spread, self.centre, self.reach):
-            array.flags.writeable = False
+        for each in fields(self):
+            getattr(self, each.name).flags.writeable = False
 
     @property
     def bound(self) -> FloatArray:

@@ -23,6 +23,7 @@ import xarray as xr
 from scipy import special
 
 from seakeep.arrays import (
+    TINY,
     BoolArray,
     FloatArray,
     IntArray,
@@ -916,7 +917,7 @@ def _quantile(level: float, spread: FloatArray, variance: FloatArray, freedom: f
     Part of the variance is the `spread`, which is known with some degrees of `freedom`, and the
     rest is known from free runs; those of the sum are Satterthwaite's (1946).
     """
-    share = spread / np.maximum(variance, np.finfo(float).tiny)
+    share = spread / np.maximum(variance, TINY)
     doubt = (1.0 - share) ** 2 / WINDOWS + share**2 / freedom
     return special.stdtrit(1.0 / np.maximum(doubt, 1e-6), 0.5 + 0.5 * level)
 

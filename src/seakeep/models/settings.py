@@ -7,7 +7,6 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from html import escape
 from typing import Any, ClassVar, Literal, Self, get_args
 
 from seakeep.arrays import TINY, Datasets, number, whole_number
@@ -433,10 +432,6 @@ class HankelSettings:
             max(after),
         )
 
-    def _repr_html_(self) -> str:
-        """Settings as a table, for notebooks."""
-        return settings_html(type(self).__name__, self.to_json())
-
     def to_json(self) -> Json:
         """Settings as JSON values."""
         content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
@@ -463,18 +458,3 @@ def _written(value: Any) -> Any:
     if isinstance(value, Length):
         return str(value)
     return prior_json(value) if isinstance(value, Prior) else value
-
-
-def settings_html(name: str, settings: Mapping[str, Any]) -> str:
-    """Settings as a table: what ``_repr_html_`` of a spec gives.
-
-    Examples
-    --------
-    >>> settings_html("HankelDMDc", {"ridge": 1.0})
-    '<table><caption>HankelDMDc</caption><tr><th>ridge</th><td>1.0</td></tr></table>'
-    """
-    rows = "".join(
-        f"<tr><th>{escape(key)}</th><td>{escape(str(value))}</td></tr>"
-        for key, value in settings.items()
-    )
-    return f"<table><caption>{escape(name)}</caption>{rows}</table>"

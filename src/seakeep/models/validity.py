@@ -14,9 +14,9 @@ import numpy as np
 import xarray as xr
 from scipy import fft
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray
+from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray, IntArray
 from seakeep.conventions import is_elevation
-from seakeep.core.bands import PER_OCTAVE, band_edges, band_energy, split_bands
+from seakeep.core.spectra import PER_OCTAVE, band_edges, band_energy, split_bands
 from seakeep.errors import warn
 from seakeep.models import labelled
 from seakeep.models.interface import Signature
@@ -98,7 +98,7 @@ class Conditions:
     @property
     def beyond(self) -> float:
         """Height over the trained one where it lies outside; the largest, 1 or more."""
-        ratio = self.heights / np.maximum(self.trained.heights, np.finfo(float).tiny)
+        ratio = self.heights / np.maximum(self.trained.heights, TINY)
         return float(np.max(ratio, where=self.reasons[1], initial=1.0))
 
     def attrs(self) -> dict[str, Any]:
@@ -305,10 +305,10 @@ def _heights(inputs: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
     """
     deviations = inputs - inputs.mean(axis=0)
     squares = deviations**2
-    variance = np.maximum(squares.mean(axis=0), np.finfo(float).tiny)
+    variance = np.maximum(squares.mean(axis=0), TINY)
     height = 4 * np.sqrt(np.mean(squares**2, axis=0) / (3 * variance))
     power = np.abs(fft.rfft(np.hanning(len(inputs))[:, None] * deviations, axis=0)) ** 2
-    total = np.maximum(power.sum(axis=0), np.finfo(float).tiny)
+    total = np.maximum(power.sum(axis=0), TINY)
     frequency = fft.rfftfreq(len(inputs), dt) @ power / total
     return height, 2 * np.pi / GRAVITY * height * frequency**2
 

@@ -6,11 +6,12 @@ from .comparison import (
     comparison_table,
     difference_table,
     in_degrees,
+    nowcast,
+    nowcasts,
     to_full_scale,
     with_degrees,
 )
 from .fit import fit_baselines, fit_campaign, training_runs
-from .nowcast import nowcast, nowcasts
 from .run import run_study
 from .settings import Study, StudySettings, read_study
 from .store import StorageError, StudyResult, read_result

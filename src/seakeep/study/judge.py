@@ -19,9 +19,9 @@ import xarray as xr
 
 from seakeep import metrics, statistics
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray, undefined
-from seakeep.core.bands import split_bands
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.metrics import over_channels, paired, root_mean_square
+from seakeep.core.spectra import split_bands
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
 from seakeep.executor import in_order
 from seakeep.study.plan import random_stream

@@ -173,18 +173,17 @@ class OutputSettings(Table):
     )
 
 
-def _default_models() -> dict[str, StudyModelSettings]:
-    return {
-        "deterministic": StudyModelSettings(kind="hankel_dmdc"),
-        "bayesian": StudyModelSettings(kind="bayesian_hankel_dmdc"),
-    }
-
-
 class StudySettings(Table):
     """A whole study file."""
 
     study: GeneralStudySettings
-    models: dict[str, StudyModelSettings] = Field(default_factory=_default_models, min_length=1)
+    models: dict[str, StudyModelSettings] = Field(
+        default_factory=lambda: {
+            "deterministic": StudyModelSettings(kind="hankel_dmdc"),
+            "bayesian": StudyModelSettings(kind="bayesian_hankel_dmdc"),
+        },
+        min_length=1,
+    )
     training: TrainingSettings = TrainingSettings()
     tests: dict[str, TestSetSettings] = Field(
         default_factory=lambda: {"irregular": TestSetSettings(waves="irregular")}, min_length=1

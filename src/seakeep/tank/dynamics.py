@@ -38,7 +38,6 @@ LIMITS = {"surge": 20.0, "heave": 2.0, "pitch": 1.2, "piston": 2.0, "slosh": 2.0
 STABLE = 2.7  # RK4 is stable for |λ|·dt up to 2.78 on the imaginary and 2.785 on the real axis
 ITERATIONS = 100  # of the losses in a sea; some twenty are enough
 SLOPE = 0.02  # rad/s, to either side for the slope of the drift force
-LINES = "eye_x", "eye_z", "pole_x", "pole_z", "stiffness", "unstretched", "damping"
 KERNEL_RATE = 40.0  # rad/s, the fastest motion in the radiation kernel
 
 
@@ -128,8 +127,9 @@ def _loop() -> ModuleType:
 def line_table(
     lines: dict[str, LineSettings], position: float, centre_of_gravity: float
 ) -> FloatArray:
-    """Lines as rows of numbers for the time loop, columns as in ``LINES``.
+    """Lines as rows of numbers for the time loop.
 
+    Columns: x and z of eye and pole, stiffness, length at rest without tension, and damping.
     Lengths count from the centre of gravity at rest: `position` from the wave maker, the other
     above still water.
 
@@ -138,7 +138,7 @@ def line_table(
     RequestError
         If eye and pole coincide, or the pretension stretches a line beyond its length at rest.
     """
-    table = np.zeros((len(lines), len(LINES)))
+    table = np.zeros((len(lines), 7))
     for row, (name, line) in zip(table, lines.items(), strict=True):
         eye = (line.eye[0], line.eye[1] - centre_of_gravity)
         pole = (line.pole[0] - position, line.pole[1] - centre_of_gravity)

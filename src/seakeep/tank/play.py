@@ -240,13 +240,7 @@ def play(
     folder = Path(out)
     _check_outputs(folder, chosen, kind)
     asked = part, rig, folder, kind, one_logger, filmed
-
-    def tell(done: int, total: int, _: str = "") -> None:
-        if progress is not None:
-            progress(done, total, chosen[done] if done < total else "done")
-
-    tell(0, len(chosen))
-    played = in_order(_record_run, asked, chosen, executor, tell)
+    played = in_order(_record_run, asked, chosen, executor, progress, "run")
     files = dict(zip(chosen, played, strict=True))
     relative = {
         run: {key: path.relative_to(folder).as_posix() for key, path in paths.items()}
