@@ -20,6 +20,7 @@ from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import regular_periods
 from seakeep.models.specs import HankelDMDc
 from seakeep.signals import encounter_period
+from seakeep.signals.lags import parabola_peak
 from seakeep.waves import phase_speed
 
 PERIODS = 5.0
@@ -317,11 +318,15 @@ def estimate_probe_offset(
         raise RequestError(f"bounds must rise; received {bounds!r} (m).")
     coarse = np.linspace(low, high, 2 * COARSE + 1)
     errors = np.array([_offset_errors(model, part, distance) for distance in coarse])
-    best = int(_least(coarse, errors.mean(axis=1))[1])
-    step = coarse[1] - coarse[0]
-    fine = coarse[best] + step / 6.0 * np.arange(-FINE, FINE + 1)
+    best = int(errors.mean(axis=1).argmin())
+    step = (coarse[1] - coarse[0]) / 6.0
+    fine = coarse[best] + step * np.arange(-FINE, FINE + 1)
     errors = np.array([_offset_errors(model, part, distance) for distance in fine])
-    offset, at = _least(fine, errors.mean(axis=1))
+
+    def least(mean: FloatArray) -> float:
+        return float(fine[0] + step * parabola_peak(-mean)[0])
+
+    offset = least(errors.mean(axis=1))
     if best in (0, coarse.size - 1):
         warn(
             f"the offset found, {offset:.3g} m, lies at the end of the distances tried, {low:.3g} "
@@ -330,13 +335,13 @@ def estimate_probe_offset(
     rng = np.random.default_rng(0)
     blocks = np.stack([block.mean(axis=1) for block in np.array_split(errors, BLOCKS, axis=1)])
     drawn = rng.integers(0, BLOCKS, (RESAMPLES, BLOCKS))
-    offsets = np.array([_least(fine, blocks[rows].mean(axis=0))[0] for rows in drawn])
+    offsets = np.array([least(blocks[rows].mean(axis=0)) for rows in drawn])
     interval = (float(np.quantile(offsets, 0.025)), float(np.quantile(offsets, 0.975)))
     return ProbeOffset(
         offset=offset,
         spread=float(offsets.std(ddof=1)),
         interval=interval,
-        nrmse=float(np.sqrt(errors[at].mean())),
+        nrmse=float(np.sqrt(errors.mean(axis=1).min())),
         nrmse_uncorrected=float(np.sqrt(_offset_errors(model, part, 0.0).mean())),
         span=(float(part["time"][0]), float(part["time"][-1])),
     )
@@ -384,14 +389,3 @@ def _offset_errors(model: HankelDMDcModel, part: xr.Dataset, distance: float) ->
             "state, or raise ridge."
         )
     return out
-
-
-def _least(places: FloatArray, values: FloatArray) -> tuple[float, int]:
-    """Place of the least value, by a parabola through three, and its index."""
-    at = int(np.argmin(values))
-    if at in (0, values.size - 1):
-        return float(places[at]), at
-    before, here, after = values[at - 1 : at + 2]
-    bend = before - 2 * here + after
-    shift = 0.5 * (before - after) / bend if bend > 0 else 0.0
-    return float(places[at] + shift * (places[1] - places[0])), at
