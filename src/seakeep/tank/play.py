@@ -213,7 +213,7 @@ def play(
     executor : Executor, optional
         Plays runs side by side, on this machine.
     progress : callable, optional
-        Called as ``progress(done, total, what)``.
+        Called as ``progress(done, total, name)`` after each run.
 
     Returns
     -------
@@ -240,8 +240,11 @@ def play(
     folder = Path(out)
     _check_outputs(folder, chosen, kind)
     asked = part, rig, folder, kind, one_logger, filmed
-    played = in_order(_record_run, asked, chosen, executor, progress, "run")
-    files = dict(zip(chosen, played, strict=True))
+    files = {}
+    for name, made in zip(chosen, in_order(_record_run, asked, chosen, executor), strict=True):
+        files[name] = made
+        if progress is not None:
+            progress(len(files), len(chosen), name)
     relative = {
         run: {key: path.relative_to(folder).as_posix() for key, path in paths.items()}
         for run, paths in files.items()
