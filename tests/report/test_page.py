@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from tutorial_study import put_tutorial
+from tutorial_study import STUDY, put_tutorial
 
 from seakeep.files import check_report
 from seakeep.report.sections.results import (
@@ -27,39 +27,14 @@ from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Drawing, Section, write_page
 from seakeep.report.sections import write_report
 
-STUDY = """
-[study]
-campaign = "campaign.toml"
-preset = "recommended"
-states = ["heave", "pitch", "heave_rate"]
-inputs = ["eta_fwd", "eta_mid"]
-[training]
-windows = 2
-[models.deterministic]
-ridge = 0.15
-observables = []
-readouts = {}
-[models.bayesian]
-kind = "bayesian_hankel_dmdc"
-n_members = 4
-ridge = { log_uniform = [0.05, 0.5] }
-observables = []
-readouts = {}
-window = { uniform = ["10 T", "20 T"] }
-[tests.unseen]
-runs = ["unseen"]
-windows = 3
-length = 6
-label = "a & b < c"
-[statistics]
-n_series = 8
-"""
+CHANNELS = 'states = ["heave", "pitch", "heave_rate"]\ninputs = ["eta_fwd", "eta_mid"]'
+NAMED = STUDY.replace("seed = 3", CHANNELS).replace("length = 6", 'length = 6\nlabel = "a & b < c"')
 
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    put_tutorial(folder, STUDY)
+    put_tutorial(folder, NAMED)
     return write_report(run_study(read_study(folder / "study.toml"), folder / "out"))
 
 
