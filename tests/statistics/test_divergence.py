@@ -64,9 +64,9 @@ def test_the_bth_prediction_meets_the_bth_measurement_from_the_same_blocks():
             where = positions[draw]
             p = kernel_density(predicted[model][where], grid)
             q = kernel_density(MEASURED[where], grid)
-            # The same arithmetic in the same order.
+            # Bins are as wide as the narrowest of all draws asks, or of one: each errs 3e-5.
             assert found.draws[model, draw] == pytest.approx(
-                float(jensenshannon(p, q)) ** 2, abs=1e-14
+                float(jensenshannon(p, q)) ** 2, rel=1e-4
             )
     assert found.mean == pytest.approx(found.draws.mean(), rel=1e-14)
     assert found.lower == pytest.approx(np.quantile(found.draws, 0.025), rel=1e-14)

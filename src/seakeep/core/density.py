@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 from scipy import fft
+from scipy.sparse import csr_array
 from scipy.special import rel_entr
 from scipy.stats import gaussian_kde
 
@@ -55,20 +56,46 @@ def _as_grid(values: npt.ArrayLike) -> FloatArray:
     return grid
 
 
+def _redrawn(series: FloatArray, positions: IntArray) -> tuple[FloatArray, IntArray]:
+    """Samples in ascending order, and how often each stands in each row of positions."""
+    order = np.argsort(series, kind="stable")
+    place = np.empty_like(order)
+    place[order] = np.arange(order.size)
+    rows = place[positions] + order.size * np.arange(len(positions))[:, None]
+    times = np.bincount(rows.ravel(), minlength=order.size * len(rows))
+    return series[order], times.reshape(len(rows), order.size)
+
+
+def _once(series: FloatArray) -> tuple[FloatArray, IntArray]:
+    """The same of a series as it is."""
+    return np.sort(series), np.ones((1, series.size), dtype=np.intp)
+
+
 def _bandwidths(
-    x: FloatArray, bandwidth: Bandwidth, of_constant: float | FloatArray = 0.0
+    ordered: FloatArray, times: IntArray, bandwidth: Bandwidth, of_constant: float = 0.0
 ) -> FloatArray:
-    """Bandwidth of each series (series, time); a constant one is refused, or has another's."""
+    """Bandwidth of each row of :func:`_redrawn`; a constant one is refused, or has another's."""
     if isinstance(bandwidth, str) and bandwidth in FACTORS:
         factor, scale = FACTORS[bandwidth]
-        spread = np.where(np.ptp(x, axis=-1) > 0, x.std(axis=-1, ddof=1), 0.0)
-        upper, lower = np.quantile(x, [0.75, 0.25], axis=-1)
-        inner = (upper - lower) / scale
+        count, below = ordered.size, np.cumsum(times, axis=1)
+
+        def at(place: float) -> FloatArray:
+            """The sample at a place, counted from zero; linear between two."""
+            low, high = (
+                ordered[(below > whole).argmax(axis=1)]
+                for whole in (math.floor(place), math.ceil(place))
+            )
+            return low + (place % 1.0) * (high - low)
+
+        deviation, weights = ordered - ordered.mean(), times.astype(float)
+        variance = (weights @ deviation**2 - (weights @ deviation) ** 2 / count) / (count - 1)
+        spread = np.where(at(count - 1) > at(0), np.sqrt(np.maximum(variance, 0.0)), 0.0)
+        inner = (at(0.75 * (count - 1)) - at(0.25 * (count - 1))) / scale
         width = np.where(inner > 0, np.minimum(spread, inner), spread)
-        h = factor * width * x.shape[-1] ** -0.2
+        h = factor * width * count**-0.2
         h = np.where(h > 0, h, of_constant)
     elif not isinstance(bandwidth, str) and 0 < bandwidth < math.inf:
-        h = np.full(x.shape[0], float(bandwidth))
+        h = np.full(len(times), float(bandwidth))
     else:
         raise RequestError(
             "a bandwidth must be 'paper', 'silverman' or a positive number in the unit of the "
@@ -76,7 +103,7 @@ def _bandwidths(
         )
     if not h.all():
         raise DataError(
-            f"the series is constant ({x[np.argmin(h), 0]:g}); it has no correlation, block length "
+            f"the series is constant ({ordered[0]:g}); it has no correlation, block length "
             "or density. Leave the channel out."
         )
     return h
@@ -112,35 +139,38 @@ def kernel_bandwidth(series: npt.ArrayLike, bandwidth: Bandwidth = "paper") -> f
     >>> round(kernel_bandwidth([0.0, 1.0, 2.0, 3.0, 4.0], "silverman"), 4)
     0.9736
     """
-    return float(_bandwidths(as_series(series)[None], bandwidth)[0])
+    return float(_bandwidths(*_once(as_series(series)), bandwidth)[0])
 
 
-def _densities(x: FloatArray, grid: FloatArray, h: FloatArray) -> FloatArray:
+def _densities(ordered: FloatArray, times: IntArray, grid: FloatArray, h: FloatArray) -> FloatArray:
+    """Densities, shape (row, grid), of the rows of :func:`_redrawn`, each with its bandwidth."""
     span, steps = grid[-1] - grid[0], grid.size - 1
     even = np.allclose(np.diff(grid), span / steps, rtol=1e-6, atol=0.0)
-    out = np.empty((x.shape[0], grid.size))
-    for row, (values, width) in enumerate(zip(x, h, strict=True)):
-        # Bins between two grid points, beyond either end of the grid, and altogether.
-        fine = math.ceil(min(span / steps / width * BINS_PER_BANDWIDTH, MOST_BINS))
-        bin_width = span / (steps * fine)
-        beyond = math.ceil(min(REACH * width / bin_width, MOST_BINS))
-        bins = steps * fine + 1 + 2 * beyond
-        if not even or bins > MOST_BINS:
-            out[row] = gaussian_kde(values, width / values.std(ddof=1))(grid)
-            continue
-        # Share each sample between the two nearest of fine bins, then convolve with the kernel.
-        position = (values - grid[0]) / bin_width + beyond
-        position = position[(position >= 0) & (position <= bins - 1)]
-        left = np.minimum(position.astype(np.intp), bins - 2)
-        share = position - left
-        size = int(fft.next_fast_len(bins, real=True))
-        counts = np.bincount(left, 1.0 - share, minlength=size)
-        counts += np.bincount(left + 1, share, minlength=size)
-        angular = 2.0 * np.pi * fft.rfftfreq(size, bin_width)
-        smooth = fft.irfft(fft.rfft(counts) * np.exp(-0.5 * (width * angular) ** 2), n=size)
-        inner = smooth[beyond : beyond + steps * fine + 1 : fine]
-        out[row] = np.maximum(inner, 0.0) / (values.size * bin_width)
-    return out
+    # Bins between two grid points, of the narrowest kernel, and grid points beyond either end.
+    fine = math.ceil(min(span / steps / h.min() * BINS_PER_BANDWIDTH, MOST_BINS))
+    beyond = math.ceil(min(REACH * h.max() / span * steps, MOST_BINS))
+    points = int(fft.next_fast_len(grid.size + 2 * beyond, real=True))
+    bins = points * fine
+    if not even or bins > MOST_BINS:
+        rows = (np.repeat(ordered, each) for each in times)
+        every = zip(rows, h, strict=True)
+        return np.stack([gaussian_kde(x, width / x.std(ddof=1))(grid) for x, width in every])
+    # Share each sample between the two nearest of fine bins, then convolve with the kernel.
+    bin_width = span / (steps * fine)
+    position = (ordered - grid[0]) / bin_width + beyond * fine
+    near = np.flatnonzero((position >= 0) & (position < bins - 1))
+    left = position[near].astype(np.intp)
+    share = position[near] - left
+    places = np.concatenate([left, left + 1]), np.concatenate([near, near])
+    shares = csr_array((np.concatenate([1.0 - share, share]), places), (bins, ordered.size))
+    counts = (shares @ times.T).T
+    # So many values to a grid step resolve all frequencies that the narrowest kernel leaves.
+    enough = math.ceil(span / steps / h.min() * REACH / np.pi)
+    angular = 2.0 * np.pi * fft.rfftfreq(bins, bin_width)[: points * enough // 2 + 1]
+    kernel = np.exp(-0.5 * (h[:, None] * angular) ** 2)
+    smooth = fft.irfft(fft.rfft(counts)[:, : angular.size] * kernel, n=points * enough)
+    inner = enough * smooth[:, beyond * enough :: enough][:, : grid.size]
+    return np.maximum(inner, 0.0) / (ordered.size * span / steps)
 
 
 def kernel_density(
@@ -185,8 +215,9 @@ def kernel_density(
     1.0
     """
     x, points = as_bundle(series, "the series"), _as_grid(grid)
-    out = _densities(x, points, _bandwidths(x, bandwidth))
-    return out[0] if np.ndim(series) == 1 else out
+    rows = (_once(each) for each in x)
+    out = [_densities(*row, points, _bandwidths(*row, bandwidth))[0] for row in rows]
+    return out[0] if np.ndim(series) == 1 else np.stack(out)
 
 
 def density_grid(
@@ -221,7 +252,8 @@ def density_grid(
     """
     whole_number(points, "points", 2)
     all_of_them = [as_bundle(item, "the series") for item in series]
-    widths = np.concatenate([_bandwidths(x, bandwidth) for x in all_of_them])
+    rows = (_once(each) for x in all_of_them for each in x)
+    widths = np.concatenate([_bandwidths(*row, bandwidth) for row in rows])
     low = float(min(map(np.min, all_of_them)) - margin * widths.max())
     high = float(max(map(np.max, all_of_them)) + margin * widths.max())
     narrow = float(widths.min())
@@ -258,8 +290,8 @@ def bootstrapped_densities(
     series: FloatArray, positions: IntArray, grid: FloatArray, bandwidth: Bandwidth
 ) -> FloatArray:
     """Densities of one series redrawn at the given positions."""
-    drawn, own = series[positions], _bandwidths(series[None], bandwidth)
-    return _densities(drawn, grid, _bandwidths(drawn, bandwidth, own))
+    drawn, own = _redrawn(series, positions), _bandwidths(*_once(series), bandwidth)
+    return _densities(*drawn, grid, _bandwidths(*drawn, bandwidth, own[0]))
 
 
 @dataclass(frozen=True)

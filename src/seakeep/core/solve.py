@@ -70,6 +70,9 @@ REFINED_LIMIT = 1e-11
 
 Each correction gains four digits or more, up to those of singular values."""
 CORRECTIONS = 2
+ENOUGH = 1e-9
+"""A correction that changes less, as a part of the coefficients, is the last: the next is
+rounding."""
 PART = 512
 """Snapshot pairs of a part."""
 
@@ -305,7 +308,10 @@ class _Delayed:
             for part in self.parts():
                 regressors, targets = part.matrices()
                 right += (targets - solution @ regressors) @ regressors.T
-            solution += solve_rows(factor, right)
+            change = solve_rows(factor, right)
+            solution += change
+            if np.linalg.norm(change) <= ENOUGH * np.linalg.norm(solution):
+                break
         return solution
 
     def dual(self, ridge: float) -> FloatArray:

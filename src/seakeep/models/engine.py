@@ -153,6 +153,13 @@ class Dynamics:
         size = len(self.state_scale.mean) * (self.state_delays + 1)
         return self.coefficients[:, :size], self.coefficients[:, size:]
 
+    @property
+    def system(self) -> FloatArray:
+        """Â, with the rows that shift the delayed states where these are exact."""
+        rows, count = self.matrices[0], len(self.state_scale.mean)
+        size = rows.shape[1]
+        return rows if len(rows) == size else np.concatenate([rows, np.eye(size - count, size)])
+
 
 class Runs(Protocol):
     """An object that makes free runs: a model, an ensemble, or members that are held."""

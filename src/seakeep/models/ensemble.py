@@ -209,7 +209,7 @@ class HankelEnsemble(Model):
 
     def system_matrices(self) -> Iterator[FloatArray]:
         """Â of each member."""
-        return (self.member(number).A for number in range(self.n_members))
+        return (self.dynamics(number).system for number in range(self.n_members))
 
     def dynamics(self, number: int) -> Dynamics:
         """What a free run of a member needs, or of what they are centred on: number n_members."""
@@ -862,10 +862,7 @@ def _spectral_radius(ensemble: HankelEnsemble, number: int) -> float:
 
 def spectral_radius(dynamics: Dynamics) -> float:
     """Largest modulus of an eigenvalue of Â."""
-    top, _ = dynamics.matrices
-    size, states = top.shape[1], len(dynamics.state_scale.mean)
-    square = top if len(top) == size else np.concatenate([top, np.eye(size - states, size)])
-    return float(np.abs(np.linalg.eigvals(square)).max())
+    return float(np.abs(np.linalg.eigvals(dynamics.system)).max())
 
 
 def _range(values: Sequence[float] | FloatArray, form: str) -> str:

@@ -158,11 +158,7 @@ class HankelDMDcModel(Model):
     @cached_property
     def A(self) -> FloatArray:
         """Â, shape (N(s+1), N(s+1)), on standardised deviations, newest block first."""
-        a = self.dynamics.matrices[0].astype(float, copy=False)
-        size, count = a.shape[1], len(self.states)
-        if a.shape[0] == size:
-            return _read_only(a)
-        return _read_only(np.concatenate([a, np.eye(size - count, size)]))
+        return _read_only(self.dynamics.system.astype(float, copy=False))
 
     @cached_property
     def B(self) -> FloatArray:
