@@ -89,17 +89,18 @@ def test_a_step_is_the_equation():
     N, s, n, z, P, places, steps = 2, 3, 2, 4, 5, 9, 30
     place = Place(np.full(P, 1 / P), -1.0, 0.25, places, 0.1)
     a, b, d = (0.1 * rng.standard_normal((3, N, each)) for each in (N * (s + 1), n * (z + 1), 1))
-    models = Recursion(a, b, d[..., 0], 0.7, 0.2, 1)
+    gain, offset = np.array([0.7, 0.6, 0.5]), np.array([0.2, 0.1, -0.1])
+    models = Recursion(a, b, d[..., 0], gain, offset, 1)
     # So wide that the vessel leaves the grid at both ends.
-    histories, delayed = 9 * rng.standard_normal((2, 6, N)), rng.standard_normal((2, z, n))
+    histories, delayed = 9 * rng.standard_normal((3, 2, 6, N)), rng.standard_normal((2, z, n))
     table, starts = rng.standard_normal((60, places, n)), np.array([0, 25])
     forcing = rng.standard_normal((3, 2, steps, N))
     found, used = recursion(models, place, histories, delayed, table, starts, forcing)
     for model in range(3):
         for window in range(2):
-            x, u = list(histories[window]), list(delayed[window])
+            x, u = list(histories[model, window]), list(delayed[window])
             for step in range(steps):
-                surge = [0.2 + 0.7 * each[1] for each in x[-P:]]
+                surge = [offset[model] + gain[model] * each[1] for each in x[-P:]]
                 here = min(max(np.mean(surge), -1.0), 1.0)
                 row = [
                     np.interp(here, place.grid, table[starts[window] + step, :, column])
@@ -117,17 +118,17 @@ def test_a_step_is_the_equation():
             np.testing.assert_allclose(used[model, window], u[z:], rtol=1e-10, atol=1e-12)
             # One window of one model runs by numbers, not by arrays.
             of, at = slice(model, model + 1), slice(window, window + 1)
-            alone = Recursion(a[of], b[of], d[of, :, 0], 0.7, 0.2, 1)
+            alone = Recursion(a[of], b[of], d[of, :, 0], gain[of], offset[of], 1)
             (one,), (driven,) = recursion(
-                alone, place, histories[at], delayed[at], table, starts[at], forcing[of, at]
+                alone, place, histories[of, at], delayed[at], table, starts[at], forcing[of, at]
             )
             np.testing.assert_allclose(one[0], x[6:], rtol=1e-10, atol=1e-12)
             np.testing.assert_allclose(driven[0], u[z:], rtol=1e-10, atol=1e-12)
     lost = np.where(np.arange(steps)[:, None] < 20, forcing, np.nan)
     for of in (slice(1), slice(3)):  # a run that is lost stays so, and keeps a place
-        alone = Recursion(a[of], b[of], d[of, :, 0], 0.7, 0.2, 1)
+        alone = Recursion(a[of], b[of], d[of, :, 0], gain[of], offset[of], 1)
         one, driven = recursion(
-            alone, place, histories[:1], delayed[:1], table, starts[:1], lost[of, :1]
+            alone, place, histories[of, :1], delayed[:1], table, starts[:1], lost[of, :1]
         )
         np.testing.assert_array_equal(np.isnan(one), np.isnan(lost[of, :1]))
         assert np.isfinite(driven).all()

@@ -119,7 +119,7 @@ class Recursion:
         B, newest block first.
     on_square : ndarray, shape (model, N)
         D.
-    gain, offset : float
+    gain, offset : ndarray, shape (model,)
         Surge of the vessel, m, of the state of the surge: offset + gain · x.
     column : int
         Place of the surge among the states.
@@ -128,8 +128,8 @@ class Recursion:
     on_states: FloatArray
     on_inputs: FloatArray
     on_square: FloatArray
-    gain: float
-    offset: float
+    gain: FloatArray
+    offset: FloatArray
     column: int
 
 
@@ -150,7 +150,7 @@ def recursion(
         A, B and D.
     place : Place
         Where waves are read.
-    histories : ndarray, shape (window, at least max(s + 1, P), N)
+    histories : ndarray, shape (model, window, at least max(s + 1, P), N)
         States up to each start, oldest first.
     delayed : ndarray, shape (window, z, n)
         What drove the steps before each start, oldest first.
@@ -169,11 +169,11 @@ def recursion(
         What drove the steps.
     """
     count, windows, steps, N = forcing.shape
-    back, n = histories.shape[1], table.shape[2]
+    back, n = histories.shape[2], table.shape[2]
     size, width = models.on_states.shape[2], models.on_inputs.shape[2]
     # Newest first, so that the extended state of each step is a block of one buffer.
     states = np.empty((count, windows, (steps + back) * N))
-    states[..., steps * N :] = histories[:, ::-1].reshape(windows, -1)
+    states[..., steps * N :] = histories[:, :, ::-1].reshape(count, windows, -1)
     states[..., : steps * N] = forcing[:, :, ::-1].reshape(count, windows, -1)
     inputs = np.empty((count, windows, 1 + steps * n + width - n))
     inputs[..., 1 + steps * n :] = delayed[:, ::-1].reshape(windows, -1)
@@ -181,8 +181,8 @@ def recursion(
     wide = max(size, models.column + (len(place.taps) - 1) * N + 1)
     on_states = np.zeros((count, N + 1, wide))
     on_states[:, :N, :size] = models.on_states
-    on_states[:, N, models.column :: N][:, : len(place.taps)] = (
-        models.gain / place.spacing * place.taps
+    on_states[:, N, models.column :: N][:, : len(place.taps)] = np.outer(
+        models.gain / place.spacing, place.taps
     )
     # D stands before B, and the square before what drives the step, where the next step writes.
     on_square = place.spacing**2 * models.on_square[..., None]
@@ -197,7 +197,8 @@ def recursion(
     if is_alone:
         x, u = x[0], u[0]
     product = np.ndarray.dot if count == 1 else np.matmul
-    still = (models.offset * place.taps.sum() - place.lowest) / place.spacing
+    each_still = (models.offset * place.taps.sum() - place.lowest) / place.spacing
+    still = float(each_still[0]) if count == 1 else each_still[:, None, None]
     centre = (place.centre - place.lowest) / place.spacing
     flat, highest = np.ascontiguousarray(table.reshape(-1, n)), place.highest
     firsts, first = starts * place.count, int(starts[0]) * place.count

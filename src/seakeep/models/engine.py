@@ -46,6 +46,8 @@ members that go on from there would make up the mean of an ensemble."""
 MEMORY, LEAST = 20, 64
 """Longest delays over which the limit falls back after a high wave, or a spike of a probe, and the
 samples that a delay counts at least: slow drift rings for some hundred wave periods."""
+TOGETHER = 8
+"""Members, at most, whose free runs are stepped side by side."""
 HELD = 32 * 2**20
 """Bytes of member series that are held in memory; more is put into a temporary file."""
 
@@ -574,78 +576,61 @@ def linear_runs(
     groups: Sequence[Windows],
     readouts: Sequence[FittedReadOut] = (),
 ) -> list[FloatArray]:
-    """Free runs of linear members, each of shape (member, window, steps, N), physical units.
+    """Free runs of linear members side by side, each (member, window, steps, N), physical units.
 
     Read-outs see each member's series when its run is done.
     """
-    runs = [model_runs(each, each.coefficients[None], groups) for each in members]
-    for every in runs:
-        for values, windows in zip(every, groups, strict=True):
-            read_out(readouts, values, windows.waves)
-            if windows.zero is not None:
-                values += windows.zero[:, None]
-    # One member needs no copy.
-    return [each[0] if len(each) == 1 else np.concatenate(each) for each in zip(*runs, strict=True)]
-
-
-def model_runs(
-    scales: Dynamics, coefficients: FloatArray, groups: Sequence[Windows]
-) -> list[FloatArray]:
-    """Free runs of models of the same delays and moments, side by side.
-
-    Parameters
-    ----------
-    scales : Dynamics
-        Delays and moments of all models.
-    coefficients : ndarray, shape (model, N, N(s+1) + n(z+1) + m)
-        [Â B̂] of each.
-    groups : sequence of Windows
-        What they read.
-
-    Returns
-    -------
-    list of ndarray, each of shape (model, window, steps, N)
-        Physical units; NaN from where a run is lost.
-    """
     if any(windows.table is not None for windows in groups):
-        return [_followed_runs(scales, coefficients, windows) for windows in groups]
-    runs = [_open_runs(replace(scales, coefficients=each), groups) for each in coefficients]
-    return [np.stack(each) if len(each) > 1 else each[0][None] for each in zip(*runs, strict=True)]
+        runs = [_followed_runs(members, windows) for windows in groups]
+    else:
+        every = zip(*(_open_runs(each, groups) for each in members), strict=True)
+        # One member needs no copy.
+        runs = [np.stack(each) if len(each) > 1 else each[0][None] for each in every]
+    for values, windows in zip(runs, groups, strict=True):
+        read_out(readouts, values, windows.waves)
+        if windows.zero is not None:
+            values += windows.zero[:, None]
+    return runs
 
 
-def _followed_runs(scales: Dynamics, coefficients: FloatArray, windows: Windows) -> FloatArray:
-    """Free runs step by step, where the model follows its own surge."""
+def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
+    """Free runs step by step, where members follow their own surge; NaN from where one is lost."""
     assert windows.starts is not None
     assert windows.table is not None
-    follows, z, s = scales.follows, scales.input_delays, scales.state_delays
+    follows = members[0].follows
     assert follows is not None
-    x, u, w = scales.state_scale, scales.input_scale, scales.direct_scale
-    size = len(x.mean) * (s + 1)
-    inputs = size + len(u.mean) * (z + 1)
-    # On regressors in physical units; their means are part of what is constant.
-    on_inputs = coefficients[..., size:inputs] / np.tile(u.std, z + 1)
-    on_direct = coefficients[..., inputs:] / w.std
-    constant = on_inputs @ np.tile(u.mean, z + 1) + on_direct @ w.mean
-    forcing = np.einsum("wtm,lnm->lwtn", windows.direct, on_direct[..., :-1], optimize=True)
-    forcing -= constant[:, None, None]
-    models = Recursion(
-        coefficients[..., :size],
-        on_inputs,
-        on_direct[..., -1],
-        gain=float(x.std[follows.column]),
-        offset=float(x.mean[follows.column]),
-        column=follows.column,
-    )
+    # Delays that a member does not have count nothing.
+    s, z = (max(getattr(each, f"{of}_delays") for each in members) for of in ("state", "input"))
+    N, n = windows.histories.shape[2], windows.table.shape[2]
+    on_states = np.zeros((len(members), N, N * (s + 1)))
+    on_inputs = np.zeros((len(members), N, n * (z + 1)))
+    on_square = np.empty((len(members), N))
+    histories = np.empty((len(members), *windows.histories.shape))
+    forcing = np.empty((len(members), len(windows), windows.steps, N))
+    for k, each in enumerate(members):
+        u, w, lags = each.input_scale, each.direct_scale, each.input_delays + 1
+        a, b = each.matrices
+        on_states[k, :, : a.shape[1]] = a
+        # On regressors in physical units; their means are part of what is constant.
+        own, on_direct = b[:, : n * lags] / np.tile(u.std, lags), b[:, n * lags :] / w.std
+        on_inputs[k, :, : n * lags] = own
+        on_square[k] = on_direct[:, -1]
+        np.matmul(windows.direct, on_direct[:, :-1].T, out=forcing[k])
+        forcing[k] -= own @ np.tile(u.mean, lags) + on_direct @ w.mean
+        histories[k] = each.state_scale.deviations(windows.histories)
+    surges = [[each.state_scale.std, each.state_scale.mean] for each in members]
+    gain, offset = np.array(surges)[..., follows.column].T
+    models = Recursion(on_states, on_inputs, on_square, gain, offset, follows.column)
     known = windows.delayed.shape[1] - windows.steps
     delayed = windows.delayed[:, known - z : known]
     computed, used = recursion(
-        models, follows.place, x.deviations(windows.histories), delayed,
-        windows.table, windows.starts, forcing,
-    )  # fmt: skip
+        models, follows.place, histories, delayed, windows.table, windows.starts, forcing
+    )
     with np.errstate(over="ignore", invalid="ignore"):  # a run that is lost is cut just below
-        for values, each in zip(computed, used, strict=True):
-            driving = np.concatenate([delayed, each], axis=1)
-            cut_lost(x.physical(values, out=values), scales, replace(windows, delayed=driving))
+        for values, drove, each in zip(computed, used, members, strict=True):
+            driving = np.concatenate([delayed, drove], axis=1)
+            each.state_scale.physical(values, out=values)
+            cut_lost(values, each, replace(windows, delayed=driving))
     return computed
 
 
@@ -720,9 +705,9 @@ def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows)
 Series = tuple[FloatArray, IntArray]
 
 
-def _run_member(data: tuple[Runs, Sequence[Windows]], member: int) -> list[FloatArray]:
+def _run_members(data: tuple[Runs, Sequence[Windows]], members: Sequence[int]) -> list[FloatArray]:
     model, groups = data
-    return [each[0] for each in model.free_runs(groups, [member])]
+    return model.free_runs(groups, members)
 
 
 @contextmanager
@@ -767,15 +752,24 @@ def member_series(
             for each in groups
         ]
         # What members are centred on comes after them.
-        numbers = range(count + model.is_centred)
-        members = in_order(_run_member, (model, groups), numbers, executor, progress)
-        for number, values in enumerate(members):
-            for (series, lost), each in zip(runs, values, strict=True):
-                if number == count:
-                    _centre(series, lost, each)
-                else:
-                    series[number] = each
-                    lost[number] = first_lost(each)
+        total = count + model.is_centred
+        size = sum(series.nbytes for series, _ in runs) // count
+        together = max(1, min(TOGETHER, HELD // max(size, 1)))
+        parts = [range(total)[at : at + together] for at in range(0, total, together)]
+
+        def tell(done: int, of: int, what: str) -> None:
+            if progress is not None:
+                number = parts[done - 1].stop
+                progress(number, total, f"member {number}")
+
+        computed = in_order(_run_members, (model, groups), parts, executor, tell)
+        for part, every in zip(parts, computed, strict=True):
+            for (series, lost), values in zip(runs, every, strict=True):
+                members = values[: count - part.start]
+                series[part.start : part.start + len(members)] = members
+                lost[part.start : part.start + len(members)] = first_lost(members)
+                if part.stop > count:
+                    _centre(series, lost, values[-1])
         yield runs
 
 

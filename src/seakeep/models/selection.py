@@ -38,7 +38,7 @@ from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.executor import in_order
 from seakeep.models import labelled
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
-from seakeep.models.engine import Dynamics, Windows, model_runs, read_groups
+from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.following import LEAD
 from seakeep.models.interface import Scale, Signature
@@ -267,8 +267,8 @@ class Problem:
 
     def models(
         self, candidate: HankelSettings, levels: Sequence[float], runs: Sequence[int]
-    ) -> tuple[Dynamics, FloatArray]:
-        """Models of some runs: the first of them, and coefficients, shape (level, N, p)."""
+    ) -> list[Dynamics]:
+        """Models of some runs, one per level."""
         data, (delayed, direct) = self.data, self.parts(candidate)
         count, blocks = len(data.signature.states), candidate.blocks
         scales, system = self._system(candidate, runs)
@@ -286,7 +286,8 @@ class Problem:
         parts = zip(scales, (slice(None), delayed, direct), strict=True)
         x, u, w = (scale.part(part) for scale, part in parts)
         reach = candidate.state_reach, candidate.input_delays
-        return Dynamics(path[0], *reach, x, u, w, data.signature.input_map.follows), path
+        follows = data.signature.input_map.follows
+        return [Dynamics(each, *reach, x, u, w, follows) for each in path]
 
     def _system(
         self, candidate: HankelSettings, runs: Sequence[int]
@@ -379,9 +380,10 @@ class Problem:
                     yield FreeRuns(predicted[None], measured, model.signature.state_scale.std)
             return
         delayed, direct = self.parts(candidate)
-        dynamics, coefficients = self.models(candidate, levels, others or rest)
+        models = self.models(candidate, levels, others or rest)
         states = data.signature.state_scale.physical(data.states[run])
-        zeros: dict[int, FloatArray] = {}
+        if data.zeros:
+            states += data.zeros[run]
         known: dict[int, FloatArray] = {}  # by start: a longer run begins with the shorter one
         every: dict[int, FreeRuns] = {}
         read = self.windows(run, horizons)
@@ -396,16 +398,12 @@ class Problem:
                     direct=windows.direct[..., direct[: windows.direct.shape[2]]],
                     table=None if windows.table is None else windows.table[..., delayed],
                 )
-                (computed,) = model_runs(dynamics, coefficients, [windows])
+                (computed,) = linear_runs(models, [windows])
                 known |= zip(new, computed.swapaxes(0, 1), strict=True)
-                if windows.zero is not None:
-                    zeros |= zip(new, data.zeros[run] - windows.zero, strict=True)
             if starts:
                 predicted = np.stack([known[at][:, :steps] for at in starts], axis=1)
                 measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
-                if zeros:
-                    measured += np.stack([zeros[at] for at in starts])[:, None]
-                every[steps] = FreeRuns(predicted, measured, dynamics.state_scale.std)
+                every[steps] = FreeRuns(predicted, measured, models[0].state_scale.std)
         yield from (every[steps] for steps in horizons if steps in every)
 
     def judge(self, candidate: HankelSettings, fold: int, levels: Sequence[float]) -> Scores:
