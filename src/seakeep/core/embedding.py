@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from seakeep.arrays import FloatArray, as_real
 from seakeep.errors import RequestError
@@ -110,11 +111,9 @@ def embed(series: FloatArray, delays: int, first: int, count: int) -> FloatArray
             f"columns {first} to {first + count - 1} with {delays} delays do not lie in a series "
             f"of shape {series.shape}; (time, channel) with all of these samples is needed."
         )
-    channels = series.shape[1]
-    out = np.empty((channels * (delays + 1), count))
-    for lag in range(delays + 1):
-        out[lag * channels : (lag + 1) * channels] = series[first - lag : first - lag + count].T
-    return out
+    newest_first = np.ascontiguousarray(series[first - delays : first + count][::-1])
+    columns = sliding_window_view(newest_first, delays + 1, axis=0)[::-1]
+    return columns.transpose(0, 2, 1).reshape(count, -1).T
 
 
 def block_means(series: FloatArray, blocks: Sequence[tuple[int, int]]) -> FloatArray:

@@ -278,7 +278,7 @@ class Problem:
         kept = np.concatenate([np.ones(own, bool), later, direct, means])
         pairs = sum(data.windows[run].columns for run in runs)
         factor = pairs if candidate.ridge_scale == "per_snapshot" else 1
-        gram, right = system.gram[np.ix_(kept, kept)], system.right[:, kept]
+        gram, right = system.gram.compress(kept, 0).compress(kept, 1), system.right[:, kept]
         path = ridge_path(gram, right, [factor * level for level in levels])
         path = spread_means(path, count, candidate.state_delays, blocks)
         if candidate.is_filter:
