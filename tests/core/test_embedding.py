@@ -8,8 +8,8 @@ from seakeep.core import embed, training_window
 
 def test_blocks_are_lag_major_the_newest_first():
     series = np.array([[0.0, 10], [1, 11], [2, 12], [3, 13]])
-    column = embed(series, delays=2, first=3, count=1)[:, 0]
-    np.testing.assert_array_equal(column, [3, 13, 2, 12, 1, 11])
+    columns = embed(series, delays=1, first=2, count=2)
+    np.testing.assert_array_equal(columns.T, [[2, 12, 1, 11], [3, 13, 2, 12]])
 
 
 @pytest.mark.parametrize(

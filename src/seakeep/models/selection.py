@@ -741,8 +741,8 @@ def select(
     period : float, optional
         Encounter period, s; by default that of the runs.
     kinds : sequence of HankelSettings, optional
-        Other kinds of models, which take what they have of the settings that were chosen. One that
-        errs less, by more than the noise, is named; it is chosen where `vary` names "kind".
+        Other kinds of models, which take what they have of the settings that were chosen: one that
+        errs less, by more than the noise, is chosen.
     executor : Executor, optional
         Judges candidates and folds side by side; the result is the same.
     progress : callable, optional
@@ -1064,16 +1064,18 @@ def _rivalled(
     kinds: Sequence[HankelSettings],
     alike: float,
 ) -> tuple[Any, float, str]:
-    """A candidate and λ, of another kind where that is varied and better, and words on the better.
+    """A candidate and λ, of another kind where one errs less by more than the noise, in words too.
 
-    The better one is the best that errs less by more than the noise and does not grow.
+    It is the best that does not grow. What a fit leaves open is not tried beside a model that only
+    its own surge makes good, which no other kind follows.
     """
-    # Beside a fit only the waves themselves are tried, which takes a hundredth of its time.
-    is_varied, words = "kind" in search.vary, ""
-    own = {"ridge"} if is_varied else {"ridge", "observables"}
-    plain = {key: v for key, v in vars(search.at_rest(taken)).items() if key not in own}
+    rest, words = search.at_rest(taken), ""
+    plain, limit = trials.made.get(rest), NEAR * trials.made[taken].best
+    if "kind" not in search.vary and (plain is None or plain.best > limit):
+        return taken, level, words
+    own = {key: value for key, value in vars(rest).items() if key != "ridge"}
     both = replace(trials, made=dict(trials.made))
-    both.judge(each.having(**plain) for each in kinds if search.given[2])
+    both.judge(each.having(**own) for each in kinds if search.given[2])
     others = [each for each in both.made if each not in trials.made]
     for other in sorted(others, key=lambda each: both.made[each].best):
         if trials.made[taken].is_as_good_as(both.made[other]):
@@ -1084,10 +1086,9 @@ def _rivalled(
         if not problem.grows(other, own_level):
             score = both.made[other].at(own_level)
             words = f"; kind = '{other.kind}' errs {score:.3f}, less by more than the noise"
-            taken, level = (other, own_level) if is_varied else (taken, level)
+            taken, level = other, own_level
             break
-    if is_varied:
-        trials.made.update(both.made)
+    trials.made.update(both.made)
     return taken, level, words
 
 
