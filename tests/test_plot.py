@@ -18,7 +18,7 @@ STATES = ["surge", "heave", "pitch"]
 
 @pytest.fixture(scope="module")
 def run():
-    return moored_run(seed=2).assign_attrs(encounter_period=1.0, waves="irregular")
+    return moored_run(2)
 
 
 @pytest.fixture(scope="module")

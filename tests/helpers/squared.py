@@ -3,6 +3,7 @@
 import numpy as np
 import xarray as xr
 from records import record
+from scipy import signal
 
 DT, PERIOD = 0.1, 10  # s, samples
 STATES, INPUTS = ["heave", "drift"], ["eta"]
@@ -18,11 +19,9 @@ def sea(
     for _ in range(12 if frequency is None else 1):
         omega = 2 * np.pi * (rng.uniform(0.7, 1.3) if frequency is None else frequency)
         eta += (0.1 if frequency is None else 0.3) * np.cos(omega * t + rng.uniform(0, 2 * np.pi))
-    heave, drift = np.zeros((2, samples))
+    heave = signal.lfilter([0.0, 0.2], [1.0, -1.5, 0.8], eta)
     square = np.convolve(eta**2, np.hanning(31) / np.hanning(31).sum(), "same")
-    for k in range(2, samples):
-        heave[k] = 1.5 * heave[k - 1] - 0.8 * heave[k - 2] + 0.2 * eta[k - 1]
-        drift[k] = 0.97 * drift[k - 1] + 0.5 * square[k - 1]
+    drift = signal.lfilter([0.0, 0.5], [1.0, -0.97], square)
     channels = {"eta": eta, "heave": heave, "drift": drift}
     for x in channels.values():
         x += noise * 0.1 * x.std() * rng.normal(size=samples)

@@ -49,6 +49,9 @@ def test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts():
             found.append(loop_score(model, run, STATES, steps, 12))
         # Windows side by side are summed in another order than one by one.
         assert float(row["score"]) == pytest.approx(np.mean(found), abs=1e-9)
+    # A vessel with a memory stays a Hankel model.
+    assert isinstance(result.spec, HankelDMDc)
+    assert "kind = " not in result.note
 
 
 def test_a_kind_that_is_better_beyond_the_noise_is_named_by_fit_and_taken_by_tune():
@@ -67,12 +70,6 @@ def test_a_kind_that_is_better_beyond_the_noise_is_named_by_fit_and_taken_by_tun
     fitted = replace(spec, ridge="rollout", select=select).fit(given, ["heave"], ["eta"])
     assert isinstance(fitted.settings, HankelDMDc)
     assert "kind = 'fir' errs 0." in fitted.selection
-
-
-def test_a_vessel_with_a_memory_stays_a_hankel_model():
-    result = tune(SPEC, runs(), STATES, INPUTS, vary=["kind"], horizon=(15,))
-    assert isinstance(result.spec, HankelDMDc)
-    assert "kind = " not in result.note
 
 
 @pytest.mark.parametrize("spec", [FIR(24, 1e-3, lead=3), Subspace(8, 24, 0.1), ARX(8, 16, 1e-2)])

@@ -22,15 +22,12 @@ START, STEPS = 500, 60  # the record that is kept holds all samples up to there
 SQUARES = seakeep.SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
 SETTINGS = {
     "plain": {},
-    "ridge rows": {"delay_rows": "ridge"},
     "lead": {"lead": 6},
-    "memory": {"memory": 40},
-    "observables": {"lead": 6, "observables": (SQUARES, seakeep.Powers("eta_fwd"))},
     "aligned": {
         "lead": 6,
         "memory": 40,
         "alignment": ProbeAlignment(mode="dispersion", surge="predicted"),
-        "observables": (SQUARES,),
+        "observables": (SQUARES, seakeep.Powers("eta_fwd")),
     },
 }
 
@@ -475,9 +472,7 @@ def thrusted():
         rng, samples = np.random.default_rng(seed), 1200
         wave = np.sin(0.3 * np.arange(samples) + rng.uniform(0, 6)) + rng.normal(0, 0.3, samples)
         thrust = np.repeat(rng.uniform(-1, 1, samples // 30), 30)
-        surge = np.zeros(samples)
-        for k in range(samples - 1):
-            surge[k + 1] = 0.9 * surge[k] + 0.3 * wave[k] + 0.5 * thrust[k]
+        surge = signal.lfilter([0.0, 1.0], [1.0, -0.9], 0.3 * wave + 0.5 * thrust)
         return record(0.1, surge=surge, eta=wave, thrust=thrust)
 
     model = HankelDMDc(0, 0, 1e-9, delay_rows="exact").fit(

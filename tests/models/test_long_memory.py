@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from records import record
+from scipy import signal
 
 from seakeep import HankelDMDc, RequestError, Select, tune
 
@@ -18,9 +19,8 @@ SPEC = HankelDMDc(4, 0, 0.0, standardize=False, delay_rows="exact", memory=16)
 def remembering(seed: int, samples: int = 300) -> xr.Dataset:
     """A heave that remembers means of its past, driven by the wave of the instant."""
     rng = np.random.default_rng(seed)
-    heave, eta = rng.standard_normal((2, samples))
-    for k in range(16, samples - 1):
-        heave[k + 1] = WEIGHTS @ heave[k - 16 : k + 1][::-1] + 0.7 * eta[k]
+    eta = rng.standard_normal(samples)
+    heave = signal.lfilter([0.0, 0.7], [1.0, *-WEIGHTS], eta)
     return record(DT, {"encounter_period": 0.4}, heave=heave, eta=eta)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from records import record
+from scipy import signal
 
 from seakeep import HankelDMDc, SlowSquares, tune
 from seakeep.core.observables import slow_kernel, slow_squares
@@ -25,9 +26,7 @@ def drifting(seed: int, samples: int = 1500) -> tuple[xr.Dataset, np.ndarray]:
     eta = 0.2 * np.cos(angles).sum(axis=1)
     square = slow_squares(eta, 0, KERNEL, (2 * PERIOD - 15,), DT)[:, 0]
     known = np.isfinite(square)
-    surge = np.zeros(samples)
-    for k in range(samples - 1):
-        surge[k + 1] = 0.95 * surge[k] + (0.05 * square[k] if known[k] else 0.01)
+    surge = signal.lfilter([0.0, 1.0], [1.0, -0.95], np.where(known, 0.05 * square, 0.01))
     noise = NOISE * surge.std() * rng.standard_normal(samples)
     return record(DT, ATTRS, eta=eta, surge=surge + noise), surge
 
