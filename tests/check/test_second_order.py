@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from records import record
+from scipy import signal
 from seas import sea
 
 from seakeep import Expression, HankelDMDc, SlowSquares, check
@@ -19,9 +20,7 @@ def drifting_run(samples=2000, waves=None, **attrs):
         wave = 0.45 * sea(0, (0.7, 1.3), PERIOD, 40).at(time)
     else:
         wave = 0.5 * np.cos(2 * np.pi * waves * time)
-    surge = np.zeros(samples)
-    for k in range(samples - 1):
-        surge[k + 1] = MEMORY * surge[k] + GAIN * wave[k] ** 2
+    surge = signal.lfilter([0.0, GAIN], [1.0, -MEMORY], wave**2)
     return record(DT, {"encounter_period": PERIOD, **attrs}, eta=wave, surge=surge)
 
 

@@ -1,7 +1,6 @@
 """A heave that is linear in the wave, and a drift that goes with its slow square."""
 
 import numpy as np
-import xarray as xr
 from records import record
 from scipy import signal
 
@@ -9,9 +8,7 @@ DT, PERIOD = 0.1, 10  # s, samples
 STATES, INPUTS = ["heave", "drift"], ["eta"]
 
 
-def sea(
-    seed: int, samples: int = 700, noise: float = 0.3, frequency: float | None = None
-) -> xr.Dataset:
+def sea(seed, samples=700, frequency=None):
     """A run in irregular waves, or in regular ones of a `frequency` (Hz)."""
     rng = np.random.default_rng(seed)
     t = np.arange(samples) * DT
@@ -24,9 +21,9 @@ def sea(
     drift = signal.lfilter([0.0, 0.5], [1.0, -0.97], square)
     channels = {"eta": eta, "heave": heave, "drift": drift}
     for x in channels.values():
-        x += noise * 0.1 * x.std() * rng.normal(size=samples)
+        x += 0.03 * x.std() * rng.normal(size=samples)
     return record(DT, {"encounter_period": PERIOD * DT}, **channels)
 
 
-def runs(count: int = 3) -> dict[str, xr.Dataset]:
+def runs(count=3):
     return {f"run{number}": sea(number) for number in range(count)}

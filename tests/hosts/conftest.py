@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from drifting import drifting_run
 from records import record, table
+from scipy import signal
 
 from seakeep import (
     Expression,
@@ -34,9 +35,7 @@ def sea_run(seed, samples=400):
     """Two probes, a surge that follows them, and the load of a line that falls slack."""
     rng = np.random.default_rng(seed)
     eta, probe = rng.standard_normal((2, samples + 2)) * 0.3
-    surge = np.zeros(samples + 2)
-    for k in range(1, samples + 1):
-        surge[k + 1] = 1.6 * surge[k] - 0.7 * surge[k - 1] + 0.3 * eta[k] + probe[k] * eta[k]
+    surge = signal.lfilter([0.0, 1.0], [1.0, -1.6, 0.7], (0.3 + probe) * eta)
     load = np.maximum(2.0, 5.0 + 8.0 * surge) + 0.1 * rng.standard_normal(samples + 2)
     channels = {"eta": eta, "wave probe": probe, "surge": surge, "load": load}
     return record(DT, **{name: values[2:] for name, values in channels.items()})
