@@ -146,9 +146,6 @@ def test_whatever_is_written_as_netcdf_survives_a_disk_that_is_full(tmp_path):
 class TestOutputs:
     """No output replaces an input, or a file that seakeep did not write."""
 
-    def test_a_place_without_a_file_is_free(self, tmp_path):
-        check_output(tmp_path / "model.nc", "model", [tmp_path / "model.nc"])
-
     def test_an_input_is_kept_under_any_name(self, tmp_path):
         raw = tmp_path / "raw.csv"
         raw.write_text("time [s],heave [m]\n")

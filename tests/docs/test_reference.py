@@ -1,20 +1,16 @@
 """The pages of the campaign file and of the study file say what the settings say."""
 
-import importlib.util
 from pathlib import Path
 
 import pytest
+from loaded import loaded
 
 DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.fixture(scope="module")
 def module():
-    place = DOCS / "make_reference.py"
-    spec = importlib.util.spec_from_file_location("make_reference", place)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return loaded(DOCS / "make_reference.py")
 
 
 @pytest.mark.parametrize("name", ["campaign_file.md", "study.md"])

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import xarray as xr
+from records import table
 from scipy import signal
 
 from seakeep import HankelDMDc, HankelDMDcModel
@@ -20,10 +21,6 @@ SAME_MATRICES = 1e-10
 SAME_FORECAST = 1e-9
 
 
-def matrix(run, names=(*STATES, *INPUTS)):
-    return np.stack([run[name].values for name in names], axis=1)
-
-
 def fit(runs, s, z, ridge=0.5, **settings):
     settings = {"standardize": False, "history": "inside", **settings}
     return HankelDMDc(s, z, ridge, **settings).fit(runs, states=STATES, inputs=INPUTS)
@@ -36,7 +33,8 @@ def koopman_pipeline(runs, s, z, ridge=0.5):
         regressor=pykoop.Edmd(alpha=ridge),
     )
     data = pykoop.combine_episodes(
-        [(number, matrix(run)) for number, run in enumerate(runs)], episode_feature=True
+        [(number, table(run, STATES + INPUTS)) for number, run in enumerate(runs)],
+        episode_feature=True,
     )
     pipeline.fit(data, n_inputs=Q, episode_feature=True)
     return pipeline
@@ -74,14 +72,14 @@ def test_forecasts_equal_pykoop(make_run, delay_rows, relift, s, z):
     pipeline = koopman_pipeline(runs, s, z)
     first = model.history_samples
     expected = pipeline.predict_trajectory(
-        matrix(other, STATES)[:first],
-        matrix(other, INPUTS),
+        table(other, STATES)[:first],
+        table(other, INPUTS),
         relift_state=relift,
         episode_feature=False,
     )
     forecast = model.forecast(other, start=float(other.time[first - 1]), steps=160 - first)
     np.testing.assert_allclose(
-        matrix(forecast, STATES), expected[first:], rtol=0, atol=SAME_FORECAST
+        table(forecast, STATES), expected[first:], rtol=0, atol=SAME_FORECAST
     )
 
 
@@ -92,7 +90,7 @@ def test_the_first_rows_equal_scikit_learn(make_run, delay_rows, samples, ridge)
     s, z = 5, 20
     run = make_run(samples=samples)
     model = fit(run, s, z, ridge=ridge, delay_rows=delay_rows)
-    x, u = matrix(run, STATES), matrix(run, INPUTS)
+    x, u = table(run, STATES), table(run, INPUTS)
     rows = [
         np.concatenate([x[j - s : j + 1][::-1].ravel(), u[j - z : j + 1][::-1].ravel()])
         for j in range(z, samples - 1)
@@ -129,10 +127,10 @@ def exported(request, make_run, delays):
     instant = float(run.time[start])
     return Exported(
         model,
-        matrix(run, INPUTS)[start : start + steps + 1] - model.input_mean,
+        table(run, INPUTS)[start : start + steps + 1] - model.input_mean,
         model.initial_state(run, start=instant),
-        matrix(run, STATES)[start],
-        matrix(model.forecast(run, start=instant, steps=steps), STATES),
+        table(run, STATES)[start],
+        table(model.forecast(run, start=instant, steps=steps), STATES),
     )
 
 
