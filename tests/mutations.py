@@ -373,12 +373,12 @@ def status(place: Path, tests: list[str]) -> int | None:
 def verdict(place: Path, file: str, old: str, new: str, tests: str) -> str:
     """What tests say of one change: killed, survives or stale."""
     path = place / "src/seakeep" / file
-    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    text = path.read_text("utf-8") if path.exists() else ""
     if text.count(old) != 1:
         return "stale"
-    path.write_text(text.replace(old, new), encoding="utf-8")
+    path.write_text(text.replace(old, new), "utf-8")
     found = status(place, tests.split())
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, "utf-8")
     return {PASSED: "survives", FAILED: "killed"}.get(found, "stale")
 
 
@@ -399,7 +399,7 @@ def main() -> int:
     changes = [each for each in CHANGES if all(word in " ".join(each) for word in chosen.k.split())]
     chosen.results.parent.mkdir(exist_ok=True)
     chosen.results.touch()
-    lines = chosen.results.read_text(encoding="utf-8").splitlines()
+    lines = chosen.results.read_text("utf-8").splitlines()
     known = dict(line.split(maxsplit=2)[:2] for line in lines if " stale " not in line)
     keys = {each: key(each) for each in changes}
     left = [each for each in changes if keys[each] not in known]

@@ -68,7 +68,7 @@ def room_of(module: str) -> str:
 def imported(path: Path) -> set[str]:
     """Modules that a file imports anywhere: ours in full, others by their first name."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):

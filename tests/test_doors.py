@@ -16,7 +16,7 @@ from seakeep.quality import Record, findings_of, warn_of
 from seakeep.quality.findings import as_json
 
 ROOT = Path(__file__).parents[1]
-PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 DOORS = dict(re.findall(r"^### Add (.*)\n(?:(?!#).*\n)*?```python\n((?:.*\n)*?)```$", PAGE, re.M))
 
 STUDY = """
@@ -47,7 +47,7 @@ def add(tmp_path):
 
     def run(door, registry):
         before.append((registry, registry.copy()))
-        (tmp_path / "door.py").write_text(DOORS[door], encoding="utf-8")
+        (tmp_path / "door.py").write_text(DOORS[door], "utf-8")
         return runpy.run_path(str(tmp_path / "door.py"))
 
     yield run

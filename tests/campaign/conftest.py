@@ -14,7 +14,7 @@ def tank(tmp_path):
     """Folder with ``first.csv``, ``second.csv`` and ``campaign.toml``."""
     for seed, name in enumerate(("first", "second")):
         write_csv(tmp_path / f"{name}.csv", tank_columns(seed))
-    (tmp_path / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
+    (tmp_path / "campaign.toml").write_text(CAMPAIGN, "utf-8")
     return tmp_path
 
 
@@ -23,7 +23,7 @@ def edited(tank):
     """Write the campaign file with texts replaced; return its path."""
 
     def write(*pairs: tuple[str, str]) -> Path:
-        (tank / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
+        (tank / "campaign.toml").write_text(CAMPAIGN, "utf-8")
         return edit(tank / "campaign.toml", *pairs)
 
     return write

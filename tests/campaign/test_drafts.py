@@ -13,7 +13,7 @@ from seakeep.campaign.guesses import suggest_channel
 def drafted(folder, files):
     text = draft_campaign(files, folder)
     path = folder / "campaign.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, "utf-8")
     return text, read_campaign(path)
 
 
@@ -211,7 +211,7 @@ def test_init_takes_what_the_message_asks_for(tmp_path, capsys):
     path = tmp_path / "de.txt"
     rows = [f"{i / 50:.4f}\t{np.sin(i / 9):.4f}".replace(".", ",") for i in range(200)]
     head = ["Messung Schlepptank BM-7", "", "Zeit\tWelle_1", "s\tcm"]
-    path.write_text("\n".join([*head, *rows, ""]), encoding="utf-8")
+    path.write_text("\n".join([*head, *rows, ""]), "utf-8")
     assert cli.main(["init", str(path)]) == 1
     assert "give --skip-rows 2 to seakeep init" in " ".join(capsys.readouterr().err.split())
     out = tmp_path / "campaign.toml"

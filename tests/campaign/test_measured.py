@@ -33,7 +33,7 @@ def files_of(name):
 def test_draft(tmp_path, name):
     files = files_of(name)
     path = tmp_path / "campaign.toml"
-    path.write_text(draft_campaign(files, tmp_path), encoding="utf-8")
+    path.write_text(draft_campaign(files, tmp_path), "utf-8")
     campaign = read_campaign(path)
     # The position of the flume's wavemaker is the one column whose header says no unit.
     bare = [n for n, each in campaign.settings.channels.items() if each.unit_assumed]

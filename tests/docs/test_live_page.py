@@ -7,7 +7,7 @@ from loaded import loaded
 from pages import play
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs/howto/live.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/howto/live.md").read_text("utf-8")
 
 
 def test_the_page_runs_and_its_example_plays_a_run(tutorial, capsys):

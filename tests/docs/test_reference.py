@@ -15,7 +15,7 @@ def module():
 
 @pytest.mark.parametrize("name", ["campaign_file.md", "study.md"])
 def test_the_page_is_up_to_date(name, module):
-    written = (DOCS / name).read_text(encoding="utf-8")
+    written = (DOCS / name).read_text("utf-8")
     assert module.keys_of(module.StudySettings)
     assert written == module.PAGES[name](), "run python docs/make_reference.py"
 

@@ -6,7 +6,7 @@ import pytest
 from pages import play
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGE = (DOCS / "study.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "study.md").read_text("utf-8")
 
 
 def test_the_page_runs_and_prints_what_it_shows(tutorial, monkeypatch):
@@ -22,5 +22,5 @@ def test_the_page_runs_and_prints_what_it_shows(tutorial, monkeypatch):
 def test_the_page_shows_the_study_file():
     begin = PAGE.index("```toml\n") + len("```toml\n")
     shown = PAGE[begin : PAGE.index("```", begin)]
-    written = (DOCS / "tutorial" / "study.toml").read_text(encoding="utf-8")
+    written = (DOCS / "tutorial" / "study.toml").read_text("utf-8")
     assert written.partition("\n\n")[2] == shown

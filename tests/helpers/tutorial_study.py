@@ -47,7 +47,7 @@ def put_tutorial(folder: Path, study: str = STUDY) -> None:
     for path in TUTORIAL.glob("*"):
         if path.suffix in (".toml", ".csv"):
             shutil.copy(path, folder)
-    (folder / "study.toml").write_text(study, encoding="utf-8")
+    (folder / "study.toml").write_text(study, "utf-8")
 
 
 def edit(path: Path, *pairs: tuple[str, str]) -> Path:

@@ -160,6 +160,6 @@ def _write_raw(folder: Path, run: str, seed: int) -> None:
 def write(folder: Path) -> Path:
     """Write settings and raw files into a folder; gives the campaign file."""
     path = folder / "campaign.toml"
-    path.write_text(CAMPAIGN, encoding="utf-8")
+    path.write_text(CAMPAIGN, "utf-8")
     _write_raw(folder, "one", 1)
     return path

@@ -25,13 +25,13 @@ def trial(*by_group):
 
 @pytest.mark.parametrize(
     ("other", "is_as_good"),
-    [
-        ((0.31, 0.21, 0.11), False),  # worse by as much everywhere: no noise
-        ((0.34, 0.22, 0.06), True),  # by .01 in the mean, with a standard error of .026
-        ((0.33, 0.21, 0.10), False),  # by .0133, with one of .0088
-        ((0.32, 0.20, 0.10), True),  # by .0067, with one of as much
-        ((0.20, 0.20, 0.10), True),
-    ],
+    {
+        (0.31, 0.21, 0.11): False,  # worse by as much everywhere: no noise
+        (0.34, 0.22, 0.06): True,  # by .01 in the mean, with a standard error of .026
+        (0.33, 0.21, 0.10): False,  # by .0133, with one of .0088
+        (0.32, 0.20, 0.10): True,  # by .0067, with one of as much
+        (0.20, 0.20, 0.10): True,
+    }.items(),
 )
 def test_the_noise_is_a_standard_error_over_what_is_held_out(other, is_as_good):
     best = trial(0.3, 0.2, 0.1)

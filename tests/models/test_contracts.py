@@ -106,7 +106,7 @@ class TestWaves:
 
     @pytest.mark.parametrize(
         ("period", "words"),
-        [(2.0, None), (2.8, "between .*, with none between"), (8.0, "outside .* to ")],
+        {2.0: None, 2.8: "between .*, with none between", 8.0: "outside .* to "}.items(),
     )
     def test_a_period_outside_and_in_a_gap(self, period, words, tmp_path):
         model = HankelDMDc(2, 8, 1.0).fit(self.regular(2.0, 4.0), ["heave"], ["eta"])

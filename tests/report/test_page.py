@@ -155,9 +155,9 @@ def test_a_report_that_was_interrupted_is_written_again(tmp_path):
         write_page(tmp_path, "Title", stamp, (section,))
     (tmp_path / "figures" / "lines.png").touch()
     check_report(tmp_path)  # raises nothing: the folder is ours
-    assert "not finished" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "not finished" in (tmp_path / "report.html").read_text("utf-8")
     write_page(tmp_path, "Title", stamp, ())
-    assert "not finished" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "not finished" not in (tmp_path / "report.html").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")

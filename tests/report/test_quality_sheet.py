@@ -127,7 +127,7 @@ def test_prepare_writes_a_page_that_needs_nothing_else(tmp_path, capsys):
     assert names == {"first.nc", "second.nc", "quality.html", "quality_first.png",
                      "quality_second.png"}  # fmt: skip
     page_of = folder / "quality.html"
-    page = page_of.read_text(encoding="utf-8")
+    page = page_of.read_text("utf-8")
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     assert page.count("<img") == 2
     assert '<th class="number">findings</th>' in page  # heads stand over their numbers

@@ -67,7 +67,7 @@ def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
 # --- the moving-block bootstrap ------------------------------------------------------------------
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     samples=st.integers(2, 60),
     data=st.data(),

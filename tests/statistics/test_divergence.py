@@ -36,7 +36,7 @@ MASSES = arrays(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(p=MASSES, q=MASSES)
 def test_it_is_bounded_symmetric_and_scipys_square(p, q):
     assume(p.sum() > 0)

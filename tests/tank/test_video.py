@@ -55,6 +55,6 @@ def test_a_filmed_campaign_is_prepared(filmed, tmp_path):
     assert files["side_view"].suffix == ".mp4"
     campaign = read_campaign(tmp_path / "campaign.toml")
     assert "side_view" not in campaign.settings.runs["one"].files  # no table of a logger
-    assert "# Filmed: raw/one/side_view.mp4" in campaign.path.read_text(encoding="utf-8")
+    assert "# Filmed: raw/one/side_view.mp4" in campaign.path.read_text("utf-8")
     assert write_prepared(campaign)
     assert "surge" in load_prepared(campaign)["one"]
