@@ -32,7 +32,7 @@ FEWER = {"bayesian_hankel_dmdc": {"n_members": 3}, "subspace": {"order": 8}}
 TANK = pytest.mark.skipif(not importlib.util.find_spec("numba"), reason="needs the extra tank")
 
 
-def written(name: str, folder: Path) -> str:
+def written(name, folder):
     """Text of the campaign of a set of data, whose files are put into `folder`."""
     if name == "tutorial":
         shutil.copytree(ROOT / "docs/tutorial", folder, dirs_exist_ok=True)

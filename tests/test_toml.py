@@ -25,7 +25,7 @@ class Whole(Table):
     depth: Positive = 1.0
 
 
-def refused(path, content: bytes | None = None) -> str:
+def refused(path, content=None):
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(RequestError) as caught:

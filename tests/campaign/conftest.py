@@ -1,7 +1,5 @@
 """Fixtures: the small tank's folder, and its campaign file with texts replaced."""
 
-from pathlib import Path
-
 import pytest
 from small_tank import CAMPAIGN, tank_columns, write_csv
 from tutorial_study import edit
@@ -22,7 +20,7 @@ def tank(tmp_path):
 def edited(tank):
     """Write the campaign file with texts replaced; return its path."""
 
-    def write(*pairs: tuple[str, str]) -> Path:
+    def write(*pairs):
         (tank / "campaign.toml").write_text(CAMPAIGN, "utf-8")
         return edit(tank / "campaign.toml", *pairs)
 

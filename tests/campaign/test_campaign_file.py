@@ -8,7 +8,7 @@ from seakeep.errors import RequestError
 from seakeep.toml import Length
 
 
-def refusal(path) -> str:
+def refusal(path):
     with pytest.raises(RequestError) as caught:
         read_campaign(path)
     return str(caught.value)

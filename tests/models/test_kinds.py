@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from free_runs import loop_score
 from records import record
 from squared import INPUTS, PERIOD, STATES, runs
@@ -19,7 +18,7 @@ from seakeep.tuning import tuned_campaign
 SPEC = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot", lead=3)
 
 
-def filtered(seed: int, samples: int = 200) -> xr.Dataset:
+def filtered(seed, samples=200):
     """A heave that is a filter of the waves, in noise as large as it."""
     rng = np.random.default_rng(seed)
     eta = rng.standard_normal(samples)

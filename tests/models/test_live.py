@@ -109,12 +109,12 @@ def test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop(mo
     np.testing.assert_allclose(std(found), limit, rtol=1e-9)
 
 
-def test_errors_are_those_of_data_that_were_not_trained_on(make_dataset):
+def test_errors_are_those_of_data_that_were_not_trained_on():
     """Of p coefficients from n rows, the residual holds σ²(1 − p/n), a new error σ²(1 + p/n)."""
     found, rng = [], np.random.default_rng(0)
     for _ in range(100):
         heave, wave = rng.standard_normal((2, 105))
-        noise = make_dataset(np.arange(105.0), heave=heave, eta_fwd=wave)
+        noise = record(1.0, heave=heave, eta_fwd=wave)
         found.append(HankelDMDc(4, 4, 1e-9).fit(noise, ["heave"], ["eta_fwd"]).errors.residual)
     # 100 rows of 10 coefficients; 100 repetitions tell a variance to 1.4 %.
     assert np.mean(found) == pytest.approx(1.1, rel=0.05)
@@ -152,7 +152,7 @@ def test_measurement_noise_makes_an_estimate_of_a_measured_state(models, drift):
     assert np.std(found - truth) < 0.9 * np.std(rough["heave"].values[200:START] - truth)
 
 
-def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(make_dataset):
+def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides():
     """Of two states that each follow x' = .98 x + b u + w, one is pushed by .7 SD of w for good."""
 
     def sea(seed, push, samples=3000):
@@ -161,8 +161,7 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
         forced = 0.5 * wave[:, None] + noise
         forced[:, 0] += push
         x = signal.lfilter([0.0, 1.0], [1.0, -0.98], forced, axis=0)
-        time = 0.1 * np.arange(samples)
-        return make_dataset(time, sway=x[:, 0], heave=x[:, 1], eta_fwd=wave)
+        return record(0.1, sway=x[:, 0], heave=x[:, 1], eta_fwd=wave)
 
     model = HankelDMDc(0, 0, 1e-6, delay_rows="exact").fit(
         sea(1, 0.0, 20_000), ["sway", "heave"], ["eta_fwd"]

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from records import record
 from scipy import signal
 
@@ -16,7 +15,7 @@ WEIGHTS = np.array([0.9, -0.5, 0.0, 0.0, 0.0, *[0.3 / 4] * 4, *[-0.4 / 8] * 8])
 SPEC = HankelDMDc(4, 0, 0.0, standardize=False, delay_rows="exact", memory=16)
 
 
-def remembering(seed: int, samples: int = 300) -> xr.Dataset:
+def remembering(seed, samples=300):
     """A heave that remembers means of its past, driven by the wave of the instant."""
     rng = np.random.default_rng(seed)
     eta = rng.standard_normal(samples)

@@ -22,7 +22,7 @@ CHOSEN = HankelDMDc(
 )
 
 
-def vessel(draught: float, seed: int, samples: int = 400, noise: float = 0.0) -> xr.Dataset:
+def vessel(draught, seed, samples=400, noise=0.0):
     """A heave of second order whose coefficients are linear in the draught."""
     rng = np.random.default_rng(seed)
     eta, rest = rng.standard_normal((2, samples))
@@ -38,7 +38,7 @@ def family():
     return [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
 
 
-def error(model) -> float:
+def error(model):
     """Of a forecast at a draught between those of the family."""
     run = vessel(0.45, 40, 800)
     return float(np.sqrt(((model.forecast(run, 5.0, 200).heave - run.heave[51:251]) ** 2).mean()))

@@ -30,7 +30,7 @@ SPEC = HankelDMDc(
 PLAIN = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot")
 
 
-def bow(kind: str) -> HankelDMDc:
+def bow(kind):
     return replace(SPEC, readouts={"mooring_bow": kind})
 
 
@@ -44,7 +44,7 @@ def chosen(runs):
     return bow("auto").fit(runs, STATES, INPUTS)
 
 
-def error(model, run: xr.Dataset) -> float:
+def error(model, run):
     found = model.forecast(run, START, STEPS)
     return float(np.sqrt(np.mean((found - run.sel(time=found["time"]))["mooring_bow"] ** 2)))
 

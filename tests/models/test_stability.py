@@ -6,50 +6,49 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ensembles import few
+from oscillators import Oscillator
+from records import record
 
 from seakeep import Fixed, HankelDMDc, SeakeepWarning, load_model
 
 
-@pytest.fixture
-def identified(oscillator):
-    run = oscillator.run()
-    return HankelDMDc(1, 1, 0.0, standardize=False).fit(run, states=["heave"], inputs=["eta_fwd"])
-
-
-def growing(make_dataset, factor=1.5, samples=60, scale=1.0):
+def growing(factor=1.5, samples=60, scale=1.0):
     """A run of a system that grows by `factor` a step unless its input holds it."""
     rng = np.random.default_rng(0)
     heave, eta = np.zeros(samples), np.zeros(samples)
     for k in range(samples - 1):
         eta[k] = -factor * heave[k] + rng.standard_normal()
         heave[k + 1] = factor * heave[k] + eta[k]
-    return make_dataset(0.1 * np.arange(samples), heave=scale * heave, eta_fwd=eta)
+    return record(0.1, heave=scale * heave, eta_fwd=eta)
 
 
-def fit_growing(make_dataset, **settings):
-    run = growing(make_dataset, **settings)
+def fit_growing(**settings):
+    run = growing(**settings)
     spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact")
     return spec.fit(run, states=["heave"], inputs=["eta_fwd"]), run
 
 
-def test_modes_are_natural_frequency_and_damping_of_the_oscillator(oscillator, identified):
-    mode = identified.modes().isel(mode=0)
-    damped = oscillator.natural_frequency * np.sqrt(1 - oscillator.damping_ratio**2)
-    decay = 1 / (2 * np.pi * oscillator.natural_frequency * oscillator.damping_ratio)
+def test_modes_are_natural_frequency_and_damping_of_the_oscillator():
+    vessel = Oscillator()
+    spec = HankelDMDc(1, 1, 0.0, standardize=False)
+    identified = spec.fit(vessel.run(), states=["heave"], inputs=["eta_fwd"])
+    mode, natural = identified.modes().isel(mode=0), vessel.frequency / (2 * np.pi)
+    damped = natural * np.sqrt(1 - vessel.ratio**2)
+    decay = 1 / (vessel.frequency * vessel.ratio)
     # As above; the logarithm adds nothing.
     assert identified.modes().sizes["mode"] == 1
-    radius = np.exp(-oscillator.dt / decay)
+    radius = np.exp(-vessel.dt / decay)
     assert identified.spectral_radius == pytest.approx(radius, rel=1e-9)
-    assert float(mode.natural_frequency) == pytest.approx(oscillator.natural_frequency, rel=1e-9)
-    assert float(mode.damping_ratio) == pytest.approx(oscillator.damping_ratio, rel=1e-9)
+    assert float(mode.natural_frequency) == pytest.approx(natural, rel=1e-9)
+    assert float(mode.damping_ratio) == pytest.approx(vessel.ratio, rel=1e-9)
     assert float(mode.frequency) == pytest.approx(damped, rel=1e-9)
     assert float(mode.period) == pytest.approx(1 / damped, rel=1e-9)
     assert float(mode.decay_time) == pytest.approx(decay, rel=1e-9)
     assert mode.natural_frequency.attrs["units"] == "Hz"
 
 
-def test_an_unstable_model_warns_and_says_what_to_do(make_dataset):
-    model, _ = fit_growing(make_dataset)
+def test_an_unstable_model_warns_and_says_what_to_do():
+    model, _ = fit_growing()
     message = (
         r"the spectral radius of the model is 1\.4979\d*: a free run grows by 50 % per step .* "
         r"Raise ridge, train on more data, use fewer state delays"
@@ -61,10 +60,10 @@ def test_an_unstable_model_warns_and_says_what_to_do(make_dataset):
 
 
 @pytest.mark.parametrize(("factor", "scale"), [(1.5, 1.0), (1e4, 1.0), (1e200, 1.0), (10.0, 1e8)])
-def test_a_forecast_that_diverges_ends_in_nan_with_its_status(make_dataset, factor, scale):
+def test_a_forecast_that_diverges_ends_in_nan_with_its_status(factor, scale):
     # The growth of the model is set by hand: what is tested is the end of the run, whatever the
     # speed it comes at and the unit it comes in. Warnings are errors in this suite.
-    model, run = fit_growing(make_dataset, scale=scale)
+    model, run = fit_growing(scale=scale)
     object.__setattr__(model, "coefficients", np.array([[factor, 0.0]]))
     long = run.pad(time=(0, 1000), mode="wrap").assign_coords(time=0.1 * np.arange(1060))
     forecast = model.forecast(long, start=1.0)
@@ -82,9 +81,9 @@ def test_a_forecast_that_diverges_ends_in_nan_with_its_status(make_dataset, fact
     assert instant == pytest.approx(expected, abs=1e-3, rel=0)
 
 
-def test_a_forecast_that_was_lost_does_not_come_back(make_dataset):
+def test_a_forecast_that_was_lost_does_not_come_back():
     rng = np.random.default_rng(0)
-    run = make_dataset(0.1 * np.arange(200), heave=rng.standard_normal(200))
+    run = record(0.1, heave=rng.standard_normal(200))
     model = HankelDMDc(1, 0, 1.0, delay_rows="exact", standardize=False).fit(run, ["heave"], [])
     # x goes 1, 100, 0: what is back at zero was lost before.
     wild = replace(model, coefficients=np.array([[100.0, -1e4]]))
@@ -98,9 +97,9 @@ class TestStable:
     @pytest.mark.parametrize(("stable", "radius"), [(True, 0.999), (0.97, 0.97)])
     @pytest.mark.parametrize("rows", ["exact", "ridge"])
     def test_the_growing_mode_alone_is_clipped_and_the_model_says_so(
-        self, make_dataset, tmp_path, stable, radius, rows
+        self, tmp_path, stable, radius, rows
     ):
-        run = growing(make_dataset)
+        run = growing()
         spec = HankelDMDc(1, 1, 1.0, delay_rows=rows)
         with pytest.warns(SeakeepWarning, match=r"or set stable = True\."):
             grows = spec.fit(run, ["heave"], ["eta_fwd"]).eigenvalues
@@ -130,10 +129,10 @@ class TestStable:
         assert clipped.training.clipped == ()
         assert "clipped" not in clipped.summary()
 
-    def test_members_are_clipped_too(self, make_dataset):
+    def test_members_are_clipped_too(self):
         delays = Fixed("0.1 s")
         spec = few(state_delays=delays, input_delays=delays, delay_rows="ridge", stable=0.95)
-        ensemble = spec.fit(growing(make_dataset), ["heave"], ["eta_fwd"])
+        ensemble = spec.fit(growing(), ["heave"], ["eta_fwd"])
         np.testing.assert_allclose(ensemble.spectral_radii(), 0.95, rtol=1e-9)
         assert len(ensemble.member(0).training.clipped) == 1
         assert "(stable, clipped to 0.95)" in ensemble.summary()

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from records import record
 from scipy import signal
 from seas import sea
@@ -19,7 +18,7 @@ NOISE = 0.02
 ATTRS = {"encounter_period": PERIOD * DT}
 
 
-def drifting(seed: int, samples: int = 1500) -> tuple[xr.Dataset, np.ndarray]:
+def drifting(seed, samples=1500):
     """A surge that answers the slow square of waves up to two periods ahead, read with noise."""
     rng = np.random.default_rng(seed)
     t = np.arange(samples) * DT

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -37,7 +36,7 @@ def halves(tmp_path):
     return tmp_path
 
 
-def campaign(folder: Path, model: str, runs: str | None = None) -> seakeep.Campaign:
+def campaign(folder, model, runs=None):
     runs = runs or '[runs.all]\nfile = "run.csv"\ntrain = [0.0, 100.0]\ntest = [100.0, 200.0]\n'
     (folder / "campaign.toml").write_text(
         '[channels.eta_fwd]\ncolumn = "eta"\n[channels.heave]\ncolumn = "z"\n'
@@ -149,7 +148,7 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
     assert found["probe_offset"] == 0.1
 
 
-def sines(folder: Path, periods: dict[str, tuple[float, ...]]) -> str:
+def sines(folder, periods):
     """Runs of regular waves, one file each; the last one tests."""
     time = np.arange(1501) / RATE
     text = ""
