@@ -1,5 +1,6 @@
 """What tests share: runs made of known systems, and what keeps a busy machine from failing them."""
 
+import os
 import signal as signals
 
 import numpy as np
@@ -39,6 +40,12 @@ def vessel_run(samples=400, seed=0):
     run["pitch"].attrs["units"] = "rad"
     run["time"].attrs = {"units": "s", "long_name": "time"}
     return run
+
+
+def pytest_runtest_setup(item):
+    """Leave out tests of measured data where there are none."""
+    if item.get_closest_marker("data") and not os.environ.get("SEAKEEP_DATA_DIR"):
+        pytest.skip("SEAKEEP_DATA_DIR is not set: it names the folder of the measured data")
 
 
 @pytest.fixture(scope="session")

@@ -14,16 +14,6 @@ def refusal(path):
     return str(caught.value)
 
 
-def test_reads(tank):
-    campaign = read_campaign(tank / "campaign.toml")
-    assert campaign.training_runs == ["first"]
-    assert campaign.test_runs == ["first", "second"]
-    model = campaign.model()
-    assert model.kind == "hankel_dmdc"
-    assert model.states == ("heave", "pitch")
-    assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0}
-
-
 # One mistake each: (old text, new text, the line of the message about it).
 MISTAKES = [
     (
@@ -196,13 +186,6 @@ def test_mistake(edited, old, new, line):
     message = refusal(path)
     assert message.startswith(f"{path}: 1 mistake in the campaign file\n  ")
     assert line in message.splitlines()[1]
-
-
-def test_every_mistake_is_named_at_once(edited):
-    message = refusal(edited(('role = "test"', 'role = "tset"'), ("states = [", "stats = [")))
-    assert "2 mistakes in the campaign file" in message
-    for key in ("runs.second.role: ", "model.states: missing"):
-        assert key in message
 
 
 def test_names_that_no_file_or_variable_can_hold(edited):

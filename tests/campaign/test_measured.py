@@ -11,13 +11,7 @@ from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.errors import SeakeepWarning
 
-pytestmark = [
-    pytest.mark.data,
-    pytest.mark.skipif(
-        not os.environ.get("SEAKEEP_DATA_DIR"),
-        reason="SEAKEEP_DATA_DIR is not set: the measured data sets are not here",
-    ),
-]
+pytestmark = pytest.mark.data
 FLUME, BASIN = "ntnu_ship_section", "sjtu_semisub"
 
 
