@@ -210,38 +210,37 @@ def test_a_derived_rate_of_an_elevation(changed):
     assert campaign.period_channel() == "eta_fwd"
 
 
-class TestModels:
-    def test_any_kind_with_keys_of_its_constructor(self, changed):
-        model = changed(
-            ("[model]", '[model]\nkind = "fir"\nmemory = "2 T"\nlead = "0.75 T"\n')
-        ).model()
-        assert model.kind == "fir"
-        assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0,
-                                     "lead": Length(0.75), "memory": Length(2.0)}  # fmt: skip
+def test_a_model_is_of_any_kind_with_keys_of_its_constructor(changed):
+    model = changed(("[model]", '[model]\nkind = "fir"\nmemory = "2 T"\nlead = "0.75 T"\n')).model()
+    assert model.kind == "fir"
+    assert model.arguments() == {"state_delays": 4, "input_delays": 8, "ridge": 1.0,
+                                 "lead": Length(0.75), "memory": Length(2.0)}  # fmt: skip
 
-    def test_named_models(self, changed):
-        campaign = changed(
-            ("[model]", "[models.small]"),
-            (
-                "ridge = 1",
-                'ridge = 1\n[models.band]\nkind = "bayesian_hankel_dmdc"\npreset = "recommended"\n'
-                'states = ["heave"]\nn_members = 10\nridge = { log_uniform = [0.1, 1] }',
-            ),
-        )
-        assert campaign.models == ["small", "band"]
-        band = campaign.model("band")
-        assert band.inputs == ()
-        assert band.arguments() == {
-            "ridge": {"log_uniform": (0.1, 1)},
-            "n_members": 10,
-        }
-        with pytest.raises(
-            RequestError, match=r"no table \[models\.bnad\]\. Did you mean 'band'\? Named models: s"
-        ):
-            campaign.model("bnad")
-        with pytest.raises(RequestError, match=r"no table \[model\]\. Name one of small, band\."):
-            campaign.model()
 
-    def test_none(self, changed):
-        with pytest.raises(RequestError, match=r"no table \[model\]\. Add \[model\] with 'states'"):
-            changed((CAMPAIGN[CAMPAIGN.index("[model]") :], "")).model()
+def test_named_models_are_found_by_their_names(changed):
+    campaign = changed(
+        ("[model]", "[models.small]"),
+        (
+            "ridge = 1",
+            'ridge = 1\n[models.band]\nkind = "bayesian_hankel_dmdc"\npreset = "recommended"\n'
+            'states = ["heave"]\nn_members = 10\nridge = { log_uniform = [0.1, 1] }',
+        ),
+    )
+    assert campaign.models == ["small", "band"]
+    band = campaign.model("band")
+    assert band.inputs == ()
+    assert band.arguments() == {
+        "ridge": {"log_uniform": (0.1, 1)},
+        "n_members": 10,
+    }
+    with pytest.raises(
+        RequestError, match=r"no table \[models\.bnad\]\. Did you mean 'band'\? Named models: s"
+    ):
+        campaign.model("bnad")
+    with pytest.raises(RequestError, match=r"no table \[model\]\. Name one of small, band\."):
+        campaign.model()
+
+
+def test_a_campaign_without_a_model_says_so(changed):
+    with pytest.raises(RequestError, match=r"no table \[model\]\. Add \[model\] with 'states'"):
+        changed((CAMPAIGN[CAMPAIGN.index("[model]") :], "")).model()

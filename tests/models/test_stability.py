@@ -91,48 +91,48 @@ def test_a_forecast_that_was_lost_does_not_come_back():
     np.testing.assert_array_equal(np.isnan(out[:, 0]), [True, True, True])
 
 
-class TestStable:
-    """``stable`` clips what grows, says so, and leaves the rest."""
+# ``stable`` clips what grows, says so, and leaves the rest.
 
-    @pytest.mark.parametrize(("stable", "radius"), [(True, 0.999), (0.97, 0.97)])
-    @pytest.mark.parametrize("rows", ["exact", "ridge"])
-    def test_the_growing_mode_alone_is_clipped_and_the_model_says_so(
-        self, tmp_path, stable, radius, rows
-    ):
-        run = growing()
-        spec = HankelDMDc(1, 1, 1.0, delay_rows=rows)
-        with pytest.warns(SeakeepWarning, match=r"or set stable = True\."):
-            grows = spec.fit(run, ["heave"], ["eta_fwd"]).eigenvalues
-        model = replace(spec, stable=stable).fit(run, ["heave"], ["eta_fwd"])
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            found = model.eigenvalues
-        assert abs(found[0]) == pytest.approx(radius, rel=1e-9)
-        np.testing.assert_allclose(found[1:], grows[1:], atol=1e-9)
-        assert model.training.clipped == pytest.approx([abs(grows[0])], rel=1e-9)
-        told = f"1 eigenvalue clipped to {radius:g}; the largest was {abs(grows[0]):.6f}"
-        assert told in model.summary()
-        assert load_model(model.save(tmp_path / "m.nc")).training.clipped == model.training.clipped
-        # The system that is exported is the one that forecasts.
-        state, system = model.initial_state(run, 1.0), model.to_state_space()
-        after = system.A @ state + system.B @ (run.eta_fwd.values[[10]] - model.input_mean)
-        step = model.forecast(run, start=1.0, steps=1)
-        expected = step.heave.values - model.state_mean
-        np.testing.assert_allclose(system.C @ after, expected, rtol=1e-9)
-        x, u = run.heave.values[:11, None], run.eta_fwd.values[:11, None]
-        np.testing.assert_array_equal(model.initial_state_arrays(x, u), state)
 
-    def test_a_stable_model_is_the_same_to_the_last_bit(self, run, channels):
-        plain = HankelDMDc(2, 4, 100.0).fit(run, **channels)
-        clipped = HankelDMDc(2, 4, 100.0, stable=True).fit(run, **channels)
-        np.testing.assert_array_equal(plain.coefficients, clipped.coefficients)
-        assert clipped.training.clipped == ()
-        assert "clipped" not in clipped.summary()
+@pytest.mark.parametrize(("stable", "radius"), [(True, 0.999), (0.97, 0.97)])
+@pytest.mark.parametrize("rows", ["exact", "ridge"])
+def test_the_growing_mode_alone_is_clipped_and_the_model_says_so(tmp_path, stable, radius, rows):
+    run = growing()
+    spec = HankelDMDc(1, 1, 1.0, delay_rows=rows)
+    with pytest.warns(SeakeepWarning, match=r"or set stable = True\."):
+        grows = spec.fit(run, ["heave"], ["eta_fwd"]).eigenvalues
+    model = replace(spec, stable=stable).fit(run, ["heave"], ["eta_fwd"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = model.eigenvalues
+    assert abs(found[0]) == pytest.approx(radius, rel=1e-9)
+    np.testing.assert_allclose(found[1:], grows[1:], atol=1e-9)
+    assert model.training.clipped == pytest.approx([abs(grows[0])], rel=1e-9)
+    told = f"1 eigenvalue clipped to {radius:g}; the largest was {abs(grows[0]):.6f}"
+    assert told in model.summary()
+    assert load_model(model.save(tmp_path / "m.nc")).training.clipped == model.training.clipped
+    # The system that is exported is the one that forecasts.
+    state, system = model.initial_state(run, 1.0), model.to_state_space()
+    after = system.A @ state + system.B @ (run.eta_fwd.values[[10]] - model.input_mean)
+    step = model.forecast(run, start=1.0, steps=1)
+    expected = step.heave.values - model.state_mean
+    np.testing.assert_allclose(system.C @ after, expected, rtol=1e-9)
+    x, u = run.heave.values[:11, None], run.eta_fwd.values[:11, None]
+    np.testing.assert_array_equal(model.initial_state_arrays(x, u), state)
 
-    def test_members_are_clipped_too(self):
-        delays = Fixed("0.1 s")
-        spec = few(state_delays=delays, input_delays=delays, delay_rows="ridge", stable=0.95)
-        ensemble = spec.fit(growing(), ["heave"], ["eta_fwd"])
-        np.testing.assert_allclose(ensemble.spectral_radii(), 0.95, rtol=1e-9)
-        assert len(ensemble.member(0).training.clipped) == 1
-        assert "(stable, clipped to 0.95)" in ensemble.summary()
+
+def test_a_stable_model_is_the_same_to_the_last_bit(run, channels):
+    plain = HankelDMDc(2, 4, 100.0).fit(run, **channels)
+    clipped = HankelDMDc(2, 4, 100.0, stable=True).fit(run, **channels)
+    np.testing.assert_array_equal(plain.coefficients, clipped.coefficients)
+    assert clipped.training.clipped == ()
+    assert "clipped" not in clipped.summary()
+
+
+def test_members_are_clipped_too():
+    delays = Fixed("0.1 s")
+    spec = few(state_delays=delays, input_delays=delays, delay_rows="ridge", stable=0.95)
+    ensemble = spec.fit(growing(), ["heave"], ["eta_fwd"])
+    np.testing.assert_allclose(ensemble.spectral_radii(), 0.95, rtol=1e-9)
+    assert len(ensemble.member(0).training.clipped) == 1
+    assert "(stable, clipped to 0.95)" in ensemble.summary()
