@@ -26,10 +26,6 @@ def model(run):
     return HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, STATES, ["eta"])
 
 
-def labels(figure):
-    return [label for each in figure.axes for label in (each.get_xlabel(), each.get_ylabel())]
-
-
 def test_overlay_draws_each_channel_with_units_on_its_axes(run, model):
     forecast = model.forecast(run, start=10.0, steps=50)
     figure = seakeep.plot.overlay(forecast, run)

@@ -24,13 +24,9 @@ def drifting_run(samples=2000, waves=None, **attrs):
     return record(DT, {"encounter_period": PERIOD, **attrs}, eta=wave, surge=surge)
 
 
-@pytest.fixture(scope="module")
-def model():
+def test_drift_of_a_square_is_its_own():
     spec = HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=(Expression("square", "eta**2"),))
-    return spec.fit(drifting_run(), ["surge"], ["eta"])
-
-
-def test_drift_of_a_square_is_its_own(model):
+    model = spec.fit(drifting_run(), ["surge"], ["eta"])
     regular = drifting_run(samples=1500, waves=0.9).assign_attrs(waves="regular")
     settled = regular.isel(time=slice(300, None))
     found = check.drift(model, {"sea": drifting_run(), "regular": settled})

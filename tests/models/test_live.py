@@ -463,11 +463,10 @@ def test_a_bad_sample_leaves_the_state_as_it_was(models, drift, message):
     assert live.consistency == untouched.consistency
 
 
-@pytest.fixture(scope="module")
-def thrusted():
+def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     """Surge that answers a wave and a thruster: x' = .9 x + .3 u + .5 thrust, exactly."""
 
-    def run(seed):
+    def made(seed):
         rng, samples = np.random.default_rng(seed), 1200
         wave = np.sin(0.3 * np.arange(samples) + rng.uniform(0, 6)) + rng.normal(0, 0.3, samples)
         thrust = np.repeat(rng.uniform(-1, 1, samples // 30), 30)
@@ -475,13 +474,9 @@ def thrusted():
         return record(0.1, surge=surge, eta=wave, thrust=thrust)
 
     model = HankelDMDc(0, 0, 1e-9, delay_rows="exact").fit(
-        {str(seed): run(seed) for seed in (1, 2)}, ["surge"], ["eta", "thrust"]
+        {str(seed): made(seed) for seed in (1, 2)}, ["surge"], ["eta", "thrust"]
     )
-    return model, run(3)
-
-
-def test_a_known_actuator_follows_its_plan_whatever_the_probe_does(thrusted):
-    model, run = thrusted
+    run = made(3)
     live = model.live(roles={"thrust": "known"})
     u, y = table(run, ["eta", "thrust"]), table(run, ["surge"])
     for at in range(300):

@@ -23,12 +23,8 @@ def remembering(seed, samples=300):
     return record(DT, {"encounter_period": 0.4}, heave=heave, eta=eta)
 
 
-@pytest.fixture(scope="module")
-def model():
-    return SPEC.fit([remembering(1), remembering(2)], ["heave"], ["eta"])
-
-
-def test_a_sparse_memory_is_recovered(model):
+def test_a_sparse_memory_is_recovered():
+    model = SPEC.fit([remembering(1), remembering(2)], ["heave"], ["eta"])
     # Exact data: what is left is rounding times the condition number, below 1e3.
     np.testing.assert_allclose(model.A[0], WEIGHTS, rtol=0, atol=1e-10)
     np.testing.assert_allclose(model.B[0], [0.7], rtol=0, atol=1e-10)

@@ -31,23 +31,6 @@ def checked(tmp_path_factory):
     return folder / "out"
 
 
-@pytest.fixture(scope="module")
-def judged():
-    """Sections of pages on runs that tell too little."""
-    run = moored_run(2)
-    model = HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, ["surge", "heave"], ["eta"])
-    still, flat = (
-        run.assign({k: (0 * run[k]).assign_attrs(run[k].attrs)}) for k in ("eta", "heave")
-    )
-    runs = {
-        "regular": run.assign_attrs(waves="regular"),
-        "short": run.isel(time=slice(0, 40)),
-        "dead": still,
-        "flat": flat,
-    }
-    return {key: check_sections(check_model(model, {"run": each})) for key, each in runs.items()}
-
-
 def test_the_page_holds_its_figures_and_tables(checked):
     page = (checked / "report.html").read_text("utf-8")
     assert page.index('id="worth"') < page.index('id="response"')

@@ -103,23 +103,18 @@ def test_an_ensemble_learns_inside_the_training_span(halves, train_on):
         assert (first, stop) == (pytest.approx(150.0 - longest), pytest.approx(150.0))
 
 
-@pytest.fixture
-def repeating(tmp_path):
-    """A sea of equally spaced components that comes back, turned, after 100 s of 200."""
-    time = np.arange(2001) / RATE
-    eta = sea(4, (0.298, 0.698), components=40, jitter=0).at(time)
-    write_csv(tmp_path / "run.csv", {"t [s]": time, "eta [m]": eta, "z [m]": np.roll(eta, 5)})
-    return tmp_path
-
-
 REPEATS = (
     r"the input 'eta_fwd' of all repeats training input: .* % of it, such as from t = .* s on, is "
     r"what all holds from t = .* turned by .* memory, not skill: test on another run"
 )
 
 
-def test_a_test_that_repeats_its_training_is_warned_of(repeating):
-    whole = campaign(repeating, EXACT)
+def test_a_test_that_repeats_its_training_is_warned_of(tmp_path):
+    """A sea of equally spaced components comes back, turned, after 100 s of 200."""
+    time = np.arange(2001) / RATE
+    eta = sea(4, (0.298, 0.698), components=40, jitter=0).at(time)
+    write_csv(tmp_path / "run.csv", {"t [s]": time, "eta [m]": eta, "z [m]": np.roll(eta, 5)})
+    whole = campaign(tmp_path, EXACT)
     with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):
         model = fit_campaign(whole)
     with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):

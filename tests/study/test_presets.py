@@ -29,24 +29,19 @@ OF_TRAINING = {3}
 """Which waves are played, and which part of them trains: the campaign's for `fit`."""
 
 
-@pytest.fixture
-def tank(tmp_path):
-    """The virtual tank's campaign file, without its raw files."""
+def found(folder, preset, door):
+    """Specs of the single model and the ensemble, by the preset of [model] or of a study.
+
+    On the virtual tank's campaign file, without its raw files.
+    """
     from seakeep.tank.delivery import campaign_text
     from seakeep.tank.settings import default_settings
 
     settings = default_settings()
     files = {run: {"wave_probes": f"{run}.csv"} for run in settings.runs}
     text = campaign_text(settings, files, "csv", one_logger=False)
-    (tmp_path / "campaign").mkdir()
-    (tmp_path / "campaign/campaign.toml").write_text(text, "utf-8")
-    return tmp_path
-
-
-def found(folder, preset, door):
-    """Specs of the single model and the ensemble, by the preset of [model] or of a study."""
     path = folder / "campaign/campaign.toml"
-    text = path.read_text("utf-8")
+    path.parent.mkdir()
     of_model = preset if door == "fit" else {"paper": "recommended", "recommended": "paper"}[preset]
     model = re.sub(r'(\[model\][^[]*?)preset = "\w+"', rf'\1preset = "{of_model}"', text)
     path.write_text(re.sub(r'(\[preparation\]\n)preset = "\w+"\n', r"\1", model), "utf-8")
@@ -99,8 +94,8 @@ def paper(found):
 
 
 @pytest.mark.parametrize("door", ["fit", "study", "reproduce"])
-def test_the_papers_column_is_taken_in_every_row(tank, door):
-    taken = found(tank, "paper", door)
+def test_the_papers_column_is_taken_in_every_row(tmp_path, door):
+    taken = found(tmp_path, "paper", door)
     assert sorted(ROWS) == list(range(1, 32))
     checked = paper(taken)
     assert checked == dict.fromkeys(checked, True)
