@@ -4,13 +4,7 @@ import math
 
 import pytest
 
-from seakeep.conventions import (
-    MOTIONS,
-    canonical_channel,
-    conversion,
-    is_elevation,
-    si_unit,
-)
+from seakeep.conventions import MOTIONS, canonical_channel, conversion, is_elevation, si_unit
 from seakeep.errors import RequestError
 
 

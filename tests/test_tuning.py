@@ -144,10 +144,7 @@ celerity = 2.0
     varied = ["memory", "alignment", "observables"]
     read = tomllib.loads(tuned_campaign(before, None, spec, varied, "recommended", 20.0))
     assert read["model"]["observables"] == [{"kind": "slow_squares", "of": ["eta"], "lead": 1.0}]
-    assert read["model"]["alignment"] == {
-        "mode": "dispersion",
-        "surge": "predicted",
-    }
+    assert read["model"]["alignment"] == {"mode": "dispersion", "surge": "predicted"}
     assert (read["model"]["memory"], read["model"]["ridge"]) == ("3.2 T", 0.1)
     assert "next" in read
     spec = replace(SPEC, ridge=1e-3)

@@ -149,11 +149,7 @@ MISTAKES = [
         'expression = "pitch"',
         "derived.pitch_rate: a derived channel needs either 'expression', or 'from' and 'step'",
     ),
-    (
-        "[derived.pitch_rate]",
-        "[derived.slope]",
-        None,
-    ),
+    ("[derived.pitch_rate]", "[derived.slope]", None),
     (
         '[derived.pitch_rate]\nfrom = "pitch"\nstep = "differentiate"',
         '[derived.slope]\nexpression = "pitch / 2"',
@@ -229,10 +225,7 @@ def test_named_models_are_found_by_their_names(changed):
     assert campaign.models == ["small", "band"]
     band = campaign.model("band")
     assert band.inputs == ()
-    assert band.arguments() == {
-        "ridge": {"log_uniform": (0.1, 1)},
-        "n_members": 10,
-    }
+    assert band.arguments() == {"ridge": {"log_uniform": (0.1, 1)}, "n_members": 10}
     with pytest.raises(
         RequestError, match=r"no table \[models\.bnad\]\. Did you mean 'band'\? Named models: s"
     ):

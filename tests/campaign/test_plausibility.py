@@ -192,10 +192,7 @@ def test_a_test_part_without_samples_is_an_error(loggers, test):
     """It would else be judged on the part that trains."""
     campaign = loggers(end=8.0, spans=f"train = [0, 8]\ntest = {test}")
     message = r"runs\.first\.test: \[10, .*holds 0 sample.* together only from 0 to 8 s"
-    with (
-        pytest.warns(SeakeepWarning, match="mru ends"),
-        pytest.raises(DataError, match=message),
-    ):
+    with pytest.warns(SeakeepWarning, match="mru ends"), pytest.raises(DataError, match=message):
         campaign.prepare()
 
 

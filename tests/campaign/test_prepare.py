@@ -193,8 +193,7 @@ def test_a_period_needs_a_wave_channel(changed):
         ("eta_fwd = -2.5", ""),
     )
     with pytest.raises(
-        RequestError,
-        match=r"no wave channel to take the encounter period from. State encounter",
+        RequestError, match=r"no wave channel to take the encounter period from. State encounter"
     ):
         campaign.encounter_period()
 
@@ -263,11 +262,7 @@ def test_a_file_at_fault(campaign, tank, change, error, message):
             for span in ("[2, 30]", "[-3, 10]", "[30, 40]")
         ),
         *(
-            (
-                "span = [2, 18]",
-                span,
-                rf"holds 0 sample\(s\) at a step of {step} s\. Lengthen",
-            )
+            ("span = [2, 18]", span, rf"holds 0 sample\(s\) at a step of {step} s\. Lengthen")
             for span, step in (("span = [2.01, 2.05]", 0.1), ("record = [2.001, 2.01]", 0.02))
         ),
         ("sampling_rate = 10", "dt = 50", r"of 20 s is shorter than two steps of 50 s"),

@@ -9,14 +9,7 @@ from drifting import drifting_run
 from records import record, table
 from scipy import signal
 
-from seakeep import (
-    Expression,
-    HankelDMDc,
-    HankelDMDcModel,
-    Powers,
-    ProbeAlignment,
-    SlowSquares,
-)
+from seakeep import Expression, HankelDMDc, HankelDMDcModel, Powers, ProbeAlignment, SlowSquares
 from seakeep.baselines import ARX
 from seakeep.hosts import start_rows
 

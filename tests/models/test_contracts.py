@@ -14,12 +14,7 @@ from records import record
 
 import seakeep
 from seakeep import BayesianHankelDMDc, DataError, HankelDMDc, RequestError, SeakeepWarning, Uniform
-from seakeep.models import (
-    KINDS,
-    alignment,
-    load_model,
-    outside_training,
-)
+from seakeep.models import KINDS, alignment, load_model, outside_training
 from seakeep.models.alignment import carry_by_dispersion
 from seakeep.models.draws import Draw
 

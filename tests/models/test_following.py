@@ -7,12 +7,7 @@ import pytest
 from drifting import INPUTS, STATES, heave_error
 from records import table
 
-from seakeep import (
-    HankelDMDc,
-    Powers,
-    ProbeAlignment,
-    SlowSquares,
-)
+from seakeep import HankelDMDc, Powers, ProbeAlignment, SlowSquares
 from seakeep.core.recursion import Place, Recursion, recursion
 from seakeep.models.calibration import envelope_of
 from seakeep.models.labelled import Span
@@ -31,10 +26,7 @@ SPEC = HankelDMDc(
 def models(drifts):
     return {
         name: each.fit(drifts, STATES, INPUTS)
-        for name, each in {
-            "ahead": SPEC,
-            "now": replace(SPEC, lead=0, observables=()),
-        }.items()
+        for name, each in {"ahead": SPEC, "now": replace(SPEC, lead=0, observables=())}.items()
     }
 
 

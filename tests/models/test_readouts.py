@@ -13,11 +13,7 @@ from moored import INPUTS as ETA
 from moored import STATES as MOORED
 from records import table
 
-from seakeep import (
-    HankelDMDc,
-    ProbeAlignment,
-    RequestError,
-)
+from seakeep import HankelDMDc, ProbeAlignment, RequestError
 from seakeep.models import ensemble as ensembles
 from seakeep.models.selection import select
 
@@ -81,8 +77,7 @@ def test_auto_takes_what_forecasts_better_and_motions_stay(chosen, runs, drift):
     assert chosen.signature.readouts[0].kind == "wave"
     assert error(chosen, drift) < 0.5 * error(linear, drift)
     xr.testing.assert_identical(
-        chosen.forecast(drift, START, STEPS)[MOTIONS],
-        linear.forecast(drift, START, STEPS)[MOTIONS],
+        chosen.forecast(drift, START, STEPS)[MOTIONS], linear.forecast(drift, START, STEPS)[MOTIONS]
     )
     summary = chosen.summary()
     assert "read-out      mooring_bow: wave at -1.33 m" in summary

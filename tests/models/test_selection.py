@@ -13,11 +13,7 @@ from records import record
 from scipy import signal
 from squared import DT, INPUTS, PERIOD, STATES, runs
 
-from seakeep import (
-    DataError,
-    HankelDMDc,
-    ProbeAlignment,
-)
+from seakeep import DataError, HankelDMDc, ProbeAlignment
 from seakeep.models.labelled import mean_period
 from seakeep.models.selection import RIDGES, default_observables, groups_of, select
 

@@ -12,11 +12,7 @@ import xarray as xr
 from tutorial_study import STUDY, put_tutorial
 
 from seakeep.files import check_report
-from seakeep.report.sections.results import (
-    coverage_table,
-    divergence_table,
-    summary,
-)
+from seakeep.report.sections.results import coverage_table, divergence_table, summary
 from seakeep.report.tables import words as known_words
 from seakeep.study import read_result, read_study, run_study
 

@@ -5,12 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seakeep.signals import (
-    band_pass,
-    differentiate,
-    envelope_squared,
-    integrate,
-)
+from seakeep.signals import band_pass, differentiate, envelope_squared, integrate
 
 DT = 0.01
 T = np.arange(0, 80, DT)
@@ -18,11 +13,7 @@ INNER = slice(2500, -2500)
 
 
 @settings(max_examples=20)
-@given(
-    st.floats(0.5, 4.0),
-    st.floats(0.0, 6.28),
-    st.sampled_from([0, 1, 2]),
-)
+@given(st.floats(0.5, 4.0), st.floats(0.0, 6.28), st.sampled_from([0, 1, 2]))
 def test_integral_of_a_wave_in_the_band(frequency, phase, times):
     omega = 2 * np.pi * frequency
     wave = np.sin(omega * T + phase)

@@ -10,11 +10,7 @@ from seakeep.signals import low_pass, lowpass_taps
 
 
 @settings(max_examples=25)
-@given(
-    st.floats(0.02, 0.3),
-    st.floats(1.1, 1.5),
-    st.sampled_from([50.0, 60.0, 80.0]),
-)
+@given(st.floats(0.02, 0.3), st.floats(1.1, 1.5), st.sampled_from([50.0, 60.0, 80.0]))
 def test_gains_of_the_taps(passband, ratio, attenuation):
     stopband = passband * ratio
     taps = lowpass_taps(1.0, passband, stopband, attenuation)

@@ -5,12 +5,7 @@ import pytest
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.signals import (
-    complementary_filter,
-    froude_factor,
-    rotation_matrix,
-    transfer_position,
-)
+from seakeep.signals import complementary_filter, froude_factor, rotation_matrix, transfer_position
 from seakeep.study import to_full_scale
 
 

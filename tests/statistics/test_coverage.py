@@ -7,13 +7,7 @@ from hypothesis import strategies as st
 from scipy import integrate
 from scipy.stats import norm
 
-from seakeep.statistics import (
-    band_crps,
-    box_statistics,
-    coverage,
-    coverage_table,
-    winkler_score,
-)
+from seakeep.statistics import band_crps, box_statistics, coverage, coverage_table, winkler_score
 
 # --- coverage ------------------------------------------------------------------------------------
 

@@ -9,12 +9,7 @@ from scipy.signal import lfilter
 from scipy.spatial.distance import jensenshannon
 
 from seakeep.core.bootstrap import bootstrap_indices
-from seakeep.statistics import (
-    density_grid,
-    jensen_shannon,
-    jsd_interval,
-    kernel_density,
-)
+from seakeep.statistics import density_grid, jensen_shannon, jsd_interval, kernel_density
 
 
 def wave_like(samples, seed):

@@ -16,11 +16,7 @@ from seakeep.campaign.store import write_prepared
 from seakeep.cli import main
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import KINDS
-from seakeep.study import (
-    compare,
-    comparison_table,
-    fit_campaign,
-)
+from seakeep.study import compare, comparison_table, fit_campaign
 
 RATE = 10.0
 

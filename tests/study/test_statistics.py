@@ -44,10 +44,7 @@ def found(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("variant", "block", "bandwidth", "crosses"),
-    [
-        ("paper", "carlstein", "paper", True),
-        ("recommended", "politis_white", "silverman", False),
-    ],
+    [("paper", "carlstein", "paper", True), ("recommended", "politis_white", "silverman", False)],
 )
 def test_divergences_are_those_of_the_joined_windows(found, variant, block, bandwidth, crosses):
     table = found.groups["statistics/divergence"]

@@ -3,13 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seakeep.tank.instruments import (
-    _immersed,
-    clock_instants,
-    record_run,
-    slap_pulses,
-    trigger,
-)
+from seakeep.tank.instruments import _immersed, clock_instants, record_run, slap_pulses, trigger
 from seakeep.tank.play import generator, play_run, truth
 from seakeep.tank.settings import SlapSettings
 
