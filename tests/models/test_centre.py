@@ -27,7 +27,7 @@ OFFSETS = {"heave": 3.0, "pitch": -0.4, "eta": 0.2, "wind": 8.0}
 SPEC = HankelDMDc(1, 0, 0.0, delay_rows="exact", centre="run")
 
 
-def vessel(seed, offset=0.0, periods=5):
+def vessel(seed, offset=0.0):
     """Two states in a steady answer to two inputs of period `PERIOD`, on zeros of their own."""
     rng = np.random.default_rng(seed)
     inputs = np.fft.rfft(rng.standard_normal((PERIOD, 2)), axis=0)
@@ -36,7 +36,7 @@ def vessel(seed, offset=0.0, periods=5):
     system = z * np.eye(2) - A[0] - A[1] / z
     states = np.linalg.solve(system, (inputs @ B.T)[..., None])[..., 0]
     values = np.fft.irfft(np.concatenate([states, inputs], axis=1), PERIOD, axis=0)
-    values = np.resize(values, (periods * PERIOD, 4)) + offset * np.array([*OFFSETS.values()])
+    values = np.resize(values, (5 * PERIOD, 4)) + offset * np.array([*OFFSETS.values()])
     attrs = {"encounter_period": PERIOD * DT / 30}
     return record(DT, attrs, **dict(zip(OFFSETS, values.T, strict=True)))
 

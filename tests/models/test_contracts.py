@@ -21,12 +21,12 @@ from seakeep.models.draws import Draw
 DT = 0.1
 
 
-def sea(samples=600, seed=0, ahead=0):
+def sea(seed=0, ahead=0):
     """Heave answers the wave `ahead` samples later; the wave is white enough to tell them apart."""
     rng = np.random.default_rng(seed)
-    eta = rng.standard_normal(samples + ahead + 3)
-    heave = 0.5 * eta[ahead : ahead + samples] - 0.2 * eta[ahead + 1 : ahead + 1 + samples]
-    return record(DT, heave=np.r_[0.0, heave[:-1]], eta=eta[:samples])
+    eta = rng.standard_normal(603 + ahead)
+    heave = 0.5 * eta[ahead : ahead + 600] - 0.2 * eta[ahead + 1 : ahead + 601]
+    return record(DT, heave=np.r_[0.0, heave[:-1]], eta=eta[:600])
 
 
 # The input up to j + lead drives the step from j.
@@ -94,8 +94,8 @@ def test_needs_of_specs():
 # What the training waves say of the waves of a forecast.
 
 
-def regular(*periods, samples=1200):
-    time = DT * np.arange(samples)
+def regular(*periods):
+    time = DT * np.arange(1200)
     eta = sum(np.cos(2 * np.pi * time / period) for period in periods)
     heave = np.r_[0.0, eta[:-1]]
     return record(DT, heave=heave, eta=eta)

@@ -18,11 +18,11 @@ from seakeep.tuning import tuned_campaign
 SPEC = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot", lead=3)
 
 
-def filtered(seed, samples=200):
+def filtered(seed):
     """A heave that is a filter of the waves, in noise as large as it."""
     rng = np.random.default_rng(seed)
-    eta = rng.standard_normal(samples)
-    heave = np.convolve(eta, [0.0, 1.0, -0.5, 0.3])[:samples] + rng.standard_normal(samples)
+    eta, noise = rng.standard_normal((2, 200))
+    heave = np.convolve(eta, [0.0, 1.0, -0.5, 0.3])[:200] + noise
     return record(0.1, {"encounter_period": 0.4}, heave=heave, eta=eta)
 
 
@@ -72,7 +72,7 @@ def test_a_kind_that_is_better_beyond_the_noise_is_named_by_fit_and_taken_by_tun
 
 
 @pytest.mark.parametrize("spec", [FIR(24, 1e-3, lead=3), Subspace(8, 24, 0.1), ARX(8, 16, 1e-2)])
-def test_a_tuned_file_states_the_kind_and_what_it_takes(spec, tmp_path):
+def test_a_tuned_file_states_the_kind_and_what_it_takes(spec):
     text = """[model]
 preset = "recommended"
 states = ["heave"]

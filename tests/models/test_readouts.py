@@ -159,7 +159,7 @@ def test_nothing_after_the_stop_of_training_is_read(runs, drift):
     xr.testing.assert_identical(clean, dirty)
 
 
-def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all(runs, drift):
+def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all(runs):
     one = bow("auto").fit(runs["run1"], STATES, INPUTS)
     assert [each.kind for each in one.signature.readouts] == ["wave"]
     short = runs["run1"].isel(time=slice(0, 300))

@@ -24,11 +24,11 @@ def fit(runs, s, z, ridge=0.5, **settings):
     return HankelDMDc(s, z, ridge, **settings).fit(runs, states=STATES, inputs=INPUTS)
 
 
-def koopman_pipeline(runs, s, z, ridge=0.5):
+def koopman_pipeline(runs, s, z):
     pykoop = pytest.importorskip("pykoop")
     pipeline = pykoop.KoopmanPipeline(
         lifting_functions=[("delay", pykoop.DelayLiftingFn(n_delays_state=s, n_delays_input=z))],
-        regressor=pykoop.Edmd(alpha=ridge),
+        regressor=pykoop.Edmd(alpha=0.5),
     )
     data = pykoop.combine_episodes(
         [(number, table(run, STATES + INPUTS)) for number, run in enumerate(runs)],

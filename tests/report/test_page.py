@@ -73,7 +73,7 @@ def test_the_page_holds_its_parts_and_names_nothing_outside_itself(page, result)
     assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", when)
 
 
-def test_figures_and_tables_are_files_too(page, result):
+def test_figures_and_tables_are_files_too(page):
     figures = {path.name for path in (page.parent / "figures").iterdir()}
     for name in ("errors_unseen", "densities_bayesian", "error_over_time", "eigenvalues"):
         assert {f"{name}.png", f"{name}.svg"} <= figures

@@ -208,7 +208,7 @@ def test_a_lead_reads_waves_ahead_of_time(halves):
     assert whole.forecast["time"][-1] == pytest.approx(float(run["time"][-8]))
 
 
-def test_a_field_of_a_spec_is_a_key_of_files(monkeypatch, halves, tmp_path):
+def test_a_field_of_a_spec_is_a_key_of_files(monkeypatch, halves):
     @dataclasses.dataclass(frozen=True)
     class Damped(seakeep.HankelDMDc):
         kind = "damped"
