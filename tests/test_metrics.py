@@ -15,10 +15,7 @@ SD = np.sqrt(np.array([8.0, 500.0]) / 3)
 
 def labelled(values, dims=("time",), **attrs):
     return xr.Dataset(
-        {
-            name: (dims, values[..., column], attrs)
-            for column, name in enumerate(("heave", "mooring_bow"))
-        },
+        {name: (dims, values[..., k], attrs) for k, name in enumerate(("heave", "mooring_bow"))},
         coords={"time": 0.5 * np.arange(values.shape[-2])},
     )
 
