@@ -101,15 +101,15 @@ def test_sound_arguments_pass_and_what_is_no_array_of_real_numbers_is_refused(na
 
 
 @pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        (masked(X), r"x holds 1 masked value\(s\).* numpy\.ma\.filled"),
-        ([masked(X), X], r"x holds 1 masked value\(s\)"),
-        (X + 1j, r"x must be real numbers; received ndarray of type complex128. Give its real"),
-        (T.astype("datetime64[s]"), r"type datetime64\[s\]. Give seconds: \(t - t\[0\]\)"),
-        (["a", "b"], r"received list of type <U1. Convert the text to numbers"),
-        ([1.0, None], r"type object. Convert every value to a number, gaps to NaN"),
-    ],
+    ("message", "values"),
+    {
+        r"x holds 1 masked value\(s\).* numpy\.ma\.filled": masked(X),
+        r"x holds 1 masked value\(s\)": [masked(X), X],
+        r"x must be real numbers; received ndarray of type complex128. Give its real": X + 1j,
+        r"type datetime64\[s\]. Give seconds: \(t - t\[0\]\)": T.astype("datetime64[s]"),
+        r"received list of type <U1. Convert the text to numbers": ["a", "b"],
+        r"type object. Convert every value to a number, gaps to NaN": [1.0, None],
+    }.items(),
 )
 def test_what_the_message_says(values, message):
     with pytest.raises(RequestError, match=message):

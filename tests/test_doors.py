@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
+from records import record
 from tutorial_study import put_tutorial
 
 import seakeep
@@ -16,7 +16,7 @@ from seakeep.quality import Record, findings_of, warn_of
 from seakeep.quality.findings import as_json
 
 ROOT = Path(__file__).parents[1]
-PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 DOORS = dict(re.findall(r"^### Add (.*)\n(?:(?!#).*\n)*?```python\n((?:.*\n)*?)```$", PAGE, re.M))
 
 STUDY = """
@@ -47,7 +47,7 @@ def add(tmp_path):
 
     def run(door, registry):
         before.append((registry, registry.copy()))
-        (tmp_path / "door.py").write_text(DOORS[door], encoding="utf-8")
+        (tmp_path / "door.py").write_text(DOORS[door], "utf-8")
         return runpy.run_path(str(tmp_path / "door.py"))
 
     yield run
@@ -88,8 +88,7 @@ def test_a_reader(add, tmp_path, name):
 def test_a_quality_check(add):
     add("a quality check", quality.CHECKS)
     time = 0.05 * np.arange(2000)
-    channels = {"heave": 1e-4 * np.sin(time), "surge": np.sin(time)}
-    run = xr.Dataset({n: ("time", x, {"units": "m"}) for n, x in channels.items()}, {"time": time})
+    run = record(0.05, heave=1e-4 * np.sin(time), surge=np.sin(time))
     (found,) = quality.check(Record("first", run))
     assert found.text == "has an SD of 7.1e-05 m, less than 0.001 m"
     run.attrs["quality"] = as_json([found])
@@ -111,10 +110,9 @@ def test_a_metric(add, run):
 
 def test_an_observable(add, tmp_path):
     slope = add("an observable", models.OBSERVABLES)["Slope"]
-    time, eta = 0.1 * np.arange(600), np.random.default_rng(0).standard_normal(600)
+    eta = np.random.default_rng(0).standard_normal(600)
     heave = np.r_[0.0, 0.0, np.abs(np.diff(eta))[:-1]]  # answers the rectified slope at once
-    variables = {"heave": heave, "eta": eta}
-    run = xr.Dataset({n: ("time", x, {"units": "m"}) for n, x in variables.items()}, {"time": time})
+    run = record(0.1, heave=heave, eta=eta)
     spec = seakeep.HankelDMDc(0, 0, 1e-9, delay_rows="exact", observables=[slope()])
     model = spec.fit(run, ["heave"], ["eta"])
     assert model.regressors == ["eta", "slope"]

@@ -32,11 +32,11 @@ FEWER = {"bayesian_hankel_dmdc": {"n_members": 3}, "subspace": {"order": 8}}
 TANK = pytest.mark.skipif(not importlib.util.find_spec("numba"), reason="needs the extra tank")
 
 
-def written(name: str, folder: Path) -> str:
+def written(name, folder):
     """Text of the campaign of a set of data, whose files are put into `folder`."""
     if name == "tutorial":
         shutil.copytree(ROOT / "docs/tutorial", folder, dirs_exist_ok=True)
-        return (folder / "campaign.toml").read_text(encoding="utf-8")
+        return (folder / "campaign.toml").read_text("utf-8")
     if name == "virtual tank":
         from seakeep.tank.play import play
         from seakeep.tank.settings import default_settings
@@ -44,9 +44,9 @@ def written(name: str, folder: Path) -> str:
         settings = default_settings()
         run = settings.runs["irregular_1"].model_copy(update={"startup": 5.0, "duration": 90.0})
         play(settings.model_copy(update={"runs": {"irregular_1": run}}), folder, kind="nc")
-        text = (folder / "campaign.toml").read_text(encoding="utf-8")
+        text = (folder / "campaign.toml").read_text("utf-8")
         return re.sub("states = .*", 'states = ["surge", "heave", "pitch", "mooring_stern"]', text)
-    return two_loggers.write(folder).read_text(encoding="utf-8")
+    return two_loggers.write(folder).read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def campaign_of(tmp_path_factory):
             if preset:
                 models[f"{kind}{preset}"]["preset"] = preset
             models[f"{kind}{preset}"] |= FEWER.get(kind, {})
-        (folder / "campaign.toml").write_text(tomlkit.dumps(table), encoding="utf-8")
+        (folder / "campaign.toml").write_text(tomlkit.dumps(table), "utf-8")
         campaign = read_campaign(folder / "campaign.toml")
         write_prepared(campaign)
         return campaign

@@ -143,46 +143,46 @@ def test_whatever_is_written_as_netcdf_survives_a_disk_that_is_full(tmp_path):
     assert not list(folder.rglob("*"))
 
 
-class TestOutputs:
-    """No output replaces an input, or a file that seakeep did not write."""
+# No output replaces an input, or a file that seakeep did not write.
 
-    def test_a_place_without_a_file_is_free(self, tmp_path):
-        check_output(tmp_path / "model.nc", "model", [tmp_path / "model.nc"])
 
-    def test_an_input_is_kept_under_any_name(self, tmp_path):
-        raw = tmp_path / "raw.csv"
-        raw.write_text("time [s],heave [m]\n")
-        (tmp_path / "same.csv").symlink_to(raw)
-        with pytest.raises(RequestError, match=r"same\.csv is read by this command and would be"):
-            check_output(tmp_path / "same.csv", "forecast", [raw], "time.*")
+def test_an_input_is_kept_under_any_name(tmp_path):
+    raw = tmp_path / "raw.csv"
+    raw.write_text("time [s],heave [m]\n")
+    (tmp_path / "same.csv").symlink_to(raw)
+    with pytest.raises(RequestError, match=r"same\.csv is read by this command and would be"):
+        check_output(tmp_path / "same.csv", "forecast", [raw], "time.*")
 
-    def test_a_netcdf_file_is_replaced_by_one_of_its_kind(self, tmp_path):
-        path = tmp_path / "a.nc"
-        write_netcdf(path, xr.Dataset(attrs={MARK: "model"}))
+
+def test_a_netcdf_file_is_replaced_by_one_of_its_kind(tmp_path):
+    path = tmp_path / "a.nc"
+    write_netcdf(path, xr.Dataset(attrs={MARK: "model"}))
+    check_output(path, "model")
+    with pytest.raises(RequestError, match="exists and is not a forecast that seakeep wrote"):
+        check_output(path, "forecast")
+    write_netcdf(path, xr.Dataset({"heave": ("time", [1.0])}))
+    with pytest.raises(RequestError, match=r"may be a measurement\. Choose another name"):
         check_output(path, "model")
-        with pytest.raises(RequestError, match="exists and is not a forecast that seakeep wrote"):
-            check_output(path, "forecast")
-        write_netcdf(path, xr.Dataset({"heave": ("time", [1.0])}))
-        with pytest.raises(RequestError, match=r"may be a measurement\. Choose another name"):
-            check_output(path, "model")
-        path.write_bytes(b"CDF\x01")
-        with pytest.raises(RequestError, match="exists and is not a model"):
-            check_output(path, "model")
+    path.write_bytes(b"CDF\x01")
+    with pytest.raises(RequestError, match="exists and is not a model"):
+        check_output(path, "model")
 
-    def test_a_table_of_any_width_is_known_by_its_start(self, tmp_path):
-        path, names = tmp_path / "a.csv", ",".join(f"member {k:04}" for k in range(2000))
-        path.write_text(f"time,{names}\n1\n")
-        check_output(path, "forecast", header=r"time(,member \d+)+\n")
 
-    def test_text_states_what_it_is_and_csv_by_its_header(self, tmp_path):
-        path = tmp_path / "a.toml"
-        path.write_text("# seakeep_file: campaign\n")
+def test_a_table_of_any_width_is_known_by_its_start(tmp_path):
+    path, names = tmp_path / "a.csv", ",".join(f"member {k:04}" for k in range(2000))
+    path.write_text(f"time,{names}\n1\n")
+    check_output(path, "forecast", header=r"time(,member \d+)+\n")
+
+
+def test_text_states_what_it_is_and_csv_by_its_header(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text("# seakeep_file: campaign\n")
+    check_output(path, "campaign")
+    path.write_text("[campaign]\n")
+    with pytest.raises(RequestError, match="exists and is not a campaign"):
         check_output(path, "campaign")
-        path.write_text("[campaign]\n")
-        with pytest.raises(RequestError, match="exists and is not a campaign"):
-            check_output(path, "campaign")
-        table = tmp_path / "a.csv"
-        table.write_text("run,channel\n1,2\n")
-        check_output(table, "table", header="run,channel")
-        with pytest.raises(RequestError, match="exists and is not a table"):
-            check_output(table, "table", header="time,.*")
+    table = tmp_path / "a.csv"
+    table.write_text("run,channel\n1,2\n")
+    check_output(table, "table", header="run,channel")
+    with pytest.raises(RequestError, match="exists and is not a table"):
+        check_output(table, "table", header="time,.*")

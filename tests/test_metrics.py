@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.signal import lfilter
 
 from seakeep import RequestError, metrics
 
@@ -12,10 +13,10 @@ PREDICTED = np.array([[1.0, 10.0], [2.0, 20.0], [3.0, 20.0], [2.0, 50.0]])
 SD = np.sqrt(np.array([8.0, 500.0]) / 3)
 
 
-def labelled(values, names=("heave", "mooring_bow"), dims=("time",), step=0.5, **attrs):
+def labelled(values, dims=("time",), **attrs):
     return xr.Dataset(
-        {name: (dims, values[..., column], attrs) for column, name in enumerate(names)},
-        coords={"time": step * np.arange(values.shape[-2])},
+        {name: (dims, values[..., k], attrs) for k, name in enumerate(("heave", "mooring_bow"))},
+        coords={"time": 0.5 * np.arange(values.shape[-2])},
     )
 
 
@@ -137,13 +138,8 @@ def test_channels_are_matched_by_name_and_instants_by_time():
     assert np.isfinite(told.heave)
 
 
-def autoregression(rng, size, phi=0.9):
-    noise = rng.standard_normal(size + 200)
-    out = np.empty_like(noise)
-    last = 0.0
-    for k, each in enumerate(noise):
-        last = out[k] = phi * last + each
-    return out[200:]
+def autoregression(rng, size):
+    return lfilter([1.0], [1.0, -0.9], rng.standard_normal(size + 200))[200:]
 
 
 def test_an_interval_holds_the_value_of_a_long_record_as_often_as_it_says():

@@ -19,21 +19,9 @@ REQUESTS = (
     ["info"],
 )
 VERBS = (
-    *(
-        "tank",
-        "init",
-        "prepare",
-        "tune",
-        "fit",
-        "calibrate",
-        "forecast",
-        "compare",
-        "export",
-        "check",
-        "study",
-    ),
-    *("report", "reproduce", "datasets", "track", "info"),
-)
+    "tank", "init", "prepare", "tune", "fit", "calibrate", "forecast", "compare", "export", "check",
+    "study", "report", "reproduce", "datasets", "track", "info",
+)  # fmt: skip
 
 
 def imported_by(code):

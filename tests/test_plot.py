@@ -18,16 +18,12 @@ STATES = ["surge", "heave", "pitch"]
 
 @pytest.fixture(scope="module")
 def run():
-    return moored_run(seed=2).assign_attrs(encounter_period=1.0, waves="irregular")
+    return moored_run(2)
 
 
 @pytest.fixture(scope="module")
 def model(run):
     return HankelDMDc(2, 4, 0.01, delay_rows="exact").fit(run, STATES, ["eta"])
-
-
-def labels(figure):
-    return [label for each in figure.axes for label in (each.get_xlabel(), each.get_ylabel())]
 
 
 def test_overlay_draws_each_channel_with_units_on_its_axes(run, model):

@@ -25,7 +25,7 @@ class Whole(Table):
     depth: Positive = 1.0
 
 
-def refused(path, content: bytes | None = None) -> str:
+def refused(path, content=None):
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(RequestError) as caught:
@@ -45,15 +45,15 @@ def test_every_mistake_has_its_line(tmp_path):
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [
-        (b"name = 'K\xf6ln'\n", "tank.toml, line 1: not UTF-8, which TOML asks for. Save the file"),
-        (b"[a\n", "is not valid TOML: "),
-        (b"a = 1979-99-99\n", "is not valid TOML: "),
-        (b"depth = 1979-01-01\n", "depth: received 1979-01-01, which should be a number"),
-        (b"depth = " + b"[" * 200 + b"]" * 200, "depth: received [[["),
-        (b"[study]\n", "is a study file (it has [study]), and a tank file is expected here"),
-        (b"[channels]\n[rig]\n", "is a campaign file (it has [channels], [rig]), and a tank file"),
-    ],
+    {
+        b"name = 'K\xf6ln'\n": "tank.toml, line 1: not UTF-8, which TOML asks for. Save the file",
+        b"[a\n": "is not valid TOML: ",
+        b"a = 1979-99-99\n": "is not valid TOML: ",
+        b"depth = 1979-01-01\n": "depth: received 1979-01-01, which should be a number",
+        b"depth = " + b"[" * 200 + b"]" * 200: "depth: received [[[",
+        b"[study]\n": "is a study file (it has [study]), and a tank file is expected here",
+        b"[channels]\n[rig]\n": "is a campaign file (it has [channels], [rig]), and a tank file",
+    }.items(),
     ids=lambda x: repr(x)[:20],
 )
 def test_a_file_that_is_wrong_is_refused_in_words(tmp_path, content, message):

@@ -1,27 +1,22 @@
 """``seakeep.tune`` and ``seakeep tune``: the table, the figure, the file, and going on."""
 
 import json
-import shutil
-import sys
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from free_runs import loop_score
+from squared import INPUTS, PERIOD, STATES, runs
 
 import seakeep
 from seakeep import HankelDMDc, RequestError
 from seakeep.cli import main
+from seakeep.study.resolve import resolve_model
 from seakeep.tuning import tuned_campaign
 
-sys.path.insert(0, str(Path(__file__).parent / "models"))
-
-from test_selection import INPUTS, PERIOD, SPEC, STATES, runs
-
-TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial"
+SPEC = HankelDMDc(6, 12, "rollout", delay_rows="exact")
 
 
 @pytest.mark.parametrize(
@@ -62,33 +57,28 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, ce
         assert float(row["score"]) == pytest.approx(np.mean(found), abs=tolerance)
 
 
-@pytest.fixture
-def tutorial(tmp_path, monkeypatch):
-    for path in TUTORIAL.iterdir():
-        if path.suffix in (".csv", ".toml"):
-            shutil.copy(path, tmp_path)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(tutorial, capsys):
-    before = (tutorial / "campaign.toml").read_text()
+def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(
+    study_folder, capsys, monkeypatch
+):
+    monkeypatch.chdir(study_folder)
+    campaign, written = study_folder / "campaign.toml", study_folder / "campaign_tuned.toml"
+    before = campaign.read_text()
     words = ["tune", "campaign.toml", "--vary", "lead", "--vary", "readouts"]
     assert main(words) == 0, capsys.readouterr().err
     told = capsys.readouterr().out
     assert "held out in turn" in told
     assert "read-out      mooring_bow: none, floor -0.0" in told
-    assert (tutorial / "campaign.toml").read_text() == before
-    tuned = seakeep.read_campaign(tutorial / "campaign_tuned.toml").model()
+    assert campaign.read_text() == before
+    tuned = seakeep.read_campaign(written).model()
     assert isinstance(tuned.ridge, float)
     assert tuned.ridge_scale == "per_snapshot"
     assert tuned.readouts == {}  # the tutorial's line is linear
-    tried = pd.read_csv(tutorial / "campaign_tuned.csv")
+    tried = pd.read_csv("campaign_tuned.csv")
     assert tried["chosen"].sum() == 1
     assert np.all((tried["lower"] <= tried["score"]) & (tried["score"] <= tried["upper"]))
     assert len(tried) > 9  # each λ of each lead
     assert tuned.lead.value in (0, 0.5, 0.75, 1)  # of the campaign's period
-    text = (tutorial / "campaign_tuned.toml").read_text()
+    text = written.read_text()
     changed = ("state_delays", "input_delays", "ridge", "lead")
     kept = [line for line in before.splitlines() if line.strip() and not line.startswith(changed)]
     assert all(line in text for line in kept)
@@ -154,10 +144,7 @@ celerity = 2.0
     varied = ["memory", "alignment", "observables"]
     read = tomllib.loads(tuned_campaign(before, None, spec, varied, "recommended", 20.0))
     assert read["model"]["observables"] == [{"kind": "slow_squares", "of": ["eta"], "lead": 1.0}]
-    assert read["model"]["alignment"] == {
-        "mode": "dispersion",
-        "surge": "predicted",
-    }
+    assert read["model"]["alignment"] == {"mode": "dispersion", "surge": "predicted"}
     assert (read["model"]["memory"], read["model"]["ridge"]) == ("3.2 T", 0.1)
     assert "next" in read
     spec = replace(SPEC, ridge=1e-3)
@@ -169,15 +156,10 @@ celerity = 2.0
     assert kept["alignment"] == {"mode": "effective", "celerity": 2.0}
 
 
-def test_a_campaign_file_states_observables_read_outs_and_a_ridge_by_roll_out(tmp_path):
-    from seakeep.study.resolve import resolve_model
-
-    for path in TUTORIAL.iterdir():
-        if path.suffix == ".csv":
-            shutil.copy(path, tmp_path)
-    text = (TUTORIAL / "campaign.toml").read_text().split("[model]")[0]
-    (tmp_path / "campaign.toml").write_text(
-        text
+def test_a_campaign_file_states_observables_read_outs_and_a_ridge_by_roll_out(study_folder):
+    path = study_folder / "campaign.toml"
+    path.write_text(
+        path.read_text().split("[model]")[0]
         + """
 [model]
 states = ["heave", "mooring_bow"]
@@ -204,8 +186,7 @@ powers = [2]
 mooring_bow = "wave"
 """
     )
-    settings = seakeep.read_campaign(tmp_path / "campaign.toml").model()
-    spec = resolve_model(settings, 1.5, 0.08).spec
+    spec = resolve_model(seakeep.read_campaign(path).model(), 1.5, 0.08).spec
     assert spec.ridge == "rollout"
     assert spec.lead == 14
     squares, powers = spec.observables

@@ -1,7 +1,5 @@
 """Fixtures: the small tank's folder, and its campaign file with texts replaced."""
 
-from pathlib import Path
-
 import pytest
 from small_tank import CAMPAIGN, tank_columns, write_csv
 from tutorial_study import edit
@@ -14,7 +12,7 @@ def tank(tmp_path):
     """Folder with ``first.csv``, ``second.csv`` and ``campaign.toml``."""
     for seed, name in enumerate(("first", "second")):
         write_csv(tmp_path / f"{name}.csv", tank_columns(seed))
-    (tmp_path / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
+    (tmp_path / "campaign.toml").write_text(CAMPAIGN, "utf-8")
     return tmp_path
 
 
@@ -22,8 +20,8 @@ def tank(tmp_path):
 def edited(tank):
     """Write the campaign file with texts replaced; return its path."""
 
-    def write(*pairs: tuple[str, str]) -> Path:
-        (tank / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
+    def write(*pairs):
+        (tank / "campaign.toml").write_text(CAMPAIGN, "utf-8")
         return edit(tank / "campaign.toml", *pairs)
 
     return write

@@ -1,14 +1,12 @@
 """A small tank: two runs as a logger writes them, and a campaign file that reads them."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 
 DT = 0.02
 
 
-def tank_columns(seed: int = 0, seconds: float = 20.0) -> dict[str, np.ndarray]:
+def tank_columns(seed=0, seconds=20.0):
     """Time (s), wave (mm), heave (mm), pitch (deg), acceleration (m/s²) of a made-up run."""
     t = DT * np.arange(int(seconds / DT) + 1)
     phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, 5)
@@ -23,7 +21,7 @@ def tank_columns(seed: int = 0, seconds: float = 20.0) -> dict[str, np.ndarray]:
     }
 
 
-def write_csv(path: Path, columns: dict[str, np.ndarray]) -> Path:
+def write_csv(path, columns):
     pd.DataFrame(columns).to_csv(path, index=False)
     return path
 

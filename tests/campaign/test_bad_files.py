@@ -134,41 +134,43 @@ def test_a_sound_file_under_another_name_is_recognised(tmp_path, make, suffix):
     np.testing.assert_array_equal(read_table(path)["heave"], HEAVE)
 
 
-class TestUnits:
-    """Runs and files that state different units."""
+# Runs and files that state different units.
 
-    def prepared(self, tank, header, text=CAMPAIGN):
-        columns = tank_columns(1)
-        size = {"cm": 0.1, "m": 1e-3}.get(header, 1.0)
-        heave = columns.pop("Heave [mm]") * size
-        columns[f"Heave [{header}]" if header else "Heave"] = heave
-        write_csv(tank / "second.csv", columns)
-        (tank / "campaign.toml").write_text(text)
-        return read_campaign(tank / "campaign.toml").prepare()
 
-    @pytest.mark.parametrize("unit", ["cm", "m"])
-    def test_each_header_counts_for_its_own_run(self, tank, unit):
-        same = self.prepared(tank, "mm")["second"]
-        # One product with another rounded factor.
-        np.testing.assert_allclose(self.prepared(tank, unit)["second"]["heave"], same["heave"],
-                                   rtol=1e-12, atol=1e-15)  # fmt: skip
+def prepared(tank, header, text=CAMPAIGN):
+    columns = tank_columns(1)
+    size = {"cm": 0.1, "m": 1e-3}.get(header, 1.0)
+    heave = columns.pop("Heave [mm]") * size
+    columns[f"Heave [{header}]" if header else "Heave"] = heave
+    write_csv(tank / "second.csv", columns)
+    (tank / "campaign.toml").write_text(text)
+    return read_campaign(tank / "campaign.toml").prepare()
 
-    def test_a_stated_unit_against_a_header(self, tank):
-        text = CAMPAIGN.replace('column = "Heave"', 'column = "Heave"\nunit = "mm"')
-        assert "second" in self.prepared(tank, "mm", text)
-        assert "second" in self.prepared(tank, "-", text)
-        assert "second" in self.prepared(tank, "", text)
-        for header in ("m", "deg"):
-            with pytest.raises(
-                RequestError,
-                match=rf"channels\.heave: the unit 'mm' is stated, and run 'second' \(.*\.csv\) "
-                rf"says '{header}' for the column 'Heave'\. Leave unit out where the files say it; "
-                r"or, if this file is wrong, state the unit in \[runs\.second\.channels\.heave\]",
-            ):
-                self.prepared(tank, header, text)
-        mended = text.replace(
-            "[preparation]", "[runs.second.channels.heave]\nunit = 'm'\n[preparation]"
-        )
-        with pytest.warns(SeakeepWarning, match=r"heave leaves its mean by .* Check unit"):
-            runs = self.prepared(tank, "deg", mended)  # millimetres, now said to be metres
-        assert runs["second"]["heave"].std() > 1.0
+
+@pytest.mark.parametrize("unit", ["cm", "m"])
+def test_each_header_counts_for_its_own_run(tank, unit):
+    same = prepared(tank, "mm")["second"]
+    # One product with another rounded factor.
+    np.testing.assert_allclose(prepared(tank, unit)["second"]["heave"], same["heave"],
+                               rtol=1e-12, atol=1e-15)  # fmt: skip
+
+
+def test_a_stated_unit_against_a_header(tank):
+    text = CAMPAIGN.replace('column = "Heave"', 'column = "Heave"\nunit = "mm"')
+    assert "second" in prepared(tank, "mm", text)
+    assert "second" in prepared(tank, "-", text)
+    assert "second" in prepared(tank, "", text)
+    for header in ("m", "deg"):
+        with pytest.raises(
+            RequestError,
+            match=rf"channels\.heave: the unit 'mm' is stated, and run 'second' \(.*\.csv\) "
+            rf"says '{header}' for the column 'Heave'\. Leave unit out where the files say it; "
+            r"or, if this file is wrong, state the unit in \[runs\.second\.channels\.heave\]",
+        ):
+            prepared(tank, header, text)
+    mended = text.replace(
+        "[preparation]", "[runs.second.channels.heave]\nunit = 'm'\n[preparation]"
+    )
+    with pytest.warns(SeakeepWarning, match=r"heave leaves its mean by .* Check unit"):
+        runs = prepared(tank, "deg", mended)  # millimetres, now said to be metres
+    assert runs["second"]["heave"].std() > 1.0

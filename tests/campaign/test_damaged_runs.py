@@ -77,7 +77,7 @@ def test_the_commands(edited, tank, capsys):
     assert "prepared/first.nc" in captured.out
     assert "second.nc" not in captured.out
     assert "second.csv" in captured.err.split("Error:")[1]
-    page = (tank / "prepared" / "quality.html").read_text(encoding="utf-8")
+    page = (tank / "prepared" / "quality.html").read_text("utf-8")
     assert re.search(r"<td>second</td><td[^>]*>not prepared</td>", page)
     assert "is left out of the encounter period" in page
     model, out = str(tank / "model.nc"), ["-o", str(tank / "out.csv")]

@@ -13,41 +13,43 @@ from seakeep.campaign.guesses import suggest_channel
 def drafted(folder, files):
     text = draft_campaign(files, folder)
     path = folder / "campaign.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, "utf-8")
     return text, read_campaign(path)
 
 
-@pytest.mark.parametrize(
-    ("column", "unit", "channel", "logger"),
-    [
-        ("HEAVE_CoG", "mm", "heave", ""),
-        ("z", "m", "heave", ""),
-        ("GyroPitch", "deg/s", "pitch_rate", ""),
-        ("acc_z", "g", "heave_acceleration", ""),
-        ("ACC_Heave_SB", "m/s2", "acc_heave_sb", ""),
-        ("Heave", "deg", "heave_signal", ""),
-        ("WP_1", "m", "eta_1", ""),
-        ("eta cog", None, "eta_cog", ""),
-        ("probe", "cm", "eta_1", ""),
-        ("probe", "V", "probe", ""),
-        ("Tension_SB", "N", "mooring_starboard", ""),
-        ("Mooring aft", "N", "mooring_stern", ""),
-        ("Line 3 load", "N", "mooring_3", ""),
-        ("Force_Sway", "N", "force_sway", ""),
-        ("3rd thing", None, "column_3_rd_thing", ""),
-        ("Ærlig", None, "rlig", ""),
-        ("Time", "V", "time_signal", ""),
-        ("heave flags", None, "heave", ""),
-        ("odd flags", None, "odd_flags_signal", ""),
-        ("°", None, "channel", ""),
-        ("us_fwd", "mm", "eta_us_fwd", "wave_probes"),
-        ("carriage", "V", "carriage", "wave_probes"),
-        ("us_fwd", "mm", "us_fwd", "mru"),
-        ("rate_x", "deg/s", "roll_rate", "mru"),
-    ],
-)
-def test_guesses(column, unit, channel, logger):
-    assert suggest_channel(column, unit, logger) == channel
+GUESSES = {
+    "": {
+        ("HEAVE_CoG", "mm"): "heave",
+        ("z", "m"): "heave",
+        ("GyroPitch", "deg/s"): "pitch_rate",
+        ("acc_z", "g"): "heave_acceleration",
+        ("ACC_Heave_SB", "m/s2"): "acc_heave_sb",
+        ("Heave", "deg"): "heave_signal",
+        ("WP_1", "m"): "eta_1",
+        ("eta cog", None): "eta_cog",
+        ("probe", "cm"): "eta_1",
+        ("probe", "V"): "probe",
+        ("Tension_SB", "N"): "mooring_starboard",
+        ("Mooring aft", "N"): "mooring_stern",
+        ("Line 3 load", "N"): "mooring_3",
+        ("Force_Sway", "N"): "force_sway",
+        ("3rd thing", None): "column_3_rd_thing",
+        ("Ærlig", None): "rlig",
+        ("Time", "V"): "time_signal",
+        ("heave flags", None): "heave",
+        ("odd flags", None): "odd_flags_signal",
+        ("°", None): "channel",
+    },
+    "wave_probes": {("us_fwd", "mm"): "eta_us_fwd", ("carriage", "V"): "carriage"},
+    "mru": {("us_fwd", "mm"): "us_fwd", ("rate_x", "deg/s"): "roll_rate"},
+}
+"""Channels by logger, column and unit."""
+
+
+@pytest.mark.parametrize("logger", GUESSES)
+def test_guesses(logger):
+    for given, channel in GUESSES[logger].items():
+        assert suggest_channel(*given, logger) == channel
 
 
 def regular(folder, name, period, rate=50):
@@ -211,7 +213,7 @@ def test_init_takes_what_the_message_asks_for(tmp_path, capsys):
     path = tmp_path / "de.txt"
     rows = [f"{i / 50:.4f}\t{np.sin(i / 9):.4f}".replace(".", ",") for i in range(200)]
     head = ["Messung Schlepptank BM-7", "", "Zeit\tWelle_1", "s\tcm"]
-    path.write_text("\n".join([*head, *rows, ""]), encoding="utf-8")
+    path.write_text("\n".join([*head, *rows, ""]), "utf-8")
     assert cli.main(["init", str(path)]) == 1
     assert "give --skip-rows 2 to seakeep init" in " ".join(capsys.readouterr().err.split())
     out = tmp_path / "campaign.toml"

@@ -25,11 +25,6 @@ def rows():
     return read_columns(TUTORIAL / "run3.csv").values
 
 
-@pytest.fixture(scope="module")
-def offline(campaign):
-    return campaign.prepare(["unseen"])["unseen"]
-
-
 def between(rows, first, stop):
     """Rows of a part of the time, which is their first column."""
     part = slice(*np.searchsorted(next(iter(rows.values())), [first, stop]))
@@ -42,8 +37,8 @@ def sent(chain, rows, stop=60.0, step=4.0):
     return xr.concat([each for each in given if each.sizes["time"]], "time")
 
 
-def test_it_gives_what_preparation_gives_but_for_the_ends_of_its_window(campaign, rows, offline):
-    errors = {}
+def test_it_gives_what_preparation_gives_but_for_the_ends_of_its_window(campaign, rows):
+    offline, errors = campaign.prepare(["unseen"])["unseen"], {}
     for delay in ("0.1 T", "1 T"):
         found = sent(campaign.live_chain("unseen", delay=delay, window="20 T"), rows)
         time = found["time"].values

@@ -11,13 +11,7 @@ from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.errors import SeakeepWarning
 
-pytestmark = [
-    pytest.mark.data,
-    pytest.mark.skipif(
-        not os.environ.get("SEAKEEP_DATA_DIR"),
-        reason="SEAKEEP_DATA_DIR is not set: the measured data sets are not here",
-    ),
-]
+pytestmark = pytest.mark.data
 FLUME, BASIN = "ntnu_ship_section", "sjtu_semisub"
 
 
@@ -33,7 +27,7 @@ def files_of(name):
 def test_draft(tmp_path, name):
     files = files_of(name)
     path = tmp_path / "campaign.toml"
-    path.write_text(draft_campaign(files, tmp_path), encoding="utf-8")
+    path.write_text(draft_campaign(files, tmp_path), "utf-8")
     campaign = read_campaign(path)
     # The position of the flume's wavemaker is the one column whose header says no unit.
     bare = [n for n, each in campaign.settings.channels.items() if each.unit_assumed]

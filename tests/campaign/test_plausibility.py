@@ -67,175 +67,177 @@ def loggers(tmp_path):
         rest = {n: x[kept] for n, x in columns.items() if n != "WP fwd [mm]"}
         write_csv(tmp_path / "mru.csv", rest)
         path = tmp_path / "campaign.toml"
-        path.write_text(LOGGERS.replace(SPANS, spans), encoding="utf-8")
+        path.write_text(LOGGERS.replace(SPANS, spans), "utf-8")
         return read_campaign(path)
 
     return write
 
 
-class TestClocksAndRates:
-    """What is assumed or contradicted about instants is a finding."""
-
-    def test_clocks_of_which_nothing_is_said_are_assumed_the_same(self, loggers, tmp_path):
-        found = told(loggers().prepare()["first"], CLOCKS)
-        assert [channel for channel, _ in found] == ["mru"]
-        assert found[0][1].startswith("clock assumed the same as the reference's: state trigger")
-        stated = ("[instruments.mru]", "[instruments.mru]\noffset = 0")
-        path = edit(tmp_path / "campaign.toml", stated)
-        assert not told(read_campaign(path).prepare()["first"], CLOCKS)
-
-    @pytest.mark.parametrize(
-        ("files", "text"),
-        [('time = "Time"\nsampling_rate = 100', "samples at 50 Hz, by its times; 100 Hz are"),
-         ("sampling_rate = 25", "counted at the 25 Hz stated; the file's own times, which are "),
-         ('time = "Time"\nsampling_rate = 50', None), ("sampling_rate = 50", None)],
-    )  # fmt: skip
-    def test_a_rate_against_the_times(self, first, files, text):
-        run = first(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
-        found = told(run, CLOCKS)
-        assert [each[0] for each in found] == ([] if text is None else ["time"])
-        assert text is None or found[0][1].startswith(text)
-
-    @pytest.mark.parametrize(
-        ("header", "files", "is_said"),
-        [("Time", "", True), ("Sample", 'time = "Sample"', True), ("Time [s]", "", False),
-         ("Time", 'time_unit = "s"', False)],
-    )  # fmt: skip
-    def test_times_that_may_count_samples(self, first, tank, header, files, is_said):
-        for number, name in enumerate(("first", "second")):
-            columns = tank_columns(number)
-            del columns["Time [s]"]
-            write_csv(tank / f"{name}.csv", {header: np.arange(1001.0)} | columns)
-        stated = ("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]")
-        warned = pytest.warns(SeakeepWarning, match=r"state sampling_rate \(Hz\) in \[files\]")
-        with warned if is_said else nullcontext():
-            run = first(stated, ("sampling_rate = 10", ""))
-        assert ("counted" in kinds(run)) is is_said
-
-    def test_a_motion_from_a_column_of_waves(self, first):
-        with pytest.warns(
-            SeakeepWarning,
-            match=r"heave is read from the column 'WP fwd', which is called as wave probes are\. "
-            r"Correct column in \[channels\.heave\]",
-        ):
-            assert "wave column" in kinds(first(('column = "Heave"', 'column = "WP fwd"')))
-        assert "wave column" not in kinds(first())
+# What is assumed or contradicted about instants is a finding.
 
 
-class TestSteps:
-    """A step that loses the waves, and one that is finer than what was recorded."""
-
-    # Five waves of 0.5 to 0.9 Hz, all of one height, two of them above 0.72 Hz, where a filter for
-    # 1.6 Hz has its middle: 40 %, give or take how they beat under the spectrum's window.
-    @pytest.mark.parametrize(
-        ("chain", "fate"),
-        [("sampling_rate = 1.6", "[345]. % of the energy of its waves .* is damped or lost at 1.6"),
-         ("sampling_rate = 1.5\nanti_alias = false", "0.75 Hz and is folded into slower waves"),
-         ("sampling_rate = 10", None), ("sampling_rate = 3", None), ("sampling_rate = 100", None)],
-    )  # fmt: skip
-    def test_what_a_coarse_step_loses_is_told(self, first, chain, fate):
-        run = first(("sampling_rate = 10", chain))
-        found = dict(told(run, ("COARSE_STEP", "FINE_STEP")))
-        assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
-        assert fate is None or re.search(fate, found["eta_fwd"])
-
-    @pytest.mark.parametrize("edges", ["[0.17, 0.33]", "[2.0, 3.0]"])
-    def test_a_low_pass_that_removes_the_waves_is_named(self, first, edges):
-        """Waves of 0.5 to 0.9 Hz: the first filter leaves none of them, the second all."""
-        stated = ("sampling_rate = 10", f"sampling_rate = 10\nlow_pass = {edges}")
-        if edges == "[2.0, 3.0]":
-            assert not kinds(first(stated))
-            return
-        with pytest.warns(
-            SeakeepWarning,
-            match=r"loses (9\d.*|100) % of the energy of its waves .* to the filter low_pass, "
-            r"which halves what lies at 0\.25 Hz .*\. Raise low_pass in \[preparation\]",
-        ):
-            assert "low pass" in kinds(first(stated))
-
-    def test_a_low_pass_longer_than_the_record(self, first):
-        """60 dB over 0.1 Hz take 41.8 s by Kaiser's formula, and the record has 20 s."""
-        with pytest.raises(DataError, match=r"'first': low_pass .* over 41\.8 s, .* lasts 20 s"):
-            first(("sampling_rate = 10", "sampling_rate = 10\nlow_pass = [2.0, 2.1]"))
+def test_clocks_of_which_nothing_is_said_are_assumed_the_same(loggers, tmp_path):
+    found = told(loggers().prepare()["first"], CLOCKS)
+    assert [channel for channel, _ in found] == ["mru"]
+    assert found[0][1].startswith("clock assumed the same as the reference's: state trigger")
+    stated = ("[instruments.mru]", "[instruments.mru]\noffset = 0")
+    path = edit(tmp_path / "campaign.toml", stated)
+    assert not told(read_campaign(path).prepare()["first"], CLOCKS)
 
 
-class TestRecords:
-    @pytest.mark.parametrize(
-        ("ends", "words", "span"),
-        [((0.0, 15.0), "ends at 15 s, the other loggers at 20 s: the run is", (10.0, 15.0)),
-         ((3.0, 20.0), "starts at 3 s, the other loggers at 0 s", (10.0, 20.0))],
-    )  # fmt: skip
-    def test_a_logger_that_was_cut_off_is_told(self, loggers, ends, words, span):
-        with pytest.warns(SeakeepWarning, match=f"first: mru {words}"):
-            run = loggers(*ends).prepare()["first"]
-        assert [text.startswith(words) for _, text in told(run, RECORDS)] == [True]
-        assert run.attrs["test_span"] == pytest.approx(span)
+@pytest.mark.parametrize(
+    ("files", "text"),
+    {'time = "Time"\nsampling_rate = 100': "samples at 50 Hz, by its times; 100 Hz are",
+     "sampling_rate = 25": "counted at the 25 Hz stated; the file's own times, which are ",
+     'time = "Time"\nsampling_rate = 50': None, "sampling_rate = 50": None}.items(),
+)  # fmt: skip
+def test_a_rate_against_the_times(first, files, text):
+    run = first(("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]"))
+    found = told(run, CLOCKS)
+    assert [each[0] for each in found] == ([] if text is None else ["time"])
+    assert text is None or found[0][1].startswith(text)
 
-    @pytest.mark.parametrize(
-        ("ends", "spans"),
-        [((0.5, 20.0), SPANS), ((0.0, 19.5), SPANS), ((5.0, 20.0), "span = [6, inf]"),
-         ((0.0, 15.0), "train = [1, 8]\ntest = [8, 14]")],
-    )  # fmt: skip
-    def test_a_start_by_hand_and_what_the_run_does_not_use_do_no_harm(self, loggers, ends, spans):
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            assert not told(loggers(*ends, spans).prepare()["first"], RECORDS)
 
-    @pytest.mark.parametrize("test", ["[10, 20]", "[10, inf]"])
-    def test_a_test_part_without_samples_is_an_error(self, loggers, test):
-        """It would else be judged on the part that trains."""
-        campaign = loggers(end=8.0, spans=f"train = [0, 8]\ntest = {test}")
-        message = r"runs\.first\.test: \[10, .*holds 0 sample.* together only from 0 to 8 s"
-        with (
-            pytest.warns(SeakeepWarning, match="mru ends"),
-            pytest.raises(DataError, match=message),
-        ):
-            campaign.prepare()
+@pytest.mark.parametrize(
+    ("header", "files", "is_said"),
+    [("Time", "", True), ("Sample", 'time = "Sample"', True), ("Time [s]", "", False),
+     ("Time", 'time_unit = "s"', False)],
+)  # fmt: skip
+def test_times_that_may_count_samples(first, tank, header, files, is_said):
+    for number, name in enumerate(("first", "second")):
+        columns = tank_columns(number)
+        del columns["Time [s]"]
+        write_csv(tank / f"{name}.csv", {header: np.arange(1001.0)} | columns)
+    stated = ("[channels.eta_fwd]", f"[files]\n{files}\n\n[channels.eta_fwd]")
+    warned = pytest.warns(SeakeepWarning, match=r"state sampling_rate \(Hz\) in \[files\]")
+    with warned if is_said else nullcontext():
+        run = first(stated, ("sampling_rate = 10", ""))
+    assert ("counted" in kinds(run)) is is_said
+
+
+def test_a_motion_from_a_column_of_waves(first):
+    with pytest.warns(
+        SeakeepWarning,
+        match=r"heave is read from the column 'WP fwd', which is called as wave probes are\. "
+        r"Correct column in \[channels\.heave\]",
+    ):
+        assert "wave column" in kinds(first(('column = "Heave"', 'column = "WP fwd"')))
+    assert "wave column" not in kinds(first())
+
+
+# A step that loses the waves, and one that is finer than what was recorded.
+
+
+# Five waves of 0.5 to 0.9 Hz, all of one height, two of them above 0.72 Hz, where a filter for
+# 1.6 Hz has its middle: 40 %, give or take how they beat under the spectrum's window.
+@pytest.mark.parametrize(
+    ("chain", "fate"),
+    {"sampling_rate = 1.6": "[345]. % of the energy of its waves .* is damped or lost at 1.6",
+     "sampling_rate = 1.5\nanti_alias = false": "0.75 Hz and is folded into slower waves",
+     **dict.fromkeys(f"sampling_rate = {rate}" for rate in (10, 3, 100))}.items(),
+)  # fmt: skip
+def test_what_a_coarse_step_loses_is_told(first, chain, fate):
+    run = first(("sampling_rate = 10", chain))
+    found = dict(told(run, ("COARSE_STEP", "FINE_STEP")))
+    assert set(found) == ({"eta_fwd", "heave", "pitch"} if fate else set())
+    assert fate is None or re.search(fate, found["eta_fwd"])
+
+
+@pytest.mark.parametrize("edges", ["[0.17, 0.33]", "[2.0, 3.0]"])
+def test_a_low_pass_that_removes_the_waves_is_named(first, edges):
+    """Waves of 0.5 to 0.9 Hz: the first filter leaves none of them, the second all."""
+    stated = ("sampling_rate = 10", f"sampling_rate = 10\nlow_pass = {edges}")
+    if edges == "[2.0, 3.0]":
+        assert not kinds(first(stated))
+        return
+    with pytest.warns(
+        SeakeepWarning,
+        match=r"loses (9\d.*|100) % of the energy of its waves .* to the filter low_pass, "
+        r"which halves what lies at 0\.25 Hz .*\. Raise low_pass in \[preparation\]",
+    ):
+        assert "low pass" in kinds(first(stated))
+
+
+def test_a_low_pass_longer_than_the_record(first):
+    """60 dB over 0.1 Hz take 41.8 s by Kaiser's formula, and the record has 20 s."""
+    with pytest.raises(DataError, match=r"'first': low_pass .* over 41\.8 s, .* lasts 20 s"):
+        first(("sampling_rate = 10", "sampling_rate = 10\nlow_pass = [2.0, 2.1]"))
+
+
+@pytest.mark.parametrize(
+    ("ends", "words", "span"),
+    [((0.0, 15.0), "ends at 15 s, the other loggers at 20 s: the run is", (10.0, 15.0)),
+     ((3.0, 20.0), "starts at 3 s, the other loggers at 0 s", (10.0, 20.0))],
+)  # fmt: skip
+def test_a_logger_that_was_cut_off_is_told(loggers, ends, words, span):
+    with pytest.warns(SeakeepWarning, match=f"first: mru {words}"):
+        run = loggers(*ends).prepare()["first"]
+    assert [text.startswith(words) for _, text in told(run, RECORDS)] == [True]
+    assert run.attrs["test_span"] == pytest.approx(span)
+
+
+@pytest.mark.parametrize(
+    ("ends", "spans"),
+    [((0.5, 20.0), SPANS), ((0.0, 19.5), SPANS), ((5.0, 20.0), "span = [6, inf]"),
+     ((0.0, 15.0), "train = [1, 8]\ntest = [8, 14]")],
+)  # fmt: skip
+def test_a_start_by_hand_and_what_the_run_does_not_use_do_no_harm(loggers, ends, spans):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert not told(loggers(*ends, spans).prepare()["first"], RECORDS)
+
+
+@pytest.mark.parametrize("test", ["[10, 20]", "[10, inf]"])
+def test_a_test_part_without_samples_is_an_error(loggers, test):
+    """It would else be judged on the part that trains."""
+    campaign = loggers(end=8.0, spans=f"train = [0, 8]\ntest = {test}")
+    message = r"runs\.first\.test: \[10, .*holds 0 sample.* together only from 0 to 8 s"
+    with pytest.warns(SeakeepWarning, match="mru ends"), pytest.raises(DataError, match=message):
+        campaign.prepare()
 
 
 COUNTED = ("sampling_rate = 10", "steps_per_period = 12")
 
 
-class TestPeriod:
-    def test_a_count_that_noise_leads_is_told(self, changed, tank):
-        sound = changed(COUNTED).encounter_period()
-        for seed, name in enumerate(("first", "second")):
-            columns = tank_columns(seed)
-            columns["WP fwd [mm]"] += np.random.default_rng(seed).normal(0, 9.5, 1001)  # of 32 mm
-            write_csv(tank / f"{name}.csv", columns)
-        message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s "
-        rest = r"\(second likewise\)\. .*period_hysteresis"
-        with pytest.warns(SeakeepWarning, match=message + rest):
-            run = changed(COUNTED).prepare()["first"]
-        assert run.attrs["encounter_period"] < sound / 1.5
-        assert [channel for channel, _ in told(run, ("PERIOD",))] == ["eta_fwd"]
+def test_a_count_that_noise_leads_is_told(changed, tank):
+    sound = changed(COUNTED).encounter_period()
+    for seed, name in enumerate(("first", "second")):
+        columns = tank_columns(seed)
+        columns["WP fwd [mm]"] += np.random.default_rng(seed).normal(0, 9.5, 1001)  # of 32 mm
+        write_csv(tank / f"{name}.csv", columns)
+    message = r"first: eta_fwd counts waves of .* energy period of its spectrum is 1\.\d+ s "
+    rest = r"\(second likewise\)\. .*period_hysteresis"
+    with pytest.warns(SeakeepWarning, match=message + rest):
+        run = changed(COUNTED).prepare()["first"]
+    assert run.attrs["encounter_period"] < sound / 1.5
+    assert [channel for channel, _ in told(run, ("PERIOD",))] == ["eta_fwd"]
 
 
-class TestValues:
-    @pytest.mark.parametrize(
-        ("stem", "header", "message"),
-        [("Pitch (deg)", "Pitch (rad)", r"pitch reaches \d.* deg, more than 90 deg"),
-         ("Heave [mm]", "Heave [m]", r"heave leaves its mean by .* m in water of 3\.6 m"),
-         ("WP fwd [mm]", "WP fwd [m]", r"eta_fwd leaves its mean by .* m in water of 3\.6 m")],
-    )  # fmt: skip
-    def test_values_that_nothing_afloat_reaches(self, changed, tank, stem, header, message):
-        columns = tank_columns(0)
-        write_csv(tank / "first.csv", {header if n == stem else n: x for n, x in columns.items()})
-        with pytest.warns(SeakeepWarning, match=message + r"\. Check unit and column in \[channe"):
-            runs = changed().prepare()
-        assert kinds(runs["first"]) & {"impossible", "out of water"}
-        assert not kinds(runs["second"])
+@pytest.mark.parametrize(
+    ("stem", "header", "message"),
+    [("Pitch (deg)", "Pitch (rad)", r"pitch reaches \d.* deg, more than 90 deg"),
+     ("Heave [mm]", "Heave [m]", r"heave leaves its mean by .* m in water of 3\.6 m"),
+     ("WP fwd [mm]", "WP fwd [m]", r"eta_fwd leaves its mean by .* m in water of 3\.6 m")],
+)  # fmt: skip
+def test_values_that_nothing_afloat_reaches(changed, tank, stem, header, message):
+    columns = tank_columns(0)
+    write_csv(tank / "first.csv", {header if n == stem else n: x for n, x in columns.items()})
+    with pytest.warns(SeakeepWarning, match=message + r"\. Check unit and column in \[channe"):
+        runs = changed().prepare()
+    assert kinds(runs["first"]) & {"impossible", "out of water"}
+    assert not kinds(runs["second"])
 
-    def test_a_unit_that_a_draft_assumed_is_told_until_it_is_confirmed(self, tank):
-        columns = tank_columns(0)
-        columns["pitch"] = np.radians(columns.pop("Pitch (deg)"))
-        bare, path = write_csv(tank / "bare.csv", columns), tank / "draft.toml"
-        path.write_text(draft_campaign([bare], tank), encoding="utf-8")
-        with pytest.warns(SeakeepWarning, match="pitch is taken as rad, .*remove unit_as"):
-            run = read_campaign(path).prepare()["bare"]
-        assert "unit" in kinds(run)
-        edit(path, ("unit_assumed = true", ""))
-        assert "unit" not in kinds(read_campaign(path).prepare()["bare"])
+
+def test_a_unit_that_a_draft_assumed_is_told_until_it_is_confirmed(tank):
+    columns = tank_columns(0)
+    columns["pitch"] = np.radians(columns.pop("Pitch (deg)"))
+    bare, path = write_csv(tank / "bare.csv", columns), tank / "draft.toml"
+    path.write_text(draft_campaign([bare], tank), "utf-8")
+    with pytest.warns(SeakeepWarning, match="pitch is taken as rad, .*remove unit_as"):
+        run = read_campaign(path).prepare()["bare"]
+    assert "unit" in kinds(run)
+    edit(path, ("unit_assumed = true", ""))
+    assert "unit" not in kinds(read_campaign(path).prepare()["bare"])
 
 
 def kinds(run):

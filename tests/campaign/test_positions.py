@@ -43,7 +43,7 @@ def campaign(tmp_path):
 
     def make(stated, waves="irregular"):
         path = tmp_path / "campaign.toml"
-        path.write_text(CAMPAIGN.format(stated=stated, waves=waves), encoding="utf-8")
+        path.write_text(CAMPAIGN.format(stated=stated, waves=waves), "utf-8")
         return seakeep.read_campaign(path)
 
     return make

@@ -126,83 +126,85 @@ def test_derived_at_the_files_own_rate(changed):
     assert run["way"].attrs["long_name"] == "way of the bow"
 
 
-class TestStep:
-    @pytest.mark.parametrize(("rate", "dt"), [("dt = 0.13", 0.13), ("steps_per_period = 32", 0.05)])
-    def test_stated(self, changed, rate, dt):
-        period = ("scale_factor = 30.0", "encounter_period = 1.6")
-        campaign = changed(("sampling_rate = 10", rate), period)
-        assert campaign.encounter_period() == 1.6
-        for run in campaign.prepare().values():
-            assert (run.attrs["dt"], run.attrs["encounter_period"]) == (dt, 1.6)
-            np.testing.assert_allclose(np.diff(run["time"]), dt, rtol=1e-12)
-
-    def test_the_files_own(self, changed):
-        campaign = changed(("sampling_rate = 10", ""))
-        run = campaign.prepare()["first"]
-        raw = campaign.read_run("first")
-        assert run.attrs["dt"] == DT
-        np.testing.assert_array_equal(run["heave"], raw["heave"])
-
-    def test_the_files_own_differ(self, edited, tank):
-        edited(("sampling_rate = 10", ""))
-        columns = {name: each[::2] for name, each in tank_columns(1).items()}
-        write_csv(tank / "second.csv", columns)
-        with pytest.raises(
-            RequestError,
-            match=r"the runs differ in rate: 'first' has a step of 0\.02 s and 'second' one of "
-            r"0\.04 s\. State sampling_rate",
-        ):
-            read_campaign(tank / "campaign.toml").prepare()
+@pytest.mark.parametrize(("rate", "dt"), [("dt = 0.13", 0.13), ("steps_per_period = 32", 0.05)])
+def test_the_step_is_the_stated_one(changed, rate, dt):
+    period = ("scale_factor = 30.0", "encounter_period = 1.6")
+    campaign = changed(("sampling_rate = 10", rate), period)
+    assert campaign.encounter_period() == 1.6
+    for run in campaign.prepare().values():
+        assert (run.attrs["dt"], run.attrs["encounter_period"]) == (dt, 1.6)
+        np.testing.assert_allclose(np.diff(run["time"]), dt, rtol=1e-12)
 
 
-class TestEncounterPeriod:
-    def test_mean_of_the_irregular_runs(self, changed):
-        both = changed().encounter_period()
-        first = changed(('sea_state = "moderate"', 'waves = "irregular"')).encounter_period()
-        second = changed(
-            ('sea_state = "moderate"', 'waves = "regular"'),
-            ('role = "test"', 'role = "test"\nwaves = "irregular"'),
-        ).encounter_period()
-        assert first != second
-        assert both == pytest.approx((first + second) / 2, rel=1e-15)  # rounding of a sum
+def test_the_step_is_the_files_own(changed):
+    campaign = changed(("sampling_rate = 10", ""))
+    run = campaign.prepare()["first"]
+    raw = campaign.read_run("first")
+    assert run.attrs["dt"] == DT
+    np.testing.assert_array_equal(run["heave"], raw["heave"])
 
-    def test_still_water_before_the_waves_does_not_count(self, tank, changed):
-        # Spans do not cut it off, and the probe's noise crosses the mean all the while.
-        columns = tank_columns(0, seconds=60.0)
-        waves = columns["WP fwd [mm]"][1250:]
-        columns["WP fwd [mm]"][:1250] = 0.05 * np.random.default_rng(0).standard_normal(1250)
-        write_csv(tank / "first.csv", columns)
-        roles = [
-            ("train = [0, 10]\ntest = [10, inf]", 'role = "train"'),
-            ('role = "test"\nspan = [2, 18]', 'role = "unused"'),
-        ]
-        found = changed(*roles).encounter_period()
-        # A wave or two of 25 may fall to the still part.
-        assert found == pytest.approx(encounter_period(waves, DT), rel=0.02)
-        campaign = changed(*roles, ("[campaign]", "[campaign]\nperiod_hysteresis = 0.9"))
-        # Only waves that pass 0.9 of a deviation on either side are counted: fewer, so longer.
-        with pytest.warns(SeakeepWarning, match=r"counts waves of 3\.\d+ s, and the energy period"):
-            assert campaign.encounter_period() > 1.1 * encounter_period(waves, DT)
 
-    def test_no_wave(self, changed):
-        campaign = changed(
-            ('inputs = ["eta_fwd"]', ""),
-            ("[channels.eta_fwd]", "[channels.probe]"),
-            ("eta_fwd = -2.5", ""),
-        )
-        with pytest.raises(
-            RequestError,
-            match=r"no wave channel to take the encounter period from. State encounter",
-        ):
-            campaign.encounter_period()
+def test_steps_of_files_that_differ_are_refused(edited, tank):
+    edited(("sampling_rate = 10", ""))
+    columns = {name: each[::2] for name, each in tank_columns(1).items()}
+    write_csv(tank / "second.csv", columns)
+    with pytest.raises(
+        RequestError,
+        match=r"the runs differ in rate: 'first' has a step of 0\.02 s and 'second' one of "
+        r"0\.04 s\. State sampling_rate",
+    ):
+        read_campaign(tank / "campaign.toml").prepare()
 
-    def test_still_water(self, tank):
-        for name in ("first.csv", "second.csv"):
-            campaign = rewrite(tank, lambda c: c["WP fwd [mm]"].fill(0.0), name)
-        with pytest.raises(DataError, match="run 'first', channel 'eta_fwd': the record of 20"):
-            campaign.encounter_period()
-        # A constant channel is kept all the same: whether it serves is the model's business.
-        assert campaign.prepare()["first"]["eta_fwd"].std() == 0.0
+
+def test_the_period_is_the_mean_of_the_irregular_runs(changed):
+    both = changed().encounter_period()
+    first = changed(('sea_state = "moderate"', 'waves = "irregular"')).encounter_period()
+    second = changed(
+        ('sea_state = "moderate"', 'waves = "regular"'),
+        ('role = "test"', 'role = "test"\nwaves = "irregular"'),
+    ).encounter_period()
+    assert first != second
+    assert both == pytest.approx((first + second) / 2, rel=1e-15)  # rounding of a sum
+
+
+def test_still_water_before_the_waves_does_not_count(tank, changed):
+    # Spans do not cut it off, and the probe's noise crosses the mean all the while.
+    columns = tank_columns(0, seconds=60.0)
+    waves = columns["WP fwd [mm]"][1250:]
+    columns["WP fwd [mm]"][:1250] = 0.05 * np.random.default_rng(0).standard_normal(1250)
+    write_csv(tank / "first.csv", columns)
+    roles = [
+        ("train = [0, 10]\ntest = [10, inf]", 'role = "train"'),
+        ('role = "test"\nspan = [2, 18]', 'role = "unused"'),
+    ]
+    found = changed(*roles).encounter_period()
+    # A wave or two of 25 may fall to the still part.
+    assert found == pytest.approx(encounter_period(waves, DT), rel=0.02)
+    campaign = changed(*roles, ("[campaign]", "[campaign]\nperiod_hysteresis = 0.9"))
+    # Only waves that pass 0.9 of a deviation on either side are counted: fewer, so longer.
+    with pytest.warns(SeakeepWarning, match=r"counts waves of 3\.\d+ s, and the energy period"):
+        assert campaign.encounter_period() > 1.1 * encounter_period(waves, DT)
+
+
+def test_a_period_needs_a_wave_channel(changed):
+    campaign = changed(
+        ('inputs = ["eta_fwd"]', ""),
+        ("[channels.eta_fwd]", "[channels.probe]"),
+        ("eta_fwd = -2.5", ""),
+    )
+    with pytest.raises(
+        RequestError, match=r"no wave channel to take the encounter period from. State encounter"
+    ):
+        campaign.encounter_period()
+
+
+def test_still_water_has_no_period(tank):
+    for name in ("first.csv", "second.csv"):
+        campaign = rewrite(tank, lambda c: c["WP fwd [mm]"].fill(0.0), name)
+    with pytest.raises(DataError, match="run 'first', channel 'eta_fwd': the record of 20"):
+        campaign.encounter_period()
+    # A constant channel is kept all the same: whether it serves is the model's business.
+    assert campaign.prepare()["first"]["eta_fwd"].std() == 0.0
 
 
 def gapped(columns):
@@ -211,86 +213,84 @@ def gapped(columns):
     return columns | {"Heave [mm]": heave, "Pitch (deg)": pitch}
 
 
-class TestBadRuns:
-    @pytest.mark.parametrize(
-        ("change", "error", "message"),
-        [
-            (
-                gapped,
-                DataError,
-                r"run 'second' .*: channel 'heave' has 4 missing values of 1001 in 2 gap\(s\), the "
-                r"first at t = 2 s \(3 samples, 0\.06 s\), the longest at t = 2 s \(3 samples, "
-                r"0\.06 s\) \(also in pitch\)\. Repair the file, leave the channel out, or cut the "
-                r"gap off with record = \[start, end\] in \[runs\.second\]",
-            ),
-            (
-                lambda columns: columns | {"Time [s]": columns["Time [s]"] ** 1.1},
-                DataError,
-                r"the times of run 'second' \(.*second\.csv\) are not uniform: steps r",
-            ),
-            (
-                lambda columns: columns | {"Heave [deg]": columns.pop("Heave [mm]")},
-                RequestError,
-                r"the unit 'deg' does not fit channel 'heave' \(column 'Heave' of .*second\.csv\), "
-                "which is measured in 'm'",
-            ),
-        ],
-    )
-    def test_a_file_at_fault(self, campaign, tank, change, error, message):
-        write_csv(tank / "second.csv", change(tank_columns(1)))
-        with pytest.raises(error, match=message):
-            campaign.prepare()
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        (
+            gapped,
+            DataError,
+            r"run 'second' .*: channel 'heave' has 4 missing values of 1001 in 2 gap\(s\), the "
+            r"first at t = 2 s \(3 samples, 0\.06 s\), the longest at t = 2 s \(3 samples, "
+            r"0\.06 s\) \(also in pitch\)\. Repair the file, leave the channel out, or cut the "
+            r"gap off with record = \[start, end\] in \[runs\.second\]",
+        ),
+        (
+            lambda columns: columns | {"Time [s]": columns["Time [s]"] ** 1.1},
+            DataError,
+            r"the times of run 'second' \(.*second\.csv\) are not uniform: steps r",
+        ),
+        (
+            lambda columns: columns | {"Heave [deg]": columns.pop("Heave [mm]")},
+            RequestError,
+            r"the unit 'deg' does not fit channel 'heave' \(column 'Heave' of .*second\.csv\), "
+            "which is measured in 'm'",
+        ),
+    ],
+)
+def test_a_file_at_fault(campaign, tank, change, error, message):
+    write_csv(tank / "second.csv", change(tank_columns(1)))
+    with pytest.raises(error, match=message):
+        campaign.prepare()
 
-    @pytest.mark.parametrize(
-        ("old", "new", "message"),
-        [
-            (
-                'column = "Heave"',
-                'column = "Heaves"',
-                r"first\.csv has no column 'Heaves'\. Did you mean 'Heave'\? Its columns: Time",
-            ),
-            *(
-                (
-                    "span = [2, 18]",
-                    f"{key} = {span}",
-                    rf"runs\.second\.{key}: received \[.*\] s, and the record runs from 0 to "
-                    r"20 s\.",
-                )
-                for key in ("span", "record")
-                for span in ("[2, 30]", "[-3, 10]", "[30, 40]")
-            ),
-            *(
-                (
-                    "span = [2, 18]",
-                    span,
-                    rf"holds 0 sample\(s\) at a step of {step} s\. Lengthen",
-                )
-                for span, step in (("span = [2.01, 2.05]", 0.1), ("record = [2.001, 2.01]", 0.02))
-            ),
-            ("sampling_rate = 10", "dt = 50", r"of 20 s is shorter than two steps of 50 s"),
-            (
-                'file = "second.csv"',
-                'file = "${TANK_FILES}/second.csv"',
-                r"needs the environment variable TANK_FILES, which is not set\. Set it to the "
-                r"folder of the data: export TANK_FILES=",
-            ),
-        ],
-    )
-    def test_a_campaign_at_fault(self, changed, old, new, message):
-        with pytest.raises(RequestError, match=message):
-            changed((old, new)).prepare()
 
-    def test_gap_cut_off(self, tank, changed):
-        rewrite(tank, lambda c: c["Heave [mm]"].__setitem__(slice(20, 30), np.nan))
-        run = changed(("span = [2, 18]", "record = [1, inf]")).prepare()["second"]
-        assert run["time"][0] == 1.0
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            'column = "Heave"',
+            'column = "Heaves"',
+            r"first\.csv has no column 'Heaves'\. Did you mean 'Heave'\? Its columns: Time",
+        ),
+        *(
+            (
+                "span = [2, 18]",
+                f"{key} = {span}",
+                rf"runs\.second\.{key}: received \[.*\] s, and the record runs from 0 to "
+                r"20 s\.",
+            )
+            for key in ("span", "record")
+            for span in ("[2, 30]", "[-3, 10]", "[30, 40]")
+        ),
+        *(
+            ("span = [2, 18]", span, rf"holds 0 sample\(s\) at a step of {step} s\. Lengthen")
+            for span, step in (("span = [2.01, 2.05]", 0.1), ("record = [2.001, 2.01]", 0.02))
+        ),
+        ("sampling_rate = 10", "dt = 50", r"of 20 s is shorter than two steps of 50 s"),
+        (
+            'file = "second.csv"',
+            'file = "${TANK_FILES}/second.csv"',
+            r"needs the environment variable TANK_FILES, which is not set\. Set it to the "
+            r"folder of the data: export TANK_FILES=",
+        ),
+    ],
+)
+def test_a_campaign_at_fault(changed, old, new, message):
+    with pytest.raises(RequestError, match=message):
+        changed((old, new)).prepare()
 
-    def test_a_variable_in_a_path(self, edited, monkeypatch):
-        path = edited(('file = "second.csv"', 'file = "${TANK_FILES}/second.csv"'))
-        with pytest.raises(RequestError, match=r"has no run 'secnd'\. Did you mean 'second'"):
-            read_campaign(path).prepare(["secnd"])
-        monkeypatch.setenv("TANK_FILES", str(path.parent))
-        assert read_campaign(path).prepare(["second"])
+
+def test_a_gap_is_cut_off(tank, changed):
+    rewrite(tank, lambda c: c["Heave [mm]"].__setitem__(slice(20, 30), np.nan))
+    run = changed(("span = [2, 18]", "record = [1, inf]")).prepare()["second"]
+    assert run["time"][0] == 1.0
+
+
+def test_a_variable_in_a_path(edited, monkeypatch):
+    path = edited(('file = "second.csv"', 'file = "${TANK_FILES}/second.csv"'))
+    with pytest.raises(RequestError, match=r"has no run 'secnd'\. Did you mean 'second'"):
+        read_campaign(path).prepare(["secnd"])
+    monkeypatch.setenv("TANK_FILES", str(path.parent))
+    assert read_campaign(path).prepare(["second"])
 
 
 def test_the_digest_follows_what_prepared_runs_depend_on(changed):
@@ -311,68 +311,71 @@ def test_the_digest_follows_what_prepared_runs_depend_on(changed):
     assert (len(same), len(others), len(same | others)) == (1, 4, 5)
 
 
-class TestFiles:
-    def test_written_runs_come_back(self, campaign, tank, monkeypatch):
-        files = write_prepared(campaign, tank / "out")
-        assert files == {n: tank / "out" / f"{n}.nc" for n in ("first", "second")}
-        expected = campaign.prepare()
-        monkeypatch.setattr(type(campaign), "prepare", None)  # nothing is prepared again
-        for name, run in load_prepared(campaign, tank / "out").items():
-            xr.testing.assert_identical(run, expected[name])
+def test_written_runs_come_back(campaign, tank, monkeypatch):
+    files = write_prepared(campaign, tank / "out")
+    assert files == {n: tank / "out" / f"{n}.nc" for n in ("first", "second")}
+    expected = campaign.prepare()
+    monkeypatch.setattr(type(campaign), "prepare", None)  # nothing is prepared again
+    for name, run in load_prepared(campaign, tank / "out").items():
+        xr.testing.assert_identical(run, expected[name])
 
-    def test_interrupted_half_way_a_second_call_continues(self, campaign, tank):
-        def stop(done, total, name):
-            if done == 2:
-                raise KeyboardInterrupt
 
-        with pytest.raises(KeyboardInterrupt):
-            write_prepared(campaign, progress=stop)
-        # Each run is written before the next one is begun, and nothing half done stays.
-        (written,) = (tank / "prepared").iterdir()
-        before, calls = written.stat().st_mtime_ns, []
-        write_prepared(campaign, progress=lambda *call: calls.append(call))
-        assert (written.name, written.stat().st_mtime_ns) == ("first.nc", before)
-        assert calls == [(2, 2, "second")]
+def test_interrupted_half_way_a_second_call_continues(campaign, tank):
+    def stop(done, total, name):
+        if done == 2:
+            raise KeyboardInterrupt
 
-    @pytest.mark.parametrize("change", ["settings", "file", "version", "name"])
-    def test_stale_files_are_not_used(self, campaign, tank, changed, change, monkeypatch):
-        path = write_prepared(campaign)["second"]
-        with xr.open_dataset(path) as opened:
-            run = opened.load()
-        run["heave"][:] = 0.0  # to be seen if it were used
-        write_netcdf(path, run)
-        assert load_prepared(campaign)["second"]["heave"].std() == 0.0
-        if change == "settings":
-            campaign = changed(("sampling_rate = 10", "sampling_rate = 12"))
-        elif change == "name":
-            campaign = changed(("Small tank", "Smaller tank"))
-        elif change == "file":
-            write_csv(tank / "second.csv", tank_columns(5))
-        else:
-            monkeypatch.setattr("seakeep.campaign.store.version", lambda: "99.0")
-        assert load_prepared(campaign)["second"]["heave"].std() > 0.0
+    with pytest.raises(KeyboardInterrupt):
+        write_prepared(campaign, progress=stop)
+    # Each run is written before the next one is begun, and nothing half done stays.
+    (written,) = (tank / "prepared").iterdir()
+    before, calls = written.stat().st_mtime_ns, []
+    write_prepared(campaign, progress=lambda *call: calls.append(call))
+    assert (written.name, written.stat().st_mtime_ns) == ("first.nc", before)
+    assert calls == [(2, 2, "second")]
 
-    def test_a_measurement_is_never_overwritten(self, tank, changed):
-        """`prepare -o .` replaced the raw run1.nc by the prepared run of that name."""
-        campaign = changed(('file = "first.csv"', 'file = "first.nc"'))
-        (tank / "other").mkdir()
-        for folder, message in (
-            (tank, r"first\.nc is read by this command and would be"),
-            (tank / "other", r"first\.nc exists and is not a prepared run that"),
-        ):
-            (folder / "first.nc").write_bytes(b"CDF")
-            with pytest.raises(RequestError, match=message):
-                write_prepared(campaign, folder, ["first"])
-            assert (folder / "first.nc").read_bytes() == b"CDF"
 
-    def test_a_byte_that_was_altered_is_noticed(self, campaign):
-        path = write_prepared(campaign, names=["second"])["second"]
-        content = path.read_bytes()
-        expected = load_prepared(campaign, names=["second"])["second"]
-        path.write_bytes(content[:900] + bytes([content[900] ^ 1]) + content[901:])
-        with pytest.warns(SeakeepWarning, match=r"second\.nc was cut off, altered"):
-            run = load_prepared(campaign, names=["second"])["second"]
-        xr.testing.assert_identical(run, expected)
+@pytest.mark.parametrize("change", ["settings", "file", "version", "name"])
+def test_stale_files_are_not_used(campaign, tank, changed, change, monkeypatch):
+    path = write_prepared(campaign)["second"]
+    with xr.open_dataset(path) as opened:
+        run = opened.load()
+    run["heave"][:] = 0.0  # to be seen if it were used
+    write_netcdf(path, run)
+    assert load_prepared(campaign)["second"]["heave"].std() == 0.0
+    if change == "settings":
+        campaign = changed(("sampling_rate = 10", "sampling_rate = 12"))
+    elif change == "name":
+        campaign = changed(("Small tank", "Smaller tank"))
+    elif change == "file":
+        write_csv(tank / "second.csv", tank_columns(5))
+    else:
+        monkeypatch.setattr("seakeep.campaign.store.version", lambda: "99.0")
+    assert load_prepared(campaign)["second"]["heave"].std() > 0.0
+
+
+def test_a_measurement_is_never_overwritten(tank, changed):
+    """`prepare -o .` replaced the raw run1.nc by the prepared run of that name."""
+    campaign = changed(('file = "first.csv"', 'file = "first.nc"'))
+    (tank / "other").mkdir()
+    for folder, message in (
+        (tank, r"first\.nc is read by this command and would be"),
+        (tank / "other", r"first\.nc exists and is not a prepared run that"),
+    ):
+        (folder / "first.nc").write_bytes(b"CDF")
+        with pytest.raises(RequestError, match=message):
+            write_prepared(campaign, folder, ["first"])
+        assert (folder / "first.nc").read_bytes() == b"CDF"
+
+
+def test_a_byte_that_was_altered_is_noticed(campaign):
+    path = write_prepared(campaign, names=["second"])["second"]
+    content = path.read_bytes()
+    expected = load_prepared(campaign, names=["second"])["second"]
+    path.write_bytes(content[:900] + bytes([content[900] ^ 1]) + content[901:])
+    with pytest.warns(SeakeepWarning, match=r"second\.nc was cut off, altered"):
+        run = load_prepared(campaign, names=["second"])["second"]
+    xr.testing.assert_identical(run, expected)
 
 
 def test_a_span_to_the_end_of_the_record(tank, first):

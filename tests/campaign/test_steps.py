@@ -165,41 +165,29 @@ def test_outliers_are_flagged_and_replaced_when_asked(tank, first, outliers):
 RATE, PERIOD = 500.0, 1.64
 
 
-def tone_campaign(folder, frequencies, preset):
+def test_the_paper_preset_of_the_preparation(tmp_path):
+    """Pass 10 Hz, stop 10.75 Hz, then 32 samples per period, and no other filter."""
     t, columns = np.arange(0, 60, 1 / RATE), {}
-    text = f"[campaign]\nencounter_period = {PERIOD}\n[preparation]\npreset = '{preset}'\n"
-    for f in frequencies:
+    text = f"[campaign]\nencounter_period = {PERIOD}\n[preparation]\npreset = 'paper'\n"
+    for f in (0.61, 5.0, 7.7, 9.9, 11.0, 30.0):
         name = f"tone_{f:g}".replace(".", "p")
         columns[f"{name} [m]"] = np.cos(2 * np.pi * f * t)
         text += f"[channels.{name}]\n"
-    return prepared(folder, columns, text, t)
-
-
-TONES = (0.61, 5.0, 7.7, 9.9, 11.0, 30.0)
-
-
-def amplitudes(run):
-    """Root mean square of each tone, in parts of a cosine's, away from the ends."""
-    inner = run.isel(time=slice(150, -150))
-    return [float(np.sqrt(2 * np.mean(each.values**2))) for each in inner.data_vars.values()]
-
-
-def test_the_paper_preset_of_the_preparation(tmp_path):
-    """Pass 10 Hz, stop 10.75 Hz, then 32 samples per period, and no other filter."""
-    run = tone_campaign(tmp_path, TONES, "paper")
+    run = prepared(tmp_path, columns, text, t)
     assert run.attrs["preparation_preset"] == "paper"
     assert run.attrs["dt"] == PERIOD / 32
     assert run["tone_5"].attrs["low_pass"] == (10.0, 10.75)
-    found = amplitudes(run)
+    # Root mean square of each tone, in parts of a cosine's, away from the ends.
+    inner = run.isel(time=slice(150, -150))
+    found = [float(np.sqrt(2 * np.mean(each.values**2))) for each in inner.data_vars.values()]
     # 60 dB either way; the mean over a broken number of cycles leaves a part in a hundred.
     assert found[:3] == pytest.approx([1, 1, 1], abs=0.02)
     assert max(found[4:]) < 2e-3
     # 9.9 Hz passes its filter, lies above the new Nyquist frequency (9.76 Hz) and is folded.
     assert found[3] == pytest.approx(1.0, abs=0.02)
-    time = run["time"].values[150:-150]
-    folded = np.cos(2 * np.pi * (32 / PERIOD - 9.9) * time)
+    folded = np.cos(2 * np.pi * (32 / PERIOD - 9.9) * inner["time"])
     # As a cosine of 9.61 Hz: the same samples, within the ripple of 60 dB twice.
-    np.testing.assert_allclose(run["tone_9p9"].values[150:-150], folded, atol=2.5e-3)
+    np.testing.assert_allclose(inner["tone_9p9"], folded, atol=2.5e-3)
 
 
 def two_probes(folder, positions, spans=""):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy
+from oscillators import Oscillator
 from records import record
 
 from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, LogUniform, check
@@ -10,20 +11,6 @@ from seakeep.check.parts import free_windows, samples_in
 from seakeep.core.extremes import free_decay
 
 DT, FREQUENCY, RATIO = 0.05, 2.0, 0.06  # s, rad/s, 1
-
-
-def oscillator_run(samples=2000, ratio=RATIO):
-    """A heave that is a mass on a spring with linear damping, driven by noise; exact in time."""
-    A = np.array([[0, 1], [-(FREQUENCY**2), -2 * ratio * FREQUENCY]])
-    step, drive, *_ = scipy.signal.cont2discrete(
-        (A, np.array([[0.0], [1.0]]), np.eye(2), np.zeros((2, 1))), DT
-    )
-    force = np.random.default_rng(0).standard_normal(samples)
-    state = np.zeros((samples, 2))
-    for k in range(samples - 1):
-        state[k + 1] = step @ state[k] + drive[:, 0] * force[k]
-    attrs = {"encounter_period": 3.0}
-    return record(DT, attrs, heave=state[:, 0], heave_rate=state[:, 1], eta=force)
 
 
 def measured_decay_run(linear, quadratic):
@@ -39,15 +26,17 @@ def measured_decay_run(linear, quadratic):
 
 @pytest.fixture(scope="module")
 def model():
-    return HankelDMDc(0, 0, 1e-9).fit(oscillator_run(), ["heave", "heave_rate"], ["eta"])
+    return HankelDMDc(0, 0, 1e-9).fit(
+        Oscillator(dt=DT).run(2000), ["heave", "heave_rate"], ["eta_fwd"]
+    )
 
 
 @pytest.mark.parametrize("ratio", [RATIO, 0.3])
 def test_the_decay_of_an_oscillator_is_its_own(ratio):
     """δ = 2πζ/√(1 − ζ²): with ζ = 0.3 a division by 2π alone is 5 % too large."""
-    run = oscillator_run(ratio=ratio)
+    run = Oscillator(ratio, DT).run(2000)
     spec = HankelDMDc(0, 0, 1e-9, centre=100 if ratio == RATIO else 0)
-    found = check.decay(spec.fit(run, ["heave", "heave_rate"], ["eta"]))
+    found = check.decay(spec.fit(run, ["heave", "heave_rate"], ["eta_fwd"]))
     period = 2 * np.pi / (FREQUENCY * np.sqrt(1 - ratio**2))
     # Extremes between samples by a parabola: (ωΔt)²/12 of a step; fewer of them with ζ = 0.3.
     assert found.period[0] == pytest.approx(period, rel=1e-3)
@@ -62,7 +51,7 @@ def test_modes_say_which_states_take_part(model):
     assert found.participation[0].values == pytest.approx([0.5, 0.5], abs=0.01)
     assert found.participation.sum("state").values == pytest.approx(1.0)
     states = ["heave", "heave_rate"]
-    overdamped = HankelDMDc(0, 0, 1e-9).fit(oscillator_run(ratio=2.0), states, ["eta"])
+    overdamped = HankelDMDc(0, 0, 1e-9).fit(Oscillator(2.0, DT).run(2000), states, ["eta_fwd"])
     real = check.modes(overdamped)
     slow, fast = FREQUENCY * (2 - 3**0.5), FREQUENCY * (2 + 3**0.5)
     assert real.decay_time.values == pytest.approx([1 / slow, 1 / fast], rel=1e-4)  # the ridge
@@ -79,12 +68,12 @@ def test_quadratic_damping_is_found_from_a_decay(model):
 
 
 def test_free_runs_of_an_ensemble_are_the_mean_of_its_members():
-    run = oscillator_run(samples=600)
+    run = Oscillator(dt=DT).run(600)
     spec = BayesianHankelDMDc(
         encounter_period=3.0, window=Fixed("4 T"), state_delays=Fixed("0.1 T"),
         input_delays=Fixed("0.1 T"), ridge=LogUniform(0.1, 10.0), n_members=3, seed=0,
     )  # fmt: skip
-    ensemble = spec.fit(run, ["heave"], ["eta"], stop=20.0)
+    ensemble = spec.fit(run, ["heave"], ["eta_fwd"], stop=20.0)
     starts = np.array([21.0, 25.0])
     made = free_windows(ensemble, run, starts, 20)
     each = [ensemble.forecast(run, start, 20)["heave"].mean("member").values for start in starts]

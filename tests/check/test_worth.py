@@ -16,7 +16,7 @@ STATES = ["surge", "heave"]
 
 
 def part(seed, **attrs):
-    return moored_run(seed=seed).assign_attrs(encounter_period=1.0, waves="irregular", **attrs)
+    return moored_run(seed).assign_attrs(attrs)
 
 
 @pytest.fixture(scope="module")

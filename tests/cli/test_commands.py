@@ -98,6 +98,7 @@ def test_forecast_writes_netcdf_and_csv_alike(run, place):
 
 
 FROM_20 = f"{CAMPAIGN} --run unseen --start 20 --steps 50"
+FORECAST = f"forecast model.nc {FROM_20}"
 
 
 def test_forecast_goes_beyond_the_waves_when_it_may_predict_them(run):
@@ -178,89 +179,63 @@ def test_baselines_stand_beside_a_model_and_their_loss_is_not_its_own(run, place
     assert float(mean["nrmse"]) == pytest.approx(1.0, abs=0.01)
 
 
-MISTAKES = [
-    ("fit missing.toml -o m.nc", r"missing\.toml does not exist\..* Draft one with"),
-    (f"fit {CAMPAIGN} -o m.nc --model sway", r"no table \[models\.sway\]"),
-    (f"compare model.nc {CAMPAIGN} --run unsen", r"no run 'unsen'\. Did you mean 'unseen'"),
-    (f"compare model.nc {CAMPAIGN} --format bmp", r"'bmp' is not one of 'png', 'svg', 'pdf'"),
-    (f"forecast model.nc {CAMPAIGN} --run unseen --start 2 -o f.nc", r"55 are missing"),
-    (f"forecast model.nc {CAMPAIGN} --run unseen --start 9 -o f.txt", r"\.nc or \.csv"),
-    (f"forecast model.nc {FROM_20} --members -o f.nc", r"--members is for ensembles, and"),
-    (f"compare model.nc {CAMPAIGN} --level 0.9", r"--level is for ensembles, and"),
-    (
-        f"forecast ensemble.nc {FROM_20} --members --level 0.9 -o f.nc",
+MISTAKES = {
+    "fit missing.toml -o m.nc": r"missing\.toml does not exist\..* Draft one with",
+    f"fit {CAMPAIGN} -o m.nc --model sway": r"no table \[models\.sway\]",
+    f"compare model.nc {CAMPAIGN} --run unsen": r"no run 'unsen'\. Did you mean 'unseen'",
+    f"compare model.nc {CAMPAIGN} --format bmp": r"'bmp' is not one of 'png', 'svg', 'pdf'",
+    f"forecast model.nc {CAMPAIGN} --run unseen --start 2 -o f.nc": r"55 are missing",
+    f"forecast model.nc {CAMPAIGN} --run unseen --start 9 -o f.txt": r"\.nc or \.csv",
+    f"forecast model.nc {FROM_20} --members -o f.nc": r"--members is for ensembles, and",
+    f"compare model.nc {CAMPAIGN} --level 0.9": r"--level is for ensembles, and",
+    f"forecast ensemble.nc {FROM_20} --members --level 0.9 -o f.nc":
         r"--level belongs to the band, and --members writes the members without it\. Leave one",
-    ),
-    (
-        f"compare ensemble.nc {CAMPAIGN} --band calibrated",
+    f"compare ensemble.nc {CAMPAIGN} --band calibrated":
         r"the ensemble is not calibrated.*seakeep calibrate",
-    ),
-    (f"compare ensemble.nc {CAMPAIGN} --nowcast --band members", r"--band and --nowcast do"),
-    (f"compare model.nc {CAMPAIGN} --nowcast --steps 9999", r"a forecast of 9999 steps"),
-    (
-        f"calibrate model.nc {CAMPAIGN} --steps 100 -o c.nc",
+    f"compare ensemble.nc {CAMPAIGN} --nowcast --band members": r"--band and --nowcast do",
+    f"compare model.nc {CAMPAIGN} --nowcast --steps 9999": r"a forecast of 9999 steps",
+    f"calibrate model.nc {CAMPAIGN} --steps 100 -o c.nc":
         r"model\.nc holds a single model, which has no band\. Fit an ensemble",
-    ),
-    (f"fit {CAMPAIGN} -o m.mat", r"m\.mat ends in '\.mat', and a file of the kind \.nc"),
-    (
-        f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop 900 -o c.nc",
+    f"fit {CAMPAIGN} -o m.mat": r"m\.mat ends in '\.mat', and a file of the kind \.nc",
+    f"calibrate ensemble.nc {CAMPAIGN} --steps 100 --run unseen --stop 900 -o c.nc":
         r"--stop 900 \(900 s\) lies in none of the runs \(unseen: [\d.]+ to [\d.]+ s\)",
-    ),
-    (
-        f"calibrate ensemble.nc {CAMPAIGN} --steps 9 --run unseen --start 20 --stop 20 -o c.nc",
+    f"calibrate ensemble.nc {CAMPAIGN} --steps 9 --run unseen --start 20 --stop 20 -o c.nc":
         r"--start 20 \(20 s\) lies at or after --stop 20 \(20 s\)",
-    ),
-    (
-        f"forecast model.nc {FROM_20} --scheduler tcp://127.0.0.1:9 -o f.nc",
+    f"forecast model.nc {FROM_20} --scheduler tcp://127.0.0.1:9 -o f.nc":
         r"--scheduler is for ensembles, and",
-    ),
-    (
-        f"calibrate ensemble.nc {CAMPAIGN} --steps 900 --run unseen --stop 30 -o c.nc",
+    f"calibrate ensemble.nc {CAMPAIGN} --steps 900 --run unseen --stop 30 -o c.nc":
         r"no window of 900 steps with \d+ samples of history is free in unseen, .* most \d+",
-    ),
-    (
-        f"forecast ensemble.nc {FROM_20} --workers 2 --scheduler tcp://h:1 -o f.nc",
+    f"forecast ensemble.nc {FROM_20} --workers 2 --scheduler tcp://h:1 -o f.nc":
         r"--workers 2 counts processes on this machine, and --scheduler tcp://h:1 hands all",
-    ),
-    (f"forecast ensemble.nc {FROM_20} --level 95 -o f.nc", r"level must be between 0 and 1"),
-    (
-        f"forecast model.nc {CAMPAIGN} --run unseen --start soon -o f.nc",
+    f"forecast ensemble.nc {FROM_20} --level 95 -o f.nc": r"level must be between 0 and 1",
+    f"forecast model.nc {CAMPAIGN} --run unseen --start soon -o f.nc":
         r"--start: received 'soon'\. Give seconds such as 20, or encounter periods such as",
-    ),
-    (
-        f"forecast model.nc {CAMPAIGN} --run unseen --start 20,5 -o f.nc",
+    f"forecast model.nc {CAMPAIGN} --run unseen --start 20,5 -o f.nc":
         r"--start: received '20,5'\. Give seconds .*\. Write a decimal point, no comma\.",
-    ),
-    (
-        f"compare model.nc {CAMPAIGN} --steps 12.5",
+    f"compare model.nc {CAMPAIGN} --steps 12.5":
         r"steps: received '12\.5'\. Give a whole number such as 400, or encounter periods",
-    ),
-    (
-        f"forecast model.nc {CAMPAIGN} --run unseen --start 1e400 -o f.nc",
+    f"forecast model.nc {CAMPAIGN} --run unseen --start 1e400 -o f.nc":
         r"--start: received '1e400'\. Give an instant within the run, s\.",
-    ),
-    ("prepare ~seakeep-nobody/c.toml", r"cannot be read: .*home directory"),
-    (
-        f"compare model.nc {CAMPAIGN} --steps {5000 * '1'}",
+    "prepare ~seakeep-nobody/c.toml": r"cannot be read: .*home directory",
+    f"compare model.nc {CAMPAIGN} --steps {5000 * '1'}":
         r"steps: received '1{12}\.\.\.1{13}'\. Give a whole number",
-    ),
-    (f"compare model.nc {CAMPAIGN} --steps 1", r"has 1 measured instant.* earlier start"),
-    (f"compare model.nc {CAMPAIGN} --steps 7", r"of \w+ from .* 7 measured .* over 8 or more"),
-    (f"forecast ensemble.nc {FROM_20} -o no/f.nc", r"the folder no does not exist"),
-    (f"fit {CAMPAIGN} -o m.nc --workers 0", r"Invalid value for '--workers'"),
-    (f"prepare {CAMPAIGN} -o model.nc", r"cannot make the folder model\.nc: File exists"),
-    (f"fit {CAMPAIGN} -o .", r"cannot write \.: it is a folder\. Name a file\."),
-    (f"compare . {CAMPAIGN}", r"\. is a folder, .* A model file is expected here"),
-    (f"compare {CAMPAIGN} model.nc", r"is a campaign file, and a model file is expected"),
-    ("datasets fetch ntnu", r"no data set 'ntnu'\."),
-    ("fitt", r"Did you mean 'fit'"),
-    (f"fit {CAMPAIGN}", r"Missing option '-o'"),
-    (f"compare model.nc {CAMPAIGN} --nowcast --radians", r"--radians and --nowcast do not"),
-    (f"forecast model.nc {FROM_20} --full-scale -o f.nc", r"--full-scale needs the scale factor"),
-]
+    f"compare model.nc {CAMPAIGN} --steps 1": r"has 1 measured instant.* earlier start",
+    f"compare model.nc {CAMPAIGN} --steps 7": r"of \w+ from .* 7 measured .* over 8 or more",
+    f"forecast ensemble.nc {FROM_20} -o no/f.nc": r"the folder no does not exist",
+    f"fit {CAMPAIGN} -o m.nc --workers 0": r"Invalid value for '--workers'",
+    f"prepare {CAMPAIGN} -o model.nc": r"cannot make the folder model\.nc: File exists",
+    f"fit {CAMPAIGN} -o .": r"cannot write \.: it is a folder\. Name a file\.",
+    f"compare . {CAMPAIGN}": r"\. is a folder, .* A model file is expected here",
+    f"compare {CAMPAIGN} model.nc": r"is a campaign file, and a model file is expected",
+    "datasets fetch ntnu": r"no data set 'ntnu'\.",
+    "fitt": r"Did you mean 'fit'",
+    f"fit {CAMPAIGN}": r"Missing option '-o'",
+    f"compare model.nc {CAMPAIGN} --nowcast --radians": r"--radians and --nowcast do not",
+    f"forecast model.nc {FROM_20} --full-scale -o f.nc": r"--full-scale needs the scale factor",
+}  # fmt: skip
 
 
-@pytest.mark.parametrize(("command", "message"), MISTAKES)
+@pytest.mark.parametrize(("command", "message"), MISTAKES.items())
 def test_a_mistake_gets_one_message_and_no_traceback(command, message, run):
     out, err = run(command, 2)
     assert re.search(message, err)
@@ -269,26 +244,20 @@ def test_a_mistake_gets_one_message_and_no_traceback(command, message, run):
 
 @pytest.mark.parametrize(
     ("command", "kept"),
-    [
-        (f"fit {CAMPAIGN} -o docs/tutorial/raw.nc", "docs/tutorial/raw.nc"),
-        (
-            f"calibrate ensemble.nc {CAMPAIGN} --run unseen --steps 200 -o ensemble.nc",
-            "ensemble.nc",
-        ),
-        (f"forecast model.nc {CAMPAIGN} --run unseen --start 20 --steps 5 -o model.nc", "model.nc"),
-        (
-            f"forecast model.nc {CAMPAIGN} --run unseen --start 20 -o docs/tutorial/run3.csv",
-            "docs/tutorial/run3.csv",
-        ),
-        (f"forecast model.nc {CAMPAIGN} --run unseen --start 20 -o other.csv", "other.csv"),
-        (f"forecast model.nc {CAMPAIGN} --run unseen --start 20 -o lf.csv", "lf.csv"),
-        (f"forecast model.nc {CAMPAIGN} --run unseen --start 20 -o crlf.csv", "crlf.csv"),
-        (f"compare model.nc {CAMPAIGN} -o mine", "mine/comparison.csv"),
-        (f"check model.nc {CAMPAIGN} -o checked", "checked/tables/modes.csv"),
-        (f"tune {CAMPAIGN} --vary rank", "docs/tutorial/campaign_tuned.png"),
-        (f"prepare --anew {CAMPAIGN} -o sheets", "sheets/quality_first.png"),
-        (f"compare model.nc {CAMPAIGN} -o drawn", "drawn/unseen.png"),
-    ],
+    {
+        f"fit {CAMPAIGN} -o docs/tutorial/raw.nc": "docs/tutorial/raw.nc",
+        f"calibrate ensemble.nc {CAMPAIGN} --run unseen --steps 200 -o ensemble.nc": "ensemble.nc",
+        f"{FORECAST} -o model.nc": "model.nc",
+        f"{FORECAST} -o docs/tutorial/run3.csv": "docs/tutorial/run3.csv",
+        f"{FORECAST} -o other.csv": "other.csv",
+        f"{FORECAST} -o lf.csv": "lf.csv",
+        f"{FORECAST} -o crlf.csv": "crlf.csv",
+        f"compare model.nc {CAMPAIGN} -o mine": "mine/comparison.csv",
+        f"check model.nc {CAMPAIGN} -o checked": "checked/tables/modes.csv",
+        f"tune {CAMPAIGN} --vary rank": "docs/tutorial/campaign_tuned.png",
+        f"prepare --anew {CAMPAIGN} -o sheets": "sheets/quality_first.png",
+        f"compare model.nc {CAMPAIGN} -o drawn": "drawn/unseen.png",
+    }.items(),
 )
 def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, place, monkeypatch):
     if "drawn" in command:
@@ -338,10 +307,10 @@ def test_commands_report_what_prepare_finds(run, place, tmp_path, monkeypatch):
     folder = tmp_path / "spoilt"
     shutil.copytree(place / "docs" / "tutorial", folder)
     for name in ("run1.csv", "run2.csv", "run3.csv"):
-        lines = (folder / name).read_text(encoding="utf-8").splitlines()
+        lines = (folder / name).read_text("utf-8").splitlines()
         fields = lines[900].split(";")
         lines[900] = ";".join([fields[0], *("-9999" for _ in fields[1:])])
-        (folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        (folder / name).write_text("\n".join(lines) + "\n", "utf-8")
     campaign, found = (
         folder / "campaign.toml",
         "Note: first: heave outlier: 1 samples in 1 place(s)",

@@ -26,7 +26,7 @@ with tell_warnings(), progress_bar("Preparing") as progress:
 """
 
 
-def shown(columns: int) -> str:
+def shown(columns):
     """What a program writes to a terminal of so many columns."""
     own, other = pty.openpty()
     fcntl.ioctl(other, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))

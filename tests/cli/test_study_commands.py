@@ -67,12 +67,12 @@ def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(study_folder, ctrl_c):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [
-        ("raw/study.toml", "exists and is not a reproduction's study file"),
-        ("report.html", "exists and is not a report that seakeep wrote"),
-        ("tables/mine.csv", "tables holds files that no report of seakeep wrote"),
-        ("campaign/played.txt", "exists and is not a note of a campaign played"),
-    ],
+    {
+        "raw/study.toml": "exists and is not a reproduction's study file",
+        "report.html": "exists and is not a report that seakeep wrote",
+        "tables/mine.csv": "tables holds files that no report of seakeep wrote",
+        "campaign/played.txt": "exists and is not a note of a campaign played",
+    }.items(),
 )
 def test_reproduce_replaces_no_file_of_the_user(name, words, tmp_path, capfd):
     pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")

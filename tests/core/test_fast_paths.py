@@ -5,7 +5,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from matrices import Problem
 
@@ -43,7 +43,6 @@ def problems(draw):
     return made
 
 
-@settings(deadline=None)
 @given(problems())
 def test_the_trace_is_the_sum_of_squares(problem):
     regressors, _ = problem.matrices()
@@ -51,7 +50,6 @@ def test_the_trace_is_the_sum_of_squares(problem):
     assert found == pytest.approx(np.sum(regressors**2), rel=TIGHT)
 
 
-@settings(deadline=None)
 @given(problems(), st.floats(0.5, 200.0), st.sampled_from(["all rows", "newest", "a filter"]))
 def test_every_form_gives_the_papers_formula(problem, ridge, kind):
     """A filter has inputs alone among its regressors."""
@@ -68,7 +66,6 @@ def test_every_form_gives_the_papers_formula(problem, ridge, kind):
         np.testing.assert_allclose(found, expected, atol=RESULT)
 
 
-@settings(deadline=None)
 @given(problems(), st.integers(1, 9))
 def test_a_rank_is_that_of_the_truncated_matrix(problem, rank):
     regressors, targets = problem.matrices()
@@ -79,7 +76,6 @@ def test_a_rank_is_that_of_the_truncated_matrix(problem, rank):
     np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
 
 
-@settings(deadline=None)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(1, 30),
@@ -125,7 +121,6 @@ def free_runs(draw):
     return a, b, rows, histories, inputs, direct, z, steps, N
 
 
-@settings(deadline=None)
 @given(free_runs(), st.sampled_from([200, 10**6]))
 def test_free_runs_are_the_loop_over_the_extended_state(case, piece):
     a, b, rows, histories, inputs, direct, z, steps, N = case

@@ -6,7 +6,7 @@ import pytest
 from seakeep.core.readouts import KNOTS, LoadMap, best_place, features, floor_of, sums, weights_of
 
 
-def motions_and_wave(seed: int = 0, count: int = 4000) -> np.ndarray:
+def motions_and_wave(seed=0, count=4000):
     """Surge, heave, and elevation and rate of a wave, standardised."""
     return np.random.default_rng(seed).standard_normal((count, 4))
 

@@ -7,18 +7,18 @@ from seakeep.core.embedding import TrainingWindow
 from seakeep.core.subspace import identify_subspace
 
 
-def plant(seed=0, order=4, outputs=2, inputs=2):
+def plant(seed=0, outputs=2, inputs=2):
     """A damped system with eigenvalues of radius 0.7 to 0.95."""
     rng = np.random.default_rng(seed)
-    blocks = np.zeros((order, order))
-    for at in range(0, order, 2):
+    blocks = np.zeros((4, 4))
+    for at in (0, 2):
         radius, angle = rng.uniform(0.7, 0.95), rng.uniform(0.2, 1.5)
         c, s = radius * np.cos(angle), radius * np.sin(angle)
         blocks[at : at + 2, at : at + 2] = [[c, -s], [s, c]]
-    return blocks, rng.normal(size=(order, inputs)), rng.normal(size=(outputs, order))
+    return blocks, rng.normal(size=(4, inputs)), rng.normal(size=(outputs, 4))
 
 
-def simulate(system, u, noise=0.0, seed=1):
+def simulate(system, u, noise=0.0):
     """y_{j+1} = C z_{j+1}, so that an input acts on the next sample."""
     a, b, c = system
     z = np.zeros(len(a))
@@ -26,21 +26,13 @@ def simulate(system, u, noise=0.0, seed=1):
     for j, row in enumerate(u):
         out[j] = c @ z
         z = a @ z + b @ row
-    return out + noise * np.random.default_rng(seed).normal(size=out.shape)
+    return out + noise * np.random.default_rng(1).normal(size=out.shape)
 
 
-def fitted(outputs, inputs, order=4, ridge=0.0, delays=12, future=8):
-    windows = [TrainingWindow(delays, len(y) - 1, delays) for y in outputs]
-    return identify_subspace(
-        outputs,
-        inputs,
-        windows,
-        order=order,
-        output_delays=delays,
-        input_delays=delays,
-        future=future,
-        ridge=ridge,
-    )
+def fitted(outputs, inputs, ridge=0.0, **more):
+    windows = [TrainingWindow(12, len(y) - 1, 12) for y in outputs]
+    lengths = {"order": 4, "output_delays": 12, "input_delays": 12, "future": 8}
+    return identify_subspace(outputs, inputs, windows, ridge=ridge, **lengths, **more)
 
 
 def by_modulus(values):
@@ -83,17 +75,7 @@ def test_direct_inputs_drive_and_do_not_tell_the_past():
     a, b, c = plant(inputs=3)
     u = np.random.default_rng(9).normal(size=(500, 3))
     y = simulate((a, b, c), u)
-    found = identify_subspace(
-        [y],
-        [u[:, :2]],
-        [TrainingWindow(12, 399, 12)],
-        order=4,
-        output_delays=12,
-        input_delays=12,
-        future=8,
-        ridge=0.0,
-        direct=[u[:, 2:]],
-    )
+    found = fitted([y[:400]], [u[:400, :2]], direct=[u[:400, 2:]])
     # Without the past of the third input the filter estimates the state, no more.
     run = found.free_runs(y[None, 408:421], u[None, 408:490, :2], 70, u[None, 420:490, 2:])[0]
     late = y[451:491]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from pages import play
 
-PAGE = (Path(__file__).parents[2] / "docs/measurement_chain.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs/measurement_chain.md").read_text("utf-8")
 
 
 @pytest.mark.usefixtures("empty_sheet")
@@ -14,5 +14,5 @@ def test_the_page_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
     pytest.importorskip("numba", reason="the page plays the tank")
     monkeypatch.chdir(tmp_path)
     play(PAGE, "measurement_chain.md")
-    sheet = (tmp_path / "virtual/prepared/quality.html").read_text(encoding="utf-8")
+    sheet = (tmp_path / "virtual/prepared/quality.html").read_text("utf-8")
     assert re.search(r"<td>regular_<wbr>2</td><td[^>]*>not prepared</td>", sheet)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs/paper_map.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/paper_map.md").read_text("utf-8")
 ROWS = [
     [each.strip() for each in line.strip("|").split("|")]
     for line in PAGE.split("## Where the paper")[0].splitlines()
@@ -39,7 +39,7 @@ def test_functions_and_tests_exist(row):
     assert quoted(tests), "the row names no test"
     for name in quoted(tests):
         file, test = name.split("::")
-        text = (ROOT / file).read_text(encoding="utf-8")
+        text = (ROOT / file).read_text("utf-8")
         assert f"def {test}(" in text, f"{file} has no {test}"
 
 

@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 TANK, STUDY = (
-    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("virtual_tank.md", "study.md")
+    (ROOT / "docs" / name).read_text("utf-8") for name in ("virtual_tank.md", "study.md")
 )
 
 
@@ -19,7 +19,7 @@ def rows(text, first):
 
 
 def results(name):
-    return (ROOT / "benchmarks" / "results" / f"{name}.md").read_text(encoding="utf-8")
+    return (ROOT / "benchmarks" / "results" / f"{name}.md").read_text("utf-8")
 
 
 def test_steps_to_the_recommended_model():

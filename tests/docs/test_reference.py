@@ -1,25 +1,21 @@
 """The pages of the campaign file and of the study file say what the settings say."""
 
-import importlib.util
 from pathlib import Path
 
 import pytest
+from loaded import loaded
 
 DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.fixture(scope="module")
 def module():
-    place = DOCS / "make_reference.py"
-    spec = importlib.util.spec_from_file_location("make_reference", place)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return loaded(DOCS / "make_reference.py")
 
 
 @pytest.mark.parametrize("name", ["campaign_file.md", "study.md"])
 def test_the_page_is_up_to_date(name, module):
-    written = (DOCS / name).read_text(encoding="utf-8")
+    written = (DOCS / name).read_text("utf-8")
     assert module.keys_of(module.StudySettings)
     assert written == module.PAGES[name](), "run python docs/make_reference.py"
 

@@ -1,30 +1,26 @@
 """The study page: its command, its Python and its study file give what it shows."""
 
-import shutil
 from pathlib import Path
 
 import pytest
 from pages import play
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGE = (DOCS / "study.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "study.md").read_text("utf-8")
 
 
-def test_the_page_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
+def test_the_page_runs_and_prints_what_it_shows(tutorial, monkeypatch):
     pytest.importorskip("matplotlib", reason="the report draws figures")
-    for path in (DOCS / "tutorial").glob("*.*"):
-        shutil.copy(path, tmp_path)
-    monkeypatch.chdir(tmp_path)
     # Figures of reports are looked at in tests/report/test_page.py, of such a study.
     monkeypatch.setattr("seakeep.report.page._drawn", lambda drawing, folder: None)
     # One process: the small study is done before another has started.
     play(PAGE.replace("seakeep study study.toml -o study", "seakeep study study.toml -o study "
                       "--workers 1", 1), "study.md")  # fmt: skip
-    assert Path("study/report.html").stat().st_size > 10_000
+    assert (tutorial / "study/report.html").stat().st_size > 10_000
 
 
 def test_the_page_shows_the_study_file():
     begin = PAGE.index("```toml\n") + len("```toml\n")
     shown = PAGE[begin : PAGE.index("```", begin)]
-    written = (DOCS / "tutorial" / "study.toml").read_text(encoding="utf-8")
+    written = (DOCS / "tutorial" / "study.toml").read_text("utf-8")
     assert written.partition("\n\n")[2] == shown

@@ -1,6 +1,5 @@
 """Every command and every Python block of the tutorial runs and prints what the page shows."""
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -8,37 +7,25 @@ from pages import play
 
 from seakeep.cli import main
 
-FOLDER = Path(__file__).parents[2] / "docs/tutorial"
-PAGE = (FOLDER / "tutorial.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs/tutorial/tutorial.md").read_text("utf-8")
 
 
-def test_the_tutorial_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
+def test_the_tutorial_runs_and_prints_what_it_shows(tutorial):
     pytest.importorskip("matplotlib", reason="seakeep compare draws a figure")
     pytest.importorskip("control", reason="the page exports to python-control")
-    folder = tmp_path / "tutorial"
-    shutil.copytree(FOLDER, folder)
-    monkeypatch.chdir(folder)
     play(PAGE, "tutorial.md")
-    assert (folder / "comparison/unseen.png").stat().st_size > 10_000
-    assert (folder / "rom.mat").exists()
+    assert (tutorial / "comparison/unseen.png").stat().st_size > 10_000
+    assert (tutorial / "rom.mat").exists()
 
 
-def test_the_page_shows_the_header_of_the_files_and_lines_of_the_draft(tmp_path, monkeypatch):
-    shutil.copytree(FOLDER, tmp_path / "tutorial")
-    monkeypatch.chdir(tmp_path / "tutorial")
-    assert Path("run1.csv").read_text(encoding="utf-8").splitlines()[0] in PAGE
+def test_the_page_shows_the_files_and_their_draft_can_be_fitted_and_judged(tutorial, capsys):
+    pytest.importorskip("matplotlib", reason="seakeep compare draws a figure")
+    assert (tutorial / "run1.csv").read_text("utf-8").splitlines()[0] in PAGE
     assert main(["init", "run1.csv", "run2.csv", "run3.csv", "-o", "draft.toml"]) == 0
-    draft = Path("draft.toml").read_text(encoding="utf-8").splitlines()
+    draft = (tutorial / "draft.toml").read_text("utf-8").splitlines()
     first = PAGE.index("```toml\n") + len("```toml\n")
     for line in PAGE[first : PAGE.index("```", first)].splitlines():
         assert line in draft
-
-
-def test_the_draft_can_be_fitted_and_judged_as_it_stands(tmp_path, monkeypatch, capsys):
-    pytest.importorskip("matplotlib", reason="seakeep compare draws a figure")
-    shutil.copytree(FOLDER, tmp_path / "tutorial")
-    monkeypatch.chdir(tmp_path / "tutorial")
-    assert main(["init", "run1.csv", "run2.csv", "run3.csv", "-o", "draft.toml"]) == 0
     assert main(["fit", "draft.toml", "-o", "draft.nc"]) == 0
     assert main(["compare", "draft.nc", "draft.toml"]) == 0
     printed = capsys.readouterr().out

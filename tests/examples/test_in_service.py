@@ -1,24 +1,17 @@
 """The examples in service: the C estimator on a run, and a thruster that is planned."""
 
-import importlib.util
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from loaded import loaded
 from records import record
 from scipy import signal
 
 import seakeep
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-
-
-def loaded(path):
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_the_c_estimator_is_python_where_a_tenth_is_lost(make_run, tmp_path):

@@ -1,6 +1,5 @@
 """The examples on measured data hold what their pages say (needs SEAKEEP_DATA_DIR)."""
 
-import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -18,10 +17,6 @@ pytestmark = [
     pytest.mark.data,
     # Models that look ahead say so, of other wave periods too: the pages say it of these.
     pytest.mark.filterwarnings("ignore::seakeep.errors.SeakeepWarning"),
-    pytest.mark.skipif(
-        not os.environ.get("SEAKEEP_DATA_DIR"),
-        reason="SEAKEEP_DATA_DIR is not set: it names the folder of the measured data",
-    ),
 ]
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

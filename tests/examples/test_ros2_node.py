@@ -1,6 +1,5 @@
 """The ROS 2 example: which samples become which step, and the node under a stand-in of rclpy."""
 
-import importlib.util
 import sys
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from loaded import loaded
 from scipy.spatial.transform import Rotation
 
 from seakeep import HankelDMDc
@@ -20,14 +20,8 @@ COUNT = 60
 PATIENCE = 0.3
 
 
-def loaded(name):
-    spec = importlib.util.spec_from_file_location(name, EXAMPLE / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-Follower = loaded("follower").Follower
+FOLLOWER = loaded(EXAMPLE / "follower.py")
+Follower = FOLLOWER.Follower
 
 
 @pytest.fixture(scope="module")
@@ -130,8 +124,8 @@ def node(monkeypatch):
     import stand_in_ros
 
     stand_in_ros.install(monkeypatch)
-    monkeypatch.setitem(sys.modules, "follower", loaded("follower"))
-    return loaded("node")
+    monkeypatch.setitem(sys.modules, "follower", FOLLOWER)
+    return loaded(EXAMPLE / "node.py")
 
 
 def recorded(path, run, samples, lost):

@@ -10,7 +10,7 @@ STATES, INPUTS = ["surge", "heave"], ["eta_fwd", "eta_cog"]
 LINE, LOAD_NOISE = -1.33, 0.5  # m from the last probe, N
 
 
-def drifting_run(seed=0, samples=1500, moved=0.0, name="run"):
+def drifting_run(seed=0, samples=1500, moved=0.0):
     """Heave answers the elevation where the vessel is; surge drifts slowly over half a wavelength.
 
     The load of a bow line is 30 − 2 surge + 5 heave and, where the wave at `LINE` is above half
@@ -37,7 +37,7 @@ def drifting_run(seed=0, samples=1500, moved=0.0, name="run"):
         **{key: waves.at(time, x + moved) for key, x in POSITIONS.items()},
         "mooring_bow": load + LOAD_NOISE * rng.standard_normal(samples),
     }
-    attrs = {"water_depth": DEPTH, "run": name, "encounter_period": 1.5}
+    attrs = {"water_depth": DEPTH, "run": "run", "encounter_period": 1.5}
     run = record(DT, attrs, **channels)
     run["mooring_bow"].attrs["units"] = "N"
     for key, x in POSITIONS.items():

@@ -1,12 +1,10 @@
 """Runs made of arrays, in metres, and arrays of runs."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import xarray as xr
 
 
-def record(step: float, /, attrs: dict | None = None, **channels: np.ndarray) -> xr.Dataset:
+def record(step, /, attrs=None, **channels):
     """A run whose samples are `step` seconds apart; rates are in m/s."""
     samples = len(next(iter(channels.values())))
     return xr.Dataset(
@@ -19,6 +17,6 @@ def record(step: float, /, attrs: dict | None = None, **channels: np.ndarray) ->
     )
 
 
-def table(run: xr.Dataset, names: Sequence[str]) -> np.ndarray:
+def table(run, names):
     """Values of channels side by side, on the last axis."""
     return np.stack([run[name].values for name in names], axis=-1)

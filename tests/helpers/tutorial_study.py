@@ -42,15 +42,15 @@ n_series = 8
 """Seconds, and all parts of a study."""
 
 
-def put_tutorial(folder: Path, study: str = STUDY) -> None:
+def put_tutorial(folder, study=STUDY):
     """Put the tutorial's campaign and a study of it into a folder."""
     for path in TUTORIAL.glob("*"):
         if path.suffix in (".toml", ".csv"):
             shutil.copy(path, folder)
-    (folder / "study.toml").write_text(study, encoding="utf-8")
+    (folder / "study.toml").write_text(study, "utf-8")
 
 
-def edit(path: Path, *pairs: tuple[str, str]) -> Path:
+def edit(path, *pairs):
     """Replace texts of a file, which must stand in it."""
     text = path.read_text("utf-8")
     for old, new in pairs:
@@ -60,14 +60,14 @@ def edit(path: Path, *pairs: tuple[str, str]) -> Path:
     return path
 
 
-def assert_same(first, second) -> None:
+def assert_same(first, second):
     """Compare the results of a study array by array."""
     assert first.groups.keys() == second.groups.keys()
     for name, group in first.groups.items():
         xr.testing.assert_identical(group, second.groups[name])
 
 
-def assert_cells_are_what_the_models_say(found, plan, **near) -> None:
+def assert_cells_are_what_the_models_say(found, plan, **near):
     """Compare the forecasts of every window of a study with those of its models alone."""
     for number, training in enumerate(plan.training):
         taught, runs = plan.taught(training.spans), plan.runs

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from seas import sea
 from small_tank import write_csv
@@ -142,10 +140,10 @@ inputs = ["eta_fwd"]
 """
 
 
-def _write_raw(folder: Path, run: str, seed: int) -> None:
+def _write_raw(folder, run, seed):
     waves, rng = sea(seed, (0.4, 0.9), components=12).at, np.random.default_rng(seed)
 
-    def noisy(t: np.ndarray, size: float, lag: float) -> np.ndarray:
+    def noisy(t, size, lag):
         return 2.5 * size * waves(t - lag) + 0.02 * rng.standard_normal(t.size)
 
     probes = {"p1": (1.0, 0.0), "p2": (1.0, 0.6)}
@@ -157,9 +155,9 @@ def _write_raw(folder: Path, run: str, seed: int) -> None:
         write_csv(folder / f"{run}_{logger}.csv", {"t [s]": t, **series, "trigger": pulses})
 
 
-def write(folder: Path) -> Path:
+def write(folder):
     """Write settings and raw files into a folder; gives the campaign file."""
     path = folder / "campaign.toml"
-    path.write_text(CAMPAIGN, encoding="utf-8")
+    path.write_text(CAMPAIGN, "utf-8")
     _write_raw(folder, "one", 1)
     return path

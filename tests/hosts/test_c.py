@@ -114,7 +114,7 @@ def test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python(tmp_path, 
 
 
 @pytest.mark.parametrize(
-    ("file", "name"), [("rom", "rom"), ("my model-2", "my_model_2"), ("3d", "m_3d"), ("η", "m__")]
+    ("file", "name"), {"rom": "rom", "my model-2": "my_model_2", "3d": "m_3d", "η": "m__"}.items()
 )
 def test_a_file_name_becomes_an_identifier(file, name):
     assert identifier(file) == name

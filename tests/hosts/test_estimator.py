@@ -243,8 +243,8 @@ def test_what_lies_outside_the_training_is_that_of_the_live_model(cases, tmp_pat
 @pytest.mark.usefixtures("errors_of_training")
 @pytest.mark.parametrize(
     ("name", "noise"),
-    [("full", 1e-4), ("short", 1e-4), ("autonomous", 0.0), ("following", 1e-4),
-     ("following_now", 0.0)],
+    {"full": 1e-4, "short": 1e-4, "autonomous": 0.0, "following": 1e-4,
+     "following_now": 0.0}.items(),
 )  # fmt: skip
 def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
     """Look-ahead, observables, carried waves and read-outs, with samples lost."""

@@ -114,9 +114,7 @@ for number, u in enumerate(np.load(inputs)):
 """
 
 
-def test_another_process_goes_on_from_a_state_to_the_last_bit(
-    slave, fmu, unpacked, cases, tmp_path
-):
+def test_another_process_goes_on_from_a_state_to_the_last_bit(slave, unpacked, cases, tmp_path):
     case = cases["full"]
     run(slave, case, 0, 20)
     state = slave.getFMUstate()

@@ -3,28 +3,21 @@
 import numpy as np
 import pytest
 import xarray as xr
-from ensembles import few
-from records import record, table
+from ensembles import INPUTS, STATES, few, wave_run
+from records import table
 
 import seakeep
 from seakeep.core.calibration import band_scores, conformal_margin
 from seakeep.errors import RequestError
 from seakeep.models.calibration import held_out, learn_margin
 
-STATES, INPUTS, DT = ["heave", "pitch"], ["eta"], 0.1
+DT = 0.1
 NOISY = {"ridge": seakeep.Uniform(200, 400), "delay_rows": "ridge", "seed": 1}
 
 
 def sea(seed, samples=1600, name="sea"):
-    """A response with noise that no member knows of, so that their band is too narrow."""
-    rng = np.random.default_rng(seed)
-    time = DT * np.arange(samples)
-    angles = np.outer(time, 2 * np.pi * rng.uniform(0.3, 1.0, 40)) + rng.uniform(0, 6.28, 40)
-    waves = {"heave": np.cos(angles - 0.4), "pitch": np.sin(angles), "eta": np.cos(angles)}
-    channels = {key: each.sum(axis=1) for key, each in waves.items()}
-    for key in STATES:
-        channels[key] = channels[key] + 1.5 * rng.standard_normal(samples)
-    return record(DT, {"run": name}, **channels)
+    """In noise by which the members' band is too narrow."""
+    return wave_run(seed, samples, name, 1.5)
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ OFFSETS = {"heave": 3.0, "pitch": -0.4, "eta": 0.2, "wind": 8.0}
 SPEC = HankelDMDc(1, 0, 0.0, delay_rows="exact", centre="run")
 
 
-def vessel(seed: int, offset: float = 0.0, periods: int = 5) -> xr.Dataset:
+def vessel(seed, offset=0.0):
     """Two states in a steady answer to two inputs of period `PERIOD`, on zeros of their own."""
     rng = np.random.default_rng(seed)
     inputs = np.fft.rfft(rng.standard_normal((PERIOD, 2)), axis=0)
@@ -36,12 +36,12 @@ def vessel(seed: int, offset: float = 0.0, periods: int = 5) -> xr.Dataset:
     system = z * np.eye(2) - A[0] - A[1] / z
     states = np.linalg.solve(system, (inputs @ B.T)[..., None])[..., 0]
     values = np.fft.irfft(np.concatenate([states, inputs], axis=1), PERIOD, axis=0)
-    values = np.resize(values, (periods * PERIOD, 4)) + offset * np.array([*OFFSETS.values()])
+    values = np.resize(values, (5 * PERIOD, 4)) + offset * np.array([*OFFSETS.values()])
     attrs = {"encounter_period": PERIOD * DT / 30}
     return record(DT, attrs, **dict(zip(OFFSETS, values.T, strict=True)))
 
 
-def runs_of(*offsets: float) -> dict[str, xr.Dataset]:
+def runs_of(*offsets):
     return {f"run{n}": vessel(n, each) for n, each in enumerate(offsets)}
 
 
@@ -78,7 +78,7 @@ def test_the_system_is_recovered_from_runs_whose_zeros_differ():
     ids=["lead", "squares", "rollout", "arx", "subspace", "ensemble"],
 )  # fmt: skip
 def test_a_zero_moves_the_forecast_and_changes_nothing_else(spec):
-    def moved(run: xr.Dataset, offset: float) -> xr.Dataset:
+    def moved(run, offset):
         """Squares are of the elevation, whose zero stays."""
         names = [name for name in OFFSETS if name != "eta"]
         return run.assign({name: run[name] + offset * OFFSETS[name] for name in names})
@@ -128,7 +128,7 @@ def test_a_surge_that_is_followed_stays_as_it_is(tmp_path):
     )  # fmt: skip
     states, inputs = [*STATES, "mooring_bow"], [*INPUTS, "wind"]
 
-    def moved(seed: int, by: float) -> xr.Dataset:
+    def moved(seed, by):
         """Waves past the probes, in gusts that drive the heave; zeros of three sensors differ."""
         run, rng = drifting_run(seed), np.random.default_rng(seed)
         gusts = np.convolve(rng.standard_normal(run.time.size + 19), np.ones(20) / 20, "valid")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from drifting import drifting_run
 from records import record
+from scipy import signal
 
 from seakeep import HankelDMDc
 from seakeep.models.conditions import disagreements
@@ -20,10 +21,8 @@ def vessel(seed, stiffness=0.16, factor=1.0, offset=0.0, samples=1200):
     time = DT * np.arange(samples)
     omega = 2 * np.pi * rng.uniform(0.5, 1.1, 30)
     eta = np.cos(np.outer(time, omega) + rng.uniform(0, 2 * np.pi, 30)).sum(axis=1) / 10
-    heave, pitch = np.zeros((2, samples))
-    for k in range(1, samples - 1):
-        heave[k + 1] = (1.75 - stiffness) * heave[k] - 0.75 * heave[k - 1] + stiffness * eta[k]
-        pitch[k + 1] = 1.6 * pitch[k] - 0.75 * pitch[k - 1] + 0.1 * eta[k - 1]
+    heave = signal.lfilter([0.0, stiffness], [1.0, stiffness - 1.75, 0.75], eta)
+    pitch = signal.lfilter([0.0, 0.0, 0.1], [1.0, -1.6, 0.75], eta)
     channels = {"heave": factor * heave + offset, "pitch": pitch, "eta": eta}
     for x in channels.values():
         x += 0.01 * x.std() * rng.standard_normal(samples)

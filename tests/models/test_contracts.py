@@ -14,166 +14,167 @@ from records import record
 
 import seakeep
 from seakeep import BayesianHankelDMDc, DataError, HankelDMDc, RequestError, SeakeepWarning, Uniform
-from seakeep.models import (
-    KINDS,
-    alignment,
-    load_model,
-    outside_training,
-)
+from seakeep.models import KINDS, alignment, load_model, outside_training
 from seakeep.models.alignment import carry_by_dispersion
 from seakeep.models.draws import Draw
 
 DT = 0.1
 
 
-def sea(samples=600, seed=0, ahead=0):
+def sea(seed=0, ahead=0):
     """Heave answers the wave `ahead` samples later; the wave is white enough to tell them apart."""
     rng = np.random.default_rng(seed)
-    eta = rng.standard_normal(samples + ahead + 3)
-    heave = 0.5 * eta[ahead : ahead + samples] - 0.2 * eta[ahead + 1 : ahead + 1 + samples]
-    return record(DT, heave=np.r_[0.0, heave[:-1]], eta=eta[:samples])
+    eta = rng.standard_normal(603 + ahead)
+    heave = 0.5 * eta[ahead : ahead + 600] - 0.2 * eta[ahead + 1 : ahead + 601]
+    return record(DT, heave=np.r_[0.0, heave[:-1]], eta=eta[:600])
 
 
-class TestLead:
-    """The input up to j + lead drives the step from j."""
-
-    def test_a_known_lead_is_learnt_and_forecast(self):
-        run, test = sea(ahead=4), sea(seed=1, ahead=4)
-        model = HankelDMDc(0, 8, 1e-9, delay_rows="exact", lead=5).fit(run, ["heave"], ["eta"])
-        found = model.forecast(test, start=10.0, steps=300)
-        # A linear law without noise, to the ridge.
-        assert np.abs(found.heave - test.heave.sel(time=found.time)).max() < 1e-6
-        assert (model.lead_samples, model.history_samples) == (5, 9)
-        assert "lead          5 samples: a step is driven by waves up to 0.4 s" in model.summary()
+# The input up to j + lead drives the step from j.
 
 
-class TestOneEngine:
-    """Windows, members and executors share one reading of each run."""
-
-    def test_each_probe_is_carried_once_per_run(self, drifts, drift):
-        measured = seakeep.ProbeAlignment(mode="dispersion", surge="measured")
-        fitted = few(alignment=measured).fit(drifts, STATES, INPUTS)
-        carry = patch.object(alignment, "carry_by_dispersion", wraps=carry_by_dispersion)
-        with carry as carries:
-            fitted.forecast_windows(drift, [20.0, 25.0, 30.0], steps=20)
-        assert carries.call_count == len(INPUTS)
-
-    def test_a_forecast_upstream_says_how_far_ahead_it_reads(self, drifts, drift):
-        here = seakeep.ProbeAlignment(mode="effective", surge="none", celerity=2.0)
-        for offset, ahead in ((0.0, 0.0), (-3.0, 1.5)):
-            spec = HankelDMDc(2, 8, 1.0, alignment=replace(here, offset=offset))
-            model = spec.fit(drifts, STATES, INPUTS)
-            attrs = model.forecast(drift, 20.0, 30).attrs
-            assert attrs["reads_input_until"] == pytest.approx(ahead - model.dt)
-            assert ("upstream" in model.summary()) == (offset < 0)
+def test_a_known_lead_is_learnt_and_forecast():
+    run, test = sea(ahead=4), sea(seed=1, ahead=4)
+    model = HankelDMDc(0, 8, 1e-9, delay_rows="exact", lead=5).fit(run, ["heave"], ["eta"])
+    found = model.forecast(test, start=10.0, steps=300)
+    # A linear law without noise, to the ridge.
+    assert np.abs(found.heave - test.heave.sel(time=found.time)).max() < 1e-6
+    assert (model.lead_samples, model.history_samples) == (5, 9)
+    assert "lead          5 samples: a step is driven by waves up to 0.4 s" in model.summary()
 
 
-class TestRegistry:
-    """Specs and files by kind."""
-
-    @pytest.mark.parametrize(
-        "spec",
-        [
-            few(seed=np.random.default_rng(3), lead="0.5 T", ridge=seakeep.Fixed(2.0)),
-            BayesianHankelDMDc.paper(1.6, n_members=3, seed=np.random.SeedSequence(5).spawn(2)[1]),
-        ],
-    )
-    def test_settings_come_back_from_json(self, spec):
-        kept = json.loads(json.dumps(spec.to_json()))
-        back = KINDS[spec.kind].from_json(kept)
-        assert back.to_json() == spec.to_json()
-        assert back.seed_sequence.entropy == spec.seed_sequence.entropy
-        assert back.seed_sequence.spawn_key == spec.seed_sequence.spawn_key
-        with pytest.raises(RequestError, match=r"unknown key 'rigde'\. Did you mean 'ridge'"):
-            KINDS[spec.kind].from_json(kept | {"rigde": 1})
-
-    def test_needs_of_specs(self):
-        single = HankelDMDc(3, 8, 1.0, window=100, lead=2).needs(0.1)
-        assert (single.snapshots, single.history, single.inside, single.lead) == (100, 8, False, 2)
-        many = few(window=Uniform("10 T", "20 T"), lead="0.5 T").needs(0.1)
-        assert (many.snapshots, many.history, many.lead) == (320, 24, 8)
+# Windows, members and executors share one reading of each run.
 
 
-class TestWaves:
-    """What the training waves say of the waves of a forecast."""
-
-    @staticmethod
-    def regular(*periods, samples=1200):
-        time = DT * np.arange(samples)
-        eta = sum(np.cos(2 * np.pi * time / period) for period in periods)
-        heave = np.r_[0.0, eta[:-1]]
-        return record(DT, heave=heave, eta=eta)
-
-    @pytest.mark.parametrize(
-        ("period", "words"),
-        [(2.0, None), (2.8, "between .*, with none between"), (8.0, "outside .* to ")],
-    )
-    def test_a_period_outside_and_in_a_gap(self, period, words, tmp_path):
-        model = HankelDMDc(2, 8, 1.0).fit(self.regular(2.0, 4.0), ["heave"], ["eta"])
-        model = load_model(model.save(tmp_path / "m.nc"))
-        found = outside_training(model, self.regular(period), 20.0, 600)
-        told = [each for each in found if "period" in each]
-        assert len(told) == (words is not None)
-        for each in told:
-            named, where = re.search(r"period of ([0-9.]+) s lies (.*);", each).groups()
-            assert float(named) == pytest.approx(period, rel=0.13)  # a band is 12 % wide
-            assert re.match(words, where)
-
-    def test_higher_waves_and_a_drift_are_outside(self, tmp_path):
-        run = self.regular(2.0).rename(heave="surge")
-        model = HankelDMDc(2, 8, 1.0).fit(run, ["surge"], ["eta"])
-        model = load_model(model.save(tmp_path / "m.nc"))
-        # A regular wave is two amplitudes high; g T²/2π is 6.25 m.
-        assert outside_training(model, 1.5 * run, 20.0, 600) == [
-            "eta: a height of 3 m, trained up to 2 m",
-            "eta: a steepness in deep water of 0.48, trained up to 0.32",
-        ]
-        (told,) = outside_training(model, run.assign(surge=run.surge - 3), 20.0, 600)
-        assert told == "a mean surge of -3 m, upstream of the trained -1 to 1 m"
-        assert outside_training(model, 1.5 * run, 20.0, 90) == []  # four waves are no sea
-
-    def test_a_forecast_says_by_how_much_and_reads_its_own_surge(self):
-        run = self.regular(2.0).rename(heave="surge")
-        high = run.map(lambda x: 1.5 * x, keep_attrs=True)  # as the oldest xarray takes it
-        high["surge"].values[high["time"].values > 20.0] = np.nan
-        words = "eta: a height of 3 m, trained up to 2 m; eta: a steepness in deep water of 0.48, "
-        for spec in (HankelDMDc(2, 8, 1.0), few(window=None)):
-            model = spec.fit(run, ["surge"], ["eta"])
-            forecasts = [model.forecast(high, 20.0, 600)]
-            if spec.is_ensemble:
-                forecasts.append(model.forecast_summary(high, 20.0, 600))
-            for forecast in forecasts:
-                assert forecast.attrs["status"] == "ok, outside training"
-                assert forecast.attrs["outside_training"].startswith(words)
-            inside = model.forecast(run, 20.0, 600).attrs
-            assert (inside["status"], "outside_training" in inside) == ("ok", False)
+def test_each_probe_is_carried_once_per_run(drifts, drift):
+    measured = seakeep.ProbeAlignment(mode="dispersion", surge="measured")
+    fitted = few(alignment=measured).fit(drifts, STATES, INPUTS)
+    carry = patch.object(alignment, "carry_by_dispersion", wraps=carry_by_dispersion)
+    with carry as carries:
+        fitted.forecast_windows(drift, [20.0, 25.0, 30.0], steps=20)
+    assert carries.call_count == len(INPUTS)
 
 
-class TestUnitsAndNumbers:
-    """Units of pooled runs, and values that no standard deviation holds."""
+def test_a_forecast_upstream_says_how_far_ahead_it_reads(drifts, drift):
+    here = seakeep.ProbeAlignment(mode="effective", surge="none", celerity=2.0)
+    for offset, ahead in ((0.0, 0.0), (-3.0, 1.5)):
+        spec = HankelDMDc(2, 8, 1.0, alignment=replace(here, offset=offset))
+        model = spec.fit(drifts, STATES, INPUTS)
+        attrs = model.forecast(drift, 20.0, 30).attrs
+        assert attrs["reads_input_until"] == pytest.approx(ahead - model.dt)
+        assert ("upstream" in model.summary()) == (offset < 0)
 
-    def test_runs_in_other_units_are_never_pooled(self):
-        plain, centimetres = sea(), sea(seed=1)
-        del plain["heave"].attrs["units"]
-        centimetres["heave"].attrs["units"] = "cm"
-        with pytest.raises(DataError, match=r"'heave' is in 'cm' in run 2 and in 'm' in run 3"):
-            HankelDMDc(1, 4, 1.0).fit([plain, centimetres, sea()], ["heave"], ["eta"])
 
-    def test_a_run_that_states_no_unit_is_taken_with_a_warning(self):
-        plain = sea(seed=1)
-        del plain["heave"].attrs["units"]
-        with pytest.warns(SeakeepWarning, match=r"'heave' of run 1 states no unit.*in 'm', as in"):
-            model = HankelDMDc(1, 4, 1.0).fit([plain, sea()], ["heave"], ["eta"])
-        assert model.state_labels[0].units == "m"
-        with pytest.warns(SeakeepWarning, match=r"'heave' of the run states no unit.*model's 'm'"):
-            model.forecast(plain, start=5.0, steps=5)
+# Specs and files by kind.
 
-    def test_an_observable_that_overflows_is_refused(self):
-        run = sea()
-        run["eta"].values[7] = 1e60
-        spec = HankelDMDc(1, 4, 1.0, observables=[seakeep.Powers(("eta",), (3,))])
-        with pytest.raises(DataError, match=r"has a standard deviation that is not finite"):
-            spec.fit(run, ["heave"], ["eta"])
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        few(seed=np.random.default_rng(3), lead="0.5 T", ridge=seakeep.Fixed(2.0)),
+        BayesianHankelDMDc.paper(1.6, n_members=3, seed=np.random.SeedSequence(5).spawn(2)[1]),
+    ],
+)
+def test_settings_come_back_from_json(spec):
+    kept = json.loads(json.dumps(spec.to_json()))
+    back = KINDS[spec.kind].from_json(kept)
+    assert back.to_json() == spec.to_json()
+    assert back.seed_sequence.entropy == spec.seed_sequence.entropy
+    assert back.seed_sequence.spawn_key == spec.seed_sequence.spawn_key
+    with pytest.raises(RequestError, match=r"unknown key 'rigde'\. Did you mean 'ridge'"):
+        KINDS[spec.kind].from_json(kept | {"rigde": 1})
+
+
+def test_needs_of_specs():
+    single = HankelDMDc(3, 8, 1.0, window=100, lead=2).needs(0.1)
+    assert (single.snapshots, single.history, single.inside, single.lead) == (100, 8, False, 2)
+    many = few(window=Uniform("10 T", "20 T"), lead="0.5 T").needs(0.1)
+    assert (many.snapshots, many.history, many.lead) == (320, 24, 8)
+
+
+# What the training waves say of the waves of a forecast.
+
+
+def regular(*periods):
+    time = DT * np.arange(1200)
+    eta = sum(np.cos(2 * np.pi * time / period) for period in periods)
+    heave = np.r_[0.0, eta[:-1]]
+    return record(DT, heave=heave, eta=eta)
+
+
+@pytest.mark.parametrize(
+    ("period", "words"),
+    {2.0: None, 2.8: "between .*, with none between", 8.0: "outside .* to "}.items(),
+)
+def test_a_period_outside_and_in_a_gap(period, words, tmp_path):
+    model = HankelDMDc(2, 8, 1.0).fit(regular(2.0, 4.0), ["heave"], ["eta"])
+    model = load_model(model.save(tmp_path / "m.nc"))
+    found = outside_training(model, regular(period), 20.0, 600)
+    told = [each for each in found if "period" in each]
+    assert len(told) == (words is not None)
+    for each in told:
+        named, where = re.search(r"period of ([0-9.]+) s lies (.*);", each).groups()
+        assert float(named) == pytest.approx(period, rel=0.13)  # a band is 12 % wide
+        assert re.match(words, where)
+
+
+def test_higher_waves_and_a_drift_are_outside(tmp_path):
+    run = regular(2.0).rename(heave="surge")
+    model = HankelDMDc(2, 8, 1.0).fit(run, ["surge"], ["eta"])
+    model = load_model(model.save(tmp_path / "m.nc"))
+    # A regular wave is two amplitudes high; g T²/2π is 6.25 m.
+    assert outside_training(model, 1.5 * run, 20.0, 600) == [
+        "eta: a height of 3 m, trained up to 2 m",
+        "eta: a steepness in deep water of 0.48, trained up to 0.32",
+    ]
+    (told,) = outside_training(model, run.assign(surge=run.surge - 3), 20.0, 600)
+    assert told == "a mean surge of -3 m, upstream of the trained -1 to 1 m"
+    assert outside_training(model, 1.5 * run, 20.0, 90) == []  # four waves are no sea
+
+
+def test_a_forecast_says_by_how_much_and_reads_its_own_surge():
+    run = regular(2.0).rename(heave="surge")
+    high = run.map(lambda x: 1.5 * x, keep_attrs=True)  # as the oldest xarray takes it
+    high["surge"].values[high["time"].values > 20.0] = np.nan
+    words = "eta: a height of 3 m, trained up to 2 m; eta: a steepness in deep water of 0.48, "
+    for spec in (HankelDMDc(2, 8, 1.0), few(window=None)):
+        model = spec.fit(run, ["surge"], ["eta"])
+        forecasts = [model.forecast(high, 20.0, 600)]
+        if spec.is_ensemble:
+            forecasts.append(model.forecast_summary(high, 20.0, 600))
+        for forecast in forecasts:
+            assert forecast.attrs["status"] == "ok, outside training"
+            assert forecast.attrs["outside_training"].startswith(words)
+        inside = model.forecast(run, 20.0, 600).attrs
+        assert (inside["status"], "outside_training" in inside) == ("ok", False)
+
+
+# Units of pooled runs, and values that no standard deviation holds.
+
+
+def test_runs_in_other_units_are_never_pooled():
+    plain, centimetres = sea(), sea(seed=1)
+    del plain["heave"].attrs["units"]
+    centimetres["heave"].attrs["units"] = "cm"
+    with pytest.raises(DataError, match=r"'heave' is in 'cm' in run 2 and in 'm' in run 3"):
+        HankelDMDc(1, 4, 1.0).fit([plain, centimetres, sea()], ["heave"], ["eta"])
+
+
+def test_a_run_that_states_no_unit_is_taken_with_a_warning():
+    plain = sea(seed=1)
+    del plain["heave"].attrs["units"]
+    with pytest.warns(SeakeepWarning, match=r"'heave' of run 1 states no unit.*in 'm', as in"):
+        model = HankelDMDc(1, 4, 1.0).fit([plain, sea()], ["heave"], ["eta"])
+    assert model.state_labels[0].units == "m"
+    with pytest.warns(SeakeepWarning, match=r"'heave' of the run states no unit.*model's 'm'"):
+        model.forecast(plain, start=5.0, steps=5)
+
+
+def test_an_observable_that_overflows_is_refused():
+    run = sea()
+    run["eta"].values[7] = 1e60
+    spec = HankelDMDc(1, 4, 1.0, observables=[seakeep.Powers(("eta",), (3,))])
+    with pytest.raises(DataError, match=r"has a standard deviation that is not finite"):
+        spec.fit(run, ["heave"], ["eta"])
 
 
 def test_a_history_inside_the_window_is_not_counted_twice():

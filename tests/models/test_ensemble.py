@@ -4,7 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 import xarray as xr
-from ensembles import few
+from ensembles import INPUTS, STATES, few, wave_run
 from records import record, table
 from scipy import stats
 
@@ -23,25 +23,6 @@ from seakeep.models.draws import child
 from seakeep.toml import Length
 
 PERIOD, DT = 1.6, 0.1  # 16 samples per period
-STATES, INPUTS = ["heave", "pitch"], ["eta"]
-
-
-def wave_run(seed=0, samples=900, name="irregular"):
-    """A linear response to a narrow-banded input, with a little noise."""
-    rng = np.random.default_rng(seed)
-    time = DT * np.arange(samples)
-    frequencies = rng.uniform(0.3, 1.0, 40)
-    phases = rng.uniform(0, 2 * np.pi, 40)
-    angles = 2 * np.pi * np.outer(time, frequencies) + phases
-    gain = 1 / (1 + (frequencies / 0.6) ** 4)
-    series = {
-        "heave": np.cos(angles - 0.4) @ gain,
-        "pitch": np.sin(angles - 1.1) @ (gain * frequencies),
-        "eta": np.cos(angles).sum(axis=1),
-    }
-    for key in STATES:
-        series[key] += 0.02 * rng.normal(size=samples)
-    return record(DT, {"run": name}, **series)
 
 
 @pytest.fixture(scope="module")

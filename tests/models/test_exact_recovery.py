@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from oscillators import Oscillator
 
 from seakeep import HankelDMDc
 
+VESSEL = Oscillator()
 FORCED = {"states": ["heave"], "inputs": ["eta_fwd"]}
 # The channels are not standardised here: a constant offset (the mean of a finite window is not a
 # fixed point of the system) is not in the model class, the raw recursion is.
@@ -16,33 +18,33 @@ def top_row(model):
 
 
 @pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
-def test_a_position_only_oscillator_gives_its_arx_coefficients(oscillator, delay_rows):
+def test_a_position_only_oscillator_gives_its_arx_coefficients(delay_rows):
     spec = HankelDMDc(1, 1, 0.0, standardize=False, delay_rows=delay_rows)
-    model = spec.fit(oscillator.run(), **FORCED)
-    np.testing.assert_allclose(top_row(model), oscillator.arx, rtol=0, atol=EXACT)
+    model = spec.fit(VESSEL.run(), **FORCED)
+    np.testing.assert_allclose(top_row(model), VESSEL.arx, rtol=0, atol=EXACT)
     np.testing.assert_allclose(model.A[1], [1, 0], rtol=0, atol=EXACT)
     np.testing.assert_allclose(model.B[1], [0, 0], rtol=0, atol=EXACT)
 
 
 @pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
 @pytest.mark.parametrize(("s", "z"), [(3, 2), (2, 5), (6, 6)])
-def test_with_redundant_delays_forecasts_are_right(oscillator, s, z, delay_rows):
+def test_with_redundant_delays_forecasts_are_right(s, z, delay_rows):
     # More delays than the system has make the regressors linearly dependent: infinitely many
     # coefficients continue the data exactly, and least norm takes one of them.
     # All of them agree on histories that obey the system, so that forecasts must be right.
-    run = oscillator.run()
+    run = VESSEL.run()
     model = HankelDMDc(s, z, 0.0, standardize=False, delay_rows=delay_rows).fit(run, **FORCED)
-    other = oscillator.run(seed=1)
+    other = VESSEL.run(seed=1)
     forecast = model.forecast(other, start=float(other.time[10]), steps=150)
     np.testing.assert_allclose(forecast.heave, other.heave[11:161], rtol=0, atol=EXACT)
 
 
-def test_no_snapshot_pair_crosses_a_joint(oscillator):
+def test_no_snapshot_pair_crosses_a_joint():
     # Two columns a run and four unknowns: one run leaves the system open, three close it.
-    runs = [oscillator.run(samples=4, seed=seed) for seed in (4, 5, 6)]
+    runs = [VESSEL.run(samples=4, seed=seed) for seed in (4, 5, 6)]
     spec = HankelDMDc(1, 1, 0.0, standardize=False)
-    assert np.max(np.abs(top_row(spec.fit(runs[0], **FORCED)) - oscillator.arx)) > 1e-3
+    assert np.max(np.abs(top_row(spec.fit(runs[0], **FORCED)) - VESSEL.arx)) > 1e-3
     pooled = spec.fit({"a": runs[0], "b": runs[1], "c": runs[2]}, **FORCED)
     # Six columns of random data: the condition number may reach 1e4, so 1e-12 and a margin.
-    np.testing.assert_allclose(top_row(pooled), oscillator.arx, rtol=0, atol=EXACT)
+    np.testing.assert_allclose(top_row(pooled), VESSEL.arx, rtol=0, atol=EXACT)
     assert pooled.training.runs == ("a", "b", "c")

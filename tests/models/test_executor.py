@@ -10,12 +10,10 @@ from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import numpy as np
 import pytest
 import side_work
 import xarray as xr
-from ensembles import few
-from records import record
+from ensembles import INPUTS, STATES, few, wave_run
 
 import seakeep
 from seakeep import executor as executors
@@ -33,13 +31,9 @@ def pool():
 
 @pytest.fixture(scope="module")
 def ensemble_and_run():
-    rng = np.random.default_rng(0)
-    time = 0.1 * np.arange(500)
-    eta = np.cos(np.outer(time, rng.uniform(2, 6, 20)) + rng.uniform(0, 6, 20)).sum(axis=1)
-    heave, pitch = (np.convolve(eta, taps, "same") for taps in ([0.1, 0.3, 0.2], [0.3, -0.1, -0.2]))
-    run = record(0.1, heave=heave, pitch=pitch, eta=eta)
+    run = wave_run(samples=500)
     spec = few(window=seakeep.Uniform("6 T", "12 T"), n_members=9, delay_rows="ridge")
-    return spec.fit(run, ["heave", "pitch"], ["eta"], stop=30.0), run
+    return spec.fit(run, STATES, INPUTS, stop=30.0), run
 
 
 def test_results_come_in_order_and_progress_is_reported(pool):

@@ -7,12 +7,7 @@ import pytest
 from drifting import INPUTS, STATES, heave_error
 from records import table
 
-from seakeep import (
-    HankelDMDc,
-    Powers,
-    ProbeAlignment,
-    SlowSquares,
-)
+from seakeep import HankelDMDc, Powers, ProbeAlignment, SlowSquares
 from seakeep.core.recursion import Place, Recursion, recursion
 from seakeep.models.calibration import envelope_of
 from seakeep.models.labelled import Span
@@ -31,19 +26,13 @@ SPEC = HankelDMDc(
 def models(drifts):
     return {
         name: each.fit(drifts, STATES, INPUTS)
-        for name, each in {
-            "ahead": SPEC,
-            "now": replace(SPEC, lead=0, observables=()),
-            "rest": replace(SPEC, alignment=None),
-        }.items()
+        for name, each in {"ahead": SPEC, "now": replace(SPEC, lead=0, observables=())}.items()
     }
 
 
 def test_the_wave_is_read_where_the_vessel_goes(models, drift):
-    errors = {name: heave_error(model, drift) for name, model in models.items()}
-    assert errors["ahead"] < 0.12  # what the forecast of surge is off
-    assert errors["now"] < 0.2  # and what a probe 3.7 m up-wave does not tell
-    assert errors["rest"] > 0.35
+    """As in `test_alignment.py`, with waves ahead and columns of their own."""
+    assert heave_error(models["ahead"], drift) < 0.12  # what the forecast of surge is off
 
 
 def test_settings_know_the_history_that_carriers_read(models, drift):

@@ -22,15 +22,12 @@ START, STEPS = 500, 60  # the record that is kept holds all samples up to there
 SQUARES = seakeep.SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
 SETTINGS = {
     "plain": {},
-    "ridge rows": {"delay_rows": "ridge"},
     "lead": {"lead": 6},
-    "memory": {"memory": 40},
-    "observables": {"lead": 6, "observables": (SQUARES, seakeep.Powers("eta_fwd"))},
     "aligned": {
         "lead": 6,
         "memory": 40,
         "alignment": ProbeAlignment(mode="dispersion", surge="predicted"),
-        "observables": (SQUARES,),
+        "observables": (SQUARES, seakeep.Powers("eta_fwd")),
     },
 }
 
@@ -112,12 +109,12 @@ def test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop(mo
     np.testing.assert_allclose(std(found), limit, rtol=1e-9)
 
 
-def test_errors_are_those_of_data_that_were_not_trained_on(make_dataset):
+def test_errors_are_those_of_data_that_were_not_trained_on():
     """Of p coefficients from n rows, the residual holds σ²(1 − p/n), a new error σ²(1 + p/n)."""
     found, rng = [], np.random.default_rng(0)
     for _ in range(100):
         heave, wave = rng.standard_normal((2, 105))
-        noise = make_dataset(np.arange(105.0), heave=heave, eta_fwd=wave)
+        noise = record(1.0, heave=heave, eta_fwd=wave)
         found.append(HankelDMDc(4, 4, 1e-9).fit(noise, ["heave"], ["eta_fwd"]).errors.residual)
     # 100 rows of 10 coefficients; 100 repetitions tell a variance to 1.4 %.
     assert np.mean(found) == pytest.approx(1.1, rel=0.05)
@@ -155,7 +152,7 @@ def test_measurement_noise_makes_an_estimate_of_a_measured_state(models, drift):
     assert np.std(found - truth) < 0.9 * np.std(rough["heave"].values[200:START] - truth)
 
 
-def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(make_dataset):
+def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides():
     """Of two states that each follow x' = .98 x + b u + w, one is pushed by .7 SD of w for good."""
 
     def sea(seed, push, samples=3000):
@@ -164,8 +161,7 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
         forced = 0.5 * wave[:, None] + noise
         forced[:, 0] += push
         x = signal.lfilter([0.0, 1.0], [1.0, -0.98], forced, axis=0)
-        time = 0.1 * np.arange(samples)
-        return make_dataset(time, sway=x[:, 0], heave=x[:, 1], eta_fwd=wave)
+        return record(0.1, sway=x[:, 0], heave=x[:, 1], eta_fwd=wave)
 
     model = HankelDMDc(0, 0, 1e-6, delay_rows="exact").fit(
         sea(1, 0.0, 20_000), ["sway", "heave"], ["eta_fwd"]
@@ -467,27 +463,20 @@ def test_a_bad_sample_leaves_the_state_as_it_was(models, drift, message):
     assert live.consistency == untouched.consistency
 
 
-@pytest.fixture(scope="module")
-def thrusted():
+def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     """Surge that answers a wave and a thruster: x' = .9 x + .3 u + .5 thrust, exactly."""
 
-    def run(seed):
+    def made(seed):
         rng, samples = np.random.default_rng(seed), 1200
         wave = np.sin(0.3 * np.arange(samples) + rng.uniform(0, 6)) + rng.normal(0, 0.3, samples)
         thrust = np.repeat(rng.uniform(-1, 1, samples // 30), 30)
-        surge = np.zeros(samples)
-        for k in range(samples - 1):
-            surge[k + 1] = 0.9 * surge[k] + 0.3 * wave[k] + 0.5 * thrust[k]
+        surge = signal.lfilter([0.0, 1.0], [1.0, -0.9], 0.3 * wave + 0.5 * thrust)
         return record(0.1, surge=surge, eta=wave, thrust=thrust)
 
     model = HankelDMDc(0, 0, 1e-9, delay_rows="exact").fit(
-        {str(seed): run(seed) for seed in (1, 2)}, ["surge"], ["eta", "thrust"]
+        {str(seed): made(seed) for seed in (1, 2)}, ["surge"], ["eta", "thrust"]
     )
-    return model, run(3)
-
-
-def test_a_known_actuator_follows_its_plan_whatever_the_probe_does(thrusted):
-    model, run = thrusted
+    run = made(3)
     live = model.live(roles={"thrust": "known"})
     u, y = table(run, ["eta", "thrust"]), table(run, ["surge"])
     for at in range(300):

@@ -3,8 +3,8 @@
 import tracemalloc
 
 import numpy as np
-import xarray as xr
 from ensembles import few
+from records import record
 
 from seakeep.models import engine, summaries
 
@@ -17,8 +17,8 @@ def test_a_summary_does_not_hold_its_members(monkeypatch):
     monkeypatch.setattr(summaries, "CHUNK", 50_000)
     rng = np.random.default_rng(0)
     eta = rng.standard_normal(2000)
-    states = {name: ("time", np.convolve(eta, rng.standard_normal(4), "same")) for name in STATES}
-    run = xr.Dataset(states | {"eta": ("time", eta)}, coords={"time": 0.1 * np.arange(eta.size)})
+    states = {name: np.convolve(eta, rng.standard_normal(4), "same") for name in STATES}
+    run = record(0.1, eta=eta, **states)
 
     def peak(members):
         """Bytes that a summary of so many members takes at most."""

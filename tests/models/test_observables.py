@@ -7,7 +7,6 @@ from records import table
 
 from seakeep.core.observables import slow_kernel, slow_squares
 from seakeep.models import HankelDMDc
-from seakeep.models.inputs import InputMap, Regressors
 from seakeep.models.labelled import Span, channel_labels
 from seakeep.models.observables import Powers, SlowSquares
 
@@ -15,12 +14,12 @@ PERIOD = 15  # samples
 CHOSEN = (SlowSquares("eta_cog"), Powers(("eta_fwd", "eta_cog"), (2, 3)))
 
 
-def fitted(run, lead=12, chosen=CHOSEN) -> InputMap:
+def fitted(run, lead=12, chosen=CHOSEN):
     spec = HankelDMDc(8, 3 * PERIOD, 1.0, lead=lead, observables=chosen)
     return spec.input_map({"run": run}, ["surge"], INPUTS, None)
 
 
-def rows(chain, run, first, stop) -> Regressors:
+def rows(chain, run, first, stop):
     span = Span(first, first, stop)
     values = table(run, INPUTS)
     read = chain.reads(span)

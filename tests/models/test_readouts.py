@@ -13,11 +13,7 @@ from moored import INPUTS as ETA
 from moored import STATES as MOORED
 from records import table
 
-from seakeep import (
-    HankelDMDc,
-    ProbeAlignment,
-    RequestError,
-)
+from seakeep import HankelDMDc, ProbeAlignment, RequestError
 from seakeep.models import ensemble as ensembles
 from seakeep.models.selection import select
 
@@ -30,7 +26,7 @@ SPEC = HankelDMDc(
 PLAIN = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot")
 
 
-def bow(kind: str) -> HankelDMDc:
+def bow(kind):
     return replace(SPEC, readouts={"mooring_bow": kind})
 
 
@@ -44,143 +40,145 @@ def chosen(runs):
     return bow("auto").fit(runs, STATES, INPUTS)
 
 
-def error(model, run: xr.Dataset) -> float:
+def error(model, run):
     found = model.forecast(run, START, STEPS)
     return float(np.sqrt(np.mean((found - run.sel(time=found["time"]))["mooring_bow"] ** 2)))
 
 
-class TestTruth:
-    def test_the_line_and_its_load_are_recovered_to_the_noise(self, chosen, drift):
-        (line,) = chosen.signature.readouts
-        spacing = chosen.signature.input_map.follows.place.spacing
-        assert abs(line.load.place - LINE) <= spacing / 2
-        # Of measured motions: what is left is noise, and what the carriers err.
-        windows = chosen.read_windows({"a": drift}, [("a", START)], STEPS)
-        measured = table(drift, STATES)[601 : 601 + STEPS]
-        found = line.read(measured, windows.waves[0, :, 0])
-        left = float(np.sqrt(np.mean((found - measured[:, 2]) ** 2)))
-        assert LOAD_NOISE * 0.9 < left < LOAD_NOISE * 1.5
-
-    def test_the_wave_at_the_line_is_that_of_the_tank(self, chosen, drift):
-        windows = chosen.read_windows({"a": drift}, [("a", START)], STEPS)
-        wave, rate = windows.waves[0, :, 0].T
-        # From the definition of the load, where its line is wet.
-        motions = 30.0 - 2.0 * drift["surge"].values + 5.0 * drift["heave"].values
-        wet = (drift["mooring_bow"].values - motions)[601 : 601 + STEPS] / 200.0
-        above = wet > 0.01
-        assert np.count_nonzero(above) > 50
-        height = wave[above] - wet[above]  # half a standard deviation, less errors of carriers
-        assert height.std() < 0.1 * wave.std()
-        np.testing.assert_allclose(
-            rate[1:-1], (wave[2:] - wave[:-2]) / (2 * DT), atol=0.05 * rate.std()
-        )
-
-    def test_auto_takes_what_forecasts_better_and_motions_stay(self, chosen, runs, drift):
-        linear = SPEC.fit(runs, STATES, INPUTS)
-        assert chosen.signature.readouts[0].kind == "wave"
-        assert error(chosen, drift) < 0.5 * error(linear, drift)
-        xr.testing.assert_identical(
-            chosen.forecast(drift, START, STEPS)[MOTIONS],
-            linear.forecast(drift, START, STEPS)[MOTIONS],
-        )
-        summary = chosen.summary()
-        assert "read-out      mooring_bow: wave at -1.33 m" in summary
-        assert "(NRMSE on held-out runs: none 0." in summary
-
-    def test_auto_leaves_a_linear_load_as_it_is(self, runs, drift):
-        dry = {}
-        for seed, (name, run) in enumerate(runs.items()):
-            load = 30.0 - 2.0 * run["surge"] + 5.0 * run["heave"]
-            noise = np.random.default_rng(seed).standard_normal(run.sizes["time"])
-            dry[name] = run.assign(mooring_bow=(load + LOAD_NOISE * noise).assign_attrs(units="N"))
-        model = replace(SPEC, readouts="auto").fit(dry, STATES, INPUTS)
-        assert [each.kind for each in model.signature.readouts] == ["none"]
-        xr.testing.assert_identical(
-            model.forecast(drift, START, STEPS),
-            SPEC.fit(dry, STATES, INPUTS).forecast(drift, START, STEPS),
-        )
-
-    def test_far_outside_training_the_state_is_left(self, chosen, runs, drift):
-        linear = SPEC.fit(runs, STATES, INPUTS)
-        high = drift.copy(deep=True)
-        for name in INPUTS:
-            high[name].values[:] *= 20.0
-        found, plain = (each.forecast(high, START, 60)["mooring_bow"] for each in (chosen, linear))
-        floor = chosen.signature.readouts[0].floor
-        moved = np.abs(found - np.maximum(plain, floor)).max() / np.abs(plain - 30.0).max()
-        assert moved < 0.05
+def test_the_line_and_its_load_are_recovered_to_the_noise(chosen, drift):
+    (line,) = chosen.signature.readouts
+    spacing = chosen.signature.input_map.follows.place.spacing
+    assert abs(line.load.place - LINE) <= spacing / 2
+    # Of measured motions: what is left is noise, and what the carriers err.
+    windows = chosen.read_windows({"a": drift}, [("a", START)], STEPS)
+    measured = table(drift, STATES)[601 : 601 + STEPS]
+    found = line.read(measured, windows.waves[0, :, 0])
+    left = float(np.sqrt(np.mean((found - measured[:, 2]) ** 2)))
+    assert LOAD_NOISE * 0.9 < left < LOAD_NOISE * 1.5
 
 
-class TestFloor:
-    """A channel that rests on a floor in training, whether waves are carried or not."""
-
-    def test_a_floor_is_never_undercut_and_a_taut_line_has_none(self, monkeypatch):
-        high = moored_run(9)
-        high["eta"] = 2 * high["eta"]
-        spec = replace(PLAIN, readouts="auto")
-        model = spec.fit(moored_runs(), MOORED, ETA)
-        bow, stern = model.signature.readouts
-        assert (bow.kind, stern.kind, bow.acts, stern.acts) == ("none", "none", False, True)
-        linear = PLAIN.fit(moored_runs(), MOORED, ETA).forecast(high, 20.0, 400)
-        load = model.forecast(high, 20.0, 400)
-        # The 0.002 quantile of normal noise lies 2.9 standard deviations below.
-        assert FLOOR - 3 * NOISE < stern.floor < FLOOR
-        assert f"mooring_stern: none, floor {stern.floor:.4g} N" in model.summary()
-        np.testing.assert_array_equal(
-            load["mooring_stern"], np.maximum(linear["mooring_stern"], stern.floor)
-        )
-        xr.testing.assert_identical(load["mooring_bow"], linear["mooring_bow"])
-        taut = spec.fit(moored_runs(slack=False), MOORED, ETA)
-        assert not any(each.acts for each in taut.signature.readouts)
-        ensemble = few(readouts="auto").fit(moored_runs(), MOORED, ETA)
-        monkeypatch.setattr(ensembles, "weigh_members", lambda _, parts, *__: parts[0].fill(-9.0))
-        found = ensemble.forecast(high[{"time": slice(0, 300)}], 20.0, 400, ahead="predict")
-        assert np.all(found["mooring_stern"] == ensemble.signature.readouts[1].floor)
-        unknown = replace(spec, centre="run").fit(moored_runs(), MOORED, ETA)
-        assert not any(each.acts for each in unknown.signature.readouts)  # on which zero?
-
-    def test_no_linear_system_stands_for_it(self, tmp_path):
-        model = replace(PLAIN, readouts="auto").fit(moored_runs(), MOORED, ETA)
-        for export in (model.to_state_space, lambda: model.to_mat(tmp_path / "m.mat")):
-            with pytest.raises(RequestError, match="reads mooring_stern off its other states"):
-                export()
-        spec = replace(PLAIN, readouts={"mooring_bow": "auto"})
-        assert spec.fit(moored_runs(), MOORED, ETA).to_state_space().C.shape[0] == len(MOORED)
+def test_the_wave_at_the_line_is_that_of_the_tank(chosen, drift):
+    windows = chosen.read_windows({"a": drift}, [("a", START)], STEPS)
+    wave, rate = windows.waves[0, :, 0].T
+    # From the definition of the load, where its line is wet.
+    motions = 30.0 - 2.0 * drift["surge"].values + 5.0 * drift["heave"].values
+    wet = (drift["mooring_bow"].values - motions)[601 : 601 + STEPS] / 200.0
+    above = wet > 0.01
+    assert np.count_nonzero(above) > 50
+    height = wave[above] - wet[above]  # half a standard deviation, less errors of carriers
+    assert height.std() < 0.1 * wave.std()
+    np.testing.assert_allclose(
+        rate[1:-1], (wave[2:] - wave[:-2]) / (2 * DT), atol=0.05 * rate.std()
+    )
 
 
-class TestOneEngine:
-    def test_nothing_after_the_stop_of_training_is_read(self, runs, drift):
-        poisoned = {name: run.copy(deep=True) for name, run in runs.items()}
-        for run in poisoned.values():
-            for name in (*STATES, *INPUTS):
-                run[name].values[run["time"].values > 120.0 + 1e-9] = np.nan
-        clean, dirty = (
-            bow("auto").fit(each, STATES, INPUTS, stop=120.0).forecast(drift, START, STEPS)
-            for each in (runs, poisoned)
-        )
-        xr.testing.assert_identical(clean, dirty)
+def test_auto_takes_what_forecasts_better_and_motions_stay(chosen, runs, drift):
+    linear = SPEC.fit(runs, STATES, INPUTS)
+    assert chosen.signature.readouts[0].kind == "wave"
+    assert error(chosen, drift) < 0.5 * error(linear, drift)
+    xr.testing.assert_identical(
+        chosen.forecast(drift, START, STEPS)[MOTIONS], linear.forecast(drift, START, STEPS)[MOTIONS]
+    )
+    summary = chosen.summary()
+    assert "read-out      mooring_bow: wave at -1.33 m" in summary
+    assert "(NRMSE on held-out runs: none 0." in summary
 
 
-class TestFitting:
-    def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all(self, runs, drift):
-        one = bow("auto").fit(runs["run1"], STATES, INPUTS)
-        assert [each.kind for each in one.signature.readouts] == ["wave"]
-        short = runs["run1"].isel(time=slice(0, 300))
-        model = bow("auto").fit(short, STATES, INPUTS)
-        assert [each.kind for each in model.signature.readouts] == ["none"]
-        assert "(not judged: no waves are carried, or" in model.summary()
+def test_auto_leaves_a_linear_load_as_it_is(runs, drift):
+    dry = {}
+    for seed, (name, run) in enumerate(runs.items()):
+        load = 30.0 - 2.0 * run["surge"] + 5.0 * run["heave"]
+        noise = np.random.default_rng(seed).standard_normal(run.sizes["time"])
+        dry[name] = run.assign(mooring_bow=(load + LOAD_NOISE * noise).assign_attrs(units="N"))
+    model = replace(SPEC, readouts="auto").fit(dry, STATES, INPUTS)
+    assert [each.kind for each in model.signature.readouts] == ["none"]
+    xr.testing.assert_identical(
+        model.forecast(drift, START, STEPS),
+        SPEC.fit(dry, STATES, INPUTS).forecast(drift, START, STEPS),
+    )
 
-    def test_a_training_window_is_all_that_is_read(self, runs):
-        spec = replace(bow("wave"), window=900)
-        late = {name: run.isel(time=slice(1500 - 900 - 86, None)) for name, run in runs.items()}
-        weights = [
-            spec.fit(each, STATES, INPUTS).signature.readouts[0].load.weights
-            for each in (runs, late)
-        ]
-        # BLAS sums in an order that follows the memory: 5e-14 under the kernels of Nehalem.
-        np.testing.assert_allclose(*weights, rtol=1e-11)
 
-    def test_settings_that_are_tuned_hold_the_kinds_that_were_chosen(self, runs):
-        found = select(SPEC, runs, STATES, INPUTS, vary=("ridge", "readouts"), horizon=(15.0,))
-        assert found.settings.readouts == (("mooring_bow", "wave"),)
-        assert [each.kind for each in found.readouts] == ["wave"]
+def test_far_outside_training_the_state_is_left(chosen, runs, drift):
+    linear = SPEC.fit(runs, STATES, INPUTS)
+    high = drift.copy(deep=True)
+    for name in INPUTS:
+        high[name].values[:] *= 20.0
+    found, plain = (each.forecast(high, START, 60)["mooring_bow"] for each in (chosen, linear))
+    floor = chosen.signature.readouts[0].floor
+    moved = np.abs(found - np.maximum(plain, floor)).max() / np.abs(plain - 30.0).max()
+    assert moved < 0.05
+
+
+# A channel that rests on a floor in training, whether waves are carried or not.
+
+
+def test_a_floor_is_never_undercut_and_a_taut_line_has_none(monkeypatch):
+    high = moored_run(9)
+    high["eta"] = 2 * high["eta"]
+    spec = replace(PLAIN, readouts="auto")
+    model = spec.fit(moored_runs(), MOORED, ETA)
+    bow, stern = model.signature.readouts
+    assert (bow.kind, stern.kind, bow.acts, stern.acts) == ("none", "none", False, True)
+    linear = PLAIN.fit(moored_runs(), MOORED, ETA).forecast(high, 20.0, 400)
+    load = model.forecast(high, 20.0, 400)
+    # The 0.002 quantile of normal noise lies 2.9 standard deviations below.
+    assert FLOOR - 3 * NOISE < stern.floor < FLOOR
+    assert f"mooring_stern: none, floor {stern.floor:.4g} N" in model.summary()
+    np.testing.assert_array_equal(
+        load["mooring_stern"], np.maximum(linear["mooring_stern"], stern.floor)
+    )
+    xr.testing.assert_identical(load["mooring_bow"], linear["mooring_bow"])
+    taut = spec.fit(moored_runs(slack=False), MOORED, ETA)
+    assert not any(each.acts for each in taut.signature.readouts)
+    ensemble = few(readouts="auto").fit(moored_runs(), MOORED, ETA)
+    monkeypatch.setattr(ensembles, "weigh_members", lambda _, parts, *__: parts[0].fill(-9.0))
+    found = ensemble.forecast(high[{"time": slice(0, 300)}], 20.0, 400, ahead="predict")
+    assert np.all(found["mooring_stern"] == ensemble.signature.readouts[1].floor)
+    unknown = replace(spec, centre="run").fit(moored_runs(), MOORED, ETA)
+    assert not any(each.acts for each in unknown.signature.readouts)  # on which zero?
+
+
+def test_no_linear_system_stands_for_it(tmp_path):
+    model = replace(PLAIN, readouts="auto").fit(moored_runs(), MOORED, ETA)
+    for export in (model.to_state_space, lambda: model.to_mat(tmp_path / "m.mat")):
+        with pytest.raises(RequestError, match="reads mooring_stern off its other states"):
+            export()
+    spec = replace(PLAIN, readouts={"mooring_bow": "auto"})
+    assert spec.fit(moored_runs(), MOORED, ETA).to_state_space().C.shape[0] == len(MOORED)
+
+
+def test_nothing_after_the_stop_of_training_is_read(runs, drift):
+    poisoned = {name: run.copy(deep=True) for name, run in runs.items()}
+    for run in poisoned.values():
+        for name in (*STATES, *INPUTS):
+            run[name].values[run["time"].values > 120.0 + 1e-9] = np.nan
+    clean, dirty = (
+        bow("auto").fit(each, STATES, INPUTS, stop=120.0).forecast(drift, START, STEPS)
+        for each in (runs, poisoned)
+    )
+    xr.testing.assert_identical(clean, dirty)
+
+
+def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all(runs):
+    one = bow("auto").fit(runs["run1"], STATES, INPUTS)
+    assert [each.kind for each in one.signature.readouts] == ["wave"]
+    short = runs["run1"].isel(time=slice(0, 300))
+    model = bow("auto").fit(short, STATES, INPUTS)
+    assert [each.kind for each in model.signature.readouts] == ["none"]
+    assert "(not judged: no waves are carried, or" in model.summary()
+
+
+def test_a_training_window_is_all_that_is_read(runs):
+    spec = replace(bow("wave"), window=900)
+    late = {name: run.isel(time=slice(1500 - 900 - 86, None)) for name, run in runs.items()}
+    weights = [
+        spec.fit(each, STATES, INPUTS).signature.readouts[0].load.weights for each in (runs, late)
+    ]
+    # BLAS sums in an order that follows the memory: 5e-14 under the kernels of Nehalem.
+    np.testing.assert_allclose(*weights, rtol=1e-11)
+
+
+def test_settings_that_are_tuned_hold_the_kinds_that_were_chosen(runs):
+    found = select(SPEC, runs, STATES, INPUTS, vary=("ridge", "readouts"), horizon=(15.0,))
+    assert found.settings.readouts == (("mooring_bow", "wave"),)
+    assert [each.kind for each in found.readouts] == ["wave"]

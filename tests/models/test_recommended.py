@@ -5,7 +5,6 @@ import pickle
 
 import numpy as np
 import pytest
-import xarray as xr
 from squared import DT, INPUTS, PERIOD, STATES, runs, sea
 
 from seakeep import (
@@ -103,7 +102,7 @@ def test_regular_runs_train_beside_irregular_ones_and_help_in_waves_like_theirs(
     assert errors[1] < 0.5 * errors[0]
 
 
-def rig(run: xr.Dataset, depth: float | None, position: float | None) -> xr.Dataset:
+def rig(run, depth, position):
     run = run.rename(drift="surge").assign_attrs(encounter_period=T)
     if depth is not None:
         run.attrs["water_depth"] = depth

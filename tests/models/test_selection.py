@@ -5,19 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from drifting import INPUTS as PROBES
 from drifting import STATES as DRIFTING
 from drifting import drifting_run
 from free_runs import loop_score
 from records import record
+from scipy import signal
 from squared import DT, INPUTS, PERIOD, STATES, runs
 
-from seakeep import (
-    DataError,
-    HankelDMDc,
-    ProbeAlignment,
-)
+from seakeep import DataError, HankelDMDc, ProbeAlignment
 from seakeep.models.labelled import mean_period
 from seakeep.models.selection import RIDGES, default_observables, groups_of, select
 
@@ -111,10 +107,8 @@ def test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone():
 
 
 def test_a_look_ahead_that_the_data_has_is_found():
-    given = {
-        name: run.assign(eta=("time", np.roll(run["eta"].values, 5), {"units": "m"}))
-        for name, run in runs().items()
-    }  # the wave is recorded half a period after it acts
+    # The wave is recorded half a period after it acts.
+    given = {name: run.assign(eta=run["eta"].roll(time=5)) for name, run in runs().items()}
     options = replace(SPEC, input_delays=12, lead=0)
     found = select(options, given, STATES, INPUTS, vary=("lead",), horizon=(15.0,))
     assert found.settings.lead == 5
@@ -129,13 +123,10 @@ def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all():
     assert "no window of 150 samples can be held out of runs of at most 200" in fallen.note
 
 
-def growing(seed: int, samples: int = 120) -> xr.Dataset:
+def growing(seed):
     """A motion that grows by half a per cent a step: the truth has no stable model."""
-    rng = np.random.default_rng(seed)
-    heave, eta = np.zeros(samples), rng.standard_normal(samples)
-    heave[0] = 1.0
-    for k in range(samples - 1):
-        heave[k + 1] = 1.005 * heave[k] + 0.5 * eta[k]
+    eta = np.random.default_rng(seed).standard_normal(120)
+    heave = signal.lfilter([0.0, 0.5], [1.0, -1.005], eta)
     return record(DT, {"encounter_period": PERIOD * DT}, heave=heave, eta=eta)
 
 

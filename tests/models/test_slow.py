@@ -12,16 +12,16 @@ from seakeep.models.validity import slow_motions, warn_of_slow_motions
 DT, PERIOD = 0.1, 1.64
 
 
-def run_of(seed, seconds, slow_period=30.0, slow=1.0, regular=False):
+def run_of(seed, seconds, slow=1.0, regular=False):
     """Surge of waves and a slow drift of a random envelope; heave of waves alone."""
     rng = np.random.default_rng(seed)
     t = np.arange(0, seconds, DT)
 
-    def sum_of(low, high, count=40):
-        f, phase = rng.uniform(low, high, count), rng.uniform(0, 2 * np.pi, count)
-        return np.cos(2 * np.pi * np.outer(t, f) + phase).sum(axis=1) / np.sqrt(count / 2)
+    def sum_of(low, high):
+        f, phase = rng.uniform(low, high, 40), rng.uniform(0, 2 * np.pi, 40)
+        return np.cos(2 * np.pi * np.outer(t, f) + phase).sum(axis=1) / np.sqrt(20)
 
-    f0 = 1.0 / slow_period
+    f0 = 1 / 30
     drift = sum_of(0.8 * f0, 1.2 * f0) if not regular else np.cos(2 * np.pi * f0 * t)
     return record(DT, surge=slow * drift + 0.3 * sum_of(0.4, 0.9), heave=sum_of(0.4, 0.9))
 

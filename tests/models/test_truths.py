@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from records import record
+from scipy import signal
+from seas import sea
 
 from seakeep import HankelDMDc, SlowSquares, tune
 from seakeep.core.observables import slow_kernel, slow_squares
@@ -17,17 +18,14 @@ NOISE = 0.02
 ATTRS = {"encounter_period": PERIOD * DT}
 
 
-def drifting(seed: int, samples: int = 1500) -> tuple[xr.Dataset, np.ndarray]:
+def drifting(seed, samples=1500):
     """A surge that answers the slow square of waves up to two periods ahead, read with noise."""
     rng = np.random.default_rng(seed)
     t = np.arange(samples) * DT
-    angles = 2 * np.pi * np.outer(t, rng.uniform(0.7, 1.3, 12)) + rng.uniform(0, 2 * np.pi, 12)
-    eta = 0.2 * np.cos(angles).sum(axis=1)
+    eta = 0.5 * sea(seed, (0.7, 1.3), 1.0, 12).at(t)
     square = slow_squares(eta, 0, KERNEL, (2 * PERIOD - 15,), DT)[:, 0]
     known = np.isfinite(square)
-    surge = np.zeros(samples)
-    for k in range(samples - 1):
-        surge[k + 1] = 0.95 * surge[k] + (0.05 * square[k] if known[k] else 0.01)
+    surge = signal.lfilter([0.0, 1.0], [1.0, -0.95], np.where(known, 0.05 * square, 0.01))
     noise = NOISE * surge.std() * rng.standard_normal(samples)
     return record(DT, ATTRS, eta=eta, surge=surge + noise), surge
 

@@ -12,7 +12,6 @@ from records import table
 from seakeep import (
     BayesianHankelDMDc,
     DataError,
-    Fixed,
     HankelDMDc,
     LogUniform,
     Powers,
@@ -100,7 +99,7 @@ def test_windows_arrays_and_service_are_the_forecast(model, run, expected):
         np.testing.assert_allclose(table(served, STATES), table(expected, STATES), **close)
 
 
-def test_members_are_the_models_of_their_settings(key, runs, run, model, expected, tmp_path):
+def test_members_are_the_models_of_their_settings(key, runs, run, model, tmp_path):
     spec = BayesianHankelDMDc(
         encounter_period=1.5,
         state_delays=Uniform(f"{2 * DT} s", f"{6 * DT} s"),
@@ -143,7 +142,7 @@ def test_a_forecast_reads_its_history_and_look_ahead_and_nothing_else(model, run
         model.forecast(gone, START * DT, STEPS)
 
 
-def test_training_reads_its_window_and_nothing_else(key, runs, model):
+def test_training_reads_its_window_and_nothing_else(runs, model):
     poisoned = [each.copy(deep=True) for each in runs]
     settings = model.settings
     history = 0 if settings.history == "inside" else model.history_samples

@@ -1,13 +1,12 @@
 """The model against outside packages: pykoop, scikit-learn, python-control, scipy, plain numpy."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 import xarray as xr
+from records import table
 from scipy import signal
 
-from seakeep import HankelDMDc, HankelDMDcModel
+from seakeep import HankelDMDc
 
 pytestmark = pytest.mark.oracle
 
@@ -20,23 +19,20 @@ SAME_MATRICES = 1e-10
 SAME_FORECAST = 1e-9
 
 
-def matrix(run, names=(*STATES, *INPUTS)):
-    return np.stack([run[name].values for name in names], axis=1)
-
-
 def fit(runs, s, z, ridge=0.5, **settings):
     settings = {"standardize": False, "history": "inside", **settings}
     return HankelDMDc(s, z, ridge, **settings).fit(runs, states=STATES, inputs=INPUTS)
 
 
-def koopman_pipeline(runs, s, z, ridge=0.5):
+def koopman_pipeline(runs, s, z):
     pykoop = pytest.importorskip("pykoop")
     pipeline = pykoop.KoopmanPipeline(
         lifting_functions=[("delay", pykoop.DelayLiftingFn(n_delays_state=s, n_delays_input=z))],
-        regressor=pykoop.Edmd(alpha=ridge),
+        regressor=pykoop.Edmd(alpha=0.5),
     )
     data = pykoop.combine_episodes(
-        [(number, matrix(run)) for number, run in enumerate(runs)], episode_feature=True
+        [(number, table(run, STATES + INPUTS)) for number, run in enumerate(runs)],
+        episode_feature=True,
     )
     pipeline.fit(data, n_inputs=Q, episode_feature=True)
     return pipeline
@@ -74,14 +70,14 @@ def test_forecasts_equal_pykoop(make_run, delay_rows, relift, s, z):
     pipeline = koopman_pipeline(runs, s, z)
     first = model.history_samples
     expected = pipeline.predict_trajectory(
-        matrix(other, STATES)[:first],
-        matrix(other, INPUTS),
+        table(other, STATES)[:first],
+        table(other, INPUTS),
         relift_state=relift,
         episode_feature=False,
     )
     forecast = model.forecast(other, start=float(other.time[first - 1]), steps=160 - first)
     np.testing.assert_allclose(
-        matrix(forecast, STATES), expected[first:], rtol=0, atol=SAME_FORECAST
+        table(forecast, STATES), expected[first:], rtol=0, atol=SAME_FORECAST
     )
 
 
@@ -92,7 +88,7 @@ def test_the_first_rows_equal_scikit_learn(make_run, delay_rows, samples, ridge)
     s, z = 5, 20
     run = make_run(samples=samples)
     model = fit(run, s, z, ridge=ridge, delay_rows=delay_rows)
-    x, u = matrix(run, STATES), matrix(run, INPUTS)
+    x, u = table(run, STATES), table(run, INPUTS)
     rows = [
         np.concatenate([x[j - s : j + 1][::-1].ravel(), u[j - z : j + 1][::-1].ravel()])
         for j in range(z, samples - 1)
@@ -103,51 +99,26 @@ def test_the_first_rows_equal_scikit_learn(make_run, delay_rows, samples, ridge)
     np.testing.assert_allclose(ours, oracle.coef_, rtol=0, atol=SAME_MATRICES)
 
 
-@dataclass(frozen=True)
-class Exported:
-    """A model, what drives its exported system, and the forecast to compare with."""
-
-    model: HankelDMDcModel
-    deviations: np.ndarray
-    initial_state: np.ndarray
-    measured: np.ndarray
-    forecast: np.ndarray
-
-
-@pytest.fixture(params=[(4, 7), (6, 3), (5, 0), (3, 1)], ids=lambda delays: f"s, z = {delays}")
-def delays(request):
-    return request.param
-
-
-@pytest.fixture(params=["ridge", "exact"])
-def exported(request, make_run, delays):
+@pytest.mark.parametrize(("s", "z"), [(4, 7), (6, 3), (5, 0), (3, 1)])
+@pytest.mark.parametrize("delay_rows", ["ridge", "exact"])
+def test_scipy_simulates_the_exported_system_like_our_forecast(make_run, s, z, delay_rows):
     run = make_run(samples=300)
     # Ridge enough for a stable model: an unstable one would compare rounding of large numbers.
-    model = fit(run, *delays, ridge=2.0, delay_rows=request.param, standardize=True)
+    model = fit(run, s, z, ridge=2.0, delay_rows=delay_rows, standardize=True)
     assert model.spectral_radius < 1
     start, steps = 100, 150
     instant = float(run.time[start])
-    return Exported(
-        model,
-        matrix(run, INPUTS)[start : start + steps + 1] - model.input_mean,
-        model.initial_state(run, start=instant),
-        matrix(run, STATES)[start],
-        matrix(model.forecast(run, start=instant, steps=steps), STATES),
-    )
-
-
-def test_scipy_simulates_the_exported_system_like_our_forecast(exported, delays):
-    s, z = delays
-    system = exported.model.to_state_space()
+    deviations = table(run, INPUTS)[start : start + steps + 1] - model.input_mean
+    system = model.to_state_space()
     assert isinstance(system, signal.StateSpace)
-    assert system.dt == exported.model.dt
+    assert system.dt == model.dt
     assert not np.any(system.D)
     assert system.A.shape == (N * (s + 1) + Q * z,) * 2
-    _, output, _ = signal.dlsim(system, exported.deviations, x0=exported.initial_state)
-    physical = output + exported.model.state_mean
+    _, output, _ = signal.dlsim(system, deviations, x0=model.initial_state(run, start=instant))
+    physical, forecast = output + model.state_mean, model.forecast(run, start=instant, steps=steps)
     # The first output is the measured state at the start; values are of order one.
-    np.testing.assert_allclose(physical[0], exported.measured, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(physical[1:], exported.forecast, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(physical[0], table(run, STATES)[start], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(physical[1:], table(forecast, STATES), rtol=0, atol=1e-10)
 
 
 def test_the_papers_formula_in_plain_numpy_at_the_papers_size():

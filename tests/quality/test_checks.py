@@ -66,7 +66,7 @@ class TestRedundantSensors:
 
     @pytest.mark.parametrize(
         ("factor", "told"),
-        [(1000.0, True), (2.2, True), (1.9, False), (0.55, False), (0.45, True), (0.001, True)],
+        {1000.0: True, 2.2: True, 1.9: False, 0.55: False, 0.45: True, 0.001: True}.items(),
     )
     def test_another_scale(self, factor, told):
         """A wrong unit does not change a correlation; the limits are 2 and 1/2."""
@@ -80,7 +80,7 @@ class TestRedundantSensors:
         grown = np.sin(2 * np.pi * (T / PERIOD - part * RUN_AWAY * (T / T[-1] - 0.5)))
         assert bool(kinds(grown, t)) is told
 
-    @pytest.mark.parametrize(("spanned", "told"), [(2, True), (4, True), (7, False), (20, False)])
+    @pytest.mark.parametrize(("spanned", "told"), {2: True, 4: True, 7: False, 20: False}.items())
     def test_motion_below_the_resolution(self, spanned, told):
         step = 2 * np.sqrt(2) * waves().std() / spanned
         noisy = waves() + 0.02 * waves().std() * np.random.default_rng(1).standard_normal(T.size)

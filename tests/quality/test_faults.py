@@ -56,7 +56,7 @@ def test_a_fault_of_any_length_is_reported(kind, length):
             assert reported(faulty(waves() + 0.2, kind, length, place)), place
 
 
-@pytest.mark.parametrize(("equal", "stuck"), [(2, 0), (3, 0), (4, 4), (5, 5)])
+@pytest.mark.parametrize(("equal", "stuck"), {2: 0, 3: 0, 4: 4, 5: 5}.items())
 def test_the_shortest_run_of_equal_readings_that_is_held(equal, stuck):
     """Where none repeats, one in n may, and twice the longest run of that chance is three."""
     x = waves()

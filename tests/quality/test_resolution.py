@@ -19,7 +19,7 @@ SEA = sea(3, (0.4, 0.9), peak=1.6, components=20).at(T)
     gain=st.sampled_from([1e-3, 1.0, 1e3]),
     every=st.sampled_from([1, 2, 4]),
 )
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_the_step_of_an_ideal_rounding_sensor_is_found(step, offset, gain, every):
     read = gain * step * np.round((SEA[::every] + offset) / step)
     # Samples are so close that the motion passes one step at a time, to rounding.

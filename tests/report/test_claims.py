@@ -69,7 +69,7 @@ def holds(claim, paper, raw=None):
 
 
 @pytest.mark.parametrize(
-    ("change", "expected"), [(0.0, True), (0.4, False), (-0.4, False), (0.15, None)]
+    ("change", "expected"), {0.0: True, 0.4: False, -0.4: False, 0.15: None}.items()
 )
 def test_errors_that_grow_or_fall_with_time_have_a_trend(change, expected):
     over = ("test", "band", "model")

@@ -19,13 +19,7 @@ from seakeep.report.comparison import (
     write_differences,
     write_forecast,
 )
-from seakeep.study import (
-    Comparison,
-    at_full_scale,
-    comparison_table,
-    difference_table,
-    in_degrees,
-)
+from seakeep.study import Comparison, at_full_scale, comparison_table, difference_table, in_degrees
 
 TIME = np.arange(1, 401) * 0.1
 UNITS = {"heave": "m", "pitch": "rad", "mooring_stern": "N"}

@@ -12,11 +12,7 @@ import xarray as xr
 from tutorial_study import STUDY, put_tutorial
 
 from seakeep.files import check_report
-from seakeep.report.sections.results import (
-    coverage_table,
-    divergence_table,
-    summary,
-)
+from seakeep.report.sections.results import coverage_table, divergence_table, summary
 from seakeep.report.tables import words as known_words
 from seakeep.study import read_result, read_study, run_study
 
@@ -77,7 +73,7 @@ def test_the_page_holds_its_parts_and_names_nothing_outside_itself(page, result)
     assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", when)
 
 
-def test_figures_and_tables_are_files_too(page, result):
+def test_figures_and_tables_are_files_too(page):
     figures = {path.name for path in (page.parent / "figures").iterdir()}
     for name in ("errors_unseen", "densities_bayesian", "error_over_time", "eigenvalues"):
         assert {f"{name}.png", f"{name}.svg"} <= figures
@@ -155,9 +151,9 @@ def test_a_report_that_was_interrupted_is_written_again(tmp_path):
         write_page(tmp_path, "Title", stamp, (section,))
     (tmp_path / "figures" / "lines.png").touch()
     check_report(tmp_path)  # raises nothing: the folder is ours
-    assert "not finished" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "not finished" in (tmp_path / "report.html").read_text("utf-8")
     write_page(tmp_path, "Title", stamp, ())
-    assert "not finished" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "not finished" not in (tmp_path / "report.html").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -184,55 +180,50 @@ def browser():
     started.quit()
 
 
-@pytest.fixture
-def opened(browser, page):
-    browser.get(page.as_uri())
-    return browser
-
-
 def state(browser, key):
     return browser.execute_script(f"return document.getElementById('history').dataset.{key}")
 
 
-def test_the_time_histories_zoom_and_choose(opened):
+def test_the_time_histories_zoom_and_choose(browser, page):
     from selenium.webdriver import ActionChains
     from selenium.webdriver.support.ui import Select, WebDriverWait
 
-    canvas = opened.find_element("id", "history")
-    whole = state(opened, "range")
-    opened.execute_script("arguments[0].scrollIntoView({block: 'center'})", canvas)
-    opened.find_element("css selector", "[data-act='+']").click()
-    low, high = map(float, state(opened, "range").split())
+    browser.get(page.as_uri())
+    canvas = browser.find_element("id", "history")
+    whole = state(browser, "range")
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", canvas)
+    browser.find_element("css selector", "[data-act='+']").click()
+    low, high = map(float, state(browser, "range").split())
     assert high - low < 0.7 * (float(whole.split()[1]) - float(whole.split()[0]))
-    opened.find_element("css selector", "[data-act=ArrowRight]").click()
-    assert float(state(opened, "range").split()[0]) > low
-    drag = ActionChains(opened).move_to_element_with_offset(canvas, -100, 0)
+    browser.find_element("css selector", "[data-act=ArrowRight]").click()
+    assert float(state(browser, "range").split()[0]) > low
+    drag = ActionChains(browser).move_to_element_with_offset(canvas, -100, 0)
     drag.click_and_hold().move_by_offset(150, 0).release().perform()
-    assert state(opened, "range") != whole
-    ActionChains(opened).double_click(canvas).perform()
-    assert state(opened, "range") == whole
-    assert state(opened, "channel") == "heave"
-    Select(opened.find_element("id", "pick-channel")).select_by_index(1)
-    assert state(opened, "channel") == "pitch"
-    opening = state(opened, "cell")
+    assert state(browser, "range") != whole
+    ActionChains(browser).double_click(canvas).perform()
+    assert state(browser, "range") == whole
+    assert state(browser, "channel") == "heave"
+    Select(browser.find_element("id", "pick-channel")).select_by_index(1)
+    assert state(browser, "channel") == "pitch"
+    opening = state(browser, "cell")
     for place in ("pick-window", "pick-training"):  # each in a file that is loaded now
-        before = state(opened, "cell")
-        Select(opened.find_element("id", place)).select_by_index(1)
-        WebDriverWait(opened, 10).until(lambda _, old=before: state(opened, "cell") != old)
+        before = state(browser, "cell")
+        Select(browser.find_element("id", place)).select_by_index(1)
+        WebDriverWait(browser, 10).until(lambda _, old=before: state(browser, "cell") != old)
     for place in ("pick-training", "pick-window"):
-        Select(opened.find_element("id", place)).select_by_index(0)
-    assert state(opened, "cell") == opening
-    ActionChains(opened).move_to_element(opened.find_element("tag name", "h1")).perform()
-    told = opened.find_element("id", "history-readout").text
+        Select(browser.find_element("id", place)).select_by_index(0)
+    assert state(browser, "cell") == opening
+    ActionChains(browser).move_to_element(browser.find_element("tag name", "h1")).perform()
+    told = browser.find_element("id", "history-readout").text
     assert re.search(r"NRMSE of pitch in this window: deterministic \d\.\d{3}, Bayesian mean", told)
-    assert state(opened, "legend").split(", ") == [
+    assert state(browser, "legend").split(", ") == [
         "Bayesian band", "measured", "deterministic", "Bayesian mean"
     ]  # fmt: skip
-    ActionChains(opened).move_to_element(canvas).perform()
-    told = opened.find_element("id", "history-readout").text
+    ActionChains(browser).move_to_element(canvas).perform()
+    told = browser.find_element("id", "history-readout").text
     assert re.search(r"measured -?[\d.e-]+ deg", told)
     assert re.search(r"wave elevation.* m\b", told)
-    assert opened.get_log("browser") == []
+    assert browser.get_log("browser") == []
 
 
 def test_lost_forecasts_are_named(result):

@@ -56,7 +56,7 @@ def test_phase_celerity_is_that_of_linear_dispersion(frequency):
     assert np.median(found.coherence[found.frequency > 3]) < 0.4
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(lag=st.floats(0.0, 1.0), period=st.floats(1.2, 3.0))
 def test_a_peak_between_samples(lag, period):
     rng = np.random.default_rng(3)

@@ -11,18 +11,18 @@ A, B = np.array([1.0, 2.0, 6.0]), np.array([4.0, -1.0, 0.5])
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [
-        ("0.5*(a + b)", 0.5 * (A + B)),
-        ("-a - -b", -A + B),
-        ("a - b / 2 * 3", A - B / 2 * 3),
-        ("a ** 0.5 + b ** -2", A**0.5 + B**-2),
-        ("-a**2", -(A**2)),
-        ("square(a) + abs(b) + sqrt(a) + sin(a) * cos(b)",
-         A**2 + abs(B) + np.sqrt(A) + np.sin(A) * np.cos(B)),
-        ("a - mean(a)", A - 3.0),
-        ("average(a, b, a + b)", 2 * (A + B) / 3),
-        ("\n  1e-3 * a +\n 2\n", 1e-3 * A + 2),
-    ],
+    {
+        "0.5*(a + b)": 0.5 * (A + B),
+        "-a - -b": -A + B,
+        "a - b / 2 * 3": A - B / 2 * 3,
+        "a ** 0.5 + b ** -2": A**0.5 + B**-2,
+        "-a**2": -(A**2),
+        "square(a) + abs(b) + sqrt(a) + sin(a) * cos(b)":
+            A**2 + abs(B) + np.sqrt(A) + np.sin(A) * np.cos(B),
+        "a - mean(a)": A - 3.0,
+        "average(a, b, a + b)": 2 * (A + B) / 3,
+        "\n  1e-3 * a +\n 2\n": 1e-3 * A + 2,
+    }.items(),
 )  # fmt: skip
 def test_values(text, expected):
     # Sums in one order or another: rounding.

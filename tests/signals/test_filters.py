@@ -9,12 +9,8 @@ from scipy import signal
 from seakeep.signals import low_pass, lowpass_taps
 
 
-@settings(max_examples=25, deadline=None)
-@given(
-    st.floats(min_value=0.02, max_value=0.3),
-    st.floats(min_value=1.1, max_value=1.5),
-    st.sampled_from([50.0, 60.0, 80.0]),
-)
+@settings(max_examples=25)
+@given(st.floats(0.02, 0.3), st.floats(1.1, 1.5), st.sampled_from([50.0, 60.0, 80.0]))
 def test_gains_of_the_taps(passband, ratio, attenuation):
     stopband = passband * ratio
     taps = lowpass_taps(1.0, passband, stopband, attenuation)
@@ -38,12 +34,3 @@ def test_constants_and_ramps_are_kept_up_to_the_ends():
     for series in (np.full(t.size, 3.0), 2.0 * t - 1.0):
         # Point reflection continues a ramp exactly: only rounding is left.
         np.testing.assert_allclose(low_pass(series, 0.01, 2.0), series, atol=1e-12)
-
-
-@pytest.mark.parametrize("frequency", [0.5, 7.0, 9.99])
-def test_the_delay_is_compensated(frequency):
-    """The filter of the paper keeps gain and phase of a tone, half its length from the ends."""
-    t = np.arange(0, 30, 1 / 500)
-    tone = np.cos(2 * np.pi * frequency * t + 0.3)
-    out = low_pass(tone, 1 / 500, 10.0, 10.75)
-    np.testing.assert_allclose(out[2000:-2000], tone[2000:-2000], atol=1.001e-3)  # 60 dB

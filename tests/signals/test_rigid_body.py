@@ -5,12 +5,7 @@ import pytest
 import xarray as xr
 
 from seakeep.errors import RequestError
-from seakeep.signals import (
-    complementary_filter,
-    froude_factor,
-    rotation_matrix,
-    transfer_position,
-)
+from seakeep.signals import complementary_filter, froude_factor, rotation_matrix, transfer_position
 from seakeep.study import to_full_scale
 
 
@@ -39,7 +34,7 @@ def test_blend_keeps_slow_motion_and_needs_no_drift_removal():
 
 @pytest.mark.parametrize(
     ("units", "power"),
-    [("m", 1), ("m/s", 0.5), ("m/s^2", 0), ("rad/s", -0.5), ("N m", 4), ("W", 3.5), ("kg", 3)],
+    {"m": 1, "m/s": 0.5, "m/s^2": 0, "rad/s": -0.5, "N m": 4, "W": 3.5, "kg": 3}.items(),
 )  # fmt: skip
 def test_froude(units, power):
     assert froude_factor(units, 50.0) == pytest.approx(50.0**power, rel=1e-12)

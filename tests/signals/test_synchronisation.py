@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from seakeep.signals import (
-    Clock,
-    clock_from_pulses,
-    pool_drift,
-)
+from seakeep.signals import Clock, clock_from_pulses, pool_drift
 from seakeep.signals.lags import _correlation
 from seakeep.signals.synchronisation import without_doubtful_drift
 
@@ -65,8 +61,7 @@ def test_uneven_pulses_leave_no_doubt():
         return sum(np.exp(-(((t - c) / 0.1) ** 2)) for c in (5.0, 17.0, 31.0, 64.0, 90.0))
 
     clock = clock_from_pulses(
-        *logger(train, 100.0, 130.0, 0.001, 0, 33.0),
-        *logger(train, 500.0, 100.0, 0.001, 1),
+        *logger(train, 100.0, 130.0, 0.001, 0, 33.0), *logger(train, 500.0, 100.0, 0.001, 1)
     )
     assert clock.offset == pytest.approx(33.0, abs=1e-3)
     assert clock.modulus == np.inf
@@ -74,8 +69,7 @@ def test_uneven_pulses_leave_no_doubt():
 
 def test_one_pulse_gives_an_offset_and_no_drift():
     clock = clock_from_pulses(
-        *logger(pulses, 100.0, 20.0, 0.001, 0, 0.2),
-        *logger(pulses, 500.0, 20.0, 0.001, 1),
+        *logger(pulses, 100.0, 20.0, 0.001, 0, 0.2), *logger(pulses, 500.0, 20.0, 0.001, 1)
     )
     assert clock.offset == pytest.approx(0.2, abs=1e-3)
     assert clock.drift == 0

@@ -245,7 +245,7 @@ def test_a_contact_sheet_shows_bad_frames_too(disturbed, flagged, tmp_path):
         contact_sheet(tmp_path / "short.mp4", flagged)
 
 
-def test_the_command_writes_what_a_campaign_reads(plain, tracked, tmp_path, monkeypatch, capsys):
+def test_the_command_writes_what_a_campaign_reads(plain, tracked, monkeypatch, capsys):
     """The example of its help, on a video of that name."""
     monkeypatch.chdir(plain[0].parent)
     assert cli.main(["track", "--help"]) == 0

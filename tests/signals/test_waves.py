@@ -58,7 +58,7 @@ def test_statistics_of_a_regular_wave(period, height):
 T = 0.02 * np.arange(12_000)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000))
 def test_a_record_that_begins_and_ends_in_waves_is_counted_as_the_paper_does(seed):
     x = sea(seed).at(T[:6000])

@@ -7,11 +7,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from seakeep.errors import DataError, RequestError, SeakeepWarning
-from seakeep.statistics import (
-    block_length,
-    lag_one_correlation,
-    moving_block_bootstrap,
-)
+from seakeep.statistics import block_length, lag_one_correlation, moving_block_bootstrap
 
 
 def autoregressive(phi, samples, seed):
@@ -67,7 +63,7 @@ def test_a_slow_series_is_capped_at_a_quarter_with_a_warning():
 # --- the moving-block bootstrap ------------------------------------------------------------------
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     samples=st.integers(2, 60),
     data=st.data(),
@@ -108,11 +104,7 @@ def redrawn(length, segments=None):
     [
         (lambda: block_length(NOISE[:5]), DataError, r"5 sample\(s\); at least 8 are needed"),
         (lambda: block_length(np.full(40, 3.0)), DataError, r"the series is constant \(3\)"),
-        (
-            lambda: block_length(NOISE, "carlsten"),
-            RequestError,
-            "unknown rule 'carlsten'.* Did",
-        ),
+        (lambda: block_length(NOISE, "carlsten"), RequestError, "unknown rule 'carlsten'.* Did"),
         (lambda: redrawn(101), RequestError, "of 101 samples does not fit into the series of 100"),
         (lambda: block_length(NOISE, segments=[50, 60]), RequestError, "add up to 110 samples and"),
         (lambda: redrawn(40, [70, 30]), RequestError, "not fit into the shortest segment of 30"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import signal, stats
 
 from seakeep.core.calibration import (
     band_scale,
@@ -44,19 +44,12 @@ def test_a_band_that_is_too_narrow_covers_what_it_says_in_new_windows():
     np.testing.assert_allclose(reach, [1.96, 39.2], rtol=0.05)
 
 
-def autoregression(rng, phi, windows, steps):
-    x = np.empty((windows, steps))
-    x[:, 0] = rng.standard_normal(windows)
-    for k in range(1, steps):
-        x[:, k] = phi * x[:, k - 1] + np.sqrt(1 - phi**2) * rng.standard_normal(windows)
-    return x[..., None]
-
-
 def test_dependent_scores_are_worth_fewer_and_the_coverage_is_kept():
     rng = np.random.default_rng(2)
     held, plain, worth = [], [], []
     for _ in range(400):
-        scores = autoregression(rng, 0.95, 6, 100)
+        noise = np.sqrt(1 - 0.95**2) * rng.standard_normal((6, 200, 1))
+        scores = signal.lfilter([1.0], [1.0, -0.95], noise, axis=1)[:, 100:]
         for found, out in (
             (conformal_margin(scores, 0.9), held),
             (conformal_margin(scores, 0.9, block_length=1), plain),

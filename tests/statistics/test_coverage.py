@@ -7,13 +7,7 @@ from hypothesis import strategies as st
 from scipy import integrate
 from scipy.stats import norm
 
-from seakeep.statistics import (
-    band_crps,
-    box_statistics,
-    coverage,
-    coverage_table,
-    winkler_score,
-)
+from seakeep.statistics import band_crps, box_statistics, coverage, coverage_table, winkler_score
 
 # --- coverage ------------------------------------------------------------------------------------
 
@@ -120,7 +114,7 @@ def test_a_table_by_wave_height_and_horizon_by_hand():
 
 
 @pytest.mark.oracle
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(values=st.lists(st.integers(-1000, 1000), min_size=1, max_size=40))
 def test_boxes_are_matplotlibs_for_any_numbers(values):
     cbook = pytest.importorskip("matplotlib.cbook")

@@ -9,12 +9,7 @@ from scipy.signal import lfilter
 from scipy.spatial.distance import jensenshannon
 
 from seakeep.core.bootstrap import bootstrap_indices
-from seakeep.statistics import (
-    density_grid,
-    jensen_shannon,
-    jsd_interval,
-    kernel_density,
-)
+from seakeep.statistics import density_grid, jensen_shannon, jsd_interval, kernel_density
 
 
 def wave_like(samples, seed):
@@ -36,7 +31,7 @@ MASSES = arrays(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(p=MASSES, q=MASSES)
 def test_it_is_bounded_symmetric_and_scipys_square(p, q):
     assume(p.sum() > 0)

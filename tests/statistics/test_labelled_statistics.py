@@ -46,11 +46,7 @@ def test_divergence_of_each_channel():
     assert found["channel"].values.tolist() == ["pitch", "heave"]
     for name, child in zip(["pitch", "heave"], children, strict=True):
         alone = core_divergence.jsd_interval(
-            PREDICTED[name].values,
-            MEASURED[name].values,
-            block_length=40,
-            rng=child,
-            n_series=10,
+            PREDICTED[name].values, MEASURED[name].values, block_length=40, rng=child, n_series=10
         )
         row = found.sel(channel=name)
         for key in ("mean", "lower", "upper", "uncertainty", "noise_floor", "block_length"):

@@ -12,14 +12,14 @@ def mean_of_difference(a, b):
     return np.nanmean(a - b, axis=(1, 2))
 
 
-def table(rng, row, column, cell, overlap=1, size=10):
+def table(rng, row, column, cell, overlap=1):
     """Errors of training sets and windows, neighbours of which share data."""
 
     def effect(spread):
-        drawn = rng.normal(0, spread, size + overlap - 1)
+        drawn = rng.normal(0, spread, 9 + overlap)
         return np.convolve(drawn, np.ones(overlap) / np.sqrt(overlap), "valid")
 
-    return 1 + effect(row)[:, None] + effect(column) + rng.normal(0, cell, (size, size))
+    return 1 + effect(row)[:, None] + effect(column) + rng.normal(0, cell, (10, 10))
 
 
 def coverage(row, column, cell, overlap=1, blocks=(1, 1)):

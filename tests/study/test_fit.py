@@ -3,11 +3,11 @@
 import dataclasses
 import json
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import signal
 from seas import sea
 from small_tank import write_csv
 
@@ -16,11 +16,7 @@ from seakeep.campaign.store import write_prepared
 from seakeep.cli import main
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import KINDS
-from seakeep.study import (
-    compare,
-    comparison_table,
-    fit_campaign,
-)
+from seakeep.study import compare, comparison_table, fit_campaign
 
 RATE = 10.0
 
@@ -31,14 +27,12 @@ def halves(tmp_path):
     rng = np.random.default_rng(4)
     time = np.arange(2001) / RATE
     eta = np.sin(2 * np.pi * 0.5 * time + np.sin(time / 9)) + 0.1 * rng.standard_normal(time.size)
-    heave = np.zeros(time.size)
-    for k in range(2, time.size):
-        heave[k] = 1.7 * heave[k - 1] - 0.8 * heave[k - 2] + 0.1 * eta[k - 1]
+    heave = signal.lfilter([0.0, 0.1], [1.0, -1.7, 0.8], eta)
     write_csv(tmp_path / "run.csv", {"t [s]": time, "eta [m]": eta, "z [m]": heave})
     return tmp_path
 
 
-def campaign(folder: Path, model: str, runs: str | None = None) -> seakeep.Campaign:
+def campaign(folder, model, runs=None):
     runs = runs or '[runs.all]\nfile = "run.csv"\ntrain = [0.0, 100.0]\ntest = [100.0, 200.0]\n'
     (folder / "campaign.toml").write_text(
         '[channels.eta_fwd]\ncolumn = "eta"\n[channels.heave]\ncolumn = "z"\n'
@@ -105,23 +99,18 @@ def test_an_ensemble_learns_inside_the_training_span(halves, train_on):
         assert (first, stop) == (pytest.approx(150.0 - longest), pytest.approx(150.0))
 
 
-@pytest.fixture
-def repeating(tmp_path):
-    """A sea of equally spaced components that comes back, turned, after 100 s of 200."""
-    time = np.arange(2001) / RATE
-    eta = sea(4, (0.298, 0.698), components=40, jitter=0).at(time)
-    write_csv(tmp_path / "run.csv", {"t [s]": time, "eta [m]": eta, "z [m]": np.roll(eta, 5)})
-    return tmp_path
-
-
 REPEATS = (
     r"the input 'eta_fwd' of all repeats training input: .* % of it, such as from t = .* s on, is "
     r"what all holds from t = .* turned by .* memory, not skill: test on another run"
 )
 
 
-def test_a_test_that_repeats_its_training_is_warned_of(repeating):
-    whole = campaign(repeating, EXACT)
+def test_a_test_that_repeats_its_training_is_warned_of(tmp_path):
+    """A sea of equally spaced components comes back, turned, after 100 s of 200."""
+    time = np.arange(2001) / RATE
+    eta = sea(4, (0.298, 0.698), components=40, jitter=0).at(time)
+    write_csv(tmp_path / "run.csv", {"t [s]": time, "eta [m]": eta, "z [m]": np.roll(eta, 5)})
+    whole = campaign(tmp_path, EXACT)
     with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):
         model = fit_campaign(whole)
     with pytest.warns(seakeep.SeakeepWarning, match=REPEATS):
@@ -150,7 +139,7 @@ def test_a_model_table_aligns_and_its_table_says_on_what_it_is_conditional(halve
     assert found["probe_offset"] == 0.1
 
 
-def sines(folder: Path, periods: dict[str, tuple[float, ...]]) -> str:
+def sines(folder, periods):
     """Runs of regular waves, one file each; the last one tests."""
     time = np.arange(1501) / RATE
     text = ""
@@ -219,7 +208,7 @@ def test_a_lead_reads_waves_ahead_of_time(halves):
     assert whole.forecast["time"][-1] == pytest.approx(float(run["time"][-8]))
 
 
-def test_a_field_of_a_spec_is_a_key_of_files(monkeypatch, halves, tmp_path):
+def test_a_field_of_a_spec_is_a_key_of_files(monkeypatch, halves):
     @dataclasses.dataclass(frozen=True)
     class Damped(seakeep.HankelDMDc):
         kind = "damped"

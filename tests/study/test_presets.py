@@ -17,7 +17,7 @@ from seakeep.study.resolve import can_align, resolve_model
 pytest.importorskip("numba", reason="the campaign is the virtual tank's")
 
 PERIOD, DT, ENSEMBLE = 1.64, 1.64 / 32, "bayesian_hankel_dmdc"
-MAP = (Path(__file__).parents[2] / "docs/paper_map.md").read_text(encoding="utf-8")
+MAP = (Path(__file__).parents[2] / "docs/paper_map.md").read_text("utf-8")
 ROWS = {
     int(cells[1]): (cells[3].strip(), cells[4].strip())
     for line in MAP.splitlines()
@@ -29,27 +29,22 @@ OF_TRAINING = {3}
 """Which waves are played, and which part of them trains: the campaign's for `fit`."""
 
 
-@pytest.fixture
-def tank(tmp_path):
-    """The virtual tank's campaign file, without its raw files."""
+def found(folder, preset, door):
+    """Specs of the single model and the ensemble, by the preset of [model] or of a study.
+
+    On the virtual tank's campaign file, without its raw files.
+    """
     from seakeep.tank.delivery import campaign_text
     from seakeep.tank.settings import default_settings
 
     settings = default_settings()
     files = {run: {"wave_probes": f"{run}.csv"} for run in settings.runs}
     text = campaign_text(settings, files, "csv", one_logger=False)
-    (tmp_path / "campaign").mkdir()
-    (tmp_path / "campaign/campaign.toml").write_text(text, encoding="utf-8")
-    return tmp_path
-
-
-def found(folder, preset, door):
-    """Specs of the single model and the ensemble, by the preset of [model] or of a study."""
     path = folder / "campaign/campaign.toml"
-    text = path.read_text(encoding="utf-8")
+    path.parent.mkdir()
     of_model = preset if door == "fit" else {"paper": "recommended", "recommended": "paper"}[preset]
     model = re.sub(r'(\[model\][^[]*?)preset = "\w+"', rf'\1preset = "{of_model}"', text)
-    path.write_text(re.sub(r'(\[preparation\]\n)preset = "\w+"\n', r"\1", model), encoding="utf-8")
+    path.write_text(re.sub(r'(\[preparation\]\n)preset = "\w+"\n', r"\1", model), "utf-8")
     if door == "fit":
         campaign, study = read_campaign(path), None
         tables = [campaign.model(), campaign.model().model_copy(update={"kind": ENSEMBLE})]
@@ -58,7 +53,7 @@ def found(folder, preset, door):
         says = f'[study]\ncampaign = "../campaign/campaign.toml"\npreset = "{preset}"\n'
         file = folder / act.name / "study.toml"
         file.parent.mkdir()
-        file.write_text(says if door == "study" else study_text(act, Size(), 0), encoding="utf-8")
+        file.write_text(says if door == "study" else study_text(act, Size(), 0), "utf-8")
         read = read_study(file)
         campaign, study = read.campaign, read.settings
         tables = list(study.models.values())[:2]
@@ -99,8 +94,8 @@ def paper(found):
 
 
 @pytest.mark.parametrize("door", ["fit", "study", "reproduce"])
-def test_the_papers_column_is_taken_in_every_row(tank, door):
-    taken = found(tank, "paper", door)
+def test_the_papers_column_is_taken_in_every_row(tmp_path, door):
+    taken = found(tmp_path, "paper", door)
     assert sorted(ROWS) == list(range(1, 32))
     checked = paper(taken)
     assert checked == dict.fromkeys(checked, True)

@@ -10,14 +10,7 @@ from seakeep.errors import SeakeepWarning
 from seakeep.report.tables import MISSING
 from seakeep.study import read_study
 from seakeep.study.plan import make_plan
-from seakeep.study.reproduce import (
-    ACTS,
-    HIGH_PASS,
-    SLOW,
-    Size,
-    reproduce,
-    study_text,
-)
+from seakeep.study.reproduce import ACTS, HIGH_PASS, SLOW, Size, reproduce, study_text
 
 pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
 from seakeep.tank.delivery import campaign_text, write_record

@@ -105,7 +105,7 @@ def test_each_key_has_its_value_and_its_source(stated, how, expected):
     assert told["n_members"] == stated.get("n_members", 100 if told["ensemble"] else 1)
 
 
-@pytest.mark.parametrize(("centre", "counts"), [("run", True), ("pooled", False), ("2 T", True)])
+@pytest.mark.parametrize(("centre", "counts"), {"run": True, "pooled": False, "2 T": True}.items())
 def test_the_reference_period_of_each_run_counts_in_encounter_periods(centre, counts):
     own = {"state_delays": 4, "input_delays": 8, "ridge": 1.0, "centre": centre}
     table = {"states": ("heave",), "inputs": ("eta_fwd",), **own}

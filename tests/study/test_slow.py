@@ -12,8 +12,7 @@ DRIFT = 60.0
 """Period of the drift put onto heave, s: the two training runs hold four periods in all."""
 
 
-@pytest.fixture
-def drifting_folder(study_folder):
+def test_a_study_with_short_windows_is_told_once(study_folder, monkeypatch):
     """The tutorial's runs, their heave on a slow drift three times as large as the waves."""
     for path in study_folder.glob("*.csv"):
         table = pd.read_csv(path, sep=";")
@@ -21,11 +20,7 @@ def drifting_folder(study_folder):
         size = 3 * np.sqrt(2) * table[heave].std()
         table[heave] += np.outer(np.sin(2 * np.pi * time / DRIFT), size)
         table.to_csv(path, sep=";", index=False, float_format="%.6g")
-    return study_folder
-
-
-def test_a_study_with_short_windows_is_told_once(drifting_folder, monkeypatch):
-    study = read_study(drifting_folder / "study.toml")
+    study = read_study(study_folder / "study.toml")
     plan = make_plan(study)
     with pytest.warns(SeakeepWarning, match=r"slow motion of heave \(period [56]\d") as caught:
         warn_of_slow_study(plan)
@@ -33,4 +28,4 @@ def test_a_study_with_short_windows_is_told_once(drifting_folder, monkeypatch):
     assert "windows of 'bayesian' in" in str(caught[0].message)  # 20 T at most
     monkeypatch.setattr("seakeep.study.run._computed", lambda *_: pytest.fail("told before"))
     with pytest.warns(SeakeepWarning, match="slow motion"), pytest.raises(pytest.fail.Exception):
-        run_study(study, drifting_folder / "out")
+        run_study(study, study_folder / "out")

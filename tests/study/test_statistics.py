@@ -29,7 +29,7 @@ from seakeep.study.plan import make_plan, random_stream
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory):
+def found(tmp_path_factory):
     """A study whose truth is known: the measurement of heave, half a centimetre higher."""
     folder = tmp_path_factory.mktemp("study")
     put_tutorial(folder, STUDY.replace("seed = 3", 'seed = 3\ntruth = "truth"'))
@@ -39,20 +39,12 @@ def place(tmp_path_factory):
         {"heave": ("time", run["heave"].values + 0.005)}, {"time": run["time"].values}
     )
     true.to_netcdf(folder / "truth" / "unseen.nc", engine="h5netcdf")
-    return folder
-
-
-@pytest.fixture(scope="module")
-def found(place):
-    return run_study(read_study(place / "study.toml"), place / "out")
+    return run_study(read_study(folder / "study.toml"), folder / "out")
 
 
 @pytest.mark.parametrize(
     ("variant", "block", "bandwidth", "crosses"),
-    [
-        ("paper", "carlstein", "paper", True),
-        ("recommended", "politis_white", "silverman", False),
-    ],
+    [("paper", "carlstein", "paper", True), ("recommended", "politis_white", "silverman", False)],
 )
 def test_divergences_are_those_of_the_joined_windows(found, variant, block, bandwidth, crosses):
     table = found.groups["statistics/divergence"]

@@ -22,17 +22,17 @@ def test_what_is_left_out_is_the_papers():
 
 
 @pytest.mark.parametrize(
-    ("tables", "words"),
-    [
-        ({"training": {"window": 3}}, "training.window: unknown key, received 3. Did you mean 'w"),
-        ({"training": {"windows": 0}, "tests": {"irregular": {"length": -1.0}}},
-         r"^study.toml: 2 mistakes(.|\n)*training.windows: received 0(.|\n)*length: received -1"),
-        ({"training": {"scheme": "leave_out", "windows": 3}}, "'windows' belongs to scheme = 'hal"),
-        ({"training": {"leave_out": "run"}}, "'leave_out' belongs to scheme = 'leave_out'"),
-        ({"statistics": {"densities_of": "regular"}}, r"densities_of = 'regular' is not a table"),
-        ({"tests": {"a/b": {}}}, "the name 'a/b' is made of more than letters"),
-        ({"study": {"campaign": "c.toml", "seed": 2**64}}, r"seed: received 18446.* below 2\^64"),
-    ],
+    ("words", "tables"),
+    {
+        "training.window: unknown key, received 3. Did you mean 'w": {"training": {"window": 3}},
+        r"^study.toml: 2 mistakes(.|\n)*training.windows: received 0(.|\n)*length: received -1":
+            {"training": {"windows": 0}, "tests": {"irregular": {"length": -1.0}}},
+        "'windows' belongs to scheme = 'hal": {"training": {"scheme": "leave_out", "windows": 3}},
+        "'leave_out' belongs to scheme = 'leave_out'": {"training": {"leave_out": "run"}},
+        r"densities_of = 'regular' is not a table": {"statistics": {"densities_of": "regular"}},
+        "the name 'a/b' is made of more than letters": {"tests": {"a/b": {}}},
+        r"seed: received 18446.* below 2\^64": {"study": {"campaign": "c.toml", "seed": 2**64}},
+    }.items(),
 )  # fmt: skip
 def test_what_no_study_file_may_say(tables, words):
     content = {"study": {"campaign": "campaign.toml"}, **tables}

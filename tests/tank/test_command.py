@@ -13,7 +13,7 @@ def test_one_logger_and_the_truth(tmp_path):
         "[runs.sea]\nstartup = 5.0\nduration = 30.0\n"
         "spectrum = { height = 0.15, peak_period = 2.0 }\n"
         "[runs.regular]\nstartup = 5.0\nduration = 20.0\nwavelength = 2.8\nheight = 0.1\n",
-        encoding="utf-8",
+        "utf-8",
     )
     words = f"tank --settings {short} --out {out} --seed 3 --one-logger --run sea"
     assert cli.main(words.split()) == 0

@@ -143,7 +143,7 @@ def test_another_hull_is_built_and_played_from_a_settings_file(tmp_path):
         '[vessel]\nhydrodynamics = "hull.nc"\n'
         f"[hull]\nmass = 55.0\nwaterplane_area = 1.05\npool = false\n{COARSE}"
         "[runs.one]\nwavelength = 2.8\nheight = 0.1\nstartup = 5.0\nduration = 10.0\n",
-        encoding="utf-8",
+        "utf-8",
     )
     frequencies = [str(0.5 * i) for i in range(1, 21)]
     out = tmp_path / "hull.nc"

@@ -3,13 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seakeep.tank.instruments import (
-    _immersed,
-    clock_instants,
-    record_run,
-    slap_pulses,
-    trigger,
-)
+from seakeep.tank.instruments import _immersed, clock_instants, record_run, slap_pulses, trigger
 from seakeep.tank.play import generator, play_run, truth
 from seakeep.tank.settings import SlapSettings
 
@@ -95,7 +89,7 @@ def test_slap_pulses_start_where_the_line_is_wetted():
     assert np.all(slap_pulses(time, wet & False, slap, np.random.default_rng(0)) == 0.0)
 
 
-def test_truth_holds_what_the_chain_is_judged_against(played, short):
+def test_truth_holds_what_the_chain_is_judged_against(played):
     data = truth(played, "irregular_1")
     assert {"surge", "heave_rate", "pitch_acceleration", "mooring_bow", "eta_vessel"} <= set(data)
     assert data.attrs["clock_mru_offset"] == 0.370

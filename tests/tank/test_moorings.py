@@ -12,15 +12,10 @@ def test_unstretched_lengths_of_the_page(rig):
     assert rig.lines[:, 5] == pytest.approx([2.368, 2.673], abs=0.0005)  # three decimals are stated
 
 
-def along_surge(rig, offsets):
-    position = np.zeros((5, offsets.size))
-    position[0] = offsets
-    return tensions(rig, position, np.zeros_like(position))
-
-
 def test_level_lines_are_springs_that_only_pull(rig):
-    offsets = np.linspace(-1.0, 2.0, 61)
-    bow, stern = along_surge(rig, offsets)
+    position = np.zeros((5, 61))
+    position[0] = offsets = np.linspace(-1.0, 2.0, 61)
+    bow, stern = tensions(rig, position, 0 * position)
     assert bow == pytest.approx(np.maximum(0.0, 1.1 + 1.89 * offsets), abs=1e-12)
     assert stern == pytest.approx(np.maximum(0.0, 1.1 - 1.33 * offsets), abs=1e-12)
 
@@ -63,5 +58,5 @@ def test_tension_is_that_of_a_catenary_solver(rig):
         ends = catenary(reach, 0.0, unstretched, stiffness * unstretched, weight, CB=0.0)[0:4]
         position = np.zeros((5, 1))
         position[0] = offset
-        ours = tensions(rig, position, np.zeros_like(position))[0, 0]
+        ours = tensions(rig, position, 0 * position)[0, 0]
         assert ours == pytest.approx(np.hypot(*ends[2:4]), rel=1e-3)

@@ -52,7 +52,7 @@ def test_raw_csv_reads_back(short, played, tmp_path):
 
 def test_campaign_file_lists_all_files_clocks_and_spans(short, tmp_path):
     play(short, tmp_path)
-    table = tomllib.loads((tmp_path / "campaign.toml").read_text(encoding="utf-8"))
+    table = tomllib.loads((tmp_path / "campaign.toml").read_text("utf-8"))
     assert table["instruments"]["video"]["trigger"] == "lamp"
     run = table["runs"]["irregular_1"]
     assert (run["train"], run["test"]) == ([10, 20], [20, 30])
@@ -63,7 +63,7 @@ def test_campaign_file_lists_all_files_clocks_and_spans(short, tmp_path):
         for path in files.values():
             assert (tmp_path / path).is_file()
             assert not path.startswith("truth")
-    assert "offset" not in (tmp_path / "campaign.toml").read_text(encoding="utf-8")
+    assert "offset" not in (tmp_path / "campaign.toml").read_text("utf-8")
     assert table["derived"]["eta_fwd"] == {
         "from": "eta_kn_fwd", "step": "low_pass", "passband": 10.0, "stopband": 10.75,
     }  # fmt: skip
@@ -87,16 +87,16 @@ def test_nothing_that_the_tank_has_not_written_is_replaced(short, tmp_path):
     play(short, tmp_path, names=["regular_2"])
     play(short, tmp_path, names=["regular_2"])  # its own files it replaces
     record = tmp_path / "raw" / "regular_2" / "mru.csv"
-    kept = record.read_text(encoding="utf-8")
-    record.write_text("time [s],heave [m]\n0.0,0.1\n", encoding="utf-8")
+    kept = record.read_text("utf-8")
+    record.write_text("time [s],heave [m]\n0.0,0.1\n", "utf-8")
     with pytest.raises(RequestError, match=r"mru\.csv exists and is not a raw file that"):
         play(short, tmp_path, names=["regular_2"])
-    record.write_text(kept, encoding="utf-8")
+    record.write_text(kept, "utf-8")
     hidden = (tmp_path / "truth").rename(tmp_path / "apart")
     with pytest.raises(RequestError, match=r"\w+\.csv exists, and no truth of the tank beside it"):
         play(short, tmp_path, names=["regular_2"])
     hidden.rename(tmp_path / "truth")
-    (tmp_path / "campaign.toml").write_text("[campaign]\nname = 'mine'\n", encoding="utf-8")
+    (tmp_path / "campaign.toml").write_text("[campaign]\nname = 'mine'\n", "utf-8")
     before = digests(tmp_path)
     with pytest.raises(RequestError, match=r"campaign\.toml exists and is not a campaign"):
         play(short, tmp_path, names=["regular_2"])

@@ -96,15 +96,14 @@ def test_unsteadiness_spreads_the_heights():
 
 
 @pytest.mark.parametrize(
-    ("run", "message"),
-    [
-        ({"wavelength": 0.5, "height": 0.05}, r"runs\.odd asks for waves of 1\.77 Hz; .*0\.1–1\.4"),
-        ({"wavelength": 2.0, "height": 0.6}, r"runs\.odd asks for waves 0\.6 m high; .* 0\.45 m"),
-        (
-            {"spectrum": {"height": 0.1, "peak_period": 2.0, "band": (0.05, 1.0)}},
-            r"asks for waves of 0\.05–1 Hz; the wave maker covers",
-        ),
-    ],
+    ("message", "run"),
+    {
+        r"runs\.odd asks for waves of 1\.77 Hz; .*0\.1–1\.4": {"wavelength": 0.5, "height": 0.05},
+        r"runs\.odd asks for waves 0\.6 m high; .* 0\.45 m": {"wavelength": 2.0, "height": 0.6},
+        r"asks for waves of 0\.05–1 Hz; the wave maker covers": {
+            "spectrum": {"height": 0.1, "peak_period": 2.0, "band": (0.05, 1.0)}
+        },
+    }.items(),
 )
 def test_waves_beyond_the_wave_maker_are_refused(settings, run, message):
     with pytest.raises(RequestError, match=message):

@@ -25,13 +25,9 @@ def played(filmed, rig):
     return play_run(filmed, "one", rig)
 
 
-@pytest.fixture(scope="module")
-def video(played, tmp_path_factory):
-    path = tmp_path_factory.mktemp("video") / "side_view.mp4"
-    return render_side_view(played, path, np.random.default_rng(0), length=10.0)
-
-
-def test_the_track_of_a_film_is_the_motion_and_its_lamp_the_trigger(video, played):
+def test_the_track_of_a_film_is_the_motion_and_its_lamp_the_trigger(played, tmp_path):
+    film = tmp_path / "side_view.mp4"
+    video = render_side_view(played, film, np.random.default_rng(0), length=10.0)
     clock = played.settings.instruments.clocks["video"]
     readings, instants = clock_instants(clock, 10.0)
     surge, heave, pitch = played.states(instants)[0][:3]
@@ -55,6 +51,6 @@ def test_a_filmed_campaign_is_prepared(filmed, tmp_path):
     assert files["side_view"].suffix == ".mp4"
     campaign = read_campaign(tmp_path / "campaign.toml")
     assert "side_view" not in campaign.settings.runs["one"].files  # no table of a logger
-    assert "# Filmed: raw/one/side_view.mp4" in campaign.path.read_text(encoding="utf-8")
+    assert "# Filmed: raw/one/side_view.mp4" in campaign.path.read_text("utf-8")
     assert write_prepared(campaign)
     assert "surge" in load_prepared(campaign)["one"]
