@@ -46,8 +46,8 @@ members that go on from there would make up the mean of an ensemble."""
 MEMORY, LEAST = 20, 64
 """Longest delays over which the limit falls back after a high wave, or a spike of a probe, and the
 samples that a delay counts at least: slow drift rings for some hundred wave periods."""
-TOGETHER = 8
-"""Members, at most, whose free runs are stepped side by side."""
+TOGETHER = 64
+"""Free runs, at most, of members that follow their own surge, which are stepped side by side."""
 HELD = 32 * 2**20
 """Bytes of member series that are held in memory; more is put into a temporary file."""
 
@@ -753,8 +753,11 @@ def member_series(
         ]
         # What members are centred on comes after them.
         total = count + model.is_centred
-        size = sum(series.nbytes for series, _ in runs) // count
-        together = max(1, min(TOGETHER, HELD // max(size, 1)))
+        together = 1
+        if any(each.table is not None for each in groups):
+            size = sum(series.nbytes for series, _ in runs) // count
+            most = TOGETHER // max(len(each) for each in groups)
+            together = max(1, min(most, HELD // size))
         parts = [range(total)[at : at + together] for at in range(0, total, together)]
 
         def tell(done: int, of: int, what: str) -> None:

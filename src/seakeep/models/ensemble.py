@@ -416,7 +416,8 @@ class HankelEnsemble(Model):
     ) -> Iterator[Series]:
         """Series of the members, weighed where waves are predicted, as :func:`member_series`."""
         held = self
-        if windows.departures and not self.identified:  # weights take errors of all members
+        # Weights take errors of all members, and what follows its surge is stepped together.
+        if (windows.departures or windows.table is not None) and not self.identified:
             held = self.hold(executor=executor, progress=progress)
         with member_series(held, [windows, *windows.departures], executor, progress) as parts:
             if windows.departures:
