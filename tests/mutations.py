@@ -69,6 +69,8 @@ CHANGES = (
     ("core/coverage.py", "below, above = (m < low).mean(axis=time), (m > high).mean(axis=time)", "below, above = (m > high).mean(axis=time), (m < low).mean(axis=time)", "statistics/test_coverage.py::test_each_channel_and_window_is_judged_alone"),
     ("core/density.py", '"paper": (1.06, 1.0)', '"paper": (1.06, 1.34)', "statistics/test_density.py::test_the_papers_bandwidth_lacks_the_divisor"),
     ("core/density.py", "again = bootstrapped_densities(m, others,", "again = bootstrapped_densities(m, positions,", "statistics/test_divergence.py::test_a_perfect_prediction_is_zero_and_its_floor_is_not"),
+    ("core/density.py", "[_densities(ordered, times[k], grid, h[k]) for k in halves]", "[_densities(ordered, times[k], grid, h[k]) for k in halves[::-1]]", "statistics/test_divergence.py::test_the_bth_prediction_meets_the_bth_measurement_from_the_same_blocks"),
+    ("core/density.py", "low + (place % 1.0) * (high - low)", "low", "statistics/test_density.py::test_the_papers_bandwidth_lacks_the_divisor"),
     ("core/density.py", "np.clip(0.5 * total", "np.clip(total", "statistics/test_divergence.py::test_it_is_bounded_symmetric_and_scipys_square"),
     ("core/density.py", "np.exp(-0.5 * (h[:, None] * angular) ** 2)", "np.exp(-((h[:, None] * angular) ** 2))", "statistics/test_density.py::test_densities_are_scipys"),
     ("core/embedding.py", "last - window + 1", "last - window", "core/test_embedding.py::test_windows_at_the_papers_delays"),

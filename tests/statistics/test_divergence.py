@@ -8,6 +8,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.signal import lfilter
 from scipy.spatial.distance import jensenshannon
 
+from seakeep.core import density
 from seakeep.core.bootstrap import bootstrap_indices
 from seakeep.statistics import density_grid, jensen_shannon, jsd_interval, kernel_density
 
@@ -47,7 +48,9 @@ def test_masses_near_the_smallest_number_do_not_vanish():
     assert float(jensen_shannon([1e-310, 0.0], [0.0, 1e300])) == pytest.approx(np.log(2))
 
 
-def test_the_bth_prediction_meets_the_bth_measurement_from_the_same_blocks():
+@pytest.mark.parametrize("most", [density.MOST_BINS, 10_000])  # with room for all draws, or two
+def test_the_bth_prediction_meets_the_bth_measurement_from_the_same_blocks(monkeypatch, most):
+    monkeypatch.setattr(density, "MOST_BINS", most)
     predicted = np.stack([0.9 * MEASURED, MEASURED + 0.3])
     found = jsd_interval(
         predicted, MEASURED, block_length=50, n_series=5, rng=np.random.default_rng(7)

@@ -151,6 +151,9 @@ def _densities(ordered: FloatArray, times: IntArray, grid: FloatArray, h: FloatA
     beyond = math.ceil(min(REACH * h.max() / span * steps, MOST_BINS))
     points = int(fft.next_fast_len(grid.size + 2 * beyond, real=True))
     bins = points * fine
+    if even and len(times) > 1 and len(times) * bins > MOST_BINS:  # room for few at a time
+        halves = np.array_split(np.arange(len(times)), 2)
+        return np.concatenate([_densities(ordered, times[k], grid, h[k]) for k in halves])
     if not even or bins > MOST_BINS:
         rows = (np.repeat(ordered, each) for each in times)
         every = zip(rows, h, strict=True)
