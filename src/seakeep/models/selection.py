@@ -821,7 +821,7 @@ def select(
     trials.try_more([taken])
     level = made[taken].level(alike, stated if taken == start else None)
     taken, level = trials.stable(taken, level)
-    worth = trials.worth(taken)
+    worth = trials.worth(taken) if settings.role == "model" else ""
     if taken != best or (varied and taken == start):
         worth += (
             "; what it starts from: nothing that was tried is better by more than the noise"
