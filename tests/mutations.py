@@ -242,7 +242,7 @@ CHANGES = (
     ("models/validity.py", "drifts = self.surge is not None and not", "drifts = self.surge is None and not", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
     ("pairing.py", "tolerance=INSTANT_TOLERANCE * step", "tolerance=step", "test_pairing.py::test_the_instants_of_a_message_can_be_told_apart"),
     ("quality/faults.py", "1.0 - weights @ power[1:] / power[0]", "weights @ power[1:] / power[0]", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
-    ("quality/faults.py", "float(high - low) / 3.29", "float(high - low) / 1.645", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
+    ("quality/faults.py", "(high - low) / 3.29", "(high - low) / 1.645", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
     ("report/acts.py", '("mean", "mean"), ("lower", "upper"), ("upper", "lower")', '("mean", "mean"), ("mean", "mean"), ("mean", "mean")', "report/test_claims.py::test_loads_diverge_more_by_the_ends_of_both_intervals"),
     ("report/tables.py", '1.0 + float(at[f"{prefix}{key}"])', '1.0 - float(at[f"{prefix}{key}"])', "report/test_claims.py::test_errors_that_grow_or_fall_with_time_have_a_trend"),
     ("report/acts.py", '[opposite(differences["ANRMSE"].below(1.0))', '[differences["ANRMSE"].below(1.0)', "report/test_claims.py::test_regular_waves_are_compared_with_irregular_ones"),

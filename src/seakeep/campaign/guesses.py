@@ -72,7 +72,7 @@ class File:
         times = self.table.values.get(self.time or "", np.zeros(1))
         unit = time_unit_of(self.table, self.time or "")
         factor = conversion(unit, "s") if is_unit(unit) else 1.0
-        return factor * float(times[0]) if np.isfinite(times[0]) else 0.0
+        return factor * times[0] if np.isfinite(times[0]) else 0.0
 
     def series(self, column: str) -> FloatArray | None:
         """A column without its gaps; None where there is too little of it, or it is constant."""
@@ -132,10 +132,10 @@ def seas_of(files: Sequence[File], guesses: Sequence[Guess], wave: Guess) -> dic
     seas = {f: sea for f, x in series.items() if x is not None and (sea := _sea(f, x)) is not None}
     highest = max((sea.height for sea in seas.values()), default=0.0)
     seas = {file: sea for file, sea in seas.items() if sea.height > STILL * highest}
-    rate = min((float(file.rate or 1.0) for file in seas), default=1.0)
+    rate = min((file.rate or 1.0 for file in seas), default=1.0)
     records = {}
     for file in seas:
-        x, own = series[file], float(file.rate or 1.0)
+        x, own = series[file], file.rate or 1.0
         assert x is not None
         records[file.run] = np.interp(np.arange(0, x.size, own / rate), np.arange(x.size), x)
     groups = repeated_waves(records, 1.0 / rate)
@@ -146,12 +146,12 @@ def seas_of(files: Sequence[File], guesses: Sequence[Guess], wave: Guess) -> dic
 
 
 def _sea(file: File, series: FloatArray) -> Sea | None:
-    step = 1.0 / float(file.rate or 1.0)
+    step = 1.0 / (file.rate or 1.0)
     try:
         series = series[waves_part(series, step)]
         power = tapered_power(series)
         frequency = np.fft.rfftfreq(series.size, step)
-        peak = frequency[1 + int(np.argmax(power[1:]))]
+        peak = frequency[1 + np.argmax(power[1:])]
         off = np.abs(frequency - peak * np.clip(np.round(frequency / peak), 1, 3))
         near = off < max(0.1 * peak, 2.5 * frequency[1])
         regular = bool(power[near].sum() > ONE_WAVE * power[1:].sum())
@@ -172,8 +172,7 @@ def _start(run: str, files: Sequence[File], guesses: Sequence[Guess]) -> float:
             if series is None or not (is_elevation(name, rates=True) or name in MOTIONS):
                 continue
             if begin := first_wave(series, name in MOTIONS):
-                step = 1.0 / float(file.rate or 1.0)
-                starts.append(step * begin + file.start)
+                starts.append(1.0 / (file.rate or 1.0) * begin + file.start)
     return max(starts)
 
 
@@ -295,7 +294,7 @@ def guess_channels(files: Sequence[File]) -> list[Guess]:
         series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
         spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
         unit = si_unit(guess.unit)
-        size = max(float(high - low) for low, high in spans) * conversion(guess.unit, unit)
+        size = max(high - low for low, high in spans) * conversion(guess.unit, unit)
         sizes[guess.channel] = unit, size
     largest = {unit: max(x for u, x in sizes.values() if u == unit) for unit, _ in sizes.values()}
     rests = {name for name, (unit, size) in sizes.items() if size <= AT_REST * largest[unit]}

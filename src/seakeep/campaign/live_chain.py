@@ -6,6 +6,7 @@ after it are there: it differs from the offline one by what the ends of the wind
 """
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -154,13 +155,13 @@ class LiveChain:
         """Model samples that are ready, and no row kept that none needs any more."""
         if self._origin is None and all(len(self._instants(key)) for key in self._rows):
             # As offline: multiples of the step from the first instant of the reference.
-            firsts = [float(self._instants(key)[0]) for key in self._rows]
+            firsts = [self._instants(key)[0] for key in self._rows]
             self._origin = firsts[0]
-            self._given = int(np.ceil((max(firsts) - firsts[0] + self.delay) / self.dt - 1e-6))
+            self._given = math.ceil((max(firsts) - firsts[0] + self.delay) / self.dt - 1e-6)
         ready = 0
         if self._origin is not None:
-            newest = min(float(self._instants(key)[-1]) for key in self._rows)
-            ready = int(np.floor((newest - self.delay - self._origin) / self.dt + 1e-9)) + 1
+            newest = min(self._instants(key)[-1] for key in self._rows)
+            ready = math.floor((newest - self.delay - self._origin) / self.dt + 1e-9) + 1
         if ready - self._given < self.every:
             empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
             return xr.Dataset(empty, coords={"time": np.empty(0)})
@@ -207,8 +208,8 @@ class LiveChain:
     def _check_all_send(self) -> None:
         """Refuse a silent logger: nothing can be made without it, and the others' rows pile up."""
         instants = {key: self._instants(key) for key in self._rows}
-        start = min((float(each[0]) for each in instants.values() if each.size), default=0.0)
-        newest = {key: float(each[-1]) if each.size else start for key, each in instants.items()}
+        start = min((each[0] for each in instants.values() if each.size), default=0.0)
+        newest = {key: each[-1] if each.size else start for key, each in instants.items()}
         last = min(newest, key=newest.__getitem__)
         silent = max(newest.values()) - newest[last]
         if silent > self.window:
@@ -227,8 +228,8 @@ class LiveChain:
         }
         run = derived(cleaned(mapped(replace(self._run, loggers=loggers))))
         ends = [each["time"].values[[0, -1]] for each in run.groups.values()]
-        low = int(np.ceil((max(each[0] for each in ends) - origin) / dt - 1e-9))
-        high = int(np.floor((min(each[1] for each in ends) - origin) / dt + 1e-9))
+        low = math.ceil((max(each[0] for each in ends) - origin) / dt - 1e-9)
+        high = math.floor((min(each[1] for each in ends) - origin) / dt + 1e-9)
         axis = origin + dt * np.arange(low, high + 1, dtype=float)
         data = resampled(run, dt, axis).data
         names = list(run.settings.channel_names)
@@ -239,7 +240,7 @@ class LiveChain:
         assert self._origin is not None
         oldest = self._origin + self._given * self.dt + self.delay - self.window
         for key, table in self._rows.items():
-            first = int(np.searchsorted(self._instants(key), oldest))
+            first = np.searchsorted(self._instants(key), oldest)
             self._rows[key] = {name: values[first:] for name, values in table.items()}
 
 

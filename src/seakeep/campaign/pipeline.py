@@ -298,7 +298,7 @@ def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings])
     records: slice | BoolArray = slice(None)
     if run.own.record is not None:
         start, end = (number(edge) for edge in run.own.record)
-        step, whole = usual_step(time), (float(time[0]), float(time[-1]))
+        step, whole = usual_step(time), (time[0], time[-1])
         slack = step * (1 + 1e-6) if logger.name == next(iter(run.loggers)) else np.inf
         place = f"runs.{run.name}.record"
         records = _part(place, (start, end), time, step, whole, slack)
@@ -387,7 +387,7 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
     longest = max(gaps, key=lambda gap: gap[1] - gap[0])
     others = f" (also in {', '.join(gapped[1:])})" if gapped[1:] else ""
     raise DataError(
-        f"run '{run}' ({path}): channel '{gapped[0]}' has {int(first.sum())} missing values of "
+        f"run '{run}' ({path}): channel '{gapped[0]}' has {first.sum()} missing values of "
         f"{first.size} in {len(gaps)} gap(s), the first at {said(gaps[0])}, the longest at "
         f"{said(longest)}{others}. Repair the file, leave the "
         f"channel out, or cut the gap off with record = [start, end] in [runs.{run}]; or state "
@@ -448,7 +448,7 @@ def _flagged(
         filled = bridge(x, step, longest)
         x = filled.values
         flags += (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
-        if count := int(filled.short.sum()):
+        if count := filled.short.sum():
             seconds = f"{count * step:.3g} s of {x.size * step:.4g} s"
             repaired.append(f"{count} samples ({seconds}) bridged by monotone cubics")
     if x.size >= 16 and np.ptp(x):
@@ -465,7 +465,7 @@ def _flagged(
         if replaced and outlier.any():
             x = bridge(np.where(outlier, np.nan, x), step, np.inf).values
             flags[outlier] |= REPLACED
-            repaired.append(f"{int(outlier.sum())} outliers replaced by monotone cubics")
+            repaired.append(f"{outlier.sum()} outliers replaced by monotone cubics")
     if repaired:
         known["repaired"] = "; ".join(repaired)
     return x, flags, known
@@ -519,10 +519,9 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
 
 
 def _axis(run: Run, dt: float) -> FloatArray:
-    begin = max(float(each["time"][0]) for each in run.groups.values())
-    end = min(float(each["time"][-1]) for each in run.groups.values())
+    times = {name: each["time"].values for name, each in run.groups.items()}
+    begin, end = max(t[0] for t in times.values()), min(t[-1] for t in times.values())
     if end <= begin:
-        times = {name: each["time"].values for name, each in run.groups.items()}
         spans = ", ".join(
             f"{name} {span_text(t[0], t[-1], usual_step(t))}" for name, t in times.items()
         )
@@ -530,7 +529,7 @@ def _axis(run: Run, dt: float) -> FloatArray:
             f"run '{run.name}': its instruments never recorded together ({spans}, on the "
             "reference's clock). Check the files of the run and the clocks."
         )
-    origin = float(run.reference_time[0])
+    origin = run.reference_time[0]
     first = np.ceil((begin - origin) / dt - 1e-6)
     last = np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6)
     if last <= first:
@@ -581,7 +580,7 @@ def _on_axis(
 
 def _flags_at(flags: Any, time: FloatArray, wanted: FloatArray, dt: float) -> Any:
     """Flags at new instants: what any sample within half a new step of them carries."""
-    half = 0.5 * max(dt, float(time[1] - time[0])) * (1 + 1e-9)
+    half = 0.5 * max(dt, time[1] - time[0]) * (1 + 1e-9)
     begin = np.searchsorted(time, wanted - half)
     end = np.searchsorted(time, wanted + half, side="right")
     edges = np.column_stack([begin, end]).ravel()
@@ -663,7 +662,7 @@ def cropped(run: Run) -> Run:
     """Step 8: cut the run to its span; spans that lie outside the record are refused."""
     data, reference = run.data, run.reference_time
     dt = usual_step(data["time"].values)
-    record = float(reference[0]), float(reference[-1])
+    record = reference[0], reference[-1]
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
     slack = max(dt, (record[1] - record[0]) / (reference.size - 1)) * (1 + 1e-6)
     stated = {key: getattr(run.own, key) for key in ("span", "train", "test")}
@@ -678,7 +677,7 @@ def cropped(run: Run) -> Run:
         data = data.isel(time=parts.pop("span"))
         time = data["time"].values
         for key in parts:
-            used(key, (float(time[0]), float(time[-1])), np.inf)
+            used(key, (time[0], time[-1]), np.inf)
     return replace(run, data=data)
 
 
@@ -708,10 +707,10 @@ def _part(
             f"{span_text(*record, dt)}. Correct the span; 'inf' stands for the end."
         )
     used = inside(time, span, dt)
-    if (count := int(used.sum())) > 1:
+    if (count := used.sum()) > 1:
         return used
     stated = f"{key}: {shown} holds {count} sample(s) at a step of {dt:.4g} s"
-    common = span_text(float(time[0]), float(time[-1]), dt)
+    common = span_text(time[0], time[-1], dt)
     if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:
         raise DataError(
             f"{stated}, since all loggers recorded together only from {common}; the reference runs "
@@ -732,7 +731,7 @@ def attributes_of(
         "seakeep_version": version(),
         "file": settings.file or ", ".join(settings.files.values()),
         "preparation_preset": campaign.preparation.preset,
-        "dt": float(dt),
+        "dt": dt,
         "scale_factor": general.scale_factor,
         "sea_state": settings.sea_state,
         "role": settings.serves,
@@ -744,7 +743,7 @@ def attributes_of(
         "probe_offset": settings.probe_offset,
         "celerity": celerity_of(run.isel(time=inside(time, used_span(settings), dt)), dt, campaign),
     }
-    whole = (float(time[0]), float(time[-1]))
+    whole = (time[0], time[-1])
     for use in ("train", "test"):
         span = getattr(settings, use)
         if span is None and settings.serves == use:

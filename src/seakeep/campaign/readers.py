@@ -198,7 +198,7 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
         )
     if name is None or (options.sampling_rate and options.time is None):
         count = next((values.size for values in table.values.values()), 0)
-        return name, check_order(np.arange(count) / float(rate or 1.0), str(path))
+        return name, check_order(np.arange(count) / (rate or 1.0), str(path))
     if name in table.faults:
         raise DataError(table.faults[name])
     stated, said = options.time_unit, _said_unit(table, name)
@@ -228,7 +228,7 @@ def _refuse_stuck_clock(path: Path, times: FloatArray, others: Sequence[FloatArr
     same = [(a == b) | ~(np.isfinite(a) | np.isfinite(b)) for a, b in pairs]
     if np.all(same, axis=0).mean() > 0.5:
         return
-    first = int(again[0])
+    first = again[0]
     raise DataError(
         f"the times of {path} repeat: {instant_text(times[first], 0)} s stands at samples {first} "
         f"and {first + 1} ({again.size} repetitions in all), and the readings beside them differ, "

@@ -102,7 +102,7 @@ def decay(model: Model) -> xr.Dataset:
     motions = _motions(single)
     table = single.modes()
     waves = table["period"].values[table["damping_ratio"].values < 0.7]
-    longest = float(waves[np.isfinite(waves)].max(initial=0.0))
+    longest = waves[np.isfinite(waves)].max(initial=0.0)
     steps = int(np.clip(8 * longest / single.dt, SHORTEST, LONGEST))
     before = single.history_samples
     history = np.tile(single.state_mean, (before, 1))
@@ -112,7 +112,7 @@ def decay(model: Model) -> xr.Dataset:
     rows = []
     for motion in motions:
         column = single.states.index(motion)
-        offset = float(single.state_scale.spread[column])
+        offset = single.state_scale.spread[column]
         moved = history.copy()
         moved[:, column] += offset
         run = single.forecast_arrays(moved, still, ahead, steps)
@@ -171,8 +171,8 @@ def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
         values = values[np.isfinite(values).all(axis=1)]
         spread = dict(zip(model.states, model.signature.state_scale.spread, strict=True))
         moved = (values - values[-1]) / [spread[each] for each in motions]
-        column = int(np.argmax(np.abs(moved).max(axis=0)))
-        first = int(np.argmax(np.abs(moved[:, column])))
+        column = np.argmax(np.abs(moved).max(axis=0))
+        first = np.argmax(np.abs(moved[:, column]))
         released = free_decay(values[first:, column], model.dt)
         numbers = {key: getattr(released, key) for key in ("period", "damping_ratio", "p", "q")}
         cycles = {

@@ -257,12 +257,12 @@ def samples_in(
     is as good a forecast as any.
     """
     time = run["time"].values
-    last = int(np.searchsorted(time, float(span[1]) + 0.5 * dt)) - 1
+    last = int(np.searchsorted(time, span[1] + 0.5 * dt)) - 1
     # The last step reads the input `lead` samples after the instant that it starts from.
     last = min(last, time.size - max(lead, 1))
     if start is None:
-        first = float(time[min(max(history - 1, _waves_come(run, names)), time.size - 1)])
-        start = max(float(span[0]), first)
+        first = time[min(max(history - 1, _waves_come(run, names)), time.size - 1)]
+        start = max(span[0], first)
     return int(np.argmin(np.abs(time - start))), last
 
 
@@ -396,9 +396,7 @@ def positions(model: Model, runs: Datasets) -> FloatArray | None:
     """Position of each elevation, m (NaN of another input); None where one is not stated."""
     waves = elevations(model)
     for run in runs.values():
-        places = np.array(
-            [float(run[name].attrs.get("x_position", np.nan)) for name in model.inputs]
-        )
+        places = np.array([run[name].attrs.get("x_position", np.nan) for name in model.inputs])
         if np.isfinite(places[waves]).all():
             return places
     return None
@@ -419,7 +417,7 @@ def wave_turns(
     depths = [run.attrs["water_depth"] for run in runs.values() if "water_depth" in run.attrs]
     if places is None or not depths:
         return None
-    k = wavenumber(2 * np.pi * frequency, float(depths[0]))
+    k = wavenumber(2 * np.pi * frequency, depths[0])
     return np.asarray(k)[:, None] * (places - places[reference])
 
 

@@ -242,7 +242,7 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
     frequency = dominant_frequency(both[:, 0], model.dt)
     harmonics, means = harmonic_fits(both, model.dt, frequency)
     amplitude, *answer = np.abs(harmonics).mean(axis=0)
-    accuracy = np.array([float(part.run[each].attrs.get("accuracy", 0.0)) for each in names])
+    accuracy = np.array([part.run[each].attrs.get("accuracy", 0.0) for each in names])
     ratio = np.array(answer) / amplitude
     type_b = np.hypot(accuracy[1:], ratio * accuracy[0]) / amplitude
     estimated = estimate(harmonics[:, 1:] / harmonics[:, :1], type_b)

@@ -218,13 +218,12 @@ def _sea(wave: FloatArray, dt: float, run: xr.Dataset) -> tuple[float, float, fl
     if not np.ptp(wave) > 0:
         return np.nan, np.nan, np.nan
     regular = is_regular(run)
-    height = (2 * np.sqrt(2) if regular else 4.0) * float(wave.std())
+    height = (2 * np.sqrt(2) if regular else 4.0) * wave.std()
     period = 1 / dominant_frequency(wave, dt) if regular else encounter_period(wave, dt)
     depth = run.attrs.get("water_depth")
     steepness = np.nan
     if depth is not None:
-        k = float(wavenumber(2 * np.pi / period, float(depth)))
-        steepness = height * k / (2 * np.pi)
+        steepness = height * wavenumber(2 * np.pi / period, depth) / (2 * np.pi)
     return height, period, steepness
 
 

@@ -53,7 +53,7 @@ def read_recording(path: Path, options: Options) -> Columns:
         ),
         highlevel.AnyReader([place], default_typestore=store) as reader,
     ):
-        begin = int(reader.start_time)
+        begin = reader.start_time
         rows = _read_topic(path, reader, options.group)
     return _columns(path, begin, *rows)
 
@@ -73,10 +73,10 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> tuple[Any, ...]:
     received, stamps, numbers = [], [], []
     for connection, instant, raw in reader.messages(chosen):
         message = reader.deserialize(raw, connection.msgtype)
-        received.append(int(instant))
+        received.append(instant)
         stamps.append(_stamp(message))
         numbers.append(dict(_flat(message, "")))
-    announced = sum(int(connection.msgcount) for connection in chosen)
+    announced = sum(connection.msgcount for connection in chosen)
     if len(received) < announced:
         raise DataError(
             f"{path} announces {announced} messages of the topic '{wanted}' and holds "

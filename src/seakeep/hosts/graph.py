@@ -86,8 +86,7 @@ def write_onnx(model: Model, path: str | Path, steps: int = 1) -> Path:
         ) from error
     target = Path(path)
     check_output(target, KIND)
-    count = whole_number(steps, "steps")
-    proto = _model(exportable(model), int(count))
+    proto = _model(exportable(model), whole_number(steps, "steps"))
     onnx.checker.check_model(proto, full_check=True)
     with replacing(target) as temporary:
         temporary.write_bytes(proto.SerializeToString())

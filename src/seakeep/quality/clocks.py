@@ -102,13 +102,13 @@ def clocks(record: Record) -> Iterator[Finding]:
     """Gaps, jitter, rates that differ from the stated one, clocks that are not certain."""
     for name, group in record.groups.items():
         label, clock, step = name or "time", record.clocks[name], step_of(group)
-        if (gaps := int(group.attrs.get("time_gaps", 0))) > 0:
-            missing = int(group.attrs["time_missing"])
+        if gaps := group.attrs.get("time_gaps"):
+            missing = group.attrs["time_missing"]
             yield record.finding(ClocksKind.TIME_GAPS, label, gaps=gaps, missing=missing)
-        if (jitter := float(group.attrs.get("time_jitter_rms", 0.0))) > 0:
+        if jitter := group.attrs.get("time_jitter_rms"):
             yield record.finding(ClocksKind.JITTER, label, jitter, unit="s", jitter=1e3 * jitter)
         if (rate := record.rates.get(name)) is not None:
-            aside = float(group.attrs.get("time_column_step", 1 / rate.stated))
+            aside = group.attrs.get("time_column_step", 1 / rate.stated)
             if abs(aside * rate.stated - 1) > RATE_TOLERANCE:
                 yield record.finding(ClocksKind.TIMES_ASIDE, label, 1 / aside, rate.stated, "Hz")
             elif abs(step * rate.stated - 1) > RATE_TOLERANCE:

@@ -121,7 +121,7 @@ def levels(record: Record) -> Iterator[Finding]:
             continue
         change, ratio = level_drift(x, dt, dominant_period(x, dt))
         # A level that moves by half the waves' spread shifts means and standardisation visibly.
-        limit = 0.5 * float(x.std())
+        limit = 0.5 * x.std()
         if abs(change) > limit and ratio > 5:
             unit = str(channel.attrs["units"])
             yield record.finding(SamplesKind.DRIFT, name, change, limit, unit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -113,8 +114,8 @@ def _transformed(
         )
     # Eight periods outlast the ringing of a flank there; a prediction needs to look back one and
     # a half of them to separate the slowest wave from a trend.
-    padding = int(np.ceil(8.0 / (slowest * dt)))
-    order = min(int(np.ceil(1.6 / (slowest * dt))), 2000)
+    padding = math.ceil(8.0 / (slowest * dt))
+    order = min(math.ceil(1.6 / (slowest * dt)), 2000)
     extended = predicted_extension(array, padding, fitted=padding, order=order)
     frequency = fft.rfftfreq(len(extended), dt)
 
@@ -355,7 +356,7 @@ def complementary_filter(
             f"frequency); received {crossover:g} Hz. Set it below the slowest wave."
         )
     at = np.arange(x.size) - 0.5 * (x.size - 1)
-    slope = float(at @ x / (at @ at))
+    slope = at @ x / (at @ at)
     trend = x.mean() + slope * at
     both = np.column_stack([x - trend, a - a.mean()])
     frequency, spectrum, back = _transformed(both, dt, crossover, "the crossover")

@@ -150,13 +150,13 @@ def foresee(
         departures[column, :, column] = scipy.signal.lfilter([1.0], whitening, first)
 
     places = np.broadcast_to(np.asarray(positions, dtype=float), channels)
-    order = [int(each) for each in np.argsort(places) if np.isfinite(places[each])]
+    order = np.argsort(places)[: np.isfinite(places).sum()].tolist()
     for column in set(range(channels)) - set(order[1:]):
         follow(column, array[:, column])
     for before, here in pairwise(order):
         left = array[:, here]
         if np.ptp(array[:, before]) > 0:
-            apart, limit = float(places[here] - places[before]), band_limit(array[:, before], dt)
+            apart, limit = places[here] - places[before], band_limit(array[:, before], dt)
             # Prediction and departures from it, beside one another: carrying is linear.
             past = np.zeros((size, channels + 1))
             past[:, 0] = array[:, before]

@@ -78,7 +78,7 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
 
 def _shown(t: FloatArray, sample: int | np.intp) -> str:
     """Instant of a sample in a message."""
-    return f"{instant_text(t[sample], float(np.median(np.abs(np.diff(t)))))} s"
+    return f"{instant_text(t[sample], np.median(np.abs(np.diff(t))))} s"
 
 
 def record(series: npt.ArrayLike, time: npt.ArrayLike, owner: str) -> tuple[FloatArray, FloatArray]:
@@ -150,18 +150,18 @@ def _tolerance(t: FloatArray, step: float) -> float:
 
 def _irregularity(t: FloatArray, name: str) -> str:
     steps = np.diff(t)
-    usual = float(np.median(steps))
+    usual = np.median(steps)
     counts = steps / usual
     gaps = np.flatnonzero(counts > 1.5)
     if gaps.size and np.max(np.abs(counts - np.rint(counts))) < 0.1:
         longest = gaps[np.argmax(steps[gaps])]
         return (
             f"the times of {name} have {gaps.size} gap(s): after t = {_shown(t, gaps[0])}, "
-            f"{int(np.rint(counts[gaps[0]])) - 1} sample(s) of {usual:g} s are missing; the "
+            f"{np.rint(counts[gaps[0]]) - 1:.0f} sample(s) of {usual:g} s are missing; the "
             f"longest gap, after t = {_shown(t, longest)}, lasts {steps[longest]:g} s. Fill the "
             "gap, or use the record before or after it."
         )
-    at = int(np.argmax(np.abs(steps - usual)))
+    at = np.argmax(np.abs(steps - usual))
     return (
         f"the times of {name} are not uniform: steps run from {steps.min():g} to {steps.max():g} s "
         f"(median {usual:g} s), the oddest after t = {_shown(t, at)}. Interpolate the series onto "
@@ -294,7 +294,7 @@ def onto_uniform(
             "record. Split the file where the logger paused, or state its sampling rate."
         )
     place, step, begin = _grid(t)
-    out = np.full((int(place[-1]) + 1, *x.shape[1:]), np.nan)
+    out = np.full((place[-1] + 1, *x.shape[1:]), np.nan)
     grid = begin + step * np.arange(out.shape[0])
     out[place] = x
     if report.uniform:

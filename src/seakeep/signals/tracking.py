@@ -232,7 +232,7 @@ def track_video(
     usual = _usual_panel(seen, how, str(path))
     pixels = int(np.prod(size if how.region is None else how.region[2:]))
     flag, quality = _judge(seen, usual, how, 1.0 / rate, pixels)
-    counts = {name: int(np.sum(flag == code)) for name, code in FLAGS.items()}
+    counts = {name: np.sum(flag == code) for name, code in FLAGS.items()}
     bad = count - counts["good"]
     if 2 * bad > count:
         words = ", ".join(f"{number} {name}" for name, number in counts.items() if number)
@@ -343,7 +343,7 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
         raise DataError(_not_found(seen, how, name))
     usual = {field: float(np.median(values[like])) for field, values in seen.items()}
     lowest = np.min([seen[corner][like] - usual[corner] for corner in CORNERS], axis=0)
-    usual["corner_noise"] = 1.4826 * float(np.median(abs(lowest - np.median(lowest))))
+    usual["corner_noise"] = 1.4826 * np.median(abs(lowest - np.median(lowest)))
     square = panel[0] * panel[1] / (usual["length"] * usual["height"])
     usual["scale"] = known or float(np.sqrt(square))
     return usual
