@@ -1,11 +1,9 @@
 """Guesses about columns, files and runs of a campaign, from names, units and waves."""
 
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from importlib import resources
 from itertools import chain
 from pathlib import Path
 from typing import Literal
@@ -21,9 +19,9 @@ from seakeep.formats.columns import is_unit, named_unit
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import energy_period, first_wave, tapered_power
+from seakeep.toml import packaged
 
-_TEXT = resources.files("seakeep.campaign").joinpath("vocabulary.toml").read_text("utf-8")
-_CALLED = tomllib.loads(_TEXT)
+_CALLED = packaged("campaign/vocabulary.toml")
 """Words of columns, runs and places in files of others."""
 
 LONG = 64
