@@ -259,7 +259,7 @@ class Claims(Evidence):
 
     def _any_length(self) -> Judged:
         period = self.result.encounter_period
-        length = float(self.result.tests["irregular"]["time"].values[-1])
+        length = self.result.tests["irregular"]["time"].values[-1]
         return f"{length / period:.0f} T̂ were forecast, as in the paper", None
 
     def _who_errs(self) -> Judged:
@@ -316,7 +316,7 @@ class Claims(Evidence):
 
     def _slow_loads(self) -> Judged:
         result = self.raw.result
-        split = float(result.settings["statistics"]["split_period"])
+        split = result.settings["statistics"]["split_period"]
         test = result.tests["irregular"].sel(channel=list(LOADS))
         forecasts = test["mean"].sel(model=ENSEMBLE).values[self.raw.order]
         measured, forecast = (
@@ -429,9 +429,7 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
     stamp = {
         "description": "A study of linear models with delays that forecast a moored vessel in head "
         "seas, on data of a virtual towing tank: six runs, three procedures.",
-        "preset": "",
         "seed": str(last.attrs["seed"]),
-        "digest": "",
         "finished": finished(last),
     }
     sections = [_summary(results)]
@@ -528,11 +526,11 @@ def still_water(results: Results) -> str:
     parts = []
     for test in REGULAR:
         at = result.tests[test].sel(channel="surge")
-        spread = float(at["measured"].std("time", ddof=1).median())
+        spread = at["measured"].std("time", ddof=1).median()
         error = at["error"].sel(model=SINGLE, measure="training_nrmse").where(at["judged"])
-        metres = float(error.median()) * float(at["training_std"].median())
-        parts.append(f"{number(metres, 3)} m ({number(spread, 3)} m)")
-    trained = number(float(at["training_std"].median()), 3)
+        metres = error.median() * at["training_std"].median()
+        parts.append(f"{number(metres)} m ({number(spread)} m)")
+    trained = number(at["training_std"].median())
     return (
         "In regular waves drift stands nearly still, at a mean far from that of the training. "
         f"There the recommended model errs by {', '.join(parts)} in surge at λ/L 1.5, 2 and 3; in "

@@ -96,16 +96,15 @@ def _extremes(at: xr.Dataset, title: str) -> Table:
 
 
 def _note(at: xr.Dataset) -> str:
-    slack, offset, spread = (
-        float(at[key]) for key in ("slack_channels", "probe_offset", "probe_offset_spread")
-    )
-    condition, status = (str(at[key].values) for key in ("conditional_on", "status"))
+    keys = ("slack_channels", "probe_offset", "probe_offset_spread", "look_ahead")
+    slack, offset, spread, ahead = (at[key].item() for key in keys)
+    condition, status = row(at, "conditional_on", "status")
     known = f" ± {spread:.2g}" if np.isfinite(spread) else ""
     said = (
         f"{slack:.0f} still channel{'s' * (slack > 1)} left out of the average" * (slack > 0),
         status * (status != "ok"),
         f"conditional on measured {condition}" * bool(condition),
-        look_ahead_words(float(at["look_ahead"])),
+        look_ahead_words(ahead),
         f"probe offset {offset:.3g}{known} m" * bool(np.isfinite(offset)),
     )
     return "; ".join(filter(None, said))
@@ -164,8 +163,8 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
 
     The table is that of :func:`seakeep.study.difference_table`; `baselines` are kinds by name.
     """
-    best = table.isel(model=int(np.argmin(table["all_anrmse"].fillna(np.inf).values)))
-    name, first = (str(each["model"].values) for each in (best, table.isel(model=0)))
+    best = table.isel(model=table["all_anrmse"].fillna(np.inf).argmin("model"))
+    name, first = (each["model"].item() for each in (best, table.isel(model=0)))
     said = f"Least error: {name}, ANRMSE {number(best['all_anrmse'])}"
     if name != first:
         value, low, high = ratio_of(best, "all_")
@@ -226,12 +225,12 @@ def plain_cells(table: pd.DataFrame) -> pd.DataFrame:
 def nowcast_blocks(nowcasts: Datasets) -> Iterator[Table]:
     """Lead times and errors per channel in service, a table per model and run."""
     for model, of_model in nowcasts.items():
-        share, lead = float(of_model.attrs["share"]), of_model["lead"].values
+        share, lead = of_model.attrs["share"], of_model["lead"].values
         places = [max(round(len(lead) * part) - 1, 0) for part in (0.05, 0.2, 0.5, 1.0)]
         times = [f"at {number(each)} s" for each in lead[places]]
         heads = ("lead time s", *times, "in band %")
         note = (
-            f"errors in training SD over {int(of_model.attrs['starts'])} forecasts, no wave after "
+            f"errors in training SD over {of_model.attrs['starts']} forecasts, no wave after "
             f"a start known; lead time: error below {share:g} SD"
         )
 
@@ -259,14 +258,14 @@ def band_findings(table: xr.Dataset) -> list[str]:
         words = band_verdict(inside / 100, float(at["level"]))
         said.append(
             f"{run}: the {_band_words(at)} of {members - lost:.0f} members holds {inside:.0f} % of "
-            f"the measured instants, {words}. {_CARRIES[str(at['band'].values)]}{left_out}."
+            f"the measured instants, {words}. {_CARRIES[at['band'].item()]}{left_out}."
         )
     return said
 
 
 def _band_words(at: xr.Dataset) -> str:
     """Level of a band, and its kind where it is not that of the members."""
-    kind = "calibrated " * (str(at["band"].values) == "calibrated")
+    kind = "calibrated " * (at["band"].item() == "calibrated")
     return f"{100 * float(at['level']):g} % {kind}band"
 
 
@@ -315,10 +314,10 @@ def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
         if "time" in variable.dims
         for words, part in parts.items()
     }
-    if (ahead := float(forecast.attrs.get("reads_input_until", 0.0))) > 0.0:
+    if (ahead := forecast.attrs.get("reads_input_until", 0.0)) > 0.0:
         columns[UNTIL] = (forecast["time"].values + ahead).round(9)
     if forecast.attrs.get("scale") == "full":
-        scale = float(forecast.attrs["scale_factor"])
+        scale = forecast.attrs["scale_factor"]
         columns["scale_factor"] = np.full(forecast.sizes["time"], scale)
     return columns
 
@@ -327,7 +326,7 @@ def forecast_words(forecast: xr.Dataset) -> str:
     """What a forecast of an ensemble holds, for a message; empty for a single model's."""
     if "statistic" in forecast.dims:
         attrs = {"band": "members", **forecast.attrs}
-        count = int(attrs["members"]) - int(attrs["diverged"])
+        count = attrs["members"] - attrs["diverged"]
         words = _band_words(xr.Dataset({key: attrs[key] for key in ("band", "level")}))
         return f"mean, std and {words} of {count} members at "
     return f"{forecast.sizes['member']} members at " if "member" in forecast.dims else ""

@@ -16,13 +16,12 @@ from markupsafe import Markup, escape
 
 from seakeep.arrays import Progress
 from seakeep.files import MARK, check_output, write_text
-from seakeep.report.style import figure_style, save_figure
+from seakeep.report.style import Figure, figure_style, save_figure
 from seakeep.report.tables import Table, shade, words, write_csv, write_latex
 from seakeep.study.store import storing
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from matplotlib.figure import Figure
 
 UNFINISHED = f"""<!DOCTYPE html>
 <meta name="generator" content="{MARK}: report">

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import textwrap
-import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -16,18 +14,19 @@ from seakeep.campaign.settings import long_name_of
 from seakeep.conventions import canonical_channel, displayed
 from seakeep.errors import RequestError
 from seakeep.files import MARK, replacing
+from seakeep.toml import packaged
 
 if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Figure
 
     from seakeep.study import StudyResult
 
-    Places = Sequence[Axes] | Axes | None
+Figure: TypeAlias = "matplotlib.figure.Figure"
+Places: TypeAlias = "Sequence[matplotlib.axes.Axes] | matplotlib.axes.Axes | None"
 
-_FILE = resources.files("seakeep.report").joinpath("templates/style.toml")
-_STYLE = tomllib.loads(_FILE.read_text("utf-8"))
+_STYLE = packaged("report/templates/style.toml")
 
 
 def _line(colour: str, width: float, dash: Sequence[float] = ()) -> dict[str, Any]:
@@ -49,6 +48,11 @@ THIN = {**LINES["measured"], "linewidth": 0.8}
 
 SERIES = [_line(**each) | {"marker": marker} for marker, each in _STYLE["series"].items()]
 """Colour, dash and marker of each of several things of one kind."""
+
+FLAGGED = {
+    word: {"color": PALETTE[colour], "marker": marker}
+    for word, (colour, marker) in _STYLE["flags"].items()
+}
 
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 """Names of the paper for the averages of the two measures over the channels."""
@@ -174,7 +178,7 @@ def model_words(model: str) -> str:
 
 def shown(channel: xr.DataArray) -> tuple[float, str]:
     """Factor to the unit in which a channel is shown, and its label for an axis."""
-    factor, units = displayed(str(channel.attrs.get("units", "")))
+    factor, units = displayed(channel.attrs.get("units", ""))
     return factor, axis_label(str(channel.name), units, channel.attrs.get("long_name"))
 
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
-import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cache, cached_property, partial
-from importlib import resources
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, SupportsFloat
@@ -18,6 +16,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.files import replacing, write_text
+from seakeep.toml import packaged
 
 if TYPE_CHECKING:
     from rich.console import JustifyMethod
@@ -93,8 +92,7 @@ class Table:
 @cache
 def words() -> dict[str, Any]:
     """Words of the pages: sections, figures and tables by name."""
-    file = resources.files("seakeep.report").joinpath("templates/words.toml")
-    return tomllib.loads(file.read_text("utf-8"))
+    return packaged("report/templates/words.toml")
 
 
 def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any) -> Table:

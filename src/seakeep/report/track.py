@@ -61,12 +61,12 @@ def write_contact_sheet(picture: bytes, path: Path) -> None:
 
 def track_words(track: Track) -> str:
     """Frames, flags and calibration of a track in one sentence."""
-    counts = {name: int((track["flag"] == code).sum()) for name, code in FLAGS.items()}
+    counts = {name: (track["flag"] == code).sum() for name, code in FLAGS.items()}
     flagged = [f"{count} {name}" for name, count in counts.items() if count and name != "good"]
     facts = track.attributes
     return (
         f"{track.time.size} frames at {facts['frame_rate']:g} Hz; flagged: "
-        f"{', '.join(flagged) or 'none'} ({int(track['bridged'].sum())} bridged); "
+        f"{', '.join(flagged) or 'none'} ({track['bridged'].sum()} bridged); "
         f"{1e3 * facts['metres_per_pixel']:.4g} mm per pixel ({facts['calibration']}); "
         f"{facts['camera']}."
     )
@@ -78,7 +78,7 @@ def agreement_words(
     """Agreement of heave and pitch with a reference; in yellow, why its lag may be wrong."""
     for name in ("heave", "pitch"):
         other, unit = reference[name], LABELS[name][0]
-        factor = conversion(str(other.attrs.get("units", unit)), unit, f"'{name}'")
+        factor = conversion(other.attrs.get("units", unit), unit, f"'{name}'")
         time = reference["time"].values
         agreement = compare_motion(track[name], track.time, factor * other.values, time, max_lag)
         shown, unit = (1e3, "mm") if unit == "m" else displayed(unit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,8 @@ from seakeep.report.style import (
     HEADING,
     PALETTE,
     SERIES,
+    Figure,
+    Places,
     figure_style,
     judged_models,
     legend_outside,
@@ -30,11 +32,6 @@ from seakeep.report.style import (
 from seakeep.report.tables import ratio_of
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from seakeep.report.style import Places
 
 NARROW = 14
 """Letters of a test set's label on one line."""
@@ -83,7 +80,7 @@ def draw_box_violin(
         patch_artist=True, manage_ticks=False, zorder=3, boxprops=box, whiskerprops=line,
         capprops=line, medianprops={"color": colour, "linewidth": 1.8, "solid_capstyle": "butt"},
     )  # fmt: skip
-    return float(drawn["whiskers"][1].get_ydata()[1])
+    return drawn["whiskers"][1].get_ydata()[1]
 
 
 def _cells(result: StudyResult, test: str, model: str, measure: str) -> FloatArray:
@@ -248,7 +245,7 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
         style = {
             "s": 9 if single else 5,
             "color": line_of(result, model)["color"],
-            "alpha": 0.9 if single else float(np.clip(12 / data.sizes["member"], 0.12, 0.6)),
+            "alpha": 0.9 if single else np.clip(12 / data.sizes["member"], 0.12, 0.6),
             "linewidths": 0,
             "rasterized": True,
             "label": model_words(model),
@@ -282,7 +279,7 @@ def errors(table: xr.Dataset, *, axes: Places = None) -> Figure:
     -------
     Figure
     """
-    labels = [short_label(str(name)) for name in table["channel"].values]
+    labels = [short_label(name) for name in table["channel"].values]
     figure, (place,) = panels(axes, 1, 1, (max(4.0, 1.2 + 0.8 * len(labels)), 2.8))
     _draw_points(place, table.transpose("run", ...), "run", "nrmse", labels)
     place.set_ylim(bottom=0)
@@ -300,7 +297,7 @@ def error_figure(table: xr.Dataset) -> Figure:
     """
     table = table.sortby("wave_period")
     labels = [
-        plain_text(str(run)) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
+        plain_text(run) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
         for run, period in zip(table["run"].values, table["wave_period"].values, strict=True)
     ]
     figure = new_figure(max(4.5, 1.5 + 0.8 * len(labels)), 3.2)
@@ -319,7 +316,7 @@ def error_figure(table: xr.Dataset) -> Figure:
 
 def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Sequence[str]) -> None:
     """Draw an error with its interval at each label, entries of a dimension beside each other."""
-    names = [str(each) for each in table[dim].values]
+    names = table[dim].values.tolist()
     for number, name in enumerate(names):
         at = table.sel({dim: name})
         reach = [np.abs(at[f"{key}_{bound}"] - at[key]) for bound in ("lower", "upper")]
@@ -333,7 +330,7 @@ def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Seque
 def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
     """Error, and the model's own estimate of it, against lead time, a panel per channel."""
     first = next(iter(nowcasts.values()))
-    names, share = list(map(str, first["channel"].values)), float(first.attrs["share"])
+    names, share = first["channel"].values, first.attrs["share"]
     figure, places = panels(None, len(names), 4, (2.125, 1.7))
     for axes, name in zip(places, names, strict=True):
         for number, (model, of_model) in enumerate(nowcasts.items()):
@@ -344,7 +341,7 @@ def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
             axes.plot(at["lead"], at["claimed"], **claimed, label=f"{model}: claimed")
         axes.axhline(share, color="0.4", linewidth=0.8, linestyle=":", label=f"{share:g} SD")
         axes.set_title(short_label(name))
-        axes.set(xlim=(0, float(first["lead"].max())), xlabel="lead time [s]")
+        axes.set(xlim=(0, first["lead"].max()), xlabel="lead time [s]")
         axes.set_ylim(bottom=0)
         if axes.get_subplotspec().is_first_col():
             axes.set_ylabel("error [training SD]")

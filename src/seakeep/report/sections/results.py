@@ -51,7 +51,7 @@ def summary(result: StudyResult) -> Section:
     shares, words = training_overlap(result)
     lost, repeats = (result.groups.get(key) for key in ("statistics/lost", "repeats"))
     notices = [
-        str(result.attrs.get("preparation_note", "")),
+        result.attrs.get("preparation_note"),
         words_of_lost(lost) if lost is not None else "",
         words_of_repeats(repeats) if repeats is not None else "",
         _few_cells(result),
@@ -84,7 +84,7 @@ def _tested(result: StudyResult) -> str:
     sets = result.groups["training"].sizes["training"]
     seas = [
         f"{result.label_of(test)} ({data.sizes['window']} windows of "
-        f"{float(data['time'].values[-1]) / period:.3g} T̂)"
+        f"{data['time'].values[-1] / period:.3g} T̂)"
         for test, data in result.tests.items()
     ]
     words = (
@@ -93,7 +93,7 @@ def _tested(result: StudyResult) -> str:
         "channels. Errors are in measured SDs of the window: 0 is perfect, 1 is no better than its "
         "mean."
     )
-    if condition := str(result.attrs.get("conditional_on", "")).replace("_", " "):
+    if condition := result.attrs["conditional_on"].replace("_", " "):
         words += (
             f" Every number is conditional on measured {condition}: the alignment of the waves "
             "reads it after the start of a forecast. It is no forecast in the strict sense."
@@ -154,7 +154,7 @@ def overview_table(result: StudyResult) -> Table:
 
 def conditional(result: StudyResult) -> str:
     """Sentence for tables whose forecasts read a measured output after the start."""
-    words = str(result.attrs.get("conditional_on", "")).replace("_", " ")
+    words = result.attrs.get("conditional_on", "").replace("_", " ")
     return f" Conditional on measured {words}." if words else ""
 
 
@@ -365,7 +365,7 @@ def regular(result: StudyResult) -> Section | None:
     """Return the errors in regular waves, taken apart."""
     if (response := result.groups.get("statistics/response")) is None:
         return None
-    tests = [str(test) for test in response["test"].values]
+    tests = response["test"].values.tolist()
     table = _response_table(result, tests)
     return section("regular", table, more=[_slack_words(result, tests)])
 
@@ -381,7 +381,7 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
         cells = [result.words_of(of_model["channel"].item()), model_words(of_model["model"].item())]
         for at in entries(of_model, "test"):
             offset, *others = (float(at[f"error_{key}"]) for key in ("offset", "wave", "rest"))
-            total = float(np.sum(np.square([offset, *others])))
+            total = np.sum(np.square([offset, *others]))
             share = Number(f"{percent(offset**2 / total)} %") if total > 0 else MISSING
             cells += [*row(at, amplitude_ratio=2, phase_lead=signed, error_offset=2), share]
         rows.append(tuple(cells))
@@ -390,10 +390,10 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
 
 def _slack_words(result: StudyResult, tests: list[str]) -> str:
     """Name the lines that lose their load, run by run."""
-    runs = dict.fromkeys(str(run) for test in tests for run in result.tests[test]["run"].values)
+    runs = dict.fromkeys(run for test in tests for run in result.tests[test]["run"].values)
     slack = result.groups["runs"]["slack"].sel(run=list(runs), name=result.channels)
     listed = [
-        f"{result.words_of(str(line['name'].values))} in {percent(line)} % of {run}"
+        f"{result.words_of(line['name'].item())} in {percent(line)} % of {run}"
         for run in runs
         for line in slack.sel(run=run)
         if line >= SELDOM
@@ -413,7 +413,7 @@ def bands(result: StudyResult) -> Section:
     for model in result.ensembles if groups else ():
         for at in entries(groups.sel(model=model), "band"):
             at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
-            band = str(at["band"].values)
+            band = at["band"].item()
             kind = "calibrated " * (band == "calibrated")
             title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
             name = f"bands_{band}_{model}"
@@ -429,8 +429,8 @@ def _by_part(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Tabl
         inside = one["inside"]
         if inside.isnull().all():
             continue
-        least = inside[int(np.nanargmin(inside.values))]
-        named = result.words_of(str(least["channel"].values))
+        least = inside[np.nanargmin(inside.values)]
+        named = result.words_of(least["channel"].item())
         moving = one[["relative_width", "winkler", "crps"]].map(lambda x: x.where(np.isfinite(x)))
         means = row(moving.mean("channel"), relative_width=2, winkler=2, crps=2)
         covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
@@ -456,12 +456,12 @@ def _of_all(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table
 
 def age(result: StudyResult) -> Section:
     """Return the error over the age of a forecast."""
-    split = float(result.settings["statistics"]["split_period"])
+    split = result.settings["statistics"]["split_period"]
     trend = result.groups["statistics/trend"].sel(model=judged_models(result))
     rows = [
         (
             result.label_of(at["test"].item()),
-            BAND_WORDS[str(at["band"].values)],
+            BAND_WORDS[at["band"].item()],
             model_words(at["model"].item()),
             number(at["error_mean"].mean()),
             ratio_of(at).change(),
@@ -532,7 +532,7 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
         f" Calibrated: {words} on training data that the members had not read, in windows as long "
         "as the first test set's. "
     )
-    lengths = {test: float(each["length"]) for test, each in result.settings["tests"].items()}
+    lengths = {test: each["length"] for test, each in result.settings["tests"].items()}
     first = lengths[next(iter(result.tests))]
     others = [f"{result.label_of(k)} ({n:g} T̂)" for k, n in lengths.items() if n != first]
     if others:
@@ -591,10 +591,10 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
         cells,
         [*heads, *published],
         " The paper's columns are of another vessel in another tank." * comparable,
-        test=str(data.attrs["test"]),
+        test=data.attrs["test"],
         name=f"jsd_{model}_{variant}",
         elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
-        folded=bool(result.ensembles) and model not in result.ensembles,
+        folded=model not in (result.ensembles or [model]),
         model=model_words(model),
         variant=variant,
         how=how,
