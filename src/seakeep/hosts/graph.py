@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from seakeep.arrays import IntArray, whole_number
+from seakeep.arrays import FloatArray, IntArray, whole_number
 from seakeep.core.recursion import Place
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
+from seakeep.models.following import Following
 from seakeep.models.interface import Signature
 from seakeep.models.observables import Observed
 from seakeep.models.terms import SlowSquare, Term
@@ -169,19 +170,20 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
     signature, coefficients = model.signature, model.coefficients
     N, s, scale = len(signature.states), signature.state_delays, signature.state_scale
     rows, extended = len(coefficients), N * (s + 1)
+    weights = coefficients[:, extended:]
     size, follows = signature.state_samples, signature.input_map.follows
     graph, step = _Graph(), _Graph("step_")
     history, u = _Array(graph, "x_history"), _Array(graph, "u")
     newest_first = scale.deviations(history[np.arange(size - 1, size - s - 2, -1)])
     # What is handed from step to step, and what each step takes: values and shapes.
     handed: _Values = {"state": (newest_first.reshape(extended), (extended,))}
-    taken: _Values = {"forced": (_forcing(graph, u, model, steps), (rows,))}
+    taken: _Values = {"forced": (_forcing(graph, u, signature, weights, steps), (rows,))}
     added = _Array(step, "forced")
     if follows is not None:
-        table, remembered = _tables(graph, u, history, signature, steps)
+        table, remembered = _tables(graph, u, history, signature, follows, steps)
         taken["places"] = (table, (follows.place.count, len(signature.input_scale.mean)))
         handed |= remembered
-        added = _followed(step, model, added)
+        added = _followed(step, signature, follows, weights, added)
     state = _Array(step, "state")
     moved = coefficients[:, :extended] @ state + added
     step("Concat", moved, state[: extended - rows], into="state_after", axis=0)
@@ -247,12 +249,13 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
     return whole
 
 
-def _forcing(graph: _Graph, u: _Value, model: HankelDMDcModel, steps: int) -> _Value:
+def _forcing(
+    graph: _Graph, u: _Value, signature: Signature, weights: FloatArray, steps: int
+) -> _Value:
     """What inputs add at each step, (steps, rows); without what the surge drives."""
-    signature, input_map = model.signature, model.signature.input_map
+    input_map = signature.input_map
     z, n, observed = signature.input_delays, signature.input_scale.mean.size, input_map.observed
     now = input_map.history(z)
-    weights = model.coefficients[:, len(signature.states) * (signature.state_delays + 1) :]
     groups, parts = [], []
     if signature.inputs and input_map.follows is None:
         rows = u[now - z + input_map.lead : now + input_map.lead + steps]
@@ -270,7 +273,7 @@ def _forcing(graph: _Graph, u: _Value, model: HankelDMDcModel, steps: int) -> _V
         groups.append((values - scale.mean[:count]) / scale.std[:count])
         parts.append(weights[:, (z + 1) * n :][:, :count])
     if not groups:
-        return graph("Identity", np.zeros((steps, len(model.coefficients))))
+        return graph("Identity", np.zeros((steps, len(weights))))
     return np.concatenate(groups, axis=1) @ np.concatenate(parts, axis=1).T
 
 
@@ -304,24 +307,25 @@ def _column(
 
 
 def _tables(
-    graph: _Graph, u: _Value, history: _Value, signature: Signature, steps: int
+    graph: _Graph,
+    u: _Value,
+    history: _Value,
+    signature: Signature,
+    follows: Following,
+    steps: int,
 ) -> tuple[_Value, _Values]:
     """Standardised rows of the steps at all places, and what the first step remembers.
 
     That are the last surges and the rows before the start, both newest first.
     """
-    follows = signature.input_map.follows
-    assert follows is not None
     place, z, n = follows.place, signature.input_delays, signature.input_scale.mean.size
     count, columns, past = z + steps, [], place.taps.size
     samples = signature.input_map.history(z) - z + np.arange(count)
-    around = samples[:, None] + np.arange(-follows.back, follows.ahead + 1)
     banks = {each.column: each for each in follows.banks(None)}
     for column in range(len(signature.inputs)):
         total = graph("Expand", u[:, column : column + 1][samples], np.array([count, place.count]))
         if bank := banks.get(column):
-            parts = [u[:, at][around] @ bank.taps[:, i].T for i, at in enumerate(bank.columns)]
-            total = sum(parts[1:], parts[0])
+            total = _carried(u, samples, follows, bank.taps, bank.columns)
         columns.append(total.reshape(count * place.count, 1))
     rows = _with_delayed(signature.input_map.observed, np.concatenate(columns, axis=1))
     rows = signature.input_scale.deviations(rows)
@@ -340,17 +344,23 @@ def _wave(u: _Value, place: float, signature: Signature, steps: int) -> _Value:
     assert follows is not None
     taps, probes = follows.lines(None, (place,))
     samples = signature.input_map.history(signature.input_delays) + np.arange(steps)
+    return _carried(u, samples, follows, taps, probes)
+
+
+def _carried(
+    u: _Value, samples: IntArray, follows: Following, taps: FloatArray, probes: tuple[int, ...]
+) -> _Value:
+    """What carriers read off the probes around samples, (samples, columns)."""
     around = samples[:, None] + np.arange(-follows.back, follows.ahead + 1)
     parts = [u[:, at][around] @ taps[:, i].T for i, at in enumerate(probes)]
     return sum(parts[1:], parts[0])
 
 
-def _followed(step: _Graph, model: HankelDMDcModel, forced: _Value) -> _Value:
+def _followed(
+    step: _Graph, signature: Signature, follows: Following, weights: FloatArray, forced: _Value
+) -> _Value:
     """What is added in a step whose waves are read at the place of its surge."""
-    signature, follows = model.signature, model.signature.input_map.follows
-    assert follows is not None
     place, scale = follows.place, signature.direct_scale
-    weights = model.coefficients[:, len(signature.states) * (signature.state_delays + 1) :]
     line = signature.input_delays * signature.input_scale.mean.size
     here = _Array(step, "surge") @ place.taps[:, None]
     row = _between(step, place, here, _Array(step, "places"), np.arange(1))
