@@ -42,9 +42,10 @@ from seakeep.campaign.settings import (
     PreparationSettings,
     RunSettings,
     long_name_of,
+    units_of,
 )
 from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
-from seakeep.conventions import MOTIONS, canonical_channel, conversion, si_unit
+from seakeep.conventions import MOTIONS, conversion
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import version
 from seakeep.formats import Columns, Options
@@ -178,11 +179,8 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
         if key and time_column(columns, options.time) is not None:
             options = options.model_copy(update={"sampling_rate": None})
         loggers[key] = Logger(key, path, columns, options)
-    reference = settings.instruments.reference
-    if reference not in loggers:
-        known = (each for each in settings.instruments.loggers if each in loggers)
-        reference = next(known, next(iter(loggers)))
-    assert reference is not None
+    order = [settings.instruments.reference, *settings.instruments.loggers, *loggers]
+    reference = min(loggers, key=order.index)
     return Run(name, settings, {reference: loggers.pop(reference), **loggers})
 
 
@@ -247,7 +245,7 @@ def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
     wanted : collection of str, optional
         The channels wanted, with what they need; the default is all.
     """
-    needed = needed_channels(run.settings, run.settings.channel_names if wanted is None else wanted)
+    needed = needed_channels(run.settings, wanted)
     every = channels_of(run.settings, run.own)
     chosen = {name: each for name, each in every.items() if name in needed}
     homes = _homes(run, chosen)
@@ -336,8 +334,7 @@ def _converted(
             f"channels.{name}: the column '{wanted}' of {path} states no unit. Add unit = '…' to "
             f"[channels.{name}] ('-' for none)."
         )
-    canonical = canonical_channel(name)
-    target = canonical.units if canonical else si_unit(unit)
+    target = units_of(name, unit)
     factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")
     values = settings.sign * factor * (logger.columns.values[column] + settings.offset)
     attributes: dict[str, Any] = {
@@ -346,8 +343,6 @@ def _converted(
     }
     if settings.accuracy is not None:
         attributes["accuracy"] = factor * settings.accuracy
-    if (position := run.settings.rig.positions.get(name)) is not None:
-        attributes["x_position"] = float(position)
     return values, attributes
 
 
@@ -477,7 +472,7 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
     `wanted` is as in :func:`mapped`.
     """
     settings, groups, late = run.settings, dict(run.groups), []
-    needed = needed_channels(settings, settings.channel_names if wanted is None else wanted)
+    needed = needed_channels(settings, wanted)
     home = {str(name): key for key, data in groups.items() for name in data.data_vars}
     for name in derivation_order(settings.derived, settings.channel_names):
         if name not in needed:
@@ -515,6 +510,8 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
             lost = (flags.values & MISSING) > 0
             data[name] = data[name].copy(data=np.where(lost, np.nan, data[name].values))
             coordinates[f"{name}_flags"] = flags
+        if name in run.settings.rig.positions:
+            data[name].attrs["x_position"] = run.settings.rig.positions[name]
     return replace(run, data=xr.Dataset(data, coordinates))
 
 
@@ -548,10 +545,8 @@ def _on_axis(
     own = uniform_step(time, f"run '{run}'")
     channels = {name: group.variables[name] for name in group.data_vars}
     series = np.column_stack([channel.values for channel in channels.values()])
-    low = settings.low_pass
-    if low is not None and low[1] >= 0.5 / own:
-        low = None
-    if low is not None:
+    low, filtered = settings.low_pass, {}
+    if low is not None and low[1] < 0.5 / own:
         length = 60 / (14.36 * (low[1] - low[0]))  # of 60 dB, by Kaiser's formula
         if (lasts := time.size * own) < 0.5 * length:
             raise DataError(
@@ -559,6 +554,7 @@ def _on_axis(
                 f"record lasts {lasts:.3g} s. Move its second edge away from the first."
             )
         series = low_pass(series, own, *low)
+        filtered = {"low_pass": low}
     if strays(own, time.size, dt) or abs(wanted[0] - time[0]) > 0.05 * own:
         # The last instant may lie a rounding beyond the record.
         clipped = np.clip(wanted, time[0], time[-1])
@@ -566,7 +562,6 @@ def _on_axis(
         series = resample(series, time, clipped, settings.attenuation, anti_alias=not fine)
     else:
         series = series[: wanted.size]
-    filtered = {"low_pass": low} if low else {}
     out = {
         str(name): xr.Variable("time", series[:, i].copy(), {**channel.attrs, **filtered})
         for i, (name, channel) in enumerate(channels.items())

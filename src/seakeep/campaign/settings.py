@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
-from seakeep.conventions import canonical_channel, is_elevation
+from seakeep.conventions import canonical_channel, is_elevation, si_unit
 from seakeep.errors import RequestError
 from seakeep.formats import Options
 from seakeep.toml import (
@@ -549,3 +549,9 @@ def long_name_of(name: str, stated: str | None) -> str:
     """Label of a channel: the one stated, the canonical one, or the name with spaces."""
     canonical = canonical_channel(name)
     return stated or (canonical.long_name if canonical else name.replace("_", " "))
+
+
+def units_of(name: str, unit: str) -> str:
+    """SI unit in which a channel is kept: the canonical one, or that of the dimension of `unit`."""
+    canonical = canonical_channel(name)
+    return canonical.units if canonical else si_unit(unit)
