@@ -17,9 +17,9 @@ from seakeep.files import expanded, sha256_of
 from seakeep.formats import Columns, folder_reader, read_columns
 from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
 from seakeep.signals.time_axis import check_order, instant_text, usual_step
+from seakeep.toml import packaged
 
-_TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "sec", "seconds",
-          "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
+_TIMES = packaged("campaign/vocabulary.toml")["time"]
 COUNTED = 64
 """Times from which a column that counts 1, 2, 3 may count samples."""
 _VARIABLE = re.compile(r"\$\{([^}]*)\}")

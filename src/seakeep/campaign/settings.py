@@ -26,6 +26,7 @@ from seakeep.toml import (
     Span,
     Table,
     optional,
+    packaged,
     parse_length,
 )
 
@@ -201,24 +202,7 @@ class InstrumentsSettings(Table):
         return self.loggers.get(name, InstrumentSettings())
 
 
-_STEPS = {
-    "band_pass": ("band", set(), "'band' (Hz), such as band = [0.3, 5.0]"),
-    "integrate": ("band", {"times"}, "'band' (Hz), such as band = [0.3, 5.0]"),
-    "differentiate": ("", set(), ""),
-    "low_pass": ("passband", {"stopband"}, "'passband' (Hz)"),
-    "envelope_squared": ("", set(), ""),
-    "complementary_filter": (
-        "crossover",
-        {"times", "position"},
-        "'position' and 'crossover' (Hz), such as position = 'surge', crossover = 0.15",
-    ),
-    "transfer": (
-        "offset",
-        {"axis"},
-        "'offset' [x, y, z] (m) from the measured point to the wanted one",
-    ),
-    "remove_gravity": ("", {"axis", "components", "zeroed"}, ""),
-}
+_STEPS = packaged("campaign/steps.toml")
 """Steps by name: a key that each needs, others that it knows, and what a message asks for."""
 Step = Literal[
     "integrate", "differentiate", "band_pass", "low_pass", "envelope_squared",
@@ -277,7 +261,7 @@ class DerivedSettings(Table):
         if self.source is None:
             raise ValueError(f"step '{self.step}' needs 'from', the channel it works on")
         needed, others, words = _STEPS[self.step]
-        if extra := given - others - {needed}:
+        if extra := given.difference(others, {needed}):
             raise ValueError(f"step '{self.step}' has no key {sorted(extra)[0]!r}; remove it")
         lacks_position = self.step == "complementary_filter" and self.position is None
         if (needed and needed not in given) or lacks_position:

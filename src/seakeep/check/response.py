@@ -251,7 +251,9 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
     return _points(
         model,
         {"run": name, "kind": "regular", "frequency": frequency, "wave_amplitude": amplitude},
-        *(estimated.ratio, estimated.amplitude, estimated.phase),
+        estimated.ratio,
+        estimated.amplitude,
+        estimated.phase,
         # Where a model departs from the means of each run, its mean state is that of the run.
         offset=np.where(model.signature.input_map.reference > 0, np.nan, mean.ratio.real),
         offset_uncertainty=mean.amplitude,
@@ -274,7 +276,9 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
     return _points(
         model,
         {**names, "frequency": spectra.frequency[at], "wave_amplitude": np.nan},
-        *(gain[at], half, turn),
+        gain[at],
+        half,
+        turn,
         coherence=spectra.ordinary()[at, 0],
     )
 

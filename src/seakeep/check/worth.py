@@ -103,7 +103,7 @@ def worth(
     # Of the model from a baseline: the other way round, so that the bounds change places.
     for key, other in {"": "change", "_lower": "upper", "_upper": "lower"}.items():
         out[f"change{key}"] = 1 / (1 + both[f"all_{other}"]) - 1
-    out = out.drop_vars([f"all_{key}" for key in ("change", "lower", "upper")])
+    out = out.drop_vars(both, errors="ignore")
     out = out.assign_coords(model=list(every), state=list(groups), waves=list(of_kind))
     upper = out["nrmse_upper"]
     most = upper.where(np.isfinite(upper), out["nrmse"]).sel(model="model", drop=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from typer import Argument, Option
 
-from seakeep.cli.console import CampaignFile, progress_bar, results, say
+from seakeep.cli.console import CampaignFile, progress_bar, results, say, say_written
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import check_output, is_there, write_text
 
@@ -195,8 +195,8 @@ def track(
     else:
         write_track(track, out)
     say(track_words(track))
-    if written := [str(path) for path in (out, sheet) if path is not None]:
-        say("Wrote " + ", ".join(written))
+    if written := [*filter(None, (out, sheet))]:
+        say_written(written)
     if reference is not None:
         for words, style in agreement_words(track, reference, max_lag):
             say(words, style=style)

@@ -10,7 +10,7 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
@@ -207,6 +207,11 @@ def member_executor(
 
     given = workers is not None or scheduler is not None
     return make_executor(checked_count(workers, scheduler) if given else 1, scheduler)
+
+
+def say_written(paths: Iterable[Path]) -> None:
+    """Say which files were written."""
+    say(f"Wrote {', '.join(map(str, paths))}")
 
 
 def refuse(given: Mapping[str, bool], words: str) -> None:

@@ -28,6 +28,7 @@ from seakeep.cli.console import (
     read_files,
     refuse,
     say,
+    say_written,
     show,
 )
 from seakeep.errors import RequestError, SeakeepError
@@ -280,7 +281,7 @@ def compare(
         show(winner(differences, {n: each.kind for n, each in fitted.items() if n not in names}))
         written.append(write_differences(differences, out / DIFFERENCES))
     written += _draw({name: comparisons[name] for name in names}, figures, differences)
-    say("Wrote " + ", ".join(map(str, written)))
+    say_written(written)
     if not all(each.complete for name in names for each in comparisons[name]):
         raise Exit(1)
 
@@ -318,7 +319,7 @@ def _nowcast(
     written = [write_nowcasts(results, table)]
     for name, path in figures.items():
         written.append(save_figure(nowcast_figure(results, name.removeprefix(NOWCAST)), path))
-    say("Wrote " + ", ".join(map(str, written)))
+    say_written(written)
 
 
 def _named(files: list[Path]) -> dict[str, Path]:

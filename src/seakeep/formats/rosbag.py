@@ -12,16 +12,9 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
-from seakeep.formats.columns import Columns, Options, decoding
+from seakeep.formats.columns import UNITS, Columns, Options, decoding
 
 _STANDARD = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
-_UNITS = {
-    "angular_velocity": "rad/s", "linear_acceleration": "m/s^2", "force": "N", "torque": "N m",
-    "position": "m", "linear": "m/s", "angular": "rad/s", "translation": "m", "point": "m",
-    "fluid_pressure": "Pa", "range": "m", "min_range": "m", "max_range": "m",
-}  # fmt: skip
-"""Units of fields of the standard messages (ROS Enhancement Proposal 103: SI)."""
-_ACCELERATION = {"linear": "m/s^2", "angular": "rad/s^2"}
 LARGEST_ARRAY = 64
 """Elements of an array field beyond which it is a picture or a cloud, not channels."""
 
@@ -186,5 +179,5 @@ def _unit(kind: str, name: str) -> str | None:
     """Unit of a field of a standard message; None where the message does not fix it."""
     if not kind.startswith(_STANDARD) or kind.endswith("JointState"):
         return None
-    table = {**_UNITS, **(_ACCELERATION if "Accel" in kind else {})}
+    table = UNITS["ros"] | (UNITS["ros_accelerations"] if "Accel" in kind else {})
     return next((table[part] for part in reversed(name.split(".")) if part in table), None)

@@ -152,11 +152,19 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
     }
     files = {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
     if live is not None:
-        content |= live.equations
-        content |= {"begins": model.history_samples, "memory": MEMORY, "pi": math.pi}
-        content |= {"coverage": model.coverage, "trained": TRAINED, "cycles": CYCLES}
-        content |= {"gravity": GRAVITY, "per_octave": PER_OCTAVE, "is_elevation": is_elevation}
-        content |= {"noise_part": NOISE, "doubted": DOUBTED}
+        content |= live.equations | {
+            "begins": model.history_samples,
+            "memory": MEMORY,
+            "pi": math.pi,
+            "coverage": model.coverage,
+            "trained": TRAINED,
+            "cycles": CYCLES,
+            "gravity": GRAVITY,
+            "per_octave": PER_OCTAVE,
+            "is_elevation": is_elevation,
+            "noise_part": NOISE,
+            "doubted": DOUBTED,
+        }
         for end in ("h", "c"):
             files[f"{name}_estimator.{end}"] = rendered(f"estimator.{end}", **content)
     return files

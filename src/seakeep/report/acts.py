@@ -131,8 +131,8 @@ class Evidence:
         blocks = blocks_of(of_tests, self.result.groups["training"])
         rng = random_stream(int(self.result.attrs["seed"]), "claims")
         bounds = two_way_interval(statistic, *cells, rng=rng, blocks=blocks, signed=signed)
-        value = statistic(*(each[None] for each in cells))[0]
-        return Interval(*map(float, (value, *bounds)))
+        value = statistic(*(each[None] for each in cells))
+        return Interval(*map(float, (*value, *bounds)))
 
     def error(self, tests: Sequence[str] = SEA, *of: Any, **named: str) -> Interval:
         """Median of the errors of :meth:`cells`, averaged over the channels."""
@@ -435,11 +435,13 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
     sections = [_summary(results)]
     if {"paper", "raw"} <= set(results):
         sections.append(section("claims", claims_table(results)))
-    divergence, beside = divergence_table(first, "bayesian", "paper"), ", beside the paper's"
+    divergence = divergence_table(first, "bayesian", "paper")
     links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
     sections += [
         section("channels", acts_table(results)),
-        Section("densities", f"Divergence of the densities{beside}", tables=(divergence,)),
+        Section(
+            "densities", "Divergence of the densities, beside the paper's", tables=(divergence,)
+        ),
         section("waves", *wave_tables(first)),
         section("studies", links=links),
     ]
@@ -561,10 +563,8 @@ def acts_table(results: Results) -> Table:
             )
     seas = [first.label_of(test).removeprefix("regular, ") for test in first.tests]
     reading = [a.letter for a in _played(results) if results[a.name].attrs["conditional_on"]]
-    conditions = ""
-    if reading:
-        conditions = (
-            f"{' and '.join(reading)}: conditional on measured surge, which the alignment reads."
-        )
+    conditions = (
+        f"{' and '.join(reading)}: conditional on measured surge, which the alignment reads."
+    ) * bool(reading)
     columns = ("act", "model", *(f"{sea}: {part}" for sea in seas for part in ("waves", "slow")))
     return table("acts", rows, more=conditions, columns=columns)

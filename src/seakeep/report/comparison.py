@@ -23,6 +23,7 @@ from seakeep.report.tables import (
     Number,
     Table,
     band_verdict,
+    band_words,
     change,
     entries,
     interval,
@@ -45,17 +46,16 @@ HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Comparison of forecasts with measurements, tables per run that fit a terminal."""
     shown = {name: each for name, each in words()["comparison"].items() if name in table}
-    heads, _, of_all = zip(*shown.values(), strict=True)
-    digits = {name: each[1] for name, each in shown.items()}
+    heads, places, of_all = zip(*shown.values(), strict=True)
+    cells = partial(row, **dict(zip(shown, places, strict=True)))
     for at in entries(table, "run"):
         title = "forecast against measurement"
         if "scale" in at:
             title += f", full scale (1:{float(at['scale_factor']):g})"
         if "level" in at:
-            title += f", {_band_words(at)}"
-        decimals = zip(of_all, digits.values(), strict=True)
-        means = [number(at[mean], places) if mean else "" for mean, places in decimals]
-        cells = partial(row, **digits)
+            title += f", {band_words(at['level'].item(), at['band'].item())}"
+        decimals = zip(of_all, places, strict=True)
+        means = [number(at[mean], digits) if mean else "" for mean, digits in decimals]
         yield _by_channel(at, "comparison", title, heads, cells, means, _note(at))
         yield _by_channel(
             at,
@@ -89,8 +89,7 @@ def _by_channel(
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
     shown = {name: heading for name, heading in words()["extremes"].items() if name in at}
-    forms = dict.fromkeys(shown, short)
-    cells = partial(row, **forms)
+    cells = partial(row, **dict.fromkeys(shown, short))
     heads = ("unit", *shown.values())
     return _by_channel(at, "extremes", title, heads, lambda one: cells(one, "channel_units"))
 
@@ -116,7 +115,8 @@ def model_blocks(tables: Datasets) -> Iterator[Table]:
     heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
     for run in first["run"].values:
         rows, status, ahead = [], [], []
-        for model, at in ((model, table.sel(run=run)) for model, table in tables.items()):
+        for model, table in tables.items():
+            at = table.sel(run=run)
             error, *others = row(at, anrmse=3, training_anrmse=3, mean_nammae=3)
             rows.append((model, error, interval(at, "anrmse"), *others))
             if at["status"] != "ok":
@@ -255,18 +255,13 @@ def band_findings(table: xr.Dataset) -> list[str]:
         if not np.isfinite(inside):
             said.append(f"{run}: there is no band to judge{left_out}.")
             continue
-        words = band_verdict(inside / 100, float(at["level"]))
+        level, band = at["level"].item(), at["band"].item()
+        words = band_verdict(inside / 100, level)
         said.append(
-            f"{run}: the {_band_words(at)} of {members - lost:.0f} members holds {inside:.0f} % of "
-            f"the measured instants, {words}. {_CARRIES[at['band'].item()]}{left_out}."
+            f"{run}: the {band_words(level, band)} of {members - lost:.0f} members holds "
+            f"{inside:.0f} % of the measured instants, {words}. {_CARRIES[band]}{left_out}."
         )
     return said
-
-
-def _band_words(at: xr.Dataset) -> str:
-    """Level of a band, and its kind where it is not that of the members."""
-    kind = "calibrated " * (at["band"].item() == "calibrated")
-    return f"{100 * float(at['level']):g} % {kind}band"
 
 
 _CARRIES = {
@@ -325,9 +320,9 @@ def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
 def forecast_words(forecast: xr.Dataset) -> str:
     """What a forecast of an ensemble holds, for a message; empty for a single model's."""
     if "statistic" in forecast.dims:
-        attrs = {"band": "members", **forecast.attrs}
+        attrs = forecast.attrs
         count = attrs["members"] - attrs["diverged"]
-        words = _band_words(xr.Dataset({key: attrs[key] for key in ("band", "level")}))
+        words = band_words(attrs["level"], attrs.get("band"))
         return f"mean, std and {words} of {count} members at "
     return f"{forecast.sizes['member']} members at " if "member" in forecast.dims else ""
 

@@ -341,6 +341,17 @@ def change(*ratios: SupportsFloat) -> Number:
     return Number(f"{to([100 * (each - 1) for each in values], signed)} %".replace("-", "−"))
 
 
+def band_words(level: float, kind: str | None) -> str:
+    """Level of a band, and its kind where it is not that of the members.
+
+    Examples
+    --------
+    >>> band_words(0.95, "members"), band_words(0.9, "calibrated")
+    ('95 % band', '90 % calibrated band')
+    """
+    return f"{100 * level:g} % {'calibrated ' * (kind == 'calibrated')}band"
+
+
 def band_verdict(inside: float, level: float) -> str:
     """Whether a band holds the part of the instants that it claims, in words.
 

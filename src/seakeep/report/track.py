@@ -25,7 +25,7 @@ def track_text(track: Track) -> str:
     """CSV with units in brackets; angles in degrees, as loggers write them; NaN is empty."""
     columns = {}
     for name, values in {"time": track.time, **track.channels}.items():
-        unit = "s" if name == "time" else LABELS[name][0]
+        unit = "s" if name == "time" else LABELS[name]["units"]
         numbers = np.asarray(values)
         if unit == "rad":
             unit, numbers = "deg", np.rad2deg(numbers)
@@ -40,10 +40,7 @@ def write_track(track: Track, path: Path) -> None:
     if path.suffix != ".nc":
         write_text(path, track_text(track))
         return
-    data = {
-        name: ("time", values, dict(zip(("units", "long_name"), LABELS[name], strict=True)))
-        for name, values in track.channels.items()
-    }
+    data = {name: ("time", values, LABELS[name]) for name, values in track.channels.items()}
     time = ("time", track.time, {"units": "s", "long_name": "time"})
     out = xr.Dataset(data, {"time": time}, {**track.attributes, MARK: TRACK})
     out["flag"].attrs |= {"flag_values": list(FLAGS.values()), "flag_meanings": " ".join(FLAGS)}
@@ -77,7 +74,7 @@ def agreement_words(
 ) -> Iterator[tuple[str, str | None]]:
     """Agreement of heave and pitch with a reference; in yellow, why its lag may be wrong."""
     for name in ("heave", "pitch"):
-        other, unit = reference[name], LABELS[name][0]
+        other, unit = reference[name], LABELS[name]["units"]
         factor = conversion(other.attrs.get("units", unit), unit, f"'{name}'")
         time = reference["time"].values
         agreement = compare_motion(track[name], track.time, factor * other.values, time, max_lag)

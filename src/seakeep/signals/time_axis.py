@@ -31,18 +31,13 @@ def instant_text(instant: float, dt: float) -> str:
     """
     known = 15 - len(f"{abs(instant):.0f}")  # digits of a double
     wanted = 3 - math.floor(math.log10(dt)) if dt > 0 else known
-    return fixed(instant, max(0, min(wanted, known)))
+    decimals = max(0, min(wanted, known))
+    return np.format_float_positional(instant, decimals, unique=False, trim="-")
 
 
 def span_text(begin: float, end: float, dt: float) -> str:
     """Write a span of time, with its unit; instants as :func:`instant_text`."""
     return f"{instant_text(begin, dt)} to {instant_text(end, dt)} s"
-
-
-def fixed(value: float, decimals: int) -> str:
-    """Write a number to so many decimals, without zeros at its end."""
-    text = f"{value:.{decimals}f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:

@@ -29,38 +29,14 @@ from seakeep.files import existing_file
 from seakeep.signals.filters import low_pass
 from seakeep.signals.panel import CORNERS, FIELDS, Image, TrackingSettings, find_panel, opencv
 from seakeep.signals.time_axis import stretches
+from seakeep.toml import packaged
 
 Seen = dict[str, FloatArray]
 """Fields of all frames."""
-FLAGS = {
-    "good": 0,
-    "lost": 1,  # nothing of the panel's colour
-    "occluded": 2,  # too small, a corner hidden, or cut by the border of the picture
-    "overexposed": 3,  # shape off, or much more of the picture saturated than usual
-    "misshapen": 4,  # too large or no rectangle, without saturation
-    "jump": 5,  # further from its neighbours than the vessel can move
-    "dropped": 6,  # not in the file
-}
+_TRACK = packaged("signals/track.toml")
+FLAGS: dict[str, int] = _TRACK["flags"]
 """Flags of a frame."""
-
-LABELS = {
-    "surge": ("m", "surge"),
-    "heave": ("m", "heave"),
-    "pitch": ("rad", "pitch"),
-    "centroid_x": ("pixel", "panel centroid, to the right"),
-    "centroid_y": ("pixel", "panel centroid, downwards"),
-    "panel_angle": ("rad", "panel orientation, clockwise as seen"),
-    "panel_length": ("pixel", "panel length as seen"),
-    "panel_height": ("pixel", "panel height as seen"),
-    "panel_area": ("pixel^2", "panel area as seen"),
-    "panel_fill": ("1", "panel area by that of the rectangle around it"),
-    "saturation": ("1", "saturated fraction of the picture"),
-    "quality": ("1", "quality of the frame"),
-    "bridged": ("1", "whether the frame is bridged"),
-    "picture": ("1", "count of the frame in the file"),
-    "flag": ("1", "flag of the frame"),
-    "lamp": ("1", "brightness of the lamp"),
-}
+LABELS: dict[str, dict[str, str]] = _TRACK["channels"]
 """Unit and long name of each channel of a track."""
 
 FRAMES = 12

@@ -42,6 +42,7 @@ from seakeep.report.style import (
     shown,
     shown_unit,
 )
+from seakeep.report.tables import band_words
 from seakeep.signals.time_axis import over_gaps
 from seakeep.study import Comparison, StudyResult, comparison_table
 from seakeep.study.comparison import wave_period
@@ -190,8 +191,7 @@ def _curve(
         line, label = LINES["ensemble"], "ensemble mean"
         band = [factor * each.band[name].sel(statistic=key) for key in ("lower", "upper")]
         attrs = each.forecast.attrs
-        kind = "calibrated " if attrs.get("band") == "calibrated" else ""
-        words = f"{100 * float(attrs['level']):g} % {kind}band"
+        words = band_words(attrs["level"], attrs.get("band"))
     if len(several) > 1:
         style = SERIES[list(several).index(key) % len(SERIES)]
         line = {what: value for what, value in style.items() if what != "marker"}
@@ -344,7 +344,7 @@ def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
     for number, (name, test) in enumerate(result.tests.items()):
         judged = test["judged"].values
         total = judged.shape[1]
-        wanted = min(count if number == 0 else min(count, 1), total)
+        wanted = min(count, total, 1 if number else total)
         for window in np.linspace(0, total - 1, wanted).round().astype(int).tolist():
             cells.append((name, int(np.argmax(judged[:, window])), window))
     return cells
@@ -369,8 +369,7 @@ def history_figure(
     legend_outside(figure, axes[0], side="upper right")
     run, learnt, start = (cell[key].item() for key in ("run", "training", "start"))
     left_out = result.groups["training"]["left_out"].values[training]
-    title = f"{run}, from {start:.1f} s; trained {'' if left_out else 'on '}{learnt}"
-    axes[0].set_title(title)
+    axes[0].set_title(f"{run}, from {start:.1f} s; trained {'' if left_out else 'on '}{learnt}")
     return figure
 
 

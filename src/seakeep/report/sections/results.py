@@ -62,7 +62,10 @@ def summary(result: StudyResult) -> Section:
     figures = [
         drawing(
             "first_history",
-            *(history_figure, result, *place, (name,)),
+            history_figure,
+            result,
+            *place,
+            (name,),
             channel=result.words_of(name).capitalize(),
             test=result.label_of(place[0]),
         )
@@ -507,7 +510,10 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
     heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
     return by_channel(
         result,
-        *("coverage", cells, heads, more),
+        "coverage",
+        cells,
+        heads,
+        more,
         name=f"coverage_{prefix}{model}",
         kind=prefix.replace("_", " "),
         level=short(100 * level),
