@@ -12,9 +12,10 @@ from seakeep.campaign.datasets import data_folder
 from seakeep.campaign.guesses import (
     HYSTERESIS,
     SHORT_GAP,
-    File,
+    Files,
     Guess,
-    Sea,
+    Guesses,
+    Seas,
     arranged,
     dead_motions,
     guess_channels,
@@ -103,7 +104,7 @@ def _key(name: str) -> str:
     return str(tomlkit.key(name).as_string())
 
 
-def _refuse(files: Sequence[File]) -> None:
+def _refuse(files: Files) -> None:
     first = files[0]
     for other in files[1:]:
         if not set(first.table.names) & set(other.table.names) - {first.time}:
@@ -118,7 +119,7 @@ def _refuse(files: Sequence[File]) -> None:
     )
 
 
-def _general(files: Sequence[File], seas: Mapping[str, Sea], wave: Guess | None) -> str:
+def _general(files: Files, seas: Seas, wave: Guess | None) -> str:
     common = Path(os.path.commonpath([file.path.resolve().parent for file in files]))
     period = "# encounter_period = …  # s; STATE IT: no wave was found"
     if seas:
@@ -149,7 +150,7 @@ def _assumed_rate(files: str) -> str:
     )
 
 
-def _files(files: Sequence[File], known: Mapping[str, object]) -> Iterator[str]:
+def _files(files: Files, known: Mapping[str, object]) -> Iterator[str]:
     yield from ("", "[files]", *(f"{key} = {_value(value)}" for key, value in known.items()))
     first, times = files[0], {file.time for file in files}
     if first.time is not None and len(times) == 1:
@@ -163,7 +164,7 @@ def _files(files: Sequence[File], known: Mapping[str, object]) -> Iterator[str]:
         yield _assumed_rate("the files have")
 
 
-def _channels(guesses: Sequence[Guess]) -> Iterator[str]:
+def _channels(guesses: Guesses) -> Iterator[str]:
     yield "\n# A channel is sign * (reading + offset), converted to SI."
     for guess in (each for each in guesses if each.channel is not None):
         canonical = canonical_channel(str(guess.channel))
@@ -186,7 +187,7 @@ def _channels(guesses: Sequence[Guess]) -> Iterator[str]:
     yield from (f"# column '{guess.header}' left out: {guess.why}" for guess in skipped)
 
 
-def _instruments(files: Sequence[File], guesses: Sequence[Guess]) -> Iterator[str]:
+def _instruments(files: Files, guesses: Guesses) -> Iterator[str]:
     """A table per logger; clocks by the trigger, where all loggers have one."""
     loggers = list({file.logger: file for file in reversed(files)}.values())[::-1]
     triggers = {file.logger: next(filter(is_trigger, file.table.values), None) for file in loggers}
@@ -213,9 +214,9 @@ def _instruments(files: Sequence[File], guesses: Sequence[Guess]) -> Iterator[st
 
 
 def _runs(
-    files: Sequence[File],
+    files: Files,
     roles: Mapping[str, tuple[str, str]],
-    seas: Mapping[str, Sea],
+    seas: Seas,
     folder: Path | str | None,
 ) -> Iterator[str]:
     groups = [sea.group for sea in seas.values()]
@@ -246,16 +247,14 @@ def _runs(
             yield from (f"{_key(logger)} = {_value(path)}" for logger, path in own.items())
 
 
-def _kind(run: str, seas: Mapping[str, Sea]) -> str | None:
+def _kind(run: str, seas: Seas) -> str | None:
     """Kind of a run's waves, by its name or else by their spectrum; None if neither says."""
     if (named := waves_of_name(run)) or run not in seas:
         return named
     return "regular" if seas[run].regular else "irregular"
 
 
-def _roles(
-    files: Sequence[File], guesses: Sequence[Guess], seas: Mapping[str, Sea]
-) -> dict[str, tuple[str, str]]:
+def _roles(files: Files, guesses: Guesses, seas: Seas) -> dict[str, tuple[str, str]]:
     """Role of each run, and why: irregular runs train, and one whose waves lie within theirs tests.
 
     Runs without waves are not used, where others have some; nor are those that lack a file, or in
@@ -288,7 +287,7 @@ def _roles(
     return roles | {n: ("train" if n in trains else "test", why) for n in moved}
 
 
-def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> tuple[list[str], str]:
+def _tests_of(names: Sequence[str], seas: Seas) -> tuple[list[str], str]:
     """A run whose waves lie within the range of the others', or nearest, and its repeats; in words.
 
     Of several regular waves, that with the least distance to the next one in period.
@@ -323,9 +322,7 @@ def _relative(path: Path, folder: Path | str | None) -> str:
     return Path(os.path.relpath(absolute, Path(folder or ".").resolve())).as_posix()
 
 
-def _preparation(
-    files: Sequence[File], guesses: Sequence[Guess], seas: Mapping[str, Sea]
-) -> Iterator[str]:
+def _preparation(files: Files, guesses: Guesses, seas: Seas) -> Iterator[str]:
     """One step for all, no finer than that of the fastest logger, and what to do about gaps."""
     yield "\n[preparation]"
     several = bool(files[0].logger)
@@ -354,7 +351,7 @@ def _preparation(
         )
 
 
-def _inputs(guesses: Sequence[Guess]) -> list[Guess]:
+def _inputs(guesses: Guesses) -> list[Guess]:
     """Wave probes that drive a model: none behind the vessel, without gaps where there are such."""
     waves = [guess for guess in guesses if is_elevation(guess.channel or "")]
     before = [guess for guess in waves if not guess.behind] or waves
@@ -362,7 +359,7 @@ def _inputs(guesses: Sequence[Guess]) -> list[Guess]:
     return [guess for guess in before if guess.gaps == least]
 
 
-def _model(guesses: Sequence[Guess]) -> Iterator[str]:
+def _model(guesses: Guesses) -> Iterator[str]:
     """Motions as states, waves as inputs, delays in encounter periods."""
     mapped = {guess.channel: guess for guess in guesses if guess.channel}
     kinds = [[m + kind for m in MOTIONS] for kind in ("", "_rate", "_acceleration")]

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -123,8 +123,14 @@ class Sea:
     group: str
 
 
+Files = Sequence[File]
+Guesses = Sequence[Guess]
+Seas = Mapping[str, Sea]
+"""By run."""
+
+
 @np.errstate(over="ignore", invalid="ignore")
-def seas_of(files: Sequence[File], guesses: Sequence[Guess], wave: Guess) -> dict[str, Sea]:
+def seas_of(files: Files, guesses: Guesses, wave: Guess) -> dict[str, Sea]:
     """Waves, as one probe recorded them, of each run that has some; decay tests have none."""
     series = {f: f.series(wave.column) for f in files if f.logger == wave.logger}
     seas = {f: sea for f, x in series.items() if x is not None and (sea := _sea(f, x)) is not None}
@@ -161,7 +167,7 @@ def _sea(file: File, series: FloatArray) -> Sea | None:
     return Sea(float(series.std()), period, regular, noisy, 0.0, file.run)
 
 
-def _start(run: str, files: Sequence[File], guesses: Sequence[Guess]) -> float:
+def _start(run: str, files: Files, guesses: Guesses) -> float:
     """Latest instant at which the waves have come to a probe, or a motion has begun."""
     starts = [0.0]
     for file in (each for each in files if each.run == run):
@@ -275,7 +281,7 @@ def _free(stem: str, taken: Counter[str]) -> str:
     return name
 
 
-def guess_channels(files: Sequence[File]) -> list[Guess]:
+def guess_channels(files: Files) -> list[Guess]:
     """Guess a channel for each column of the first file of each logger."""
     out = []
     taken: Counter[str] = Counter()
@@ -299,7 +305,7 @@ def guess_channels(files: Sequence[File]) -> list[Guess]:
     return [replace(each, at_rest=each.channel in rests) for each in out]
 
 
-def dead_motions(files: Sequence[File], guesses: Sequence[Guess]) -> dict[str, str]:
+def dead_motions(files: Files, guesses: Guesses) -> dict[str, str]:
     """Runs in which a motion that others show is constant, as where its sensor is dead."""
     dead: dict[str, str] = {}
     for guess in (each for each in guesses if each.is_motion and not each.at_rest):
@@ -310,7 +316,7 @@ def dead_motions(files: Sequence[File], guesses: Sequence[Guess]) -> dict[str, s
     return dead
 
 
-def _guess(column: str, files: Sequence[File]) -> Guess:
+def _guess(column: str, files: Files) -> Guess:
     table, logger = files[0].table, files[0].logger
     header = _printable(table.headers.get(column, column))
     if is_trigger(column):
@@ -339,7 +345,7 @@ def _printable(text: str) -> str:
     return re.sub(r"[\x00-\x08\x0a-\x1f\x7f]", "?", text)
 
 
-def _fault(column: str, files: Sequence[File]) -> tuple[str, Literal["", "short", "long"]]:
+def _fault(column: str, files: Files) -> tuple[str, Literal["", "short", "long"]]:
     """Why a column cannot be a channel, if it cannot; and what gaps it has."""
     if column in files[0].table.faults:
         return "not all of it are numbers, or its name is there twice", ""
@@ -381,7 +387,7 @@ def _step_of(series: FloatArray) -> float | None:
         return None
 
 
-def _listed(files: Sequence[File]) -> str:
+def _listed(files: Files) -> str:
     return ", ".join(f"{f.run}/{f.path.name}" if f.logger else f.path.name for f in files[:3])
 
 

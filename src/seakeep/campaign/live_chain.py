@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, as_real, as_table
+from seakeep.arrays import FloatArray, as_real
 from seakeep.campaign.pipeline import Logger, Run, cleaned, derived, mapped, resampled
 from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.conventions import conversion
@@ -80,15 +80,10 @@ class LiveChain:
             If the chain cannot use the samples. Nothing was taken then, as with a RequestError.
         """
         before = self._rows, self._origin, self._given
-        new = {
-            key: self._checked(key, table) for key, table in as_table(samples, "samples").items()
-        }
-        self._rows = {
-            key: {
-                name: np.concatenate([values, new[key][name]]) if key in new else values
-                for name, values in table.items()
-            }
-            for key, table in self._rows.items()
+        new = {key: self._checked(key, table) for key, table in samples.items()}
+        self._rows = self._rows | {
+            key: {n: np.concatenate([x, more[n]]) for n, x in self._rows[key].items()}
+            for key, more in new.items()
         }
         try:
             self._check_all_send()
@@ -179,7 +174,7 @@ class LiveChain:
         logger = self._run.loggers[key]
         arrays = {
             find_column(logger.path, logger.columns, name): as_real(values, name)
-            for name, values in as_table(table, f"samples of '{key}'").items()
+            for name, values in table.items()
         }
         missing = [name for name in self._rows[key] if name not in arrays]
         sizes = {each.shape for each in arrays.values()}

@@ -14,7 +14,7 @@ step       what it does
 ========== =====================================================================================
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -126,11 +126,11 @@ class Run:
         Clock of each logger.
     groups : mapping of str to Dataset
         Channels by logger, each at its own rate.
-    late : tuple of str
+    late : sequence of str
         Derived channels that need several loggers.
     data : Dataset or None
         All channels on one axis.
-    findings : tuple of Finding
+    findings : sequence of Finding
         Results of the checks.
     """
 
@@ -139,9 +139,9 @@ class Run:
     loggers: Mapping[str, Logger]
     clocks: Mapping[str, Clock] = field(default_factory=dict)
     groups: Datasets = field(default_factory=dict)
-    late: tuple[str, ...] = ()
+    late: Sequence[str] = ()
     data: xr.Dataset = field(default_factory=xr.Dataset)
-    findings: tuple[Finding, ...] = ()
+    findings: Sequence[Finding] = ()
 
     @property
     def own(self) -> RunSettings:
@@ -217,8 +217,8 @@ def _clock(
     pair = own.shared or own.correlated
     if pair is None:
         stated = own.offset is not None or own.drift is not None
-        clock = Clock(own.offset or 0.0, 1e-6 * (own.drift or 0.0))
-        return replace(clock, method="as stated" if stated else ASSUMED)
+        method = "as stated" if stated else ASSUMED
+        return Clock(own.offset or 0.0, 1e-6 * (own.drift or 0.0), method=method)
     time, series = logger.uniform(pair[0])
     instants, other = reference.uniform(pair[1])
     if not np.ptp(series) or not np.ptp(other):
@@ -298,8 +298,7 @@ def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings])
         start, end = (number(edge) for edge in run.own.record)
         step, whole = usual_step(time), (time[0], time[-1])
         slack = step * (1 + 1e-6) if logger.name == next(iter(run.loggers)) else np.inf
-        place = f"runs.{run.name}.record"
-        records = _part(place, (start, end), time, step, whole, slack)
+        records = _part(f"runs.{run.name}.record", (start, end), time, step, whole, slack)
     variables = {}
     for name, each in channels.items():
         values, attributes = _converted(name, each, run, logger)
@@ -487,7 +486,7 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
         step = uniform_step(data["time"].values, f"run '{run.name}'")
         variable = derive(data.variables, name, settings, step, run.name)
         groups[home[name]] = data.assign({name: variable.pop(name)}).assign_coords(variable)
-    return replace(run, groups=groups, late=tuple(late))
+    return replace(run, groups=groups, late=late)
 
 
 def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
@@ -642,7 +641,7 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
         anti_alias=preparation.anti_alias,
         left_out=left_out,
     )
-    return replace(run, findings=tuple(check(record)))
+    return replace(run, findings=check(record))
 
 
 def used_span(settings: RunSettings) -> tuple[float, float]:

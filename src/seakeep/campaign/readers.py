@@ -118,8 +118,8 @@ def read_table(
         variables[name] = ("time", table.values[name], attributes)
     if not variables:
         raise DataError(f"{path} holds times and no channel. Export the run again.")
-    coordinates = {"time": ("time", time, {"units": "s", "long_name": "time"})}
-    return xr.Dataset(variables, coordinates)
+    axis = ("time", time, {"units": "s", "long_name": "time"})
+    return xr.Dataset(variables, {"time": axis})
 
 
 def find_column(path: Path, table: Columns, wanted: str) -> str:

@@ -465,15 +465,15 @@ class CampaignSettings(Table):
     channels: dict[ChannelName, ChannelSettings] = Field(
         min_length=1, description="at least one table [channels.NAME]"
     )
-    derived: dict[ChannelName, DerivedSettings] = Field(default_factory=dict)
+    derived: dict[ChannelName, DerivedSettings] = Field({})
     instruments: InstrumentsSettings = InstrumentsSettings()
-    redundant: dict[str, RedundantSettings] = Field(default_factory=dict)
+    redundant: dict[str, RedundantSettings] = Field({})
     runs: dict[RunName, RunSettings] = Field(
         min_length=1, description="at least one table [runs.NAME] with a file"
     )
     preparation: PreparationSettings = PreparationSettings()
     model: ModelSettings | None = None
-    models: dict[str, ModelSettings] = Field(default_factory=dict)
+    models: dict[str, ModelSettings] = Field({})
 
     @property
     def channel_names(self) -> tuple[str, ...]:

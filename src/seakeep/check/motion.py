@@ -283,8 +283,7 @@ def _probed(model: HankelDMDcModel, step: float) -> IntArray:
     known = every[model.coverage.is_trained(frequency).any(axis=0)]
     if not known.size:
         raise DataError("training holds no waves by which the model could be probed.")
-    chosen = np.linspace(0, known.size - 1, min(12, known.size)).round().astype(int)
-    return known[chosen]
+    return known[np.linspace(0, known.size - 1, min(12, known.size)).round().astype(int)]
 
 
 def _wave(samples: int, cycles: int, turns: FloatArray, amplitude: float) -> FloatArray:

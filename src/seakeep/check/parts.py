@@ -418,7 +418,7 @@ def wave_turns(
     if places is None or not depths:
         return None
     k = wavenumber(2 * np.pi * frequency, depths[0])
-    return np.asarray(k)[:, None] * (places - places[reference])
+    return k[:, None] * (places - places[reference])
 
 
 def units_of(model: Model, names: Sequence[str]) -> list[str]:

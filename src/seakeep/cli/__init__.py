@@ -127,7 +127,7 @@ def main(arguments: list[str] | None = None) -> int:
     int
         0 done, 1 the run failed, 2 the request is wrong, 130 interrupted.
     """
-    received = sys.argv[1:] if arguments is None else list(arguments)
+    received = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in received
     received = [each for each in received if each != "--debug"]
     command = typer.main.get_command(app)

@@ -97,8 +97,8 @@ def tune(
         search_result = search(
             replace(spec, select=chosen),
             runs,
-            list(settings.states),
-            list(settings.inputs),
+            settings.states,
+            settings.inputs,
             vary=sorted({*vary}),
             horizon=chosen.horizon,
             folds=chosen.folds,

@@ -52,7 +52,7 @@ def read_tdms(path: Path, options: Options) -> Columns:
                 for channel in _chosen(path, file, options.group)
                 if len(channel) > 1 and np.dtype(channel.dtype or object).kind in "fiubM"
             ]
-            data = [np.asarray(channel[:]) for channel in channels]
+            data = [channel[:] for channel in channels]
     return _columns(path, channels, data)
 
 

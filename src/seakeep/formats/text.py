@@ -289,7 +289,7 @@ def _frame(path: Path, lines: list[str], layout: _Layout) -> pd.DataFrame:
                 sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
                 decimal=layout.decimal,
                 header=None,
-                names=list(range(len(layout.headers))),
+                names=range(len(layout.headers)),
                 index_col=False,
                 skip_blank_lines=False,
                 skipinitialspace=" " in body,

@@ -132,7 +132,7 @@ def find_outliers(series: npt.ArrayLike) -> BoolArray:
         near = np.median(away[max(begin - AROUND, 0) : end + AROUND])
         apart = min(jumps[begin] / away[begin], jumps[end] / away[end - 1])
         outliers[begin:end] = away[begin:end].max() > ALONE * 1.4826 * near and apart > ABRUPT
-    return np.asarray(outliers | _bursts(x) | (np.abs(x - middle) > FAR * spread) & (spread > 0))
+    return outliers | _bursts(x) | (np.abs(x - middle) > FAR * spread) & (spread > 0)
 
 
 def _bursts(x: FloatArray) -> BoolArray:

@@ -1,7 +1,5 @@
 """Checks of one channel: flagged samples, constant values, levels, values that cannot be."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import scipy
 
@@ -16,7 +14,7 @@ from seakeep.quality.faults import (
     STUCK,
     noise_share,
 )
-from seakeep.quality.findings import Finding, Kind, Record, channels_of, sound, step_of
+from seakeep.quality.findings import Findings, Kind, Record, channels_of, sound, step_of
 from seakeep.signals.time_axis import stretches
 from seakeep.signals.waves import dominant_period
 
@@ -63,7 +61,7 @@ _FLAGS = {
 }
 
 
-def flagged(record: Record) -> Iterator[Finding]:
+def flagged(record: Record) -> Findings:
     """Samples that carry a flag."""
     for _, group, name, _ in record.recorded():
         if f"{name}_flags" not in group.coords:
@@ -95,7 +93,7 @@ def flagged(record: Record) -> Iterator[Finding]:
             )
 
 
-def constant(record: Record) -> Iterator[Finding]:
+def constant(record: Record) -> Findings:
     """Channels that never change."""
     for _, _, name, channel in record.recorded():
         if not np.ptp(channel.values):
@@ -103,14 +101,14 @@ def constant(record: Record) -> Iterator[Finding]:
             yield record.finding(SamplesKind.CONSTANT, name, float(channel[0]), unit=unit)
 
 
-def noise(record: Record) -> Iterator[Finding]:
+def noise(record: Record) -> Findings:
     """Channels most of whose variance has no memory, such as a record of random readings."""
     for _, group, name, _ in record.recorded():
         if (share := noise_share(sound(group, name))) > 0.5:
             yield record.finding(SamplesKind.NOISE, name, share=100 * share)
 
 
-def levels(record: Record) -> Iterator[Finding]:
+def levels(record: Record) -> Findings:
     """Levels that drift, of channels that have no slow motion of their own."""
     dt = step_of(record.whole)
     for name, channel in channels_of(record.whole).items():
@@ -127,7 +125,7 @@ def levels(record: Record) -> Iterator[Finding]:
             yield record.finding(SamplesKind.DRIFT, name, change, limit, unit)
 
 
-def impossible(record: Record) -> Iterator[Finding]:
+def impossible(record: Record) -> Findings:
     """Values that no floating vessel and no wave reach, and a wrong unit does.
 
     Roll or pitch beyond a right angle; waves or heave that leave their mean by more than the water
@@ -144,7 +142,7 @@ def impossible(record: Record) -> Iterator[Finding]:
                 yield record.finding(kind, name, reached, limit, "rad" if turns else "m")
 
 
-def units(record: Record) -> Iterator[Finding]:
+def units(record: Record) -> Findings:
     """Units that are guesses, and motions that are read from columns of waves."""
     for name, column in record.wave_columns.items():
         yield record.finding(SamplesKind.WAVE_COLUMN, name, column=column)

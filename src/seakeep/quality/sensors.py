@@ -14,7 +14,7 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray, as_series
 from seakeep.quality.faults import STUCK, find_held
-from seakeep.quality.findings import Finding, Kind, Record, Redundant, channels_of, filled, step_of
+from seakeep.quality.findings import Findings, Kind, Record, Redundant, channels_of, filled, step_of
 from seakeep.signals import misplaced_probes
 from seakeep.signals.lags import Lags, windowed_lags
 from seakeep.signals.waves import dominant_period
@@ -77,7 +77,7 @@ def compared(run: xr.Dataset, groups: Redundant) -> dict[tuple[str, str], Agreem
     return out
 
 
-def redundant(record: Record) -> Iterator[Finding]:
+def redundant(record: Record) -> Findings:
     """Redundant sensors that disagree by more than a model may err, or hold still alone."""
     run = record.whole
     for (name, other), agreement in compared(run, record.redundant).items():
@@ -127,7 +127,7 @@ def _faults(agreement: Agreement, unit: str) -> Iterator[tuple[SensorsKind, floa
             yield SensorsKind.DIFFERENCE, agreement.nrmse, LARGEST_NRMSE, "1"
 
 
-def positions(record: Record) -> Iterator[Finding]:
+def positions(record: Record) -> Findings:
     """Stated positions of wave probes against the phases of the waves that passed them.
 
     Nothing can be said without a water depth, nor of regular waves.
@@ -236,7 +236,7 @@ def compare_sensors(
     trusted: npt.ArrayLike,
     dt: float,
     window: float | None = None,
-    stuck_samples: npt.ArrayLike | None = None,
+    stuck_samples: BoolArray | None = None,
     step: float = np.nan,
 ) -> Agreement:
     """Compare a sensor with a trusted one of the same motion, window by window.
@@ -277,7 +277,7 @@ def compare_sensors(
     length = 4 * period if window is None else window
     if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
         return nothing
-    stuck = np.zeros(x.size, bool) if stuck_samples is None else np.asarray(stuck_samples, bool)
+    stuck = np.zeros(x.size, bool) if stuck_samples is None else stuck_samples
     windows, motion, gain = _windows(x, y, dt, length, period, stuck)
     if not windows.lag.size:
         return nothing

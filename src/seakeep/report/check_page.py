@@ -454,7 +454,7 @@ def check_sections(checked: Checked) -> list[Section]:
         refused = [checked.refused[name] for name in needed if name in checked.refused]
         texts = [f"Cannot be judged: {text}" for text in dict.fromkeys(refused)]
         texts += dict.fromkeys(note for name in needed for note in checked.notes.get(name, ()))
-        out.append(replace(built, notices=tuple(texts)))
+        out.append(replace(built, notices=texts))
     return out
 
 

@@ -359,4 +359,4 @@ def margins_table(ensemble: HankelEnsemble) -> Table:
         )
     names = ("margin",) if floor is None else ("k", "f")
     columns = ("channel", "unit", *names, "in SD", "blocks", "warranted %")
-    return Table("margins", title, columns, tuple(rows), numeric=tuple(range(2, len(columns))))
+    return Table("margins", title, columns, rows, numeric=range(2, len(columns)))

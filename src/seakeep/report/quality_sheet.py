@@ -84,8 +84,7 @@ def write_quality_sheet(
         if not is_newer(path, folder / f"{name}.nc"):
             run, period = runs[name], runs[name].attrs.get("encounter_period", np.nan)
             pairs = compared(run, redundant_pairs(settings, period))
-            agreements = {channel: each for (channel, _), each in pairs.items()}
-            figure = quality_figure(run, agreements)
+            figure = quality_figure(run, {channel: each for (channel, _), each in pairs.items()})
             with figure_style(), replacing(path) as temporary:  # all colours: marks are small
                 mark, small = {"Software": f"{MARK}: {SHEET}"}, {"optimize": True}
                 figure.savefig(temporary, format="png", dpi=100, metadata=mark, pil_kwargs=small)

@@ -125,7 +125,7 @@ class _Video:
                     f"{1 / self.rate:.4g} s apart, so the frame rate varies. Encode the video "
                     "again with a constant rate."
                 )
-            yield number, np.asarray(read[1], dtype=np.uint8)
+            yield number, read[1]
             previous, count = number, count + 1
         if count == 0:
             raise DataError(f"{self.path} holds no frame that can be decoded. Export it again.")
@@ -482,4 +482,4 @@ def _tile(cv2: Any, frame: Image, track: Track, index: int) -> Image:
     text = f"{track.time[index]:.2f} s  {name}  quality {here['quality']:.2f}"
     cv2.putText(small, text, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
     cv2.rectangle(small, (0, 0), (small.shape[1] - 1, small.shape[0] - 1), colour, 3)
-    return np.asarray(small, dtype=np.uint8)
+    return small

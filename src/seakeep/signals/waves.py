@@ -191,7 +191,7 @@ def _spectrum(series: npt.ArrayLike, dt: float) -> tuple[FloatArray, FloatArray,
     x = as_series(series)
     if x.size < 8 or not np.ptp(x):
         return x, x, np.nan
-    power, lines = tapered_power(x), np.asarray(np.fft.rfftfreq(x.size, dt), dtype=float)
+    power, lines = tapered_power(x), fft.rfftfreq(x.size, dt)
     smooth = np.convolve(power, [0.25, 0.5, 0.25], mode="same")
     smooth[:3] = 0.0
     return power, lines, float(1.0 / lines[np.argmax(smooth)])
@@ -746,8 +746,7 @@ def find_leakage(
 
 def _analytic(series: FloatArray) -> ComplexArray:
     centred = series - series.mean()
-    out = scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))
-    return out[: centred.size]
+    return scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))[: centred.size]
 
 
 def is_regular(series: npt.ArrayLike) -> bool:

@@ -192,8 +192,7 @@ def modes(result: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
             *(at[key].values for key in ("period", "damping_ratio", "decay_time")), strict=True
         )
     ]
-    size = (2.8 + 0.5 * len(states), 0.9 + 0.24 * len(words))
-    figure, (place,) = panels(axes, 1, 1, size)
+    figure, (place,) = panels(axes, 1, 1, (2.8 + 0.5 * len(states), 0.9 + 0.24 * len(words)))
     picture = place.imshow(shares, cmap="Greys", vmin=0, vmax=1, aspect="auto")
     for (row, column), value in np.ndenumerate(shares):
         if value >= 0.05:

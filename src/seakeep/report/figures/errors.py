@@ -86,8 +86,7 @@ def draw_box_violin(
 def _cells(result: StudyResult, test: str, model: str, measure: str) -> FloatArray:
     """Errors of all judged cells, shape (cell, channel)."""
     data = result.tests[test]
-    errors = data["error"].sel(model=model, measure=measure).values
-    return errors[data["judged"].values]
+    return data["error"].sel(model=model, measure=measure).values[data["judged"].values]
 
 
 @figure_style()
@@ -251,8 +250,7 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
             "label": model_words(model),
         }
         plane.scatter(values.real, values.imag, **style)
-        frequency = np.angle(values) / (2 * np.pi * result.dt)
-        decay.scatter(frequency, np.abs(values), **style)
+        decay.scatter(np.angle(values) / (2 * np.pi * result.dt), np.abs(values), **style)
     plane.set(aspect="equal", ylim=(0, 1.05), xticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
     plane.set(xlabel="real part", ylabel="imaginary part")
     decay.axhline(1.0, color=PALETTE["slate"], linewidth=0.8)

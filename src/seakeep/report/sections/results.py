@@ -369,8 +369,8 @@ def regular(result: StudyResult) -> Section | None:
     if (response := result.groups.get("statistics/response")) is None:
         return None
     tests = response["test"].values.tolist()
-    table = _response_table(result, tests)
-    return section("regular", table, more=[_slack_words(result, tests)])
+    more = [_slack_words(result, tests)]
+    return section("regular", _response_table(result, tests), more=more)
 
 
 def _response_table(result: StudyResult, tests: list[str]) -> Table:
