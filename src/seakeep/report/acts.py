@@ -74,11 +74,6 @@ def all_of(verdicts: Iterable[bool | None]) -> bool | None:
     return False if False in known else None if None in known else True
 
 
-def opposite(verdict: bool | None) -> bool | None:
-    """The verdict on the contrary."""
-    return None if verdict is None else not verdict
-
-
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """Cells of an act, training sets in the order of their runs, and statistics of them.
@@ -254,7 +249,7 @@ class Claims(Evidence):
             at = act.result.groups["statistics/trend"].sel(test="irregular", band="all")
             growths.append([ratio_of(at.sel(model=model)) for model in (SINGLE, ENSEMBLE)])
         texts = (" and ".join(each.change() for each in of_act) for of_act in growths)
-        within = [v for e in growths[0] for v in (e.below(1 + AGED), opposite(e.below(1 - AGED)))]
+        within = [v for e in growths[0] for v in (e.below(1 + AGED), e.above(1 - AGED))]
         return "{}; act (b): {}".format(*texts), all_of(within)
 
     def _any_length(self) -> Judged:
@@ -267,7 +262,7 @@ class Claims(Evidence):
         listed = ", ".join(f"{each.part()} of {words}" for words, each in shares.items())
         slow = _share(self.raw, "nrmse", SLOW).part()
         words = f"loads make {listed}; act (b): surge and loads {slow} of ANRMSE"
-        return words, all_of(opposite(each.below(0.5)) for each in shares.values())
+        return words, all_of(each.above(0.5) for each in shares.values())
 
     def _load_divergence(self) -> Judged:
         at = self.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
@@ -278,7 +273,7 @@ class Claims(Evidence):
             f"{float(loads['mean']):.4f} against {float(others['mean']):.4f}: a factor of "
             f"{ratio.value:.0f} [{ratio.lower:.1f}, {ratio.upper:.0f}]"
         )
-        return words, opposite(ratio.below(10**0.5))
+        return words, ratio.above(10**0.5)
 
     def _densities(self) -> Judged:
         at = self.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
@@ -286,7 +281,7 @@ class Claims(Evidence):
         count, total = int(within.sum()), within.size
         share = Interval(count / total, *binomtest(count, total).proportion_ci())
         words = f"{count} of {total} motions within the noise of the record: {share.part()}"
-        return words, opposite(share.below(ALMOST))
+        return words, share.above(ALMOST)
 
     def _better(self, statistic: Statistic = _median) -> Judged:
         differences = _against_single(self, statistic=statistic)
@@ -358,7 +353,7 @@ class Claims(Evidence):
             for key, words in HEADING.items()
         }
         return _changes(differences), all_of(
-            [opposite(differences["ANRMSE"].below(1.0)), differences["NAMMAE"].below(1.0)]
+            [differences["ANRMSE"].above(1.0), differences["NAMMAE"].below(1.0)]
         )
 
     def _phase(self) -> Judged:
@@ -368,7 +363,7 @@ class Claims(Evidence):
         interval = partial(self.interval, tests=REGULAR)
         loads, motions = (interval(_middle, each).text(0, "°") for each in both)
         more = interval(lambda a, b: _middle(a) - _middle(b), *both, signed=True)
-        return f"median |phase|: loads {loads}, motions {motions}", opposite(more.below(0.0))
+        return f"median |phase|: loads {loads}, motions {motions}", more.above(0.0)
 
     def _stern(self) -> Judged:
         line = "mooring_stern"
@@ -388,12 +383,12 @@ class Claims(Evidence):
         radii = self.variants("radius")
         ours, none = (self.interval(_middle, radii[k]) for k in ("ridge", "none"))
         words = f"spectral radius {ours.text()} with λ, {none.text()} without"
-        return words, all_of([ours.below(1.0), opposite(none.below(1.0))])
+        return words, all_of([ours.below(1.0), none.above(1.0)])
 
     def _cheaper(self) -> Judged:
         seconds = self.variants("seconds")
         times = self.interval(_middle, seconds["truncated"] / seconds["ridge"])
-        return f"the SVD takes {times.text(0)} times as long", opposite(times.below(1.0))
+        return f"the SVD takes {times.text(0)} times as long", times.above(1.0)
 
     def _robust_to_noise(self) -> Judged:
         data = self.result.groups[f"regularisation/{SINGLE}"]

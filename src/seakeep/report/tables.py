@@ -278,6 +278,10 @@ class Interval(NamedTuple):
         """Whether it lies below a bound; None where the interval holds the bound."""
         return self.below_other(Interval(bound, bound, bound))
 
+    def above(self, bound: float) -> bool | None:
+        """Whether it lies above a bound; None where the interval holds the bound."""
+        return Interval(bound, bound, bound).below_other(self)
+
     def below_other(self, other: Interval) -> bool | None:
         """Whether it lies below another number; None where the intervals meet."""
         if self.upper < other.lower:
