@@ -124,7 +124,10 @@ def response(
         values["phase_spread"] = np.degrees(np.quantile(turned, LEVEL, axis=0))
     known = coverage.is_trained(frequency)[[coverage.channels.index(name) for name in waves]]
     of = units_of(model, waves)
-    units = [[_ratio(x, u) for u in of] for x in units_of(model, model.states)]
+    units = [
+        [x if u in ("", "1") else f"{x or '1'}/{u}" for u in of]
+        for x in units_of(model, model.states)
+    ]
     out = xr.Dataset(
         {key: (dims, value) for key, value in values.items()}
         | {"trained": (("input", "frequency"), known)},
@@ -174,10 +177,6 @@ def _default_frequencies(coverage: Coverage, dt: float) -> FloatArray:
     if known.size:
         low, highest = 0.5 * known[0], min(highest, 1.3 * known[-1])
     return np.geomspace(low, highest, FREQUENCIES)
-
-
-def _ratio(units: str, per: str) -> str:
-    return f"{units or '1'}/{per}" if per and per != "1" else units
 
 
 def measured_response(model: Model, runs: Datasets) -> xr.Dataset:

@@ -197,7 +197,11 @@ def validity(model: Model, runs: Datasets) -> xr.Dataset:
                 row[:3] = _sea(part.inputs[inside, reference], model.dt, part.run)
                 row[3] = np.nan if surge is None else part.states[inside, surge].mean()
         facts.append(of_parts)
-        outside.append(_outside(model, part.run, np.isfinite(of_parts[1, 1])))
+        why = []
+        if np.isfinite(of_parts[1, 1]):
+            begin, end = whole_span(part.run, "test")
+            why = outside_training(model, part.run, begin, round((end - begin) / model.dt))
+        outside.append("; ".join(why))
     if not parts:
         raise DataError("no run has all channels of the model: there are no waves to compare.")
     columns = np.moveaxis(np.array(facts), -1, 0)
@@ -225,10 +229,3 @@ def _sea(wave: FloatArray, dt: float, run: xr.Dataset) -> tuple[float, float, fl
     if depth is not None:
         steepness = height * wavenumber(2 * np.pi / period, depth) / (2 * np.pi)
     return height, period, steepness
-
-
-def _outside(model: Model, run: xr.Dataset, is_test: bool) -> str:
-    if not is_test:
-        return ""
-    begin, end = whole_span(run, "test")
-    return "; ".join(outside_training(model, run, begin, round((end - begin) / model.dt)))

@@ -119,7 +119,8 @@ def _columns(path: Path, channels: list[Any], data: list[npt.NDArray[Any]]) -> C
     values, units = {}, {}
     for name, channel, numbers in zip(names, channels, data, strict=True):
         if numbers.dtype.kind == "M":
-            values[name], units[name] = _seconds(numbers), "s"
+            after = numbers - numbers[0]  # NaN where one is missing
+            values[name], units[name] = after / np.timedelta64(1, "ns") * 1e-9, "s"
             continue
         values[name] = numbers.astype(float)
         unit = next((channel.properties[key] for key in _UNITS if key in channel.properties), "")
@@ -130,11 +131,6 @@ def _columns(path: Path, channels: list[Any], data: list[npt.NDArray[Any]]) -> C
         values = {"time": time, **values}
         units["time"] = "s"
     return Columns(values, units)
-
-
-def _seconds(instants: npt.NDArray[Any]) -> FloatArray:
-    """Seconds after the first instant; a missing one is NaN."""
-    return (instants - instants[0]) / np.timedelta64(1, "ns") * 1e-9
 
 
 def _waveform_time(path: Path, channels: list[Any], count: int) -> FloatArray | None:

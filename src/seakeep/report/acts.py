@@ -18,7 +18,7 @@ from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.results import divergence_table
 from seakeep.report.style import HEADING, model_words
-from seakeep.report.tables import Interval, Number, Table, number, numbers, ratio_of, table, words
+from seakeep.report.tables import WORDS, Interval, Number, Table, number, numbers, ratio_of, table
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -56,7 +56,7 @@ def claims_table(results: Results) -> Table:
     verdicts = {True: "holds", False: "does not", None: "cannot tell"}
     limits = {"useful": USEFUL, "aged": 100 * AGED, "almost": 100 * ALMOST}
     acts, rows = Claims(results["paper"], Evidence(results["raw"])), []
-    for key, (claim, how) in words()["claims"].items():
+    for key, (claim, how) in WORDS["claims"].items():
         figure, holds = acts.judge(key)
         rows.append((claim, figure, verdicts[holds], how.format(**limits)))
     return table("claims", rows)
@@ -478,7 +478,7 @@ def short_table(results: Results) -> Table:
     last = list(results)[-1]
     rows = [
         (said, *(" / ".join(pair) for pair in _pairs(results[act], model)))
-        for act, model, said in (*words()["rows"], (last, "hold_last", "last measured state"))
+        for act, model, said in (*WORDS["rows"], (last, "hold_last", "last measured state"))
         if act in results
     ]
     first = results[last]

@@ -15,6 +15,7 @@ from seakeep.report.page import Drawing, Section, drawing, section, write_page
 from seakeep.report.style import shown_unit
 from seakeep.report.tables import (
     MISSING,
+    WORDS,
     Number,
     Table,
     change,
@@ -28,7 +29,6 @@ from seakeep.report.tables import (
     short,
     table,
     uncertain,
-    words,
 )
 
 OVERSHOOT = 1.1
@@ -449,7 +449,7 @@ def check_sections(checked: Checked) -> list[Section]:
     out = []
     for make, needed in CHECK_SECTIONS.items():
         result = checked.results.get(needed[0])
-        title = words()["sections"][needed[0]]["title"]
+        title = WORDS["sections"][needed[0]]["title"]
         built = Section(needed[0], title) if result is None else make(result, checked)
         refused = [checked.refused[name] for name in needed if name in checked.refused]
         texts = [f"Cannot be judged: {text}" for text in dict.fromkeys(refused)]

@@ -20,6 +20,7 @@ from seakeep.files import MARK, replacing, write_netcdf, write_text
 from seakeep.models import HankelEnsemble
 from seakeep.models.forecasts import counted
 from seakeep.report.tables import (
+    WORDS,
     Number,
     Table,
     band_verdict,
@@ -33,7 +34,6 @@ from seakeep.report.tables import (
     ratio_of,
     row,
     short,
-    words,
 )
 from seakeep.study.judge import verdict
 
@@ -45,7 +45,7 @@ HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
 
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Comparison of forecasts with measurements, tables per run that fit a terminal."""
-    shown = {name: each for name, each in words()["comparison"].items() if name in table}
+    shown = {name: each for name, each in WORDS["comparison"].items() if name in table}
     heads, places, of_all = zip(*shown.values(), strict=True)
     cells = partial(row, **dict(zip(shown, places, strict=True)))
     for at in entries(table, "run"):
@@ -88,7 +88,7 @@ def _by_channel(
 
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
-    shown = {name: heading for name, heading in words()["extremes"].items() if name in at}
+    shown = {name: heading for name, heading in WORDS["extremes"].items() if name in at}
     cells = partial(row, **dict.fromkeys(shown, short))
     heads = ("unit", *shown.values())
     return _by_channel(at, "extremes", title, heads, lambda one: cells(one, "channel_units"))

@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 from seakeep.arrays import Progress
 from seakeep.files import MARK, check_output, write_text
 from seakeep.report.style import Figure, figure_style, save_figure
-from seakeep.report.tables import Table, shade, words, write_csv, write_latex
+from seakeep.report.tables import WORDS, Table, shade, write_csv, write_latex
 from seakeep.study.store import storing
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def drawing(key: str, draw: Callable[..., Figure], *given: Any, **values: Any) -
 
     `draw` takes what is `given`; the value ``name`` is that of its files, by default the key.
     """
-    caption = words()["figures"][key].format(**values)
+    caption = WORDS["figures"][key].format(**values)
     return Drawing(values.get("name", key), caption, partial(draw, *given))
 
 
@@ -111,7 +111,7 @@ def section(
     `parts` are its figures and tables; a table without rows is left out. Of what is `given`, parts
     of a :class:`Section` are its own, and the rest is what the paragraphs hold in braces.
     """
-    entry = words()["sections"][key]
+    entry = WORDS["sections"][key]
     paragraphs = [each.format(**given) for each in entry.get("words", ())]
     return Section(
         key,

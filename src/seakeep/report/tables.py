@@ -6,7 +6,7 @@ import csv
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, SupportsFloat
@@ -89,10 +89,8 @@ class Table:
         )
 
 
-@cache
-def words() -> dict[str, Any]:
-    """Words of the pages: sections, figures and tables by name."""
-    return packaged("report/templates/words.toml")
+WORDS = packaged("report/templates/words.toml")
+"""Words of the pages: sections, figures and tables by name."""
 
 
 def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any) -> Table:
@@ -114,7 +112,7 @@ def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any)
     -------
     Table
     """
-    entry = {"name": key, "columns": (), "note": "", **words()["tables"][key], **given}
+    entry = {"name": key, "columns": (), "note": "", **WORDS["tables"][key], **given}
     entry["columns"] = tuple(each.format(**given) for each in entry["columns"])
     for part in ("title", "note"):
         entry[part] = entry[part].format(**given)
@@ -461,7 +459,7 @@ def latex_text(text: str) -> str:
     '$-$0.12 [$-$0.3, 0.1] a-1'
     """
     text = re.sub(r"(?<![\w)])-(?=\d)", "−", text)
-    known = words()["latex"]
+    known = WORDS["latex"]
     signs = "|".join(map(re.escape, sorted(known, key=len, reverse=True)))
     return re.sub(signs, lambda match: known[match[0]], text)
 

@@ -25,6 +25,7 @@ from seakeep.report.sections.data import test_overlap, training_overlap, unequal
 from seakeep.report.style import HEADING, judged_models, model_words
 from seakeep.report.tables import (
     MISSING,
+    WORDS,
     Number,
     Table,
     band_verdict,
@@ -39,7 +40,6 @@ from seakeep.report.tables import (
     signed,
     small_number,
     table,
-    words,
 )
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -293,7 +293,7 @@ def glossary(result: StudyResult) -> Section:
     }
     terms = [
         (term, meaning.format(**values))
-        for term, meaning in words()["terms"].items()
+        for term, meaning in WORDS["terms"].items()
         if not left_out.get(term)
     ]
     return section("words", terms=terms)
@@ -583,7 +583,7 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
         yield from (small_number(one[key]) for key in keys)
         yield "" if of_all else number(one["block_length"], 0)
         if comparable:
-            yield from words()["published"].get(name, (MISSING,) * 4)
+            yield from WORDS["published"].get(name, (MISSING,) * 4)
 
     quantiles = ("EV", "q0.025", "q0.975", "U")
     heads = [*quantiles, "noise floor", "block (samples)"]
