@@ -347,7 +347,6 @@ datasets = typer.Typer(
     help=("List the public data sets of the examples, or fetch one.\n\nExample: seakeep datasets"),
     invoke_without_command=True,
     rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 
 

@@ -478,10 +478,7 @@ def check(
     for section in check_sections(checked):
         for text in (*section.points, *section.notices):
             show(f"{section.title}: {text}")
-    kind = ", ".join(
-        counted(len(names), what)
-        for names, what in ((identified.states, "state"), (identified.inputs, "input"))
-    )
-    words = f"{model.name}, a model of kind {identified.kind} ({kind}), on {read.name}."
+    size = f"{counted(len(channels[0]), 'state')}, {counted(len(channels[1]), 'input')}"
+    words = f"{model.name}, a model of kind {identified.kind} ({size}), on {read.name}."
     page = write_check(checked, out, f"{model.stem}: what the model is worth", words)
     say(f"Wrote {page}.")

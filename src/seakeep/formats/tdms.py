@@ -123,9 +123,9 @@ def _columns(path: Path, channels: list[Any], data: list[npt.NDArray[Any]]) -> C
             values[name], units[name] = after / np.timedelta64(1, "ns") * 1e-9, "s"
             continue
         values[name] = numbers.astype(float)
-        unit = next((channel.properties[key] for key in _UNITS if key in channel.properties), "")
-        if str(unit).strip():
-            units[name] = str(unit).strip()
+        stated = (channel.properties[key] for key in _UNITS if key in channel.properties)
+        if unit := str(next(stated, "")).strip():
+            units[name] = unit
     time = _waveform_time(path, channels, data[0].size)
     if time is not None and not any(name.lower() == "time" for name in names):
         values = {"time": time, **values}
