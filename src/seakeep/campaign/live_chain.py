@@ -185,8 +185,7 @@ class LiveChain:
                 "needed, a number per row each. Send NaN for a value that was lost."
             )
         name, factor = self._time[key]
-        before = self._rows[key][name][-1:]
-        times = np.concatenate([before, arrays[name]])
+        times = np.concatenate([self._rows[key][name][-1:], arrays[name]])
         if not np.all(np.diff(times) > 0) or not np.all(np.isfinite(times)):
             raise RequestError(
                 f"the instants of '{key}' do not increase: "
@@ -225,10 +224,11 @@ class LiveChain:
         ends = [each["time"].values[[0, -1]] for each in run.groups.values()]
         low = math.ceil((max(each[0] for each in ends) - origin) / dt - 1e-9)
         high = math.floor((min(each[1] for each in ends) - origin) / dt + 1e-9)
-        axis = origin + dt * np.arange(low, high + 1, dtype=float)
-        data = resampled(run, dt, axis).data
-        names = list(run.settings.channel_names)
-        return data[names].reset_coords(drop=True).isel(time=slice(max(first - low, 0), stop - low))
+        data = resampled(run, dt, origin + dt * np.arange(low, high + 1)).data
+        ready = data[[*run.settings.channel_names]].isel(
+            time=slice(max(first - low, 0), stop - low)
+        )
+        return ready.reset_coords(drop=True)
 
     def _trim(self) -> None:
         """Forget rows that have left the window."""

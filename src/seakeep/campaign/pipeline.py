@@ -663,8 +663,8 @@ def cropped(run: Run) -> Run:
     spans = {k: (number(each[0]), number(each[1])) for k, each in stated.items() if each}
 
     def used(key: str, record: tuple[float, float], slack: float) -> BoolArray:
-        time = data["time"].values
-        return _part(f"runs.{run.name}.{key}", spans[key], time, dt, record, slack)
+        place = f"runs.{run.name}.{key}"
+        return _part(place, spans[key], data["time"].values, dt, record, slack)
 
     parts = {key: used(key, record, slack) for key in spans}
     if "span" in parts:

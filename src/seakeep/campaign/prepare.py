@@ -114,8 +114,7 @@ class Campaign:
             content["campaign"]["period_channel"] = self.period_channel()
         content["celerity_channels"] = self.settings.celerity_channels
         content["format"] = FORMAT
-        text = json.dumps(content, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     @property
     def _measures_period(self) -> bool:

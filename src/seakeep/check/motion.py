@@ -232,8 +232,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
             "waves. Fit one with observables = [seakeep.SlowSquares(…)] for drift."
         )
     reference = reference_probe(model, runs)
-    period = mean_period(runs, model.inputs) * model.dt
-    samples = round(PERIODS * period / model.dt)
+    samples = round(PERIODS * mean_period(runs, model.inputs))
     step = 1.0 / (samples * model.dt)
     bins = _probed(single, step)
     turns = wave_turns(model, runs, step * np.arange(bins[-1] + DIFFERENCES + 1), reference)
@@ -279,8 +278,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
 def _probed(model: HankelDMDcModel, step: float) -> IntArray:
     """Multiples of the step at which waves probe: up to twelve that were trained."""
     every = np.arange(1, int(0.4 / model.dt / step))
-    frequency = step * every.astype(float)
-    known = every[model.coverage.is_trained(frequency).any(axis=0)]
+    known = every[model.coverage.is_trained(step * every.astype(float)).any(axis=0)]
     if not known.size:
         raise DataError("training holds no waves by which the model could be probed.")
     return known[np.linspace(0, known.size - 1, min(12, known.size)).round().astype(int)]

@@ -115,8 +115,7 @@ def used_parts(model: Model, runs: Datasets) -> dict[str, Part]:
             continue
         begin, end = whole_span(run)
         whole = np.isfinite(states).all(axis=1) & np.isfinite(inputs).all(axis=1)
-        inside = whole & (time >= begin - 1e-6) & (time <= end + 1e-6)
-        pieces = stretches(inside)
+        pieces = stretches(whole & (time >= begin - 1e-6) & (time <= end + 1e-6))
         if not pieces:
             warn(f"{name} is left out: no sample of it has all channels of the model.")
             continue

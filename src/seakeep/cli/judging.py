@@ -317,8 +317,10 @@ def _nowcast(
     for block in nowcast_blocks(results):
         print_table(block)
     written = [write_nowcasts(results, table)]
-    for name, path in figures.items():
-        written.append(save_figure(nowcast_figure(results, name.removeprefix(NOWCAST)), path))
+    written += [
+        save_figure(nowcast_figure(results, name.removeprefix(NOWCAST)), path)
+        for name, path in figures.items()
+    ]
     say_written(written)
 
 
@@ -357,8 +359,7 @@ def _print_comparison(tables: Datasets) -> None:
     from seakeep.report.comparison import band_findings, comparison_blocks, model_blocks
 
     several = len(tables) > 1
-    blocks = model_blocks(tables) if several else comparison_blocks(*tables.values())
-    for block in blocks:
+    for block in model_blocks(tables) if several else comparison_blocks(*tables.values()):
         print_table(block)
     for name, table in tables.items():
         for text in band_findings(table):

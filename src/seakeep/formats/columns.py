@@ -58,8 +58,7 @@ class Columns:
         """Name of a column, given by name or by full header; None if there is none."""
         if wanted in self.values or wanted in self.faults:
             return wanted
-        by_header = {header: name for name, header in self.headers.items()}
-        return by_header.get(wanted.strip())
+        return {header: name for name, header in self.headers.items()}.get(wanted.strip())
 
 
 def meant_column(wanted: str, tables: Iterable[Columns]) -> str:

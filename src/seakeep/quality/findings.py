@@ -109,7 +109,7 @@ def as_json(findings: Iterable[Finding]) -> str:
     return json.dumps(
         [
             vars(each)
-            | {"kind": each.kind.name, "details": dict(each.details), "text": each.text}
+            | {"kind": each.kind.name, "text": each.text}
             | {key: _finite(getattr(each, key)) for key in ("value", "limit", "place")}
             for each in findings
         ],

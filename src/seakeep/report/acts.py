@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -548,14 +548,12 @@ def _pairs(result: StudyResult, model: str) -> list[list[Number]]:
 
 def acts_table(results: Results) -> Table:
     """Median errors of every model of every act, per sea, of wave-frequency and slow channels."""
-    rows, first = [], next(iter(results.values()))
-    for act in _played(results):
-        result = results[act.name]
-        for model in result.models:
-            pairs = _pairs(result, model)
-            rows.append(
-                (act.letter, model_words(model), *(each for pair in pairs for each in pair))
-            )
+    first = next(iter(results.values()))
+    rows = [
+        (act.letter, model_words(model), *chain(*_pairs(results[act.name], model)))
+        for act in _played(results)
+        for model in results[act.name].models
+    ]
     seas = [first.label_of(test).removeprefix("regular, ") for test in first.tests]
     reading = [a.letter for a in _played(results) if results[a.name].attrs["conditional_on"]]
     conditions = (

@@ -83,8 +83,7 @@ def _by_channel(
     last = [len(rows)] if averages else []
     if averages:
         rows.append(("average", *averages))
-    columns = ("channel", *heads)
-    return Table(f"{name}_{run}", f"{run}: {title}", columns, rows, note, averages=last)
+    return Table(f"{name}_{run}", f"{run}: {title}", ("channel", *heads), rows, note, averages=last)
 
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
@@ -227,8 +226,7 @@ def nowcast_blocks(nowcasts: Datasets) -> Iterator[Table]:
     for model, of_model in nowcasts.items():
         share, lead = of_model.attrs["share"], of_model["lead"].values
         places = [max(round(len(lead) * part) - 1, 0) for part in (0.05, 0.2, 0.5, 1.0)]
-        times = [f"at {number(each)} s" for each in lead[places]]
-        heads = ("lead time s", *times, "in band %")
+        heads = ("lead time s", *(f"at {number(each)} s" for each in lead[places]), "in band %")
         note = (
             f"errors in training SD over {of_model.attrs['starts']} forecasts, no wave after "
             f"a start known; lead time: error below {share:g} SD"

@@ -122,9 +122,8 @@ def legend_outside(figure: Any, *places: Any, side: str = "lower center", **opti
     if not unique:
         return None
     across = max(1, int(13 * figure.get_figwidth() / (6 + max(map(len, unique)))))  # letters
-    columns = min(len(unique), across)
-    loc = f"outside {side}"
-    return figure.legend(unique.values(), unique, loc=loc, ncols=columns, **options)
+    options |= {"loc": f"outside {side}", "ncols": min(len(unique), across)}
+    return figure.legend(unique.values(), unique, **options)
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
@@ -157,7 +156,7 @@ def line_of(result: StudyResult, model: str) -> dict[str, Any]:
     """Line of a model: that of a forecast or an ensemble, in its own colour beyond the first."""
     kinds = {name: "ensemble" if name in result.ensembles else "forecast" for name in result.models}
     line = LINES[kinds[model]]
-    first = [name for kind in LINES for name in [n for n in kinds if kinds[n] == kind][:1]]
+    first = {kind: name for name, kind in reversed(kinds.items())}.values()
     if model in first:
         return line
     others = [name for name in kinds if name not in first]

@@ -70,8 +70,7 @@ def autoregression(series: FloatArray, order: int, noise: float = 0.0) -> tuple[
 def continued(past: FloatArray, whitening: FloatArray, count: int) -> FloatArray:
     """The `count` values that are expected after a series of zero mean."""
     order = len(whitening) - 1
-    lags = scipy.linalg.toeplitz(past[: -order - 1 : -1], np.zeros(order))
-    state = -whitening[1:] @ lags
+    state = -whitening[1:] @ scipy.linalg.toeplitz(past[: -order - 1 : -1], np.zeros(order))
     return scipy.signal.lfilter([1.0], whitening, np.zeros(count), zi=state)[0]
 
 

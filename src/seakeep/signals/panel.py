@@ -201,8 +201,7 @@ def _corners(
         # Pixels that a border divides count in part, or the sum would depend on the grid.
         near = np.clip(end * along - (0.5 * length - side) + 0.5, 0.0, 1.0)
         for half in (-1.0, 1.0):
-            inside = near * np.clip(half * down + 0.5, 0.0, 1.0)
-            out.append(np.sum(inside * seen) / side**2)
+            out.append(np.sum(near * np.clip(half * down + 0.5, 0.0, 1.0) * seen) / side**2)
     return dict(zip(CORNERS, out, strict=True))
 
 

@@ -247,5 +247,5 @@ def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: f
     >>> round(predictable_time(wave, 0.05, 2.0, np.inf), 1)  # 2 d ω / g
     1.2
     """
-    edge = band_limit(series, dt, QUICKLY)
-    return float(distance / group_speed(2 * np.pi * edge, depth))
+    edge = 2 * np.pi * band_limit(series, dt, QUICKLY)
+    return float(distance / group_speed(edge, depth))

@@ -379,8 +379,7 @@ def _judge(
         middle = scipy.ndimage.median_filter(place, (1, NEIGHBOURS), mode="nearest")
         flag[at[np.hypot(*(place - middle)) > reach]] = FLAGS["jump"]
     quality = np.clip(1.0 - 0.5 * shape, 0.0, 1.0)
-    most = np.where(flag == FLAGS["good"], 1.0, FLAGGED_QUALITY)
-    return flag, np.minimum(quality, most)
+    return flag, np.minimum(quality, np.where(flag == FLAGS["good"], 1.0, FLAGGED_QUALITY))
 
 
 def _motions(

@@ -408,5 +408,5 @@ def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
             place.errorbar(own["point_frequency"], *offsets, **style)
         place.set(xlabel="frequency [Hz]", ylabel=f"{label} [{unit}]")
 
-    states = _answering(result["slow_response"])
-    return by_state(result.sel(state=states), axes, (3.0, 2.0), draw)
+    shown = result.sel(state=_answering(result["slow_response"]))
+    return by_state(shown, axes, (3.0, 2.0), draw)

@@ -547,8 +547,7 @@ def draw_spectra(
             f, (colour, dash) = curves[0][0], WELCH[kind]
             mean = np.mean([np.interp(f, *each) for each in curves], axis=0)
             axes.plot(f, mean, label=label, color=colour, linestyle=dash)
-    known = np.unique(regular[np.isfinite(regular)].round(3))
-    for number, frequency in enumerate(known):
+    for number, frequency in enumerate(np.unique(regular[np.isfinite(regular)].round(3))):
         style = {"color": COLOURS["start"], "linewidth": 0.9, "linestyle": "--"}
         axes.axvline(frequency, **style, label=None if number else "regular waves")
     axes.set_ylim(bottom=0)

@@ -9,7 +9,7 @@ from seakeep.report.sections import data, histories, results
 from seakeep.study import StudyResult
 from seakeep.study.store import storing
 
-SECTIONS: list[Callable[[StudyResult], Section | None]] = [
+SECTIONS: list[Callable[[StudyResult], Section]] = [
     results.summary,
     results.errors,
     results.scales,
@@ -48,8 +48,7 @@ def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
     Path
         The page; errors as of :func:`seakeep.report.page.write_page`.
     """
-    made = [make(result) for make in SECTIONS]
-    sections = [each for each in made if each is not None and not each.is_empty]
+    sections = [each for make in SECTIONS if not (each := make(result)).is_empty]
     stamp = {key: str(result.attrs[key]) for key in ("preset", "seed", "digest", "description")}
     stamp["finished"] = data.finished(result)
     with storing(result.folder):

@@ -307,15 +307,30 @@ def errors(result: StudyResult) -> Section:
     """Return the errors of every model in every test set."""
     tests = list(result.tests)
     groups = [tests[:1], tests[1:]] if len(tests) <= 9 else [tests]
-    figures = []
-    for group in filter(None, groups):
-        words = {"tests": ", ".join(map(result.label_of, group)), "fewest": FEWEST}
-        words["name"] = f"errors_{group[0] if len(group) == 1 else 'others'}"
-        figures.append(drawing("errors", average_boxes, result, group, **words))
-    for test in tests:
-        words = {"tests": result.label_of(test), "fewest": FEWEST}
-        words["name"] = f"errors_{test}_by_channel"
-        figures.append(drawing("errors_by_channel", channel_boxes, result, test, **words))
+    figures = [
+        drawing(
+            "errors",
+            average_boxes,
+            result,
+            group,
+            tests=", ".join(map(result.label_of, group)),
+            fewest=FEWEST,
+            name=f"errors_{group[0] if len(group) == 1 else 'others'}",
+        )
+        for group in filter(None, groups)
+    ]
+    figures += [
+        drawing(
+            "errors_by_channel",
+            channel_boxes,
+            result,
+            test,
+            tests=result.label_of(test),
+            fewest=FEWEST,
+            name=f"errors_{test}_by_channel",
+        )
+        for test in tests
+    ]
     tables = (error_table(result, test) for test in tests)
     return section("errors", *figures, overview_table(result), *tables)
 
@@ -364,10 +379,10 @@ def _scales_table(result: StudyResult, test: str) -> Table:
     return by_channel(result, "scales", cells, heads, test=test)
 
 
-def regular(result: StudyResult) -> Section | None:
+def regular(result: StudyResult) -> Section:
     """Return the errors in regular waves, taken apart."""
     if (response := result.groups.get("statistics/response")) is None:
-        return None
+        return section("regular")
     tests = response["test"].values.tolist()
     more = [_slack_words(result, tests)]
     return section("regular", _response_table(result, tests), more=more)
@@ -561,10 +576,17 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
 
 def densities(result: StudyResult) -> Section:
     """Return densities of measurement and forecasts, and their divergence."""
-    figures = []
-    for model in result.ensembles or result.models[:1]:
-        words = {"name": f"densities_{model}", "model": model_words(model)}
-        figures.append(drawing("densities", density_figure, result, model, **words))
+    figures = [
+        drawing(
+            "densities",
+            density_figure,
+            result,
+            model,
+            name=f"densities_{model}",
+            model=model_words(model),
+        )
+        for model in result.ensembles or result.models[:1]
+    ]
     order = sorted(judged_models(result), key=lambda model: model not in result.ensembles)
     tables = (divergence_table(result, m, variant) for m in order for variant in VARIANTS)
     return section("densities", *figures, *tables)
@@ -607,8 +629,9 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     )
 
 
-def eigenvalues(result: StudyResult) -> Section | None:
+def eigenvalues(result: StudyResult) -> Section:
     """Return the eigenvalues of the models of the first training set."""
-    if not any(name.startswith("eigenvalues/") for name in result.groups):
-        return None
-    return section("eigenvalues", drawing("eigenvalues", eigenvalue_figure, result, lowest=LOWEST))
+    figure = None
+    if any(name.startswith("eigenvalues/") for name in result.groups):
+        figure = drawing("eigenvalues", eigenvalue_figure, result, lowest=LOWEST)
+    return section("eigenvalues", figure)
