@@ -177,7 +177,6 @@ def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
         # Structured names are ASCII.
         "convention": "structured" if all(c["name"].isascii() for c in channels) else "flat",
         "channels": channels,
-        "start": [channel["start"] for channel in channels],
         # Histories stand in the order of C: those of the states, row by row, then the inputs'.
         "histories": [
             (channel, row + 1)

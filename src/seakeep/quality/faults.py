@@ -17,10 +17,8 @@ from seakeep.signals.filters import odd_extension
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import dominant_period
 
-MISSING, BRIDGED, OUTLIER, SATURATED, STUCK, REPLACED = 1, 2, 4, 8, 16, 32
-
-FLAGS = {"missing": MISSING, "bridged": BRIDGED, "outlier": OUTLIER, "saturated": SATURATED,
-         "stuck": STUCK, "replaced": REPLACED}  # fmt: skip
+FLAGS = {"missing": 1, "bridged": 2, "outlier": 4, "saturated": 8, "stuck": 16, "replaced": 32}
+MISSING, BRIDGED, OUTLIER, SATURATED, STUCK, REPLACED = FLAGS.values()
 
 BESIDE = 5
 """Samples on either side whose medians say where a sample should be: they stay right beside a

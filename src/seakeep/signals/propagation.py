@@ -449,7 +449,7 @@ def probe_separation(
         spread=float(_jackknife(np.array(without))),
         correlation=float(total.max()),
         stated=place,
-        input_error=float(np.sqrt(np.sum(weight * turned) / np.sum(weight))),
+        input_error=math.sqrt(np.sum(weight * turned) / np.sum(weight)),
     )
 
 

@@ -113,7 +113,7 @@ def _line(own: FloatArray, reference: FloatArray, errors: FloatArray, method: st
             break
         inliers = updated
     count = int(inliers.sum())
-    rms = float(np.sqrt(np.mean(residual[inliers] ** 2)))
+    rms = math.sqrt(np.mean(residual[inliers] ** 2))
     formal = np.sqrt(np.mean(errors[inliers] ** 2))
     sigma = max(rms * np.sqrt(count / (count - 2)) if count > 2 else 0.0, formal)
     drift_error = float(sigma / np.sqrt(spread)) if spread > 0 else np.nan
@@ -379,7 +379,7 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
         level = max(clock.offset_error**2 - (clock.centre * own) ** 2, 0.0)
         return replace(
             clock.with_drift(mean, f"drift of {len(known)} runs"),
-            offset_error=float(np.sqrt(level + (clock.centre * error) ** 2)),
+            offset_error=math.sqrt(level + (clock.centre * error) ** 2),
             drift_error=error,
         )
 

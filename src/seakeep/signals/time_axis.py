@@ -231,7 +231,7 @@ def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
         count=t.size,
         missing=int(place[-1]) + 1 - t.size,
         gaps=tuple((float(t[i]), float(round(t[i + 1] - t[i], 9))) for i in at),
-        jitter_rms=float(np.sqrt(np.mean(away**2))),
+        jitter_rms=math.sqrt(np.mean(away**2)),
         jittered=bool(np.abs(away).max() > _tolerance(t, step)),
     )
 

@@ -12,7 +12,7 @@ from seakeep.report.figures.histories import spectrum_figure
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.quality_sheet import clock_rows, other_findings, run_row
 from seakeep.report.style import model_words, shown_unit
-from seakeep.report.tables import Table, entries, number, percent, row, table
+from seakeep.report.tables import WORDS, Table, entries, number, percent, row, table
 from seakeep.study import StudyResult
 from seakeep.study.judge import window_spans
 from seakeep.study.plan import windows_overlap
@@ -96,11 +96,7 @@ def data(result: StudyResult) -> Section:
 
 APART = 0.005
 """Windows that share less than this part of their length are apart."""
-UNITS = {
-    **dict.fromkeys(("length", "split_period"), "T̂"),
-    **dict.fromkeys(("state_delays", "input_delays", "window", "lead"), "samples"),
-    **dict.fromkeys(("startup", "encounter_period"), "s"),
-}
+UNITS = WORDS["units"]
 """Units of settings, by the last part of their key."""
 
 

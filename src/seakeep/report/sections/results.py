@@ -1,6 +1,7 @@
 """Results of a study: their summary in sentences, errors, bands and densities, and a glossary."""
 
 import re
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
@@ -253,7 +254,6 @@ def _few_cells(result: StudyResult) -> str:
     )
 
 
-_LETTERS = {r"\theta": "θ", r"\phi": "φ", r"\psi": "ψ", r"\eta": "η"}
 _ACCENTS = {"dot": "\N{COMBINING DOT ABOVE}", "ddot": "\N{COMBINING DIAERESIS}"}
 
 
@@ -269,8 +269,8 @@ def plain_symbol(channel: str) -> str:
     if known is None:
         return channel.replace("_", " ")
     text = re.sub(r"\\mathrm\{([^}]*)\}|\\mathrm ?(\w+)", r"\1\2", known.symbol)
-    for tex, letter in _LETTERS.items():
-        text = text.replace(tex, letter)
+    greek = r"\\(theta|phi|psi|eta)"
+    text = re.sub(greek, lambda m: unicodedata.lookup(f"GREEK SMALL LETTER {m[1]}"), text)
     return re.sub(r"\\(d?dot)\{(\w)\}", lambda m: m[2] + _ACCENTS[m[1]], text)
 
 
