@@ -97,11 +97,11 @@ def draft_campaign(
 
 def _value(value: object) -> str:
     """A value as TOML writes it."""
-    return str(tomlkit.item(value).as_string())
+    return tomlkit.item(value).as_string()
 
 
 def _key(name: str) -> str:
-    return str(tomlkit.key(name).as_string())
+    return tomlkit.key(name).as_string()
 
 
 def _refuse(files: Files) -> None:
@@ -153,21 +153,21 @@ def _assumed_rate(files: str) -> str:
 def _files(files: Files, known: Mapping[str, object]) -> Iterator[str]:
     yield from ("", "[files]", *(f"{key} = {_value(value)}" for key, value in known.items()))
     first, times = files[0], {file.time for file in files}
-    if first.time is not None and len(times) == 1:
+    if first.time and len(times) == 1:
         why = "guessed from its name"
         if time_column(first.table) is None:
             unit, step = (of(first.table, first.time) for of in (time_unit_of, time_step_of))
             rate = "" if step is None else f": {1 / float(step):.6g} samples per second"
             why = f"guessed: it rises evenly, as times do, in {unit}{rate}. Check it"
         yield f"time = {_value(first.time)} # {why}"
-    elif not first.logger and None in times and first.table.sampling_rate is None:
+    elif not first.logger and "" in times and first.table.sampling_rate is None:
         yield _assumed_rate("the files have")
 
 
 def _channels(guesses: Guesses) -> Iterator[str]:
     yield "\n# A channel is sign * (reading + offset), converted to SI."
-    for guess in (each for each in guesses if each.channel is not None):
-        canonical = canonical_channel(str(guess.channel))
+    for guess in (each for each in guesses if each.channel):
+        canonical = canonical_channel(guess.channel)
         said = f" # guessed: {canonical.long_name}; header '{guess.header}'" if canonical else ""
         yield f"\n[channels.{guess.channel}]\ncolumn = {_value(guess.column)}{said}"
         if guess.logger:
@@ -182,7 +182,7 @@ def _channels(guesses: Guesses) -> Iterator[str]:
             yield f"long_name = {_value(named_unit(guess.column)[0] if named else guess.column)}"
         if guess.gaps:
             yield "# it has gaps: see 'gaps' in [preparation]"
-    skipped = [guess for guess in guesses if guess.channel is None]
+    skipped = [guess for guess in guesses if not guess.channel]
     yield from [""] * bool(skipped)
     yield from (f"# column '{guess.header}' left out: {guess.why}" for guess in skipped)
 
@@ -191,7 +191,7 @@ def _instruments(files: Files, guesses: Guesses) -> Iterator[str]:
     """A table per logger; clocks by the trigger, where all loggers have one."""
     loggers = list({file.logger: file for file in reversed(files)}.values())[::-1]
     triggers = {file.logger: next(filter(is_trigger, file.table.values), None) for file in loggers}
-    waves = [g.logger for g in guesses if is_elevation(g.channel or "")]
+    waves = [g.logger for g in guesses if is_elevation(g.channel)]
     reference = (waves or list(triggers))[0]
     yield "\n[instruments]"
     yield f"reference = {_value(reference)} # guessed: its clock is the time of all"
@@ -202,11 +202,11 @@ def _instruments(files: Files, guesses: Guesses) -> Iterator[str]:
     stated = len({file.time for file in loggers}) > 1
     for file in loggers:
         yield f"\n[instruments.{_key(file.logger)}]"
-        if stated and file.time is not None:
+        if stated and file.time:
             yield f"time = {_value(file.time)}"
         if file.rate is not None:
             yield f"# {file.rate:.6g} samples per second"
-        elif file.time is None:
+        elif not file.time:
             yield _assumed_rate("the file has")
         if all(triggers.values()):
             name = _value(triggers[file.logger])
@@ -341,9 +341,7 @@ def _preparation(files: Files, guesses: Guesses, seas: Seas) -> Iterator[str]:
         yield f"sampling_rate = {rate:#.6g} # Hz; guessed: that of the slowest logger"
     else:
         yield f"# sampling_rate = {min([25.0, *rates]):.6g}  # Hz; left out, the files' own"
-    if gapped := {
-        str(guess.channel): guess.gaps for guess in guesses if guess.channel and guess.gaps
-    }:
+    if gapped := {guess.channel: guess.gaps for guess in guesses if guess.channel and guess.gaps}:
         yield (
             f'gaps = "{"bridge" if "short" in gapped.values() else "mask"}" # '
             f"{', '.join(gapped)}: 'mask' flags gaps, 'bridge' fills those up to {SHORT_GAP} s "
@@ -353,7 +351,7 @@ def _preparation(files: Files, guesses: Guesses, seas: Seas) -> Iterator[str]:
 
 def _inputs(guesses: Guesses) -> list[Guess]:
     """Wave probes that drive a model: none behind the vessel, without gaps where there are such."""
-    waves = [guess for guess in guesses if is_elevation(guess.channel or "")]
+    waves = [guess for guess in guesses if is_elevation(guess.channel)]
     before = [guess for guess in waves if not guess.behind] or waves
     least = min((guess.gaps for guess in before), key=("", "short", "long").index, default="long")
     return [guess for guess in before if guess.gaps == least]
@@ -367,7 +365,7 @@ def _model(guesses: Guesses) -> Iterator[str]:
     moved = [[name for name in usable if name in kind] for kind in kinds]
     rest = [name for name in usable if not is_elevation(name, rates=True)]
     states = [*moved[0], *moved[1]] or moved[2] or rest or list(mapped)[:1]
-    inputs = [str(guess.channel) for guess in _inputs(guesses) if guess.channel not in states]
+    inputs = [guess.channel for guess in _inputs(guesses) if guess.channel not in states]
     motions = [name for name in mapped if any(name in kind for kind in kinds)]
     loads = [n for n in rest if n.startswith("mooring_") and n not in states]
     probes = [name for name in mapped if is_elevation(name) and name not in inputs]

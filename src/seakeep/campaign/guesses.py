@@ -56,19 +56,19 @@ class File:
     run: str
     logger: str
     table: Columns
-    time: str | None
+    time: str
 
     @property
     def rate(self) -> float | None:
         """Samples per second, where the file states them."""
-        step = None if self.time is None else time_step_of(self.table, self.time)
+        step = time_step_of(self.table, self.time) if self.time else None
         return self.table.sampling_rate if step is None else 1.0 / step
 
     @property
     def start(self) -> float:
         """First instant, s; zero where the file states none."""
-        times = self.table.values.get(self.time or "", np.zeros(1))
-        unit = time_unit_of(self.table, self.time or "")
+        times = self.table.values.get(self.time, np.zeros(1))
+        unit = time_unit_of(self.table, self.time)
         factor = conversion(unit, "s") if is_unit(unit) else 1.0
         return factor * times[0] if np.isfinite(times[0]) else 0.0
 
@@ -83,7 +83,7 @@ class File:
 
 @dataclass(frozen=True)
 class Guess:
-    """A guess for a column; `channel` is None where nothing fits, and `why` says so.
+    """A guess for a column; `channel` is empty where nothing fits, and `why` says so.
 
     `unit_from` says who states the unit: the file, the end of the column's name, or nobody.
     `at_rest` says that the motion is restrained or does not show, `behind` that a probe's name
@@ -94,7 +94,7 @@ class Guess:
     header: str
     unit: str
     unit_from: Literal["file", "name", "nobody"]
-    channel: str | None = None
+    channel: str = ""
     logger: str = ""
     why: str = ""
     gaps: Literal["", "short", "long"] = ""
@@ -104,7 +104,7 @@ class Guess:
     @property
     def is_motion(self) -> bool:
         """Whether it is a motion, a rate or an acceleration of the body."""
-        return (self.channel or "").partition("_")[0] in MOTIONS
+        return self.channel.partition("_")[0] in MOTIONS
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ def _start(run: str, files: Files, guesses: Guesses) -> float:
     starts = [0.0]
     for file in (each for each in files if each.run == run):
         for guess in (each for each in guesses if each.logger == file.logger):
-            name, series = str(guess.channel), file.series(guess.column)
+            name, series = guess.channel, file.series(guess.column)
             if series is None or not (is_elevation(name, rates=True) or name in MOTIONS):
                 continue
             if begin := first_wave(series, name in MOTIONS):
@@ -237,7 +237,7 @@ def arranged(paths: Sequence[Path], tables: Sequence[Columns]) -> list[File]:
     """
     # By its name; else by its values, where no file states its rate.
     times = [
-        time_column(table) or (None if table.sampling_rate else _rising_column(table))
+        time_column(table) or ("" if table.sampling_rate else _rising_column(table))
         for table in tables
     ]
     own = [
@@ -312,7 +312,7 @@ def dead_motions(files: Files, guesses: Guesses) -> dict[str, str]:
         for file in (each for each in files if each.logger == guess.logger):
             values = file.table.values[guess.column]
             if np.ptp(values[np.isfinite(values)]) == 0:
-                dead.setdefault(file.run, str(guess.channel))
+                dead.setdefault(file.run, guess.channel)
     return dead
 
 
@@ -332,8 +332,8 @@ def _guess(column: str, files: Files) -> Guess:
     if unit is not None and not is_unit(unit):
         why = why or f"its unit '{unit}' is not known; state unit = '…'"
     # One file per run may be that of one logger, whose name says what it measured.
-    channel = None if why else suggest_channel(name, unit, logger or _stem(files[0].path))
-    canonical = canonical_channel(channel) if channel else None
+    channel = "" if why else suggest_channel(name, unit, logger or _stem(files[0].path))
+    canonical = canonical_channel(channel)
     unit = unit if unit is not None else canonical.units if canonical else "-"
     behind = "behind" in _kinds(_words(column))
     return Guess(column, header, unit, stated_by, channel, logger, _printable(why), gaps,
@@ -364,8 +364,8 @@ def _fault(column: str, files: Files) -> tuple[str, Literal["", "short", "long"]
     return "", "" if not lengths else "short" if max(lengths) <= SHORT_GAP else "long"
 
 
-def _rising_column(table: Columns) -> str | None:
-    """Name of the first column that rises evenly, as times do; None if there is none.
+def _rising_column(table: Columns) -> str:
+    """Name of the first column that rises evenly, as times do; empty if there is none.
 
     One that a unit says to be something else is none, nor is one that counts 1, 2, 3.
     """
@@ -374,7 +374,7 @@ def _rising_column(table: Columns) -> str | None:
         is_time = unit is None or (is_unit(unit) and si_unit(unit) == "s")
         if is_time and _step_of(series) not in (None, 1.0):
             return column
-    return None
+    return ""
 
 
 def _step_of(series: FloatArray) -> float | None:
