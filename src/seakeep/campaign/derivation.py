@@ -123,7 +123,7 @@ def _body_step(
     angles = _three(dataset)
     if settings.step == "remove_gravity":
         words = f"gravity removed by {', '.join(name for name in TURNS if name in dataset)}"
-        if settings.components is not None:
+        if settings.components:
             force = np.column_stack([dataset[each].values for each in settings.components])
             moved = remove_gravity(force, angles, zeroed=bool(settings.zeroed))
             return _afloat(moved[:, axis], axis), unit, words

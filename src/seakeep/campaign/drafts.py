@@ -80,7 +80,7 @@ def draft_campaign(
     if not any(guess.channel for guess in guesses):
         _refuse(read)
     wave = next(iter(_inputs(guesses)), None)
-    seas = {} if wave is None else seas_of(read, guesses, wave)
+    seas = seas_of(read, guesses, wave) if wave else {}
     parts = [
         f"# Draft of a campaign ({MARK}: draft). Read every line that says 'guessed', then\n"
         "# run: seakeep prepare THIS-FILE, and look at the sheet it makes",
@@ -129,7 +129,7 @@ def _general(files: Files, seas: Seas, wave: Guess | None) -> str:
             f"# encounter_period = {sea.period:.3g}  # s; left out, it is measured: the mean of "
             f"{'the irregular runs' if some else 'all runs'} (this is that of {run})"
         )
-    if wave is not None and any(sea.noisy for sea in seas.values()):
+    if wave and any(sea.noisy for sea in seas.values()):
         said = f"guessed: without it, noise of {wave.channel} counts as waves"
         period += f"\nperiod_hysteresis = {HYSTERESIS} # {said}"
     return f"""
@@ -204,7 +204,7 @@ def _instruments(files: Files, guesses: Guesses) -> Iterator[str]:
         yield f"\n[instruments.{_key(file.logger)}]"
         if stated and file.time:
             yield f"time = {_value(file.time)}"
-        if file.rate is not None:
+        if file.rate:
             yield f"# {file.rate:.6g} samples per second"
         elif not file.time:
             yield _assumed_rate("the file has")
@@ -233,11 +233,11 @@ def _runs(
         if len(roles) == 1:
             yield "# train = [0.0, 60.0]  # s; in place of role, with test = [60.0, inf]"
         # Training keeps the onset, since steady waves hold one frequency.
-        if sea is not None and sea.start > 0 and role == "test":
+        if sea and sea.start > 0 and role == "test":
             yield f"span = [{sea.start:.2f}, inf] # s; guessed: the waves have come to the vessel"
         elif is_first:
             yield "# span = [10.0, inf]  # s; cut the start-up of the waves off"
-        if sea is not None and groups.count(sea.group) > 1:
+        if sea and groups.count(sea.group) > 1:
             group = _value(f"waves of {sea.group}")
             yield f"sea_state = {group} # guessed: the same waves come again"
         elif is_first:

@@ -326,7 +326,7 @@ def _guess(column: str, files: Files) -> Guess:
     if unit is None:
         bare, named = named_unit(column)
         stated_by = "nobody"
-        if named is not None and si_unit(named) != "s":  # "Tension_s" is a side, and no time
+        if named and si_unit(named) != "s":  # "Tension_s" is a side, and no time
             name, unit, stated_by = bare, named, "name"
     why, gaps = _fault(column, files)
     if unit is not None and not is_unit(unit):

@@ -176,7 +176,7 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
             stated = settings.instruments[key].model_dump(include=keys, exclude_none=True)
             options = options.model_copy(update=stated)
         columns = reader(path, options)
-        if key and time_column(columns, options.time) is not None:
+        if key and time_column(columns, options.time):
             options = options.model_copy(update={"sampling_rate": None})
         loggers[key] = Logger(key, path, columns, options)
     order = [settings.instruments.reference, *settings.instruments.loggers, *loggers]
@@ -294,7 +294,7 @@ def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings])
     """Channels of one logger, gaps and jitter as they are."""
     time = run.clocks[logger.name].reference(logger.time)
     records: slice | BoolArray = slice(None)
-    if run.own.record is not None:
+    if run.own.record:
         start, end = (number(edge) for edge in run.own.record)
         step, whole = usual_step(time), (time[0], time[-1])
         slack = step * (1 + 1e-6) if logger.name == next(iter(run.loggers)) else np.inf
@@ -355,10 +355,10 @@ def cleaned(run: Run) -> Run:
             _refuse_gaps(data, run.name, logger.path)
         data = _regular(data, preparation, f"run '{run.name}' ({logger.path})")
         groups[key] = data = flag_samples(data, preparation)
-        if logger.options.sampling_rate is not None and logger.options.time is None:
+        if logger.options.sampling_rate and logger.options.time is None:
             aside = time_column(logger.columns)
             step = None if aside is None else time_step_of(logger.columns, aside)
-            if step is not None:  # the step of the file's times, where a stated rate is used
+            if step:  # the step of the file's times, where a stated rate is used
                 data.attrs["time_column_step"] = step
         elif counts_samples(logger.columns, logger.options):
             data.attrs["time_counts"] = 1
@@ -545,7 +545,7 @@ def _on_axis(
     channels = {name: group.variables[name] for name in group.data_vars}
     series = np.column_stack([channel.values for channel in channels.values()])
     low, filtered = settings.low_pass, {}
-    if low is not None and low[1] < 0.5 / own:
+    if low and low[1] < 0.5 / own:
         length = 60 / (14.36 * (low[1] - low[0]))  # of 60 dB, by Kaiser's formula
         if (lasts := time.size * own) < 0.5 * length:
             raise DataError(
@@ -614,7 +614,7 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
     rates = {}
     for name in run.groups:
         own = settings.instruments[name] if name else settings.files
-        if own.sampling_rate is not None:
+        if own.sampling_rate:
             rates[name] = Rate(own.sampling_rate, own.time is None, own.sampling_rate_assumed)
     channels = channels_of(settings, run.own)
     units = {name: each.unit or "-" for name, each in channels.items() if each.unit_assumed}
@@ -647,7 +647,7 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
 def used_span(settings: RunSettings) -> tuple[float, float]:
     """First and last instant of a run that is used at all, s."""
     stated = (settings.span,) if settings.span else (settings.train, settings.test)
-    spans = [(number(each[0]), number(each[1])) for each in stated if each is not None]
+    spans = [(number(each[0]), number(each[1])) for each in stated if each]
     starts, ends = zip(*spans, strict=True) if spans else ((-np.inf,), (np.inf,))
     return min(starts), max(ends)
 
@@ -742,7 +742,7 @@ def attributes_of(
         span = getattr(settings, use)
         if span is None and settings.serves == use:
             span = whole
-        if span is not None:
+        if span:
             used = time[inside(time, span, dt)]
             if used.size:
                 attributes[f"{use}_span"] = (float(used[0]), float(used[-1]))

@@ -91,7 +91,7 @@ class Campaign:
         """
         models = self.settings.models
         if name is None:
-            if self.settings.model is not None:
+            if self.settings.model:
                 return self.settings.model
             if len(models) == 1:
                 return next(iter(models.values()))
@@ -409,7 +409,7 @@ class Campaign:
                 if progress is not None:
                     progress(done, len(wanted), f"{name} cannot be prepared")
                 continue
-            if period is not None:
+            if period:
                 data.attrs["encounter_period"] = period
             if progress is not None:
                 progress(done, len(wanted), name)
@@ -476,9 +476,9 @@ class Campaign:
         if needed and period is None:
             period = self._mean_period(surveyed)
         dt = preparation.dt
-        if preparation.steps_per_period is not None and period is not None:
+        if preparation.steps_per_period and period:
             dt = period / preparation.steps_per_period
-        elif preparation.sampling_rate is not None:
+        elif preparation.sampling_rate:
             dt = 1.0 / preparation.sampling_rate
         return replace(surveyed, settings=self._in_seconds(period)), period, dt
 

@@ -142,7 +142,7 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
         return table.find(stated)
     for name in table.names:
         bare, unit = named_unit(name)
-        if unit is not None and si_unit(unit) != "s":
+        if unit and si_unit(unit) != "s":
             bare = name
         if bare.strip().lower() in _TIMES:
             return name
@@ -153,7 +153,7 @@ def time_unit_of(table: Columns, name: str, stated: str | None = None) -> str:
     """Unit of a time column: as stated, as its header says, as its name ends, or seconds."""
     said = _said_unit(table, name)
     named = named_unit(name)[1]
-    return stated or said or (named if named is not None and si_unit(named) == "s" else "s")
+    return stated or said or (named if named and si_unit(named) == "s" else "s")
 
 
 def _said_unit(table: Columns, name: str) -> str:

@@ -525,7 +525,7 @@ class CampaignSettings(Table):
 
     def all_models(self) -> dict[str, ModelSettings]:
         """Models by the key of their table: ``model`` and ``models.NAME``."""
-        unnamed = {} if self.model is None else {"model": self.model}
+        unnamed = {"model": self.model} if self.model else {}
         return {**unnamed, **{f"models.{name}": each for name, each in self.models.items()}}
 
 

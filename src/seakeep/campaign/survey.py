@@ -75,7 +75,7 @@ class ReadOnce:
 
     def __call__(self, path: Path, options: Options) -> Columns:
         """Columns of a file."""
-        if (known := self.columns.pop((path, options), None)) is not None:
+        if known := self.columns.pop((path, options), None):
             return known
         columns = read_columns(path, options)
         size = sum(x.nbytes for each in self.columns.values() for x in each.values.values())

@@ -40,7 +40,7 @@ def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) 
         turning = ["", "_rate", "_acceleration"]
         if settings.step == "remove_gravity":
             turning = [""]
-        elif (known := canonical_channel(sources[0]) or canonical_channel(name)) is not None:
+        elif known := canonical_channel(sources[0]) or canonical_channel(name):
             turning = turning[: {"m": 1, "m/s": 2}.get(known.units, 3)]
         sources += [turn + kind for kind in turning for turn in TURNS if turn + kind in channels]
     return tuple(dict.fromkeys(each for each in sources if each != name))

@@ -325,7 +325,7 @@ def regressors(model: Model, part: Part) -> FloatArray:
     out = np.full((size, width), np.nan)
     if stop > first:
         values, surge = channel_matrix(run, model.inputs, "the run"), None
-        if (follows := model.signature.input_map.follows) is not None:
+        if follows := model.signature.input_map.follows:
             surge = channel_matrix(run, [model.states[follows.column]], "the run")[:, 0]
         out[first:stop] = driven(input_map, values, run, first, stop, surge)
     return out
@@ -334,9 +334,9 @@ def regressors(model: Model, part: Part) -> FloatArray:
 def _at_once(input_map: InputMap) -> InputMap:
     """The map without look-ahead and lags, and without limits of what is above training."""
     follows, observed = input_map.follows, input_map.observed
-    if observed is not None:
+    if observed:
         observed = replace(observed, observables=tuple(map(at_once, observed.observables)), tops=())
-    if follows is not None:
+    if follows:
         follows = replace(follows, lead=0)
     return replace(input_map, lead=0, observed=observed, follows=follows, reference=0)
 
@@ -353,7 +353,7 @@ def single_model(model: Model) -> HankelDMDcModel:
             f"or FIR model; received one of kind '{model.kind}'. For free motion of an ensemble, "
             "check a member: seakeep.check.modes(ensemble.member(0))."
         )
-    if (varies := model.variation) is not None:
+    if varies := model.variation:
         warn(
             f"the model varies with {model.signature.parameter}: what is shown is the one in the "
             f"middle of the training, {varies.centre:g}."

@@ -105,7 +105,7 @@ def response(
     names = list(model.inputs)
     waves, size, turns = names, len(names), None
     each = np.stack([transfer(model, one, frequency)[:, :, :size] for one in dynamics])
-    if runs is not None and size > 1:
+    if runs and size > 1:
         probe = reference_probe(model, runs)
         turns = wave_turns(model, runs, frequency, probe)
     if turns is not None:

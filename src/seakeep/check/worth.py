@@ -226,6 +226,6 @@ def _sea(wave: FloatArray, dt: float, run: xr.Dataset) -> tuple[float, float, fl
     period = 1 / dominant_frequency(wave, dt) if regular else encounter_period(wave, dt)
     depth = run.attrs.get("water_depth")
     steepness = np.nan
-    if depth is not None:
+    if depth:
         steepness = height * wavenumber(2 * np.pi / period, depth) / (2 * np.pi)
     return height, period, steepness

@@ -149,9 +149,9 @@ def track(
 
     Example: seakeep track side_view.mp4 -o track.csv --contact-sheet sheet.png
     """
-    if out is not None and out.suffix not in (".nc", ".csv"):
+    if out and out.suffix not in (".nc", ".csv"):
         raise RequestError(f"{out} ends in '{out.suffix}'; a track is written as .csv or .nc.")
-    if sheet is not None and sheet.suffix.lower() != ".png":
+    if sheet and sheet.suffix.lower() != ".png":
         raise RequestError(f"a contact sheet is written as PNG; received {sheet}.")
     from seakeep.report.track import (
         CONTACT_SHEET,
@@ -164,9 +164,9 @@ def track(
         write_track,
     )
 
-    inputs = [each for each in (video, mru) if each is not None]
+    inputs = [*filter(None, (video, mru))]
     for place, kind in ((out, TRACK), (sheet, CONTACT_SHEET)):
-        if place is not None:
+        if place:
             check_output(place, kind, inputs, HEADER)
     from seakeep.campaign import read_table
     from seakeep.signals import TrackingSettings, contact_sheet, track_video
@@ -188,7 +188,7 @@ def track(
     reference = None if mru is None else read_table(mru, columns=("heave", "pitch"))
     with progress_bar("Tracking") as progress:
         track = track_video(video, settings, progress)
-    if sheet is not None:
+    if sheet:
         write_contact_sheet(contact_sheet(video, track), sheet)
     if out is None:
         typer.echo(track_text(track), nl=False)
@@ -227,7 +227,7 @@ def init(
     """
     from seakeep.campaign import draft_campaign
 
-    if out is not None:
+    if out:
         if is_there(out) and not force:
             raise RequestError(f"{out} exists already. Give another name, or --force.")
         check_output(out, "draft", files)

@@ -290,7 +290,7 @@ def _displayed(each: Comparison, scale: float | None, degrees: bool) -> Comparis
     """A comparison at full scale, where there is a scale, and in degrees, if wanted."""
     from seakeep.study import at_full_scale, in_degrees
 
-    each = each if scale is None else at_full_scale(each, scale)
+    each = at_full_scale(each, scale) if scale else each
     return in_degrees(each) if degrees else each
 
 
@@ -381,7 +381,7 @@ def _draw(
     for of_run in zip(*comparisons.values(), strict=True):
         figure = overlay_figure(dict(zip(comparisons, of_run, strict=True)))
         written.append(save_figure(figure, figures[of_run[0].run]))
-    if differences is not None:
+    if differences:
         written.append(save_figure(error_figure(differences), figures[ERRORS]))
     return written
 

@@ -157,7 +157,7 @@ def named_unit(name: str) -> tuple[str, str | None]:
     words = re.split(r"[_ ]+", name.strip())
     for count in (3, 2, 1):
         unit = UNITS["endings"].get("_".join(words[-count:]))
-        if unit is not None and any(words[:-count]):
+        if unit and any(words[:-count]):
             return "_".join(words[:-count]), unit
     return name, None
 

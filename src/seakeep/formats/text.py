@@ -62,7 +62,7 @@ def read_text(path: Path, options: Options) -> Columns:
     if lines[-1]:
         _warn_of_a_short_end(path, lines, layout)
     names, units = unique_names(layout.headers)
-    if layout.units is not None:
+    if layout.units:
         for name, row, unit in zip(names, layout.units, units, strict=True):
             if row and unit and is_unit(unit) and not same_unit(row, unit):
                 raise DataError(

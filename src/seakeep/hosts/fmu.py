@@ -97,7 +97,7 @@ def write_fmu(
         for file, text in files.items():
             Path(folder, file).write_text(text, encoding="utf-8")
             archive.writestr(f"sources/{file}", text)
-        if (cc := compiler()) is not None:
+        if cc := compiler():
             place, suffix = PLATFORMS[platform.system(), platform.machine()]
             library = _compiled(cc, Path(folder), name, suffix)
             archive.write(library, f"binaries/{place}/{library.name}")

@@ -179,7 +179,7 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
     handed: _Values = {"state": (newest_first.reshape(extended), (extended,))}
     taken: _Values = {"forced": (_forcing(graph, u, signature, weights, steps), (rows,))}
     added = _Array(step, "forced")
-    if follows is not None:
+    if follows:
         table, remembered = _tables(graph, u, history, signature, follows, steps)
         taken["places"] = (table, (follows.place.count, len(signature.input_scale.mean)))
         handed |= remembered
@@ -188,7 +188,7 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
     moved = coefficients[:, :extended] @ state + added
     step("Concat", moved, state[: extended - rows], into="state_after", axis=0)
     newest = step("Slice", moved, [0], [N], [0], into="newest")
-    if follows is not None:
+    if follows:
         surge = newest * scale.std + scale.mean
         line = [surge[follows.column : follows.column + 1], _Array(step, "surge")[:-1]]
         step("Concat", *line, into="surge_after", axis=0)
@@ -263,7 +263,7 @@ def _forcing(
         windows = values[np.arange(steps)[:, None] + np.arange(z, -1, -1)]
         groups.append(windows.reshape(steps, (z + 1) * n))
         parts.append(weights[:, : (z + 1) * n])
-    if observed is not None and observed.slopes.size:
+    if observed and observed.slopes.size:
         terms = [term for each in observed.groups[1] for term in each.terms]
         values = np.concatenate(
             [_column(graph, term, u, now, steps, observed) for term in terms], axis=1
@@ -280,7 +280,7 @@ def _forcing(
 def _with_delayed(observed: Observed | None, rows: _Value) -> _Value:
     """Inputs beside the columns that take the input delays."""
     columns = [rows]
-    if observed is not None:
+    if observed:
         terms = [term for each in observed.groups[0] for term in each.terms]
         columns += [term.columns(rows, observed.limits) for term in terms]
     return np.concatenate(columns, axis=1)

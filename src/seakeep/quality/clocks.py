@@ -106,7 +106,7 @@ def clocks(record: Record) -> Findings:
             yield record.finding(ClocksKind.TIME_GAPS, label, gaps=gaps, missing=missing)
         if jitter := group.attrs.get("time_jitter_rms"):
             yield record.finding(ClocksKind.JITTER, label, jitter, unit="s", jitter=1e3 * jitter)
-        if (rate := record.rates.get(name)) is not None:
+        if rate := record.rates.get(name):
             aside = group.attrs.get("time_column_step", 1 / rate.stated)
             if abs(aside * rate.stated - 1) > RATE_TOLERANCE:
                 yield record.finding(ClocksKind.TIMES_ASIDE, label, 1 / aside, rate.stated, "Hz")
@@ -131,7 +131,7 @@ def rates(record: Record) -> Findings:
         table = f"instruments.{name}" if name else "files"
         if group.attrs.get("time_counts"):
             yield record.finding(ClocksKind.COUNTED, label, table=table)
-        if rate is not None and rate.counted and rate.assumed:
+        if rate and rate.counted and rate.assumed:
             yield record.finding(ClocksKind.RATE, label, rate.stated, unit="Hz", table=table)
 
 
@@ -170,7 +170,7 @@ def steps(record: Record) -> Findings:
         if not (is_elevation(name) or name in MOTIONS):
             continue
         cuts = [(ClocksKind.COARSE_STEP, edge)] if own[logger] < dt else []
-        if (passed := record.whole[name].attrs.get("low_pass")) is not None:
+        if passed := record.whole[name].attrs.get("low_pass"):
             cuts.append((ClocksKind.LOW_PASS, float(np.mean(passed))))
         x = sound(group, name)
         for kind, cut in cuts:
@@ -183,7 +183,7 @@ def steps(record: Record) -> Findings:
 
 def periods(record: Record) -> Findings:
     """A counted period that is not a period of the waves."""
-    if record.period is not None and record.wave_channel is not None:
+    if record.period and record.wave_channel:
         yield record.finding(ClocksKind.PERIOD, record.wave_channel, *record.period, "s")
 
 

@@ -76,7 +76,7 @@ def flagged(record: Record) -> Findings:
             done = ""
             if bit == OUTLIER and (flags & REPLACED).any():
                 done = "; replaced by interpolation"
-            elif bit == MISSING and record.bridged is not None:
+            elif bit == MISSING and record.bridged:
                 limit = f"longest_gap = {record.bridged:g} s in [preparation]"
                 longer = f"a gap of {max(inner, default=0):.3g} s is longer than {limit}"
                 why = longer if inner else "it stands at an end of the record"
@@ -135,7 +135,7 @@ def impossible(record: Record) -> Findings:
     for name, channel in channels_of(record.whole).items():
         x, turns = channel.values, name in ("roll", "pitch")
         x, limit = x[np.isfinite(x)], np.pi / 2 if turns else depth
-        if x.size and limit is not None and (turns or name == "heave" or is_elevation(name)):
+        if x.size and limit and (turns or name == "heave" or is_elevation(name)):
             reached = float(np.percentile(np.abs(x if turns else x - x.mean()), 99))
             kind = SamplesKind.IMPOSSIBLE if turns else SamplesKind.OUT_OF_WATER
             if reached > limit:

@@ -458,7 +458,7 @@ def _summary(results: Results) -> Section:
         more=(finding(results), against_filter(results), NOTE),
         points=[f"{act.title}. {act.sentence}" for act in _played(results)],
         # Once what several studies warn of.
-        notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each is not None)),
+        notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each)),
     )
 
 

@@ -59,7 +59,7 @@ def worth_section(result: xr.Dataset, checked: Checked) -> Section:
         )
     if lost := result.attrs["lost"]:
         points.append(f"Baselines that do not count in all verdicts: {lost}.")
-    if (validity := checked.results.get("validity")) is not None:
+    if validity := checked.results.get("validity"):
         points += [
             f"{run}: outside what trained the model ({why})." for run, why in _outside(validity)
         ]
@@ -176,7 +176,7 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
     unknown = result["amplitude"].isnull().all(["input", "frequency"])
     if read := ", ".join(map(str, result["state"].values[unknown])):
         words.append(f"{read}: read off other states, so that no linear response stands for it.")
-    if measured is not None:
+    if measured:
         kinds = {*measured["kind"].values}
         tables.append(table("measured_response", _points(measured, result)))
     if "irregular" in kinds:
@@ -242,7 +242,7 @@ def possible_section(result: xr.Dataset, checked: Checked) -> Section:
     ahead = worth is not None and bool((worth["look_ahead"] > 0).any())
     for state in result["state"].values:
         own = result.sel(state=state)
-        rows += [_bounds(each.sel(state=state)) for each in (result, trained) if each is not None]
+        rows += [_bounds(each.sel(state=state)) for each in (result, trained) if each]
         if own["still"]:
             unjudged["it stands still in these runs"].append(state)
         elif own["period"] > segment / 3:
@@ -259,7 +259,7 @@ def possible_section(result: xr.Dataset, checked: Checked) -> Section:
             advice[_advice(model, linear, more, ahead)].append(beside)
     points = [f"{'; '.join(states)}. {words}" for words, states in advice.items()]
     points += [f"{', '.join(of)}: cannot be judged: {why}." for why, of in unjudged.items()]
-    if worth is not None and (state := worth.attrs["conditional_on"]):
+    if worth and (state := worth.attrs["conditional_on"]):
         points.append(
             f"The inputs are carried by measured {state} and so hold part of it: with waves alone "
             f"the bounds of {state}, and of what follows it, are higher."
@@ -300,7 +300,7 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
     """Return free decay, beside measured ones, and the modes."""
     words, points = [], []
     parts: list[Drawing | Table] = []
-    if (result := checked.results.get("decay")) is not None:
+    if result := checked.results.get("decay"):
         parts = [
             drawing("decay", checks.decay, result),
             _decay_table(result, checked.results.get("measured_decay")),
@@ -326,7 +326,7 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
 def _decay_table(result: xr.Dataset, measured: xr.Dataset | None) -> Table:
     """Period and damping of each motion of the model, and of each measured decay."""
     cases = [(own, "model") for own in entries(result.assign(q=0), "motion")]
-    if measured is not None:
+    if measured:
         cases += [(own, own["run"].item()) for own in entries(measured, "run")]
     rows = [
         (*row(own, "motion", period=3, damping_ratio=3, p=3, q=0 if of == "model" else 3), of)

@@ -298,7 +298,7 @@ def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
 def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
     dim = next((each for each in ("statistic", "member") if each in forecast.dims), None)
     parts, kind = {"": forecast}, "member " * (dim == "member")
-    if dim is not None:
+    if dim:
         places = forecast[dim].values
         parts = {f" {kind}{p}".removesuffix(" mean"): forecast.sel({dim: p}) for p in places}
     columns = {

@@ -213,7 +213,7 @@ def _drawn(drawing: Drawing, folder: Path) -> Markup:
     """Draw a figure, write its files, and return it as an element of the page."""
     figure = drawing.draw()
     engine = figure.get_layout_engine()
-    if engine is not None:  # laid out once, not again for each file
+    if engine:  # laid out once, not again for each file
         engine.execute(figure)
         # Without any engine; "none" stands for one, for which each file would be drawn twice.
         figure.set_layout_engine(None)

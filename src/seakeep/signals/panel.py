@@ -114,7 +114,7 @@ class TrackingSettings:
     @property
     def stop(self) -> float | None:
         """Edge of the stop band in use, Hz; None where nothing is filtered."""
-        return None if self.passband is None else 1.5 * self.passband
+        return self.passband and 1.5 * self.passband
 
 
 def opencv(doing: str = "reading") -> Any:

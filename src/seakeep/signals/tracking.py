@@ -206,7 +206,7 @@ def track_video(
     if count < 2:
         raise DataError(f"{path} holds one frame; a motion needs at least two. Export it again.")
     usual = _usual_panel(seen, how, str(path))
-    pixels = int(np.prod(size if how.region is None else how.region[2:]))
+    pixels = int(np.prod(how.region[2:] if how.region else size))
     flag, quality = _judge(seen, usual, how, 1.0 / rate, pixels)
     counts = {name: np.sum(flag == code) for name, code in FLAGS.items()}
     bad = count - counts["good"]
@@ -230,7 +230,7 @@ def track_video(
         "picture": np.nan_to_num(seen["picture"], nan=-1.0).astype(int),
         "flag": flag.astype(np.int8),
     }
-    if how.lamp is not None:
+    if how.lamp:
         channels["lamp"] = seen["lamp"]
     attributes = {
         "source": Path(path).name,
@@ -238,7 +238,7 @@ def track_video(
         "camera": f"downstream to the {how.downstream} of the picture",
         "frame_rate": rate,
         "metres_per_pixel": usual["scale"],
-        "calibration": "stated" if how.metres_per_pixel is not None else "size of the panel",
+        "calibration": "stated" if how.metres_per_pixel else "size of the panel",
         "panel_length_seen": usual["length"],
         "panel_height_seen": usual["height"],
         "settings": json.dumps(asdict(how)),
@@ -248,14 +248,14 @@ def track_video(
 
 def _check_fit(video: _Video, how: TrackingSettings) -> None:
     width, height = video.size
-    if how.region is not None:
+    if how.region:
         left, top, wide, high = how.region if len(how.region) == 4 else (0, 0, 0, 0)
         if min(left, top) < 0 or not (0 < wide <= width - left and 0 < high <= height - top):
             raise RequestError(
                 f"region = {how.region} is no part of the picture of {video.path}, {width} × "
                 f"{height} pixels. State left, top, width and height of one."
             )
-    if how.lamp is not None:
+    if how.lamp:
         x, y, radius = how.lamp
         if not (0 <= x < width and 0 <= y < height and radius > 0):
             raise RequestError(
@@ -263,7 +263,7 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
                 f"{width} × {height} pixels. Correct its place."
             )
     stop = how.stop
-    if stop is not None and stop >= 0.5 * video.rate:
+    if stop and stop >= 0.5 * video.rate:
         raise RequestError(
             f"{video.path} has {video.rate:g} frames per second, so the low-pass filter cannot "
             f"stop at {stop:g} Hz. Lower the passband (--passband) so that the stopband, 1.5 times "
@@ -277,7 +277,7 @@ def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) ->
     numbers: list[int] = []
     rows: list[list[float]] = []
     at_rest = how.origin is None
-    if how.lamp is not None:
+    if how.lamp:
         x, y, radius = how.lamp
         below, right = np.ogrid[: video.size[1], : video.size[0]]
         disc = np.nonzero((right - x) ** 2 + (below - y) ** 2 <= radius**2)
@@ -293,7 +293,7 @@ def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) ->
             where = f"first {how.rest:g} s (unless the origin is stated, zero lies there)"
             _usual_panel(seen(), how, f"{video.path}, {where}")
         row = find_panel(frame, how) | {"picture": len(rows)}
-        if how.lamp is not None:
+        if how.lamp:
             row["lamp"] = float(np.mean(frame[disc])) / 255.0
         numbers.append(number)
         rows.append([row.get(field, np.nan) for field in FIELDS])
@@ -313,7 +313,7 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
     panel, known = how.panel, how.metres_per_pixel
     aspect = (seen["length"] / seen["height"]) / (panel[0] / panel[1])
     like = (abs(aspect - 1) < ASPECT_BAND) & (seen["fill"] > LEAST_FILL) & (seen["cut"] == 0)
-    if known is not None:
+    if known:
         like &= abs(seen["length"] / (panel[0] / known) - 1) < SIZE_BAND
     if not like.any():
         raise DataError(_not_found(seen, how, name))
@@ -328,7 +328,7 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
 def _not_found(seen: Seen, how: TrackingSettings, name: str) -> str:
     there, panel, known = seen["area"] > 0, how.panel, how.metres_per_pixel
     wanted = f"{panel[0]:g} × {panel[1]:g} m"
-    if known is not None:
+    if known:
         wanted += f", {panel[0] / known:.0f} × {panel[1] / known:.0f} pixels"
     start = f"{name}: the panel ({wanted}) was not found in any of {there.size} frames: "
     if not there.any():
@@ -398,7 +398,7 @@ def _motions(
     x = side * scale * seen["x"] - along * np.cos(pitch) - up * np.sin(pitch)
     z = -scale * seen["y"] + along * np.sin(pitch) - up * np.cos(pitch)
     table = np.stack([x, z, pitch], axis=1)
-    if how.origin is not None:
+    if how.origin:
         table[:, :2] -= side * scale * how.origin[0] - along, -scale * how.origin[1] - up
     else:
         rest = good & (np.arange(good.size) < max(1, round(how.rest * rate)))
@@ -417,7 +417,7 @@ def _motions(
         there = np.flatnonzero(good)
         between = scipy.interpolate.PchipInterpolator(there, table[there], axis=0)
         table[filled] = between(np.flatnonzero(filled))
-    if how.passband is not None:
+    if how.passband:
         for begin, end in stretches(good | filled):
             if end - begin > 1:
                 table[begin:end] = low_pass(table[begin:end], 1.0 / rate, how.passband, how.stop)

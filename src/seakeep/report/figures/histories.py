@@ -213,7 +213,7 @@ def _judgement(rows: Sequence[xr.Dataset]) -> str:
 def _title(comparisons: Sequence[Comparison]) -> str:
     first = comparisons[0]
     parts = [first.run, first.sea_state]
-    if first.full_scale is not None:
+    if first.full_scale:
         stated = f"sea state as stated: {first.sea_state}" if first.sea_state else ""
         parts[1:] = [f"full scale, λ = {first.full_scale:g}", stated]
     if len(comparisons) == 1:

@@ -53,8 +53,8 @@ def summary(result: StudyResult) -> Section:
     lost, repeats = (result.groups.get(key) for key in ("statistics/lost", "repeats"))
     notices = [
         result.attrs.get("preparation_note"),
-        words_of_lost(lost) if lost is not None else "",
-        words_of_repeats(repeats) if repeats is not None else "",
+        words_of_lost(lost) if lost else "",
+        words_of_repeats(repeats) if repeats else "",
         _few_cells(result),
         words if shares else "",
         test_overlap(result),
