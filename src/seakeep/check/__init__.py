@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from inspect import signature
-from typing import Any
 
 import xarray as xr
 
@@ -121,7 +120,7 @@ def check_model(
         check_channels(run, [*model.states, *model.inputs], name)
     results: Groups = {}
     refused, notes = {}, {}
-    given: dict[str, Any] = {"model": model, "runs": runs, "free": {}, "baselines": baselines}
+    given = {"model": model, "runs": runs, "free": {}, "baselines": baselines}
     for number, (name, check) in enumerate(CHECKS.items()):
         if progress is not None:
             progress(number, len(CHECKS), name)

@@ -6,6 +6,7 @@ import xarray as xr
 
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, IntArray
 from seakeep.check.parts import (
+    HERTZ,
     driven,
     is_regular,
     read_off,
@@ -268,7 +269,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
         coords={
             "state": single.states,
             "difference": ("difference", differences, {"units": "Hz"}),
-            "frequency": ("frequency", step * bins, {"units": "Hz", "long_name": "frequency"}),
+            "frequency": ("frequency", step * bins, HERTZ),
             "units": ("state", [f"{unit}/m²" for unit in units_of(model, single.states)]),
         },
         attrs={"amplitude": amplitude, "reference": model.inputs[reference]},

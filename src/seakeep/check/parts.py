@@ -60,6 +60,7 @@ class FreeRun(NamedTuple):
     measured: FloatArray
 
 
+HERTZ = {"units": "Hz", "long_name": "frequency"}
 Known = dict[tuple[str, str], FreeRun]
 """Free runs that several checks share, by label of a baseline ("" is the model) and run."""
 

@@ -7,6 +7,7 @@ import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
+    HERTZ,
     FreeRun,
     Known,
     free_runs,
@@ -166,6 +167,6 @@ def _of_free_runs(model: Model, free: Mapping[str, FreeRun], period: float) -> d
     return {
         "error_spectrum": (("state", "frequency"), error.T),
         "measured_spectrum": (("state", "frequency"), power.T),
-        "frequency": ("frequency", spectra.frequency, {"units": "Hz", "long_name": "frequency"}),
+        "frequency": ("frequency", spectra.frequency, HERTZ),
         "band_nrmse": (("state", "band"), np.stack(bands, axis=1)),
     }

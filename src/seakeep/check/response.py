@@ -11,6 +11,7 @@ from scipy.interpolate import interp1d
 
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real, undefined
 from seakeep.check.parts import (
+    HERTZ,
     Part,
     elevations,
     gathered,
@@ -134,7 +135,7 @@ def response(
         coords={
             "state": model.states,
             "input": names,
-            "frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"}),
+            "frequency": ("frequency", frequency, HERTZ),
             "units": (("state", "input"), units),
         },
         attrs={"reference": waves[-1]},

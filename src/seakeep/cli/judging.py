@@ -151,13 +151,13 @@ def forecast(
         result = with_degrees(result)
     write_forecast(result, out)
     status = result.attrs["status"]
-    begin = instant_text(float(result.attrs["start"]), identified.dt)
-    reads = look_ahead_words(float(result.attrs.get("reads_input_until", 0.0)))
+    begin = instant_text(result.attrs["start"], identified.dt)
+    reads = look_ahead_words(result.attrs.get("reads_input_until", 0.0))
     say(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
         f"t = {begin} s, status {status}{reads and f'; {reads}'}.{scaled}"
     )
-    members_left = result.sizes.get("member", 0) - int(result.attrs.get("diverged", 0))
+    members_left = result.sizes.get("member", 0) - result.attrs.get("diverged", 0)
     usable = members_left > 0 if "member" in result.dims else "diverged_at" not in result.attrs
     if not usable:
         raise Exit(1)

@@ -77,7 +77,7 @@ def write_fmu(
     linear, name = exportable(model, ahead is not None), identifier(target.stem)
     files = sources(linear, name, None if ahead is None else linear.live(noise=noise, roles=roles))
     digest = hashlib.sha256("".join(files.values()).encode()).digest()
-    content: dict[str, Any] = {
+    content = {
         "name": name,
         "upper": name.upper(),
         "mark": f"{MARK}: {KIND},",

@@ -424,7 +424,7 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
     stamp = {
         "description": "A study of linear models with delays that forecast a moored vessel in head "
         "seas, on data of a virtual towing tank: six runs, three procedures.",
-        "seed": str(last.attrs["seed"]),
+        "seed": last.attrs["seed"],
         "finished": finished(last),
     }
     sections = [_summary(results)]

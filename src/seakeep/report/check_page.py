@@ -151,7 +151,7 @@ def _by_state(result: xr.Dataset) -> Table:
     """Mean error of each state, the best baseline, and the verdict."""
     rows = []
     for one in entries(result.isel(state=slice(1, None)), "waves", "state"):
-        beside: tuple[str, ...] = (MISSING, MISSING, MISSING)
+        beside = (MISSING, MISSING, MISSING)
         if best := one["best"].item():
             beside = (best, number(one["nrmse"].sel(model=best)), _change(one, best))
         use = USES.get(float(one["limit"]), "not judged").partition(" (")[0]

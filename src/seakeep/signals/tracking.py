@@ -34,9 +34,9 @@ from seakeep.toml import packaged
 Seen = dict[str, FloatArray]
 """Fields of all frames."""
 _TRACK = packaged("signals/track.toml")
-FLAGS: dict[str, int] = _TRACK["flags"]
+FLAGS = _TRACK["flags"]
 """Flags of a frame."""
-LABELS: dict[str, dict[str, str]] = _TRACK["channels"]
+LABELS = _TRACK["channels"]
 """Unit and long name of each channel of a track."""
 
 FRAMES = 12

@@ -725,7 +725,7 @@ def find_leakage(
     length = min(max(length, 1), record.size)
     if _even(waves):
         return None
-    found: list[Leakage] = []
+    found = []
     repeated = np.zeros(record.size, dtype=bool)
     pool = [as_series(each, minimum=8) for each in training]
     ready = [(index, _analytic(each)) for index, each in enumerate(pool) if each.size >= length]

@@ -119,7 +119,7 @@ def response(
             at = measured.sel(state=own["state"])
             at = at.where(at["amplitude_uncertainty"] < at["amplitude"])  # the rest is noise
             for kind, mark in MARKS.items():
-                one = at.isel(point=np.flatnonzero(measured["kind"].values == kind))
+                one = at.isel(point=measured["kind"].values == kind)
                 if one["amplitude"].notnull().any():
                     style = {**mark, **POINTS, "label": f"measured, {kind} waves"}
                     for place, key, scale in ((gain, "amplitude", factor), (turn, "phase", 1.0)):

@@ -370,12 +370,12 @@ def tuning_figure(table: xr.Dataset) -> Figure:
     figure = new_figure(7.0, 4.2)
     axes = figure.subplots()
     for number, name in enumerate(dict.fromkeys(names)):
-        part = table.isel(trial=np.flatnonzero(np.array(names) == name))
+        part = table.isel(trial=np.array(names) == name)
         line = {**SERIES[number % len(SERIES)], "linestyle": "-"}
         axes.semilogx(part["ridge"], part["score"], **line, markersize=4, label=name)
         band = {"color": line["color"], "alpha": 0.12}
         axes.fill_between(part["ridge"], part["lower"], part["upper"], **band)
-    best = table.isel(trial=np.flatnonzero(table["chosen"].values))
+    best = table.isel(trial=table["chosen"].values)
     ring = {"markersize": 11, "fillstyle": "none", "color": "k"}
     axes.semilogx(best["ridge"], best["score"], "o", **ring, label="chosen")
     axes.set_xlabel("ridge per snapshot pair (1)")

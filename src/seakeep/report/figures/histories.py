@@ -456,7 +456,7 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
         at.plot(time, x, color=COLOURS["measured"], linewidth=0.6)
         at.set_ylabel(label, fontsize=8)
         if f"{name}_flags" in run.coords:
-            _mark(at, time, x, run[f"{name}_flags"].values.astype(int))
+            _mark(at, time, x, run[f"{name}_flags"].values)
         known = x[np.isfinite(x)]
         if known.size and np.ptp(known) <= 1e-9 * max(np.abs(known).max(), 1e-300):
             value = known[0]  # an axis that shows no rounding

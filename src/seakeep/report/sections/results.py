@@ -207,7 +207,7 @@ def _coverage_findings(result: StudyResult, model: str) -> list[str]:
     level = result.level
     at = {"test": first, "model": model, "against": "measured", "channel": "average"}
     row = result.groups["statistics/coverage"].sel(at)
-    inside = float(row["inside"].sel(band="members"))
+    inside = row["inside"].sel(band="members").item()
     words = band_verdict(inside, level)
     calibrated = ""
     if "calibrated" in row["band"] and np.isfinite(held := row["inside"].sel(band="calibrated")):
