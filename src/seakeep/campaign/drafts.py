@@ -166,7 +166,9 @@ def _files(files: Files, known: Mapping[str, object]) -> Iterator[str]:
 
 def _channels(guesses: Guesses) -> Iterator[str]:
     yield "\n# A channel is sign * (reading + offset), converted to SI."
-    for guess in (each for each in guesses if each.channel):
+    for guess in guesses:
+        if not guess.channel:
+            continue
         canonical = canonical_channel(guess.channel)
         said = f" # guessed: {canonical.long_name}; header '{guess.header}'" if canonical else ""
         yield f"\n[channels.{guess.channel}]\ncolumn = {_value(guess.column)}{said}"

@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from typing import Literal
 
@@ -170,13 +170,15 @@ def _sea(file: File, series: FloatArray) -> Sea | None:
 def _start(run: str, files: Files, guesses: Guesses) -> float:
     """Latest instant at which the waves have come to a probe, or a motion has begun."""
     starts = [0.0]
-    for file in (each for each in files if each.run == run):
-        for guess in (each for each in guesses if each.logger == file.logger):
-            name, series = guess.channel, file.series(guess.column)
-            if series is None or not (is_elevation(name, rates=True) or name in MOTIONS):
-                continue
-            if begin := first_wave(series, name in MOTIONS):
-                starts.append(1.0 / (file.rate or 1.0) * begin + file.start)
+    for file, guess in product(files, guesses):
+        name = guess.channel
+        if file.run != run or file.logger != guess.logger:
+            continue
+        series = file.series(guess.column)
+        if series is None or not (is_elevation(name, rates=True) or name in MOTIONS):
+            continue
+        if begin := first_wave(series, name in MOTIONS):
+            starts.append(1.0 / (file.rate or 1.0) * begin + file.start)
     return max(starts)
 
 
@@ -294,12 +296,13 @@ def guess_channels(files: Files) -> list[Guess]:
                 out.append(replace(guess, channel=name))
     # Motions, rates and accelerations beside which others of their unit move far more.
     sizes = {}
-    for guess in (each for each in out if each.is_motion):
-        series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
-        spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
-        unit = si_unit(guess.unit)
-        size = max(high - low for low, high in spans) * conversion(guess.unit, unit)
-        sizes[guess.channel] = unit, size
+    for guess in out:
+        if guess.is_motion:
+            series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
+            spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
+            unit = si_unit(guess.unit)
+            size = max(high - low for low, high in spans) * conversion(guess.unit, unit)
+            sizes[guess.channel] = unit, size
     largest = {unit: max(x for u, x in sizes.values() if u == unit) for unit, _ in sizes.values()}
     rests = {name for name, (unit, size) in sizes.items() if size <= AT_REST * largest[unit]}
     return [replace(each, at_rest=each.channel in rests) for each in out]
@@ -308,8 +311,8 @@ def guess_channels(files: Files) -> list[Guess]:
 def dead_motions(files: Files, guesses: Guesses) -> dict[str, str]:
     """Runs in which a motion that others show is constant, as where its sensor is dead."""
     dead: dict[str, str] = {}
-    for guess in (each for each in guesses if each.is_motion and not each.at_rest):
-        for file in (each for each in files if each.logger == guess.logger):
+    for guess, file in product(guesses, files):
+        if guess.is_motion and not guess.at_rest and file.logger == guess.logger:
             values = file.table.values[guess.column]
             if np.ptp(values[np.isfinite(values)]) == 0:
                 dead.setdefault(file.run, guess.channel)

@@ -503,7 +503,9 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         channels |= derive(channels, name, run.settings, dt, run.name)
     axis = xr.Variable("time", time, next(iter(run.groups.values()))["time"].attrs)
     data, coordinates = {}, {"time": axis}
-    for name in (each for each in run.settings.channel_names if each in channels):
+    for name in run.settings.channel_names:
+        if name not in channels:
+            continue
         data[name] = channels[name]
         if (flags := channels.get(f"{name}_flags")) is not None:
             lost = (flags.values & MISSING) > 0

@@ -269,10 +269,11 @@ def samples_in(
 def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
     """Sample at which waves have come to each probe, and each motion has begun."""
     begins = [0]
-    for name in (each for each in names if is_elevation(each) or each in MOTIONS):
-        series = run[name].values
-        if np.isfinite(series).all() and np.ptp(series):
-            begins.append(first_wave(series, name in MOTIONS))
+    for name in names:
+        if is_elevation(name) or name in MOTIONS:
+            series = run[name].values
+            if np.isfinite(series).all() and np.ptp(series):
+                begins.append(first_wave(series, name in MOTIONS))
     return max(begins)
 
 

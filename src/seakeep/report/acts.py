@@ -541,7 +541,7 @@ def _pairs(result: StudyResult, model: str) -> list[list[Number]]:
     pairs = []
     for data in result.tests.values():
         cells = data["error"].sel(model=model, measure="nrmse").values[data["judged"].values]
-        slow = np.isin(data["channel"].values.astype(str), SLOW)
+        slow = np.isin(data["channel"].values, SLOW)
         pairs.append(numbers([np.nanmedian(average_of(cells[:, k])) for k in (~slow, slow)], 2))
     return pairs
 

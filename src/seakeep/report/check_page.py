@@ -192,7 +192,7 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
 
 def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
     """Some variables in the units that are shown, and ``shown``: each state with its unit."""
-    factors, units = zip(*map(displayed, result["units"].values.astype(str)), strict=True)
+    factors, units = zip(*map(displayed, result["units"].values), strict=True)
     factor = xr.DataArray(list(factors), dims="state")
     names = [
         f"{state} [{shown_unit(unit)}]"

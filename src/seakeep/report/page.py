@@ -165,11 +165,12 @@ def write_page(
     with storing(folder), figure_style():
         if not page.exists():  # figures of an interrupted report are known as ours
             write_text(page, UNFINISHED)
-        for each in ("figures", "tables"):
-            (folder / each).mkdir(exist_ok=True)
-        for table in (each for section in sections for each in section.tables):
-            write_csv(table, folder / "tables" / f"{table.name}.csv")
-            write_latex(table, folder / "tables" / f"{table.name}.tex")
+        for kind in ("figures", "tables"):
+            (folder / kind).mkdir(exist_ok=True)
+        for each in sections:
+            for table in each.tables:
+                write_csv(table, folder / "tables" / f"{table.name}.csv")
+                write_latex(table, folder / "tables" / f"{table.name}.tex")
         for number, drawing in enumerate(drawings):
             tell(number, len(drawings), f"drawing {drawing.name.replace('_', ' ')}")
             drawn[drawing.name] = _drawn(drawing, folder / "figures")

@@ -104,7 +104,7 @@ def panels(
         for spare in every[count:]:
             spare.remove()
         return figure, every[:count]
-    given = list(np.ravel(np.array(axes, dtype=object)))
+    given = np.ravel(np.array(axes, dtype=object)).tolist()
     if len(given) != count:
         raise RequestError(
             f"axes holds {len(given)} Axes and the figure draws {count} panels. Give as many, or "

@@ -198,7 +198,7 @@ def modes(result: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
         if value >= 0.05:
             style = {"ha": "center", "va": "center", "fontsize": 7}
             place.text(column, row, f"{value:.2f}", color="w" if value > 0.5 else "k", **style)
-    place.set_xticks(range(len(states)), [short_label(name) for name in states])
+    place.set_xticks(range(len(states)), list(map(short_label, states)))
     place.set_yticks(range(len(words)), words)
     place.grid(False)
     place.set_ylabel("mode: period, damping ratio")

@@ -108,7 +108,7 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
 def channel_boxes(result: StudyResult, test: str) -> Figure:
     """NRMSE and NAMMAE of all cells of a test set, channel by channel."""
     figure = new_figure(8.5, 5.6)
-    models, labels = judged_models(result), [short_label(name) for name in result.channels]
+    models, labels = judged_models(result), list(map(short_label, result.channels))
     errors = [[_cells(result, test, model, measure) for model in models] for measure in HEADING]
     scale = "log" if any(_spans_decades(np.concatenate(cells)) for cells in errors) else "linear"
     for axes, measure, cells in zip(
@@ -277,7 +277,7 @@ def errors(table: xr.Dataset, *, axes: Places = None) -> Figure:
     -------
     Figure
     """
-    labels = [short_label(name) for name in table["channel"].values]
+    labels = list(map(short_label, table["channel"].values))
     figure, (place,) = panels(axes, 1, 1, (max(4.0, 1.2 + 0.8 * len(labels)), 2.8))
     _draw_points(place, table.transpose("run", ...), "run", "nrmse", labels)
     place.set_ylim(bottom=0)

@@ -99,14 +99,16 @@ def draw_history(
         pale = {"color": PALETTE["pale"], "linewidth": 0, "label": "measured, envelope"}
         _envelope(axes, time, (measured, measured), period, fill=True, **pale)
     alpha = 0.3 if len(curves) == 1 else 0.2
-    for each in (each for each in curves if len(each.band)):
+    for each in curves:
+        if not each.band:
+            continue
         edge = {"color": each.line["color"], "linewidth": 0.6, "label": each.words}
         if period is None:
             axes.fill_between(time, *each.band, alpha=alpha, **edge)
         else:
             _envelope(axes, time, each.band, period, alpha=2 * alpha, **edge | {"label": None})
     if period is None:
-        banded = any(len(each.band) for each in curves)
+        banded = any(each.band for each in curves)
         axes.plot(time, measured, label="measured", **(THIN if banded else LINES["measured"]))
     for each in curves:
         if period is not None:
@@ -503,7 +505,7 @@ def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
 def spectrum_figure(result: StudyResult) -> Figure:
     """Mean spectrum of the irregular runs of a study, and the frequencies of the regular ones."""
     spectra, runs = result.groups["spectra"], result.groups["runs"]
-    every = runs["run"].values.astype(str)
+    every = runs["run"].values
     # Where no run is irregular the mean over all of them is drawn.
     irregular = every[runs["waves"].values != "regular"]
     names = irregular if irregular.size else every
