@@ -289,9 +289,7 @@ class Campaign:
             If no run is left.
         """
         stated = self.settings.campaign.encounter_period
-        if stated is not None:
-            return stated
-        return self._mean_period(self._survey([], True))
+        return stated or self._mean_period(self._survey([], True))
 
     def seconds(self, stated: float | str) -> float:
         """Seconds of a length or an instant that may be stated in encounter periods.

@@ -24,12 +24,13 @@ from seakeep.models import HankelDMDcModel, Model
 
 KIND = "functional mock-up unit"
 PLATFORMS = {
-    ("Linux", "x86_64"): ("linux64", ".so"),
-    ("Darwin", "x86_64"): ("darwin64", ".dylib"),
-    ("Darwin", "arm64"): ("darwin64", ".dylib"),
-    ("Windows", "AMD64"): ("win64", ".dll"),
+    "Linux x86_64": ("linux64", ".so"),
+    "Darwin x86_64": ("darwin64", ".dylib"),
+    "Darwin arm64": ("darwin64", ".dylib"),
+    "Windows AMD64": ("win64", ".dll"),
 }
 """Folder of a binary in an FMU and its suffix, by system and processor."""
+HERE = f"{platform.system()} {platform.machine()}"
 
 
 def write_fmu(
@@ -98,7 +99,7 @@ def write_fmu(
             Path(folder, file).write_text(text, encoding="utf-8")
             archive.writestr(f"sources/{file}", text)
         if cc := compiler():
-            place, suffix = PLATFORMS[platform.system(), platform.machine()]
+            place, suffix = PLATFORMS[HERE]
             library = _compiled(cc, Path(folder), name, suffix)
             archive.write(library, f"binaries/{place}/{library.name}")
     return target
@@ -109,7 +110,7 @@ def compiler() -> list[str] | None:
 
     The environment variable ``CC`` names another one than cc, gcc or clang.
     """
-    if (platform.system(), platform.machine()) not in PLATFORMS:
+    if HERE not in PLATFORMS:
         return None
     if named := shlex.split(os.environ.get("CC", "")):
         return named

@@ -30,7 +30,6 @@ END = np.iinfo(np.int64).max
 INT64 = 7
 """Number of the type in ONNX."""
 OPERATORS = {
-    "add": "Add",
     "subtract": "Sub",
     "multiply": "Mul",
     "divide": "Div",
@@ -38,13 +37,10 @@ OPERATORS = {
     "power": "Pow",
     "negative": "Neg",
     "absolute": "Abs",
-    "sqrt": "Sqrt",
-    "sin": "Sin",
-    "floor": "Floor",
     "maximum": "Max",
     "minimum": "Min",
 }
-"""Operators of ONNX by the functions of numpy."""
+"""Operators of ONNX by the functions of numpy, where they are called otherwise."""
 
 
 def write_onnx(model: Model, path: str | Path, steps: int = 1) -> Path:
@@ -139,7 +135,8 @@ class _Array(NDArrayOperatorsMixin):
             return self.graph("Mul", *values, *values)
         if function is np.cos:  # onnxruntime knows no cosine in double precision
             return np.sin(values[0] + np.pi / 2)
-        return self.graph(OPERATORS[function.__name__], *values)
+        name = function.__name__
+        return self.graph(OPERATORS.get(name, name.capitalize()), *values)
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> _Value:
         assert function is np.concatenate

@@ -357,12 +357,13 @@ def history_figure(
     result: StudyResult, test: str, training: int, window: int, names: Sequence[str] | None = None
 ) -> Figure:
     """Channels of one cell over time; all of them unless `names` are given."""
-    names = result.channels if names is None else names
+    names = names or result.channels
     figure = new_figure(7.5, 0.9 + (0.95 if len(names) > 1 else 1.4) * len(names))
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     cell = result.tests[test].isel(training=[training], window=[window])
     calibration = result.groups.get("calibration")
-    calibration = calibration if calibration is None else calibration.isel(training=[training])
+    if calibration:
+        calibration = calibration.isel(training=[training])
     for each, name in zip(axes, names, strict=True):
         _draw_channel(each, result, cell, name, calibration)
     words = "deviation from the training mean, in training SD" if len(names) > 1 else "training SD"
