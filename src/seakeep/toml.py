@@ -12,6 +12,7 @@ import tomllib
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar
 
@@ -45,6 +46,11 @@ _KEY = re.compile(r"\s*((?:[\w.\s-]|\"[^\"]*\"|'[^']*')+?)\s*=")
 _PART = re.compile(r"\"([^\"]*)\"|'([^']*)'|([\w-]+)")
 
 Settings = TypeVar("Settings", bound=BaseModel)
+
+
+def packaged(path: str) -> dict[str, Any]:
+    """Content of a TOML file that comes with seakeep."""
+    return tomllib.loads(resources.files("seakeep").joinpath(path).read_text("utf-8"))
 
 
 @dataclass(frozen=True)

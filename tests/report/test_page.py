@@ -13,7 +13,7 @@ from tutorial_study import STUDY, put_tutorial
 
 from seakeep.files import check_report
 from seakeep.report.sections.results import coverage_table, divergence_table, summary
-from seakeep.report.tables import words as known_words
+from seakeep.report.tables import WORDS
 from seakeep.study import read_result, read_study, run_study
 
 pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
@@ -136,7 +136,7 @@ def test_the_published_divergences_stand_beside_a_study_that_asks_for_them(resul
     asked = changed(result, output={**result.settings["output"], "paper": True})
     table = divergence_table(asked, "bayesian", "paper")
     assert table.columns[-4:] == ("paper: EV", "paper: q0.025", "paper: q0.975", "paper: U")
-    published = known_words()["published"]
+    published = WORDS["published"]
     rows = [row[-4:] for row in table.rows if row[0] == "heave"]
     assert rows == [tuple(published["heave"])]
 

@@ -1,15 +1,14 @@
 """Public data sets of the examples: origin, licence, checksums; fetched only on request."""
 
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 
 from seakeep.arrays import Progress
 from seakeep.errors import DataError, RequestError, did_you_mean
 from seakeep.files import expanded, make_folder, sha256_of
+from seakeep.toml import packaged
 
 TIMEOUT = 60.0
 """Seconds without an answer after which a download is given up."""
@@ -44,8 +43,7 @@ class PublicDataset:
     note: str = ""
 
 
-_TEXT = resources.files("seakeep.campaign").joinpath("datasets.toml").read_text("utf-8")
-DATASETS = [PublicDataset(name, **facts) for name, facts in tomllib.loads(_TEXT).items()]
+DATASETS = [PublicDataset(n, **facts) for n, facts in packaged("campaign/datasets.toml").items()]
 
 
 def find_dataset(name: str) -> PublicDataset:

@@ -7,9 +7,14 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.campaign.settings import CampaignSettings, DerivedSettings, long_name_of
+from seakeep.campaign.settings import (
+    CampaignSettings,
+    DerivedSettings,
+    long_name_of,
+    units_of,
+)
 from seakeep.campaign.validation import sources_of
-from seakeep.conventions import TURNS, canonical_channel, conversion, si_unit
+from seakeep.conventions import TURNS, conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError
 from seakeep.quality.faults import BRIDGED, MISSING, flag_attributes
 from seakeep.signals import (
@@ -43,8 +48,6 @@ def derive(
         channel = _derived(channels, name, own, dt)
     except SeakeepError as error:
         raise type(error)(f"run '{run}', derived channel '{name}': {error}") from None
-    if name in settings.rig.positions:
-        channel.attrs["x_position"] = float(settings.rig.positions[name])
     flags = np.zeros(channel.size, dtype=np.int16)
     for source in sources_of(name, own, channels):
         if (known := channels.get(f"{source}_flags")) is not None:
@@ -55,13 +58,12 @@ def derive(
 
 
 def _derived(dataset: Channels, name: str, settings: DerivedSettings, dt: float) -> xr.Variable:
-    canonical = canonical_channel(name)
     label = f"the derived channel '{name}'"
     source = {} if settings.source is None else dataset[settings.source].attrs
     if settings.expression is not None:
         expression = parse(settings.expression)
         values = expression.evaluate({n: dataset[n].values for n in expression.channels})
-        unit = settings.unit or (canonical.units if canonical else "-")
+        unit = settings.unit or units_of(name, "-")
         origin = settings.expression
     else:
         values, unit, words = _step(dataset, name, settings, dt)
@@ -70,7 +72,7 @@ def _derived(dataset: Channels, name: str, settings: DerivedSettings, dt: float)
             origin = f"squared envelope of {settings.source}"
         if settings.unit is not None:
             conversion(unit, settings.unit, label)
-    target = canonical.units if canonical else si_unit(unit)
+    target = units_of(name, unit)
     values = values * conversion(unit, target, label)
     attributes = {
         "units": target,
@@ -121,7 +123,7 @@ def _body_step(
     angles = _three(dataset)
     if settings.step == "remove_gravity":
         words = f"gravity removed by {', '.join(name for name in TURNS if name in dataset)}"
-        if settings.components is not None:
+        if settings.components:
             force = np.column_stack([dataset[each].values for each in settings.components])
             moved = remove_gravity(force, angles, zeroed=bool(settings.zeroed))
             return _afloat(moved[:, axis], axis), unit, words

@@ -12,9 +12,10 @@ from seakeep.campaign.datasets import data_folder
 from seakeep.campaign.guesses import (
     HYSTERESIS,
     SHORT_GAP,
-    File,
+    Files,
     Guess,
-    Sea,
+    Guesses,
+    Seas,
     arranged,
     dead_motions,
     guess_channels,
@@ -79,7 +80,7 @@ def draft_campaign(
     if not any(guess.channel for guess in guesses):
         _refuse(read)
     wave = next(iter(_inputs(guesses)), None)
-    seas = {} if wave is None else seas_of(read, guesses, wave)
+    seas = seas_of(read, guesses, wave) if wave else {}
     parts = [
         f"# Draft of a campaign ({MARK}: draft). Read every line that says 'guessed', then\n"
         "# run: seakeep prepare THIS-FILE, and look at the sheet it makes",
@@ -96,14 +97,14 @@ def draft_campaign(
 
 def _value(value: object) -> str:
     """A value as TOML writes it."""
-    return str(tomlkit.item(value).as_string())
+    return tomlkit.item(value).as_string()
 
 
 def _key(name: str) -> str:
-    return str(tomlkit.key(name).as_string())
+    return tomlkit.key(name).as_string()
 
 
-def _refuse(files: Sequence[File]) -> None:
+def _refuse(files: Files) -> None:
     first = files[0]
     for other in files[1:]:
         if not set(first.table.names) & set(other.table.names) - {first.time}:
@@ -118,7 +119,7 @@ def _refuse(files: Sequence[File]) -> None:
     )
 
 
-def _general(files: Sequence[File], seas: Mapping[str, Sea], wave: Guess | None) -> str:
+def _general(files: Files, seas: Seas, wave: Guess | None) -> str:
     common = Path(os.path.commonpath([file.path.resolve().parent for file in files]))
     period = "# encounter_period = …  # s; STATE IT: no wave was found"
     if seas:
@@ -128,7 +129,7 @@ def _general(files: Sequence[File], seas: Mapping[str, Sea], wave: Guess | None)
             f"# encounter_period = {sea.period:.3g}  # s; left out, it is measured: the mean of "
             f"{'the irregular runs' if some else 'all runs'} (this is that of {run})"
         )
-    if wave is not None and any(sea.noisy for sea in seas.values()):
+    if wave and any(sea.noisy for sea in seas.values()):
         said = f"guessed: without it, noise of {wave.channel} counts as waves"
         period += f"\nperiod_hysteresis = {HYSTERESIS} # {said}"
     return f"""
@@ -149,24 +150,26 @@ def _assumed_rate(files: str) -> str:
     )
 
 
-def _files(files: Sequence[File], known: Mapping[str, object]) -> Iterator[str]:
+def _files(files: Files, known: Mapping[str, object]) -> Iterator[str]:
     yield from ("", "[files]", *(f"{key} = {_value(value)}" for key, value in known.items()))
     first, times = files[0], {file.time for file in files}
-    if first.time is not None and len(times) == 1:
+    if first.time and len(times) == 1:
         why = "guessed from its name"
         if time_column(first.table) is None:
             unit, step = (of(first.table, first.time) for of in (time_unit_of, time_step_of))
             rate = "" if step is None else f": {1 / float(step):.6g} samples per second"
             why = f"guessed: it rises evenly, as times do, in {unit}{rate}. Check it"
         yield f"time = {_value(first.time)} # {why}"
-    elif not first.logger and None in times and first.table.sampling_rate is None:
+    elif not first.logger and "" in times and first.table.sampling_rate is None:
         yield _assumed_rate("the files have")
 
 
-def _channels(guesses: Sequence[Guess]) -> Iterator[str]:
+def _channels(guesses: Guesses) -> Iterator[str]:
     yield "\n# A channel is sign * (reading + offset), converted to SI."
-    for guess in (each for each in guesses if each.channel is not None):
-        canonical = canonical_channel(str(guess.channel))
+    for guess in guesses:
+        if not guess.channel:
+            continue
+        canonical = canonical_channel(guess.channel)
         said = f" # guessed: {canonical.long_name}; header '{guess.header}'" if canonical else ""
         yield f"\n[channels.{guess.channel}]\ncolumn = {_value(guess.column)}{said}"
         if guess.logger:
@@ -181,16 +184,16 @@ def _channels(guesses: Sequence[Guess]) -> Iterator[str]:
             yield f"long_name = {_value(named_unit(guess.column)[0] if named else guess.column)}"
         if guess.gaps:
             yield "# it has gaps: see 'gaps' in [preparation]"
-    skipped = [guess for guess in guesses if guess.channel is None]
+    skipped = [guess for guess in guesses if not guess.channel]
     yield from [""] * bool(skipped)
     yield from (f"# column '{guess.header}' left out: {guess.why}" for guess in skipped)
 
 
-def _instruments(files: Sequence[File], guesses: Sequence[Guess]) -> Iterator[str]:
+def _instruments(files: Files, guesses: Guesses) -> Iterator[str]:
     """A table per logger; clocks by the trigger, where all loggers have one."""
     loggers = list({file.logger: file for file in reversed(files)}.values())[::-1]
     triggers = {file.logger: next(filter(is_trigger, file.table.values), None) for file in loggers}
-    waves = [g.logger for g in guesses if is_elevation(g.channel or "")]
+    waves = [g.logger for g in guesses if is_elevation(g.channel)]
     reference = (waves or list(triggers))[0]
     yield "\n[instruments]"
     yield f"reference = {_value(reference)} # guessed: its clock is the time of all"
@@ -201,11 +204,11 @@ def _instruments(files: Sequence[File], guesses: Sequence[Guess]) -> Iterator[st
     stated = len({file.time for file in loggers}) > 1
     for file in loggers:
         yield f"\n[instruments.{_key(file.logger)}]"
-        if stated and file.time is not None:
+        if stated and file.time:
             yield f"time = {_value(file.time)}"
-        if file.rate is not None:
+        if file.rate:
             yield f"# {file.rate:.6g} samples per second"
-        elif file.time is None:
+        elif not file.time:
             yield _assumed_rate("the file has")
         if all(triggers.values()):
             name = _value(triggers[file.logger])
@@ -213,9 +216,9 @@ def _instruments(files: Sequence[File], guesses: Sequence[Guess]) -> Iterator[st
 
 
 def _runs(
-    files: Sequence[File],
+    files: Files,
     roles: Mapping[str, tuple[str, str]],
-    seas: Mapping[str, Sea],
+    seas: Seas,
     folder: Path | str | None,
 ) -> Iterator[str]:
     groups = [sea.group for sea in seas.values()]
@@ -232,11 +235,11 @@ def _runs(
         if len(roles) == 1:
             yield "# train = [0.0, 60.0]  # s; in place of role, with test = [60.0, inf]"
         # Training keeps the onset, since steady waves hold one frequency.
-        if sea is not None and sea.start > 0 and role == "test":
+        if sea and sea.start > 0 and role == "test":
             yield f"span = [{sea.start:.2f}, inf] # s; guessed: the waves have come to the vessel"
         elif is_first:
             yield "# span = [10.0, inf]  # s; cut the start-up of the waves off"
-        if sea is not None and groups.count(sea.group) > 1:
+        if sea and groups.count(sea.group) > 1:
             group = _value(f"waves of {sea.group}")
             yield f"sea_state = {group} # guessed: the same waves come again"
         elif is_first:
@@ -246,16 +249,14 @@ def _runs(
             yield from (f"{_key(logger)} = {_value(path)}" for logger, path in own.items())
 
 
-def _kind(run: str, seas: Mapping[str, Sea]) -> str | None:
+def _kind(run: str, seas: Seas) -> str | None:
     """Kind of a run's waves, by its name or else by their spectrum; None if neither says."""
     if (named := waves_of_name(run)) or run not in seas:
         return named
     return "regular" if seas[run].regular else "irregular"
 
 
-def _roles(
-    files: Sequence[File], guesses: Sequence[Guess], seas: Mapping[str, Sea]
-) -> dict[str, tuple[str, str]]:
+def _roles(files: Files, guesses: Guesses, seas: Seas) -> dict[str, tuple[str, str]]:
     """Role of each run, and why: irregular runs train, and one whose waves lie within theirs tests.
 
     Runs without waves are not used, where others have some; nor are those that lack a file, or in
@@ -288,7 +289,7 @@ def _roles(
     return roles | {n: ("train" if n in trains else "test", why) for n in moved}
 
 
-def _tests_of(names: Sequence[str], seas: Mapping[str, Sea]) -> tuple[list[str], str]:
+def _tests_of(names: Sequence[str], seas: Seas) -> tuple[list[str], str]:
     """A run whose waves lie within the range of the others', or nearest, and its repeats; in words.
 
     Of several regular waves, that with the least distance to the next one in period.
@@ -323,9 +324,7 @@ def _relative(path: Path, folder: Path | str | None) -> str:
     return Path(os.path.relpath(absolute, Path(folder or ".").resolve())).as_posix()
 
 
-def _preparation(
-    files: Sequence[File], guesses: Sequence[Guess], seas: Mapping[str, Sea]
-) -> Iterator[str]:
+def _preparation(files: Files, guesses: Guesses, seas: Seas) -> Iterator[str]:
     """One step for all, no finer than that of the fastest logger, and what to do about gaps."""
     yield "\n[preparation]"
     several = bool(files[0].logger)
@@ -344,9 +343,7 @@ def _preparation(
         yield f"sampling_rate = {rate:#.6g} # Hz; guessed: that of the slowest logger"
     else:
         yield f"# sampling_rate = {min([25.0, *rates]):.6g}  # Hz; left out, the files' own"
-    if gapped := {
-        str(guess.channel): guess.gaps for guess in guesses if guess.channel and guess.gaps
-    }:
+    if gapped := {guess.channel: guess.gaps for guess in guesses if guess.channel and guess.gaps}:
         yield (
             f'gaps = "{"bridge" if "short" in gapped.values() else "mask"}" # '
             f"{', '.join(gapped)}: 'mask' flags gaps, 'bridge' fills those up to {SHORT_GAP} s "
@@ -354,15 +351,15 @@ def _preparation(
         )
 
 
-def _inputs(guesses: Sequence[Guess]) -> list[Guess]:
+def _inputs(guesses: Guesses) -> list[Guess]:
     """Wave probes that drive a model: none behind the vessel, without gaps where there are such."""
-    waves = [guess for guess in guesses if is_elevation(guess.channel or "")]
+    waves = [guess for guess in guesses if is_elevation(guess.channel)]
     before = [guess for guess in waves if not guess.behind] or waves
     least = min((guess.gaps for guess in before), key=("", "short", "long").index, default="long")
     return [guess for guess in before if guess.gaps == least]
 
 
-def _model(guesses: Sequence[Guess]) -> Iterator[str]:
+def _model(guesses: Guesses) -> Iterator[str]:
     """Motions as states, waves as inputs, delays in encounter periods."""
     mapped = {guess.channel: guess for guess in guesses if guess.channel}
     kinds = [[m + kind for m in MOTIONS] for kind in ("", "_rate", "_acceleration")]
@@ -370,7 +367,7 @@ def _model(guesses: Sequence[Guess]) -> Iterator[str]:
     moved = [[name for name in usable if name in kind] for kind in kinds]
     rest = [name for name in usable if not is_elevation(name, rates=True)]
     states = [*moved[0], *moved[1]] or moved[2] or rest or list(mapped)[:1]
-    inputs = [str(guess.channel) for guess in _inputs(guesses) if guess.channel not in states]
+    inputs = [guess.channel for guess in _inputs(guesses) if guess.channel not in states]
     motions = [name for name in mapped if any(name in kind for kind in kinds)]
     loads = [n for n in rest if n.startswith("mooring_") and n not in states]
     probes = [name for name in mapped if is_elevation(name) and name not in inputs]

@@ -1,12 +1,10 @@
 """Guesses about columns, files and runs of a campaign, from names, units and waves."""
 
 import re
-import tomllib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib import resources
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from typing import Literal
 
@@ -21,9 +19,9 @@ from seakeep.formats.columns import is_unit, named_unit
 from seakeep.signals import encounter_period, repeated_waves, uniform_step, waves_part
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import energy_period, first_wave, tapered_power
+from seakeep.toml import packaged
 
-_TEXT = resources.files("seakeep.campaign").joinpath("vocabulary.toml").read_text("utf-8")
-_CALLED = tomllib.loads(_TEXT)
+_CALLED = packaged("campaign/vocabulary.toml")
 """Words of columns, runs and places in files of others."""
 
 LONG = 64
@@ -58,21 +56,21 @@ class File:
     run: str
     logger: str
     table: Columns
-    time: str | None
+    time: str
 
     @property
     def rate(self) -> float | None:
         """Samples per second, where the file states them."""
-        step = None if self.time is None else time_step_of(self.table, self.time)
+        step = time_step_of(self.table, self.time) if self.time else None
         return self.table.sampling_rate if step is None else 1.0 / step
 
     @property
     def start(self) -> float:
         """First instant, s; zero where the file states none."""
-        times = self.table.values.get(self.time or "", np.zeros(1))
-        unit = time_unit_of(self.table, self.time or "")
+        times = self.table.values.get(self.time, np.zeros(1))
+        unit = time_unit_of(self.table, self.time)
         factor = conversion(unit, "s") if is_unit(unit) else 1.0
-        return factor * float(times[0]) if np.isfinite(times[0]) else 0.0
+        return factor * times[0] if np.isfinite(times[0]) else 0.0
 
     def series(self, column: str) -> FloatArray | None:
         """A column without its gaps; None where there is too little of it, or it is constant."""
@@ -85,7 +83,7 @@ class File:
 
 @dataclass(frozen=True)
 class Guess:
-    """A guess for a column; `channel` is None where nothing fits, and `why` says so.
+    """A guess for a column; `channel` is empty where nothing fits, and `why` says so.
 
     `unit_from` says who states the unit: the file, the end of the column's name, or nobody.
     `at_rest` says that the motion is restrained or does not show, `behind` that a probe's name
@@ -96,7 +94,7 @@ class Guess:
     header: str
     unit: str
     unit_from: Literal["file", "name", "nobody"]
-    channel: str | None = None
+    channel: str = ""
     logger: str = ""
     why: str = ""
     gaps: Literal["", "short", "long"] = ""
@@ -106,7 +104,7 @@ class Guess:
     @property
     def is_motion(self) -> bool:
         """Whether it is a motion, a rate or an acceleration of the body."""
-        return (self.channel or "").partition("_")[0] in MOTIONS
+        return self.channel.partition("_")[0] in MOTIONS
 
 
 @dataclass(frozen=True)
@@ -125,17 +123,23 @@ class Sea:
     group: str
 
 
+Files = Sequence[File]
+Guesses = Sequence[Guess]
+Seas = Mapping[str, Sea]
+"""By run."""
+
+
 @np.errstate(over="ignore", invalid="ignore")
-def seas_of(files: Sequence[File], guesses: Sequence[Guess], wave: Guess) -> dict[str, Sea]:
+def seas_of(files: Files, guesses: Guesses, wave: Guess) -> dict[str, Sea]:
     """Waves, as one probe recorded them, of each run that has some; decay tests have none."""
     series = {f: f.series(wave.column) for f in files if f.logger == wave.logger}
     seas = {f: sea for f, x in series.items() if x is not None and (sea := _sea(f, x)) is not None}
     highest = max((sea.height for sea in seas.values()), default=0.0)
     seas = {file: sea for file, sea in seas.items() if sea.height > STILL * highest}
-    rate = min((float(file.rate or 1.0) for file in seas), default=1.0)
+    rate = min((file.rate or 1.0 for file in seas), default=1.0)
     records = {}
     for file in seas:
-        x, own = series[file], float(file.rate or 1.0)
+        x, own = series[file], file.rate or 1.0
         assert x is not None
         records[file.run] = np.interp(np.arange(0, x.size, own / rate), np.arange(x.size), x)
     groups = repeated_waves(records, 1.0 / rate)
@@ -146,12 +150,12 @@ def seas_of(files: Sequence[File], guesses: Sequence[Guess], wave: Guess) -> dic
 
 
 def _sea(file: File, series: FloatArray) -> Sea | None:
-    step = 1.0 / float(file.rate or 1.0)
+    step = 1.0 / (file.rate or 1.0)
     try:
         series = series[waves_part(series, step)]
         power = tapered_power(series)
         frequency = np.fft.rfftfreq(series.size, step)
-        peak = frequency[1 + int(np.argmax(power[1:]))]
+        peak = frequency[1 + np.argmax(power[1:])]
         off = np.abs(frequency - peak * np.clip(np.round(frequency / peak), 1, 3))
         near = off < max(0.1 * peak, 2.5 * frequency[1])
         regular = bool(power[near].sum() > ONE_WAVE * power[1:].sum())
@@ -163,17 +167,18 @@ def _sea(file: File, series: FloatArray) -> Sea | None:
     return Sea(float(series.std()), period, regular, noisy, 0.0, file.run)
 
 
-def _start(run: str, files: Sequence[File], guesses: Sequence[Guess]) -> float:
+def _start(run: str, files: Files, guesses: Guesses) -> float:
     """Latest instant at which the waves have come to a probe, or a motion has begun."""
     starts = [0.0]
-    for file in (each for each in files if each.run == run):
-        for guess in (each for each in guesses if each.logger == file.logger):
-            name, series = str(guess.channel), file.series(guess.column)
-            if series is None or not (is_elevation(name, rates=True) or name in MOTIONS):
-                continue
-            if begin := first_wave(series, name in MOTIONS):
-                step = 1.0 / float(file.rate or 1.0)
-                starts.append(step * begin + file.start)
+    for file, guess in product(files, guesses):
+        name = guess.channel
+        if file.run != run or file.logger != guess.logger:
+            continue
+        series = file.series(guess.column)
+        if series is None or not (is_elevation(name, rates=True) or name in MOTIONS):
+            continue
+        if begin := first_wave(series, name in MOTIONS):
+            starts.append(1.0 / (file.rate or 1.0) * begin + file.start)
     return max(starts)
 
 
@@ -234,7 +239,7 @@ def arranged(paths: Sequence[Path], tables: Sequence[Columns]) -> list[File]:
     """
     # By its name; else by its values, where no file states its rate.
     times = [
-        time_column(table) or (None if table.sampling_rate else _rising_column(table))
+        time_column(table) or ("" if table.sampling_rate else _rising_column(table))
         for table in tables
     ]
     own = [
@@ -278,7 +283,7 @@ def _free(stem: str, taken: Counter[str]) -> str:
     return name
 
 
-def guess_channels(files: Sequence[File]) -> list[Guess]:
+def guess_channels(files: Files) -> list[Guess]:
     """Guess a channel for each column of the first file of each logger."""
     out = []
     taken: Counter[str] = Counter()
@@ -291,29 +296,30 @@ def guess_channels(files: Sequence[File]) -> list[Guess]:
                 out.append(replace(guess, channel=name))
     # Motions, rates and accelerations beside which others of their unit move far more.
     sizes = {}
-    for guess in (each for each in out if each.is_motion):
-        series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
-        spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
-        unit = si_unit(guess.unit)
-        size = max(float(high - low) for low, high in spans) * conversion(guess.unit, unit)
-        sizes[guess.channel] = unit, size
+    for guess in out:
+        if guess.is_motion:
+            series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
+            spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
+            unit = si_unit(guess.unit)
+            size = max(high - low for low, high in spans) * conversion(guess.unit, unit)
+            sizes[guess.channel] = unit, size
     largest = {unit: max(x for u, x in sizes.values() if u == unit) for unit, _ in sizes.values()}
     rests = {name for name, (unit, size) in sizes.items() if size <= AT_REST * largest[unit]}
     return [replace(each, at_rest=each.channel in rests) for each in out]
 
 
-def dead_motions(files: Sequence[File], guesses: Sequence[Guess]) -> dict[str, str]:
+def dead_motions(files: Files, guesses: Guesses) -> dict[str, str]:
     """Runs in which a motion that others show is constant, as where its sensor is dead."""
     dead: dict[str, str] = {}
-    for guess in (each for each in guesses if each.is_motion and not each.at_rest):
-        for file in (each for each in files if each.logger == guess.logger):
+    for guess, file in product(guesses, files):
+        if guess.is_motion and not guess.at_rest and file.logger == guess.logger:
             values = file.table.values[guess.column]
             if np.ptp(values[np.isfinite(values)]) == 0:
-                dead.setdefault(file.run, str(guess.channel))
+                dead.setdefault(file.run, guess.channel)
     return dead
 
 
-def _guess(column: str, files: Sequence[File]) -> Guess:
+def _guess(column: str, files: Files) -> Guess:
     table, logger = files[0].table, files[0].logger
     header = _printable(table.headers.get(column, column))
     if is_trigger(column):
@@ -323,14 +329,14 @@ def _guess(column: str, files: Sequence[File]) -> Guess:
     if unit is None:
         bare, named = named_unit(column)
         stated_by = "nobody"
-        if named is not None and si_unit(named) != "s":  # "Tension_s" is a side, and no time
+        if named and si_unit(named) != "s":  # "Tension_s" is a side, and no time
             name, unit, stated_by = bare, named, "name"
     why, gaps = _fault(column, files)
     if unit is not None and not is_unit(unit):
         why = why or f"its unit '{unit}' is not known; state unit = '…'"
     # One file per run may be that of one logger, whose name says what it measured.
-    channel = None if why else suggest_channel(name, unit, logger or _stem(files[0].path))
-    canonical = canonical_channel(channel) if channel else None
+    channel = "" if why else suggest_channel(name, unit, logger or _stem(files[0].path))
+    canonical = canonical_channel(channel)
     unit = unit if unit is not None else canonical.units if canonical else "-"
     behind = "behind" in _kinds(_words(column))
     return Guess(column, header, unit, stated_by, channel, logger, _printable(why), gaps,
@@ -342,7 +348,7 @@ def _printable(text: str) -> str:
     return re.sub(r"[\x00-\x08\x0a-\x1f\x7f]", "?", text)
 
 
-def _fault(column: str, files: Sequence[File]) -> tuple[str, Literal["", "short", "long"]]:
+def _fault(column: str, files: Files) -> tuple[str, Literal["", "short", "long"]]:
     """Why a column cannot be a channel, if it cannot; and what gaps it has."""
     if column in files[0].table.faults:
         return "not all of it are numbers, or its name is there twice", ""
@@ -361,8 +367,8 @@ def _fault(column: str, files: Sequence[File]) -> tuple[str, Literal["", "short"
     return "", "" if not lengths else "short" if max(lengths) <= SHORT_GAP else "long"
 
 
-def _rising_column(table: Columns) -> str | None:
-    """Name of the first column that rises evenly, as times do; None if there is none.
+def _rising_column(table: Columns) -> str:
+    """Name of the first column that rises evenly, as times do; empty if there is none.
 
     One that a unit says to be something else is none, nor is one that counts 1, 2, 3.
     """
@@ -371,7 +377,7 @@ def _rising_column(table: Columns) -> str | None:
         is_time = unit is None or (is_unit(unit) and si_unit(unit) == "s")
         if is_time and _step_of(series) not in (None, 1.0):
             return column
-    return None
+    return ""
 
 
 def _step_of(series: FloatArray) -> float | None:
@@ -384,7 +390,7 @@ def _step_of(series: FloatArray) -> float | None:
         return None
 
 
-def _listed(files: Sequence[File]) -> str:
+def _listed(files: Files) -> str:
     return ", ".join(f"{f.run}/{f.path.name}" if f.logger else f.path.name for f in files[:3])
 
 

@@ -6,6 +6,7 @@ after it are there: it differs from the offline one by what the ends of the wind
 """
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, as_real, as_table
+from seakeep.arrays import FloatArray, as_real
 from seakeep.campaign.pipeline import Logger, Run, cleaned, derived, mapped, resampled
 from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.conventions import conversion
@@ -79,15 +80,10 @@ class LiveChain:
             If the chain cannot use the samples. Nothing was taken then, as with a RequestError.
         """
         before = self._rows, self._origin, self._given
-        new = {
-            key: self._checked(key, table) for key, table in as_table(samples, "samples").items()
-        }
-        self._rows = {
-            key: {
-                name: np.concatenate([values, new[key][name]]) if key in new else values
-                for name, values in table.items()
-            }
-            for key, table in self._rows.items()
+        new = {key: self._checked(key, table) for key, table in samples.items()}
+        self._rows = self._rows | {
+            key: {n: np.concatenate([x, more[n]]) for n, x in self._rows[key].items()}
+            for key, more in new.items()
         }
         try:
             self._check_all_send()
@@ -154,13 +150,13 @@ class LiveChain:
         """Model samples that are ready, and no row kept that none needs any more."""
         if self._origin is None and all(len(self._instants(key)) for key in self._rows):
             # As offline: multiples of the step from the first instant of the reference.
-            firsts = [float(self._instants(key)[0]) for key in self._rows]
+            firsts = [self._instants(key)[0] for key in self._rows]
             self._origin = firsts[0]
-            self._given = int(np.ceil((max(firsts) - firsts[0] + self.delay) / self.dt - 1e-6))
+            self._given = math.ceil((max(firsts) - firsts[0] + self.delay) / self.dt - 1e-6)
         ready = 0
         if self._origin is not None:
-            newest = min(float(self._instants(key)[-1]) for key in self._rows)
-            ready = int(np.floor((newest - self.delay - self._origin) / self.dt + 1e-9)) + 1
+            newest = min(self._instants(key)[-1] for key in self._rows)
+            ready = math.floor((newest - self.delay - self._origin) / self.dt + 1e-9) + 1
         if ready - self._given < self.every:
             empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
             return xr.Dataset(empty, coords={"time": np.empty(0)})
@@ -178,7 +174,7 @@ class LiveChain:
         logger = self._run.loggers[key]
         arrays = {
             find_column(logger.path, logger.columns, name): as_real(values, name)
-            for name, values in as_table(table, f"samples of '{key}'").items()
+            for name, values in table.items()
         }
         missing = [name for name in self._rows[key] if name not in arrays]
         sizes = {each.shape for each in arrays.values()}
@@ -189,8 +185,7 @@ class LiveChain:
                 "needed, a number per row each. Send NaN for a value that was lost."
             )
         name, factor = self._time[key]
-        before = self._rows[key][name][-1:]
-        times = np.concatenate([before, arrays[name]])
+        times = np.concatenate([self._rows[key][name][-1:], arrays[name]])
         if not np.all(np.diff(times) > 0) or not np.all(np.isfinite(times)):
             raise RequestError(
                 f"the instants of '{key}' do not increase: "
@@ -207,8 +202,8 @@ class LiveChain:
     def _check_all_send(self) -> None:
         """Refuse a silent logger: nothing can be made without it, and the others' rows pile up."""
         instants = {key: self._instants(key) for key in self._rows}
-        start = min((float(each[0]) for each in instants.values() if each.size), default=0.0)
-        newest = {key: float(each[-1]) if each.size else start for key, each in instants.items()}
+        start = min((each[0] for each in instants.values() if each.size), default=0.0)
+        newest = {key: each[-1] if each.size else start for key, each in instants.items()}
         last = min(newest, key=newest.__getitem__)
         silent = max(newest.values()) - newest[last]
         if silent > self.window:
@@ -227,19 +222,20 @@ class LiveChain:
         }
         run = derived(cleaned(mapped(replace(self._run, loggers=loggers))))
         ends = [each["time"].values[[0, -1]] for each in run.groups.values()]
-        low = int(np.ceil((max(each[0] for each in ends) - origin) / dt - 1e-9))
-        high = int(np.floor((min(each[1] for each in ends) - origin) / dt + 1e-9))
-        axis = origin + dt * np.arange(low, high + 1, dtype=float)
-        data = resampled(run, dt, axis).data
-        names = list(run.settings.channel_names)
-        return data[names].reset_coords(drop=True).isel(time=slice(max(first - low, 0), stop - low))
+        low = math.ceil((max(each[0] for each in ends) - origin) / dt - 1e-9)
+        high = math.floor((min(each[1] for each in ends) - origin) / dt + 1e-9)
+        data = resampled(run, dt, origin + dt * np.arange(low, high + 1)).data
+        ready = data[[*run.settings.channel_names]].isel(
+            time=slice(max(first - low, 0), stop - low)
+        )
+        return ready.reset_coords(drop=True)
 
     def _trim(self) -> None:
         """Forget rows that have left the window."""
         assert self._origin is not None
         oldest = self._origin + self._given * self.dt + self.delay - self.window
         for key, table in self._rows.items():
-            first = int(np.searchsorted(self._instants(key), oldest))
+            first = np.searchsorted(self._instants(key), oldest)
             self._rows[key] = {name: values[first:] for name, values in table.items()}
 
 

@@ -14,7 +14,7 @@ step       what it does
 ========== =====================================================================================
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -42,9 +42,10 @@ from seakeep.campaign.settings import (
     PreparationSettings,
     RunSettings,
     long_name_of,
+    units_of,
 )
 from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
-from seakeep.conventions import MOTIONS, canonical_channel, conversion, si_unit
+from seakeep.conventions import MOTIONS, conversion
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import version
 from seakeep.formats import Columns, Options
@@ -125,11 +126,11 @@ class Run:
         Clock of each logger.
     groups : mapping of str to Dataset
         Channels by logger, each at its own rate.
-    late : tuple of str
+    late : sequence of str
         Derived channels that need several loggers.
     data : Dataset or None
         All channels on one axis.
-    findings : tuple of Finding
+    findings : sequence of Finding
         Results of the checks.
     """
 
@@ -138,9 +139,9 @@ class Run:
     loggers: Mapping[str, Logger]
     clocks: Mapping[str, Clock] = field(default_factory=dict)
     groups: Datasets = field(default_factory=dict)
-    late: tuple[str, ...] = ()
+    late: Sequence[str] = ()
     data: xr.Dataset = field(default_factory=xr.Dataset)
-    findings: tuple[Finding, ...] = ()
+    findings: Sequence[Finding] = ()
 
     @property
     def own(self) -> RunSettings:
@@ -175,14 +176,11 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
             stated = settings.instruments[key].model_dump(include=keys, exclude_none=True)
             options = options.model_copy(update=stated)
         columns = reader(path, options)
-        if key and time_column(columns, options.time) is not None:
+        if key and time_column(columns, options.time):
             options = options.model_copy(update={"sampling_rate": None})
         loggers[key] = Logger(key, path, columns, options)
-    reference = settings.instruments.reference
-    if reference not in loggers:
-        known = (each for each in settings.instruments.loggers if each in loggers)
-        reference = next(known, next(iter(loggers)))
-    assert reference is not None
+    order = [settings.instruments.reference, *settings.instruments.loggers, *loggers]
+    reference = min(loggers, key=order.index)
     return Run(name, settings, {reference: loggers.pop(reference), **loggers})
 
 
@@ -219,8 +217,8 @@ def _clock(
     pair = own.shared or own.correlated
     if pair is None:
         stated = own.offset is not None or own.drift is not None
-        clock = Clock(own.offset or 0.0, 1e-6 * (own.drift or 0.0))
-        return replace(clock, method="as stated" if stated else ASSUMED)
+        method = "as stated" if stated else ASSUMED
+        return Clock(own.offset or 0.0, 1e-6 * (own.drift or 0.0), method=method)
     time, series = logger.uniform(pair[0])
     instants, other = reference.uniform(pair[1])
     if not np.ptp(series) or not np.ptp(other):
@@ -247,7 +245,7 @@ def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
     wanted : collection of str, optional
         The channels wanted, with what they need; the default is all.
     """
-    needed = needed_channels(run.settings, run.settings.channel_names if wanted is None else wanted)
+    needed = needed_channels(run.settings, wanted)
     every = channels_of(run.settings, run.own)
     chosen = {name: each for name, each in every.items() if name in needed}
     homes = _homes(run, chosen)
@@ -296,12 +294,11 @@ def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings])
     """Channels of one logger, gaps and jitter as they are."""
     time = run.clocks[logger.name].reference(logger.time)
     records: slice | BoolArray = slice(None)
-    if run.own.record is not None:
+    if run.own.record:
         start, end = (number(edge) for edge in run.own.record)
-        step, whole = usual_step(time), (float(time[0]), float(time[-1]))
+        step, whole = usual_step(time), (time[0], time[-1])
         slack = step * (1 + 1e-6) if logger.name == next(iter(run.loggers)) else np.inf
-        place = f"runs.{run.name}.record"
-        records = _part(place, (start, end), time, step, whole, slack)
+        records = _part(f"runs.{run.name}.record", (start, end), time, step, whole, slack)
     variables = {}
     for name, each in channels.items():
         values, attributes = _converted(name, each, run, logger)
@@ -336,8 +333,7 @@ def _converted(
             f"channels.{name}: the column '{wanted}' of {path} states no unit. Add unit = '…' to "
             f"[channels.{name}] ('-' for none)."
         )
-    canonical = canonical_channel(name)
-    target = canonical.units if canonical else si_unit(unit)
+    target = units_of(name, unit)
     factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")
     values = settings.sign * factor * (logger.columns.values[column] + settings.offset)
     attributes: dict[str, Any] = {
@@ -346,8 +342,6 @@ def _converted(
     }
     if settings.accuracy is not None:
         attributes["accuracy"] = factor * settings.accuracy
-    if (position := run.settings.rig.positions.get(name)) is not None:
-        attributes["x_position"] = float(position)
     return values, attributes
 
 
@@ -361,10 +355,10 @@ def cleaned(run: Run) -> Run:
             _refuse_gaps(data, run.name, logger.path)
         data = _regular(data, preparation, f"run '{run.name}' ({logger.path})")
         groups[key] = data = flag_samples(data, preparation)
-        if logger.options.sampling_rate is not None and logger.options.time is None:
+        if logger.options.sampling_rate and logger.options.time is None:
             aside = time_column(logger.columns)
             step = None if aside is None else time_step_of(logger.columns, aside)
-            if step is not None:  # the step of the file's times, where a stated rate is used
+            if step:  # the step of the file's times, where a stated rate is used
                 data.attrs["time_column_step"] = step
         elif counts_samples(logger.columns, logger.options):
             data.attrs["time_counts"] = 1
@@ -387,7 +381,7 @@ def _refuse_gaps(data: xr.Dataset, run: str, path: Path) -> None:
     longest = max(gaps, key=lambda gap: gap[1] - gap[0])
     others = f" (also in {', '.join(gapped[1:])})" if gapped[1:] else ""
     raise DataError(
-        f"run '{run}' ({path}): channel '{gapped[0]}' has {int(first.sum())} missing values of "
+        f"run '{run}' ({path}): channel '{gapped[0]}' has {first.sum()} missing values of "
         f"{first.size} in {len(gaps)} gap(s), the first at {said(gaps[0])}, the longest at "
         f"{said(longest)}{others}. Repair the file, leave the "
         f"channel out, or cut the gap off with record = [start, end] in [runs.{run}]; or state "
@@ -448,7 +442,7 @@ def _flagged(
         filled = bridge(x, step, longest)
         x = filled.values
         flags += (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
-        if count := int(filled.short.sum()):
+        if count := filled.short.sum():
             seconds = f"{count * step:.3g} s of {x.size * step:.4g} s"
             repaired.append(f"{count} samples ({seconds}) bridged by monotone cubics")
     if x.size >= 16 and np.ptp(x):
@@ -465,7 +459,7 @@ def _flagged(
         if replaced and outlier.any():
             x = bridge(np.where(outlier, np.nan, x), step, np.inf).values
             flags[outlier] |= REPLACED
-            repaired.append(f"{int(outlier.sum())} outliers replaced by monotone cubics")
+            repaired.append(f"{outlier.sum()} outliers replaced by monotone cubics")
     if repaired:
         known["repaired"] = "; ".join(repaired)
     return x, flags, known
@@ -477,7 +471,7 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
     `wanted` is as in :func:`mapped`.
     """
     settings, groups, late = run.settings, dict(run.groups), []
-    needed = needed_channels(settings, settings.channel_names if wanted is None else wanted)
+    needed = needed_channels(settings, wanted)
     home = {str(name): key for key, data in groups.items() for name in data.data_vars}
     for name in derivation_order(settings.derived, settings.channel_names):
         if name not in needed:
@@ -492,7 +486,7 @@ def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
         step = uniform_step(data["time"].values, f"run '{run.name}'")
         variable = derive(data.variables, name, settings, step, run.name)
         groups[home[name]] = data.assign({name: variable.pop(name)}).assign_coords(variable)
-    return replace(run, groups=groups, late=tuple(late))
+    return replace(run, groups=groups, late=late)
 
 
 def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
@@ -509,20 +503,23 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         channels |= derive(channels, name, run.settings, dt, run.name)
     axis = xr.Variable("time", time, next(iter(run.groups.values()))["time"].attrs)
     data, coordinates = {}, {"time": axis}
-    for name in (each for each in run.settings.channel_names if each in channels):
+    for name in run.settings.channel_names:
+        if name not in channels:
+            continue
         data[name] = channels[name]
         if (flags := channels.get(f"{name}_flags")) is not None:
             lost = (flags.values & MISSING) > 0
             data[name] = data[name].copy(data=np.where(lost, np.nan, data[name].values))
             coordinates[f"{name}_flags"] = flags
+        if name in run.settings.rig.positions:
+            data[name].attrs["x_position"] = run.settings.rig.positions[name]
     return replace(run, data=xr.Dataset(data, coordinates))
 
 
 def _axis(run: Run, dt: float) -> FloatArray:
-    begin = max(float(each["time"][0]) for each in run.groups.values())
-    end = min(float(each["time"][-1]) for each in run.groups.values())
+    times = {name: each["time"].values for name, each in run.groups.items()}
+    begin, end = max(t[0] for t in times.values()), min(t[-1] for t in times.values())
     if end <= begin:
-        times = {name: each["time"].values for name, each in run.groups.items()}
         spans = ", ".join(
             f"{name} {span_text(t[0], t[-1], usual_step(t))}" for name, t in times.items()
         )
@@ -530,7 +527,7 @@ def _axis(run: Run, dt: float) -> FloatArray:
             f"run '{run.name}': its instruments never recorded together ({spans}, on the "
             "reference's clock). Check the files of the run and the clocks."
         )
-    origin = float(run.reference_time[0])
+    origin = run.reference_time[0]
     first = np.ceil((begin - origin) / dt - 1e-6)
     last = np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6)
     if last <= first:
@@ -549,10 +546,8 @@ def _on_axis(
     own = uniform_step(time, f"run '{run}'")
     channels = {name: group.variables[name] for name in group.data_vars}
     series = np.column_stack([channel.values for channel in channels.values()])
-    low = settings.low_pass
-    if low is not None and low[1] >= 0.5 / own:
-        low = None
-    if low is not None:
+    low, filtered = settings.low_pass, {}
+    if low and low[1] < 0.5 / own:
         length = 60 / (14.36 * (low[1] - low[0]))  # of 60 dB, by Kaiser's formula
         if (lasts := time.size * own) < 0.5 * length:
             raise DataError(
@@ -560,6 +555,7 @@ def _on_axis(
                 f"record lasts {lasts:.3g} s. Move its second edge away from the first."
             )
         series = low_pass(series, own, *low)
+        filtered = {"low_pass": low}
     if strays(own, time.size, dt) or abs(wanted[0] - time[0]) > 0.05 * own:
         # The last instant may lie a rounding beyond the record.
         clipped = np.clip(wanted, time[0], time[-1])
@@ -567,7 +563,6 @@ def _on_axis(
         series = resample(series, time, clipped, settings.attenuation, anti_alias=not fine)
     else:
         series = series[: wanted.size]
-    filtered = {"low_pass": low} if low else {}
     out = {
         str(name): xr.Variable("time", series[:, i].copy(), {**channel.attrs, **filtered})
         for i, (name, channel) in enumerate(channels.items())
@@ -581,7 +576,7 @@ def _on_axis(
 
 def _flags_at(flags: Any, time: FloatArray, wanted: FloatArray, dt: float) -> Any:
     """Flags at new instants: what any sample within half a new step of them carries."""
-    half = 0.5 * max(dt, float(time[1] - time[0])) * (1 + 1e-9)
+    half = 0.5 * max(dt, time[1] - time[0]) * (1 + 1e-9)
     begin = np.searchsorted(time, wanted - half)
     end = np.searchsorted(time, wanted + half, side="right")
     edges = np.column_stack([begin, end]).ravel()
@@ -621,7 +616,7 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
     rates = {}
     for name in run.groups:
         own = settings.instruments[name] if name else settings.files
-        if own.sampling_rate is not None:
+        if own.sampling_rate:
             rates[name] = Rate(own.sampling_rate, own.time is None, own.sampling_rate_assumed)
     channels = channels_of(settings, run.own)
     units = {name: each.unit or "-" for name, each in channels.items() if each.unit_assumed}
@@ -648,13 +643,13 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
         anti_alias=preparation.anti_alias,
         left_out=left_out,
     )
-    return replace(run, findings=tuple(check(record)))
+    return replace(run, findings=check(record))
 
 
 def used_span(settings: RunSettings) -> tuple[float, float]:
     """First and last instant of a run that is used at all, s."""
     stated = (settings.span,) if settings.span else (settings.train, settings.test)
-    spans = [(number(each[0]), number(each[1])) for each in stated if each is not None]
+    spans = [(number(each[0]), number(each[1])) for each in stated if each]
     starts, ends = zip(*spans, strict=True) if spans else ((-np.inf,), (np.inf,))
     return min(starts), max(ends)
 
@@ -663,22 +658,22 @@ def cropped(run: Run) -> Run:
     """Step 8: cut the run to its span; spans that lie outside the record are refused."""
     data, reference = run.data, run.reference_time
     dt = usual_step(data["time"].values)
-    record = float(reference[0]), float(reference[-1])
+    record = reference[0], reference[-1]
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
     slack = max(dt, (record[1] - record[0]) / (reference.size - 1)) * (1 + 1e-6)
     stated = {key: getattr(run.own, key) for key in ("span", "train", "test")}
     spans = {k: (number(each[0]), number(each[1])) for k, each in stated.items() if each}
 
     def used(key: str, record: tuple[float, float], slack: float) -> BoolArray:
-        time = data["time"].values
-        return _part(f"runs.{run.name}.{key}", spans[key], time, dt, record, slack)
+        place = f"runs.{run.name}.{key}"
+        return _part(place, spans[key], data["time"].values, dt, record, slack)
 
     parts = {key: used(key, record, slack) for key in spans}
     if "span" in parts:
         data = data.isel(time=parts.pop("span"))
         time = data["time"].values
         for key in parts:
-            used(key, (float(time[0]), float(time[-1])), np.inf)
+            used(key, (time[0], time[-1]), np.inf)
     return replace(run, data=data)
 
 
@@ -708,10 +703,10 @@ def _part(
             f"{span_text(*record, dt)}. Correct the span; 'inf' stands for the end."
         )
     used = inside(time, span, dt)
-    if (count := int(used.sum())) > 1:
+    if (count := used.sum()) > 1:
         return used
     stated = f"{key}: {shown} holds {count} sample(s) at a step of {dt:.4g} s"
-    common = span_text(float(time[0]), float(time[-1]), dt)
+    common = span_text(time[0], time[-1], dt)
     if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:
         raise DataError(
             f"{stated}, since all loggers recorded together only from {common}; the reference runs "
@@ -732,7 +727,7 @@ def attributes_of(
         "seakeep_version": version(),
         "file": settings.file or ", ".join(settings.files.values()),
         "preparation_preset": campaign.preparation.preset,
-        "dt": float(dt),
+        "dt": dt,
         "scale_factor": general.scale_factor,
         "sea_state": settings.sea_state,
         "role": settings.serves,
@@ -744,12 +739,12 @@ def attributes_of(
         "probe_offset": settings.probe_offset,
         "celerity": celerity_of(run.isel(time=inside(time, used_span(settings), dt)), dt, campaign),
     }
-    whole = (float(time[0]), float(time[-1]))
+    whole = (time[0], time[-1])
     for use in ("train", "test"):
         span = getattr(settings, use)
         if span is None and settings.serves == use:
             span = whole
-        if span is not None:
+        if span:
             used = time[inside(time, span, dt)]
             if used.size:
                 attributes[f"{use}_span"] = (float(used[0]), float(used[-1]))

@@ -91,7 +91,7 @@ class Campaign:
         """
         models = self.settings.models
         if name is None:
-            if self.settings.model is not None:
+            if self.settings.model:
                 return self.settings.model
             if len(models) == 1:
                 return next(iter(models.values()))
@@ -114,8 +114,7 @@ class Campaign:
             content["campaign"]["period_channel"] = self.period_channel()
         content["celerity_channels"] = self.settings.celerity_channels
         content["format"] = FORMAT
-        text = json.dumps(content, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     @property
     def _measures_period(self) -> bool:
@@ -126,8 +125,7 @@ class Campaign:
     @cached_property
     def _counts_in_periods(self) -> bool:
         """Whether something on which prepared runs depend is stated in encounter periods."""
-        models = ("model", "models")
-        return any(place[0] not in models for place in lengths(self.settings))
+        return any(place[0] not in ("model", "models") for place in lengths(self.settings))
 
     def _in_seconds(self, period: float | None) -> CampaignSettings:
         """Settings with all that counts in encounter periods turned into seconds and hertz."""
@@ -167,8 +165,7 @@ class Campaign:
 
     def basis_of(self, name: str) -> str:
         """SHA-256 of all files on which a prepared run depends, through period and clocks too."""
-        settings = self.settings
-        pooled = settings.instruments.pool_drift and bool(self._run(name).files)
+        pooled = self.settings.instruments.pool_drift and self._run(name).files
         sums = []
         for each in dict.fromkeys([name, *(self.runs if pooled or self._measures_period else [])]):
             try:
@@ -179,9 +176,9 @@ class Campaign:
 
     def _run(self, name: str) -> RunSettings:
         runs = self.settings.runs
-        if not isinstance(name, str) or name not in runs:
+        if name not in runs:
             raise RequestError(
-                f"{self.path} has no run '{name}'.{did_you_mean(str(name), runs)} "
+                f"{self.path} has no run '{name}'.{did_you_mean(name, runs)} "
                 f"Runs: {', '.join(runs)}."
             )
         return runs[name]
@@ -292,9 +289,7 @@ class Campaign:
             If no run is left.
         """
         stated = self.settings.campaign.encounter_period
-        if stated is not None:
-            return stated
-        return self._mean_period(self._survey([], True))
+        return stated or self._mean_period(self._survey([], True))
 
     def seconds(self, stated: float | str) -> float:
         """Seconds of a length or an instant that may be stated in encounter periods.
@@ -412,7 +407,7 @@ class Campaign:
                 if progress is not None:
                     progress(done, len(wanted), f"{name} cannot be prepared")
                 continue
-            if period is not None:
+            if period:
                 data.attrs["encounter_period"] = period
             if progress is not None:
                 progress(done, len(wanted), name)
@@ -461,8 +456,7 @@ class Campaign:
         whole = settings.runs[run].model_copy(update={"record": None})
         changed: dict[str, Any] = {"runs": {**settings.runs, run: whole}}
         if settings.preparation.gaps == "refuse":  # rows get lost in service
-            masked = settings.preparation.model_copy(update={"gaps": "mask"})
-            changed["preparation"] = masked
+            changed["preparation"] = settings.preparation.model_copy(update={"gaps": "mask"})
         source = replace(surveyed, settings=settings.model_copy(update=changed)).read(run)
         return LiveChain(source, dt, late, length, whole_number(every, "every"))
 
@@ -475,15 +469,14 @@ class Campaign:
     ) -> tuple[Survey, float | None, float | None]:
         """Survey with settings in seconds, encounter period if needed, common step if stated."""
         preparation, period = self.settings.preparation, self.settings.campaign.encounter_period
-        counting = steps and preparation.steps_per_period is not None
-        needed = counting or self._counts_in_periods
+        needed = self._counts_in_periods or (steps and preparation.steps_per_period is not None)
         surveyed = self._survey(wanted, needed and period is None, progress, failures)
         if needed and period is None:
             period = self._mean_period(surveyed)
         dt = preparation.dt
-        if preparation.steps_per_period is not None and period is not None:
+        if preparation.steps_per_period and period:
             dt = period / preparation.steps_per_period
-        elif preparation.sampling_rate is not None:
+        elif preparation.sampling_rate:
             dt = 1.0 / preparation.sampling_rate
         return replace(surveyed, settings=self._in_seconds(period)), period, dt
 

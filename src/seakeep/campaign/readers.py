@@ -17,9 +17,9 @@ from seakeep.files import expanded, sha256_of
 from seakeep.formats import Columns, folder_reader, read_columns
 from seakeep.formats.columns import is_unit, meant_column, named_unit, same_unit
 from seakeep.signals.time_axis import check_order, instant_text, usual_step
+from seakeep.toml import packaged
 
-_TIMES = {"time", "t", "times", "tid", "tempo", "zeit", "temps", "tiempo", "sec", "seconds",
-          "elapsed", "elapsed time", "time elapsed", "timestamp"}  # fmt: skip
+_TIMES = packaged("campaign/vocabulary.toml")["time"]
 COUNTED = 64
 """Times from which a column that counts 1, 2, 3 may count samples."""
 _VARIABLE = re.compile(r"\$\{([^}]*)\}")
@@ -118,8 +118,8 @@ def read_table(
         variables[name] = ("time", table.values[name], attributes)
     if not variables:
         raise DataError(f"{path} holds times and no channel. Export the run again.")
-    coordinates = {"time": ("time", time, {"units": "s", "long_name": "time"})}
-    return xr.Dataset(variables, coordinates)
+    axis = ("time", time, {"units": "s", "long_name": "time"})
+    return xr.Dataset(variables, {"time": axis})
 
 
 def find_column(path: Path, table: Columns, wanted: str) -> str:
@@ -142,7 +142,7 @@ def time_column(table: Columns, stated: str | None = None) -> str | None:
         return table.find(stated)
     for name in table.names:
         bare, unit = named_unit(name)
-        if unit is not None and si_unit(unit) != "s":
+        if unit and si_unit(unit) != "s":
             bare = name
         if bare.strip().lower() in _TIMES:
             return name
@@ -153,7 +153,7 @@ def time_unit_of(table: Columns, name: str, stated: str | None = None) -> str:
     """Unit of a time column: as stated, as its header says, as its name ends, or seconds."""
     said = _said_unit(table, name)
     named = named_unit(name)[1]
-    return stated or said or (named if named is not None and si_unit(named) == "s" else "s")
+    return stated or said or (named if named and si_unit(named) == "s" else "s")
 
 
 def _said_unit(table: Columns, name: str) -> str:
@@ -198,7 +198,7 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
         )
     if name is None or (options.sampling_rate and options.time is None):
         count = next((values.size for values in table.values.values()), 0)
-        return name, check_order(np.arange(count) / float(rate or 1.0), str(path))
+        return name, check_order(np.arange(count) / (rate or 1.0), str(path))
     if name in table.faults:
         raise DataError(table.faults[name])
     stated, said = options.time_unit, _said_unit(table, name)
@@ -228,7 +228,7 @@ def _refuse_stuck_clock(path: Path, times: FloatArray, others: Sequence[FloatArr
     same = [(a == b) | ~(np.isfinite(a) | np.isfinite(b)) for a, b in pairs]
     if np.all(same, axis=0).mean() > 0.5:
         return
-    first = int(again[0])
+    first = again[0]
     raise DataError(
         f"the times of {path} repeat: {instant_text(times[first], 0)} s stands at samples {first} "
         f"and {first + 1} ({again.size} repetitions in all), and the readings beside them differ, "

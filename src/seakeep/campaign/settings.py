@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
-from seakeep.conventions import canonical_channel, is_elevation
+from seakeep.conventions import canonical_channel, is_elevation, si_unit
 from seakeep.errors import RequestError
 from seakeep.formats import Options
 from seakeep.toml import (
@@ -26,6 +26,7 @@ from seakeep.toml import (
     Span,
     Table,
     optional,
+    packaged,
     parse_length,
 )
 
@@ -201,24 +202,7 @@ class InstrumentsSettings(Table):
         return self.loggers.get(name, InstrumentSettings())
 
 
-_STEPS = {
-    "band_pass": ("band", set(), "'band' (Hz), such as band = [0.3, 5.0]"),
-    "integrate": ("band", {"times"}, "'band' (Hz), such as band = [0.3, 5.0]"),
-    "differentiate": ("", set(), ""),
-    "low_pass": ("passband", {"stopband"}, "'passband' (Hz)"),
-    "envelope_squared": ("", set(), ""),
-    "complementary_filter": (
-        "crossover",
-        {"times", "position"},
-        "'position' and 'crossover' (Hz), such as position = 'surge', crossover = 0.15",
-    ),
-    "transfer": (
-        "offset",
-        {"axis"},
-        "'offset' [x, y, z] (m) from the measured point to the wanted one",
-    ),
-    "remove_gravity": ("", {"axis", "components", "zeroed"}, ""),
-}
+_STEPS = packaged("campaign/steps.toml")
 """Steps by name: a key that each needs, others that it knows, and what a message asks for."""
 Step = Literal[
     "integrate", "differentiate", "band_pass", "low_pass", "envelope_squared",
@@ -277,7 +261,7 @@ class DerivedSettings(Table):
         if self.source is None:
             raise ValueError(f"step '{self.step}' needs 'from', the channel it works on")
         needed, others, words = _STEPS[self.step]
-        if extra := given - others - {needed}:
+        if extra := given.difference(others, {needed}):
             raise ValueError(f"step '{self.step}' has no key {sorted(extra)[0]!r}; remove it")
         lacks_position = self.step == "complementary_filter" and self.position is None
         if (needed and needed not in given) or lacks_position:
@@ -481,15 +465,15 @@ class CampaignSettings(Table):
     channels: dict[ChannelName, ChannelSettings] = Field(
         min_length=1, description="at least one table [channels.NAME]"
     )
-    derived: dict[ChannelName, DerivedSettings] = Field(default_factory=dict)
+    derived: dict[ChannelName, DerivedSettings] = Field({})
     instruments: InstrumentsSettings = InstrumentsSettings()
-    redundant: dict[str, RedundantSettings] = Field(default_factory=dict)
+    redundant: dict[str, RedundantSettings] = Field({})
     runs: dict[RunName, RunSettings] = Field(
         min_length=1, description="at least one table [runs.NAME] with a file"
     )
     preparation: PreparationSettings = PreparationSettings()
     model: ModelSettings | None = None
-    models: dict[str, ModelSettings] = Field(default_factory=dict)
+    models: dict[str, ModelSettings] = Field({})
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -541,7 +525,7 @@ class CampaignSettings(Table):
 
     def all_models(self) -> dict[str, ModelSettings]:
         """Models by the key of their table: ``model`` and ``models.NAME``."""
-        unnamed = {} if self.model is None else {"model": self.model}
+        unnamed = {"model": self.model} if self.model else {}
         return {**unnamed, **{f"models.{name}": each for name, each in self.models.items()}}
 
 
@@ -549,3 +533,9 @@ def long_name_of(name: str, stated: str | None) -> str:
     """Label of a channel: the one stated, the canonical one, or the name with spaces."""
     canonical = canonical_channel(name)
     return stated or (canonical.long_name if canonical else name.replace("_", " "))
+
+
+def units_of(name: str, unit: str) -> str:
+    """SI unit in which a channel is kept: the canonical one, or that of the dimension of `unit`."""
+    canonical = canonical_channel(name)
+    return canonical.units if canonical else si_unit(unit)

@@ -54,10 +54,9 @@ def write_prepared(
         As :meth:`Campaign.prepare`.
     """
     failed = {} if failures is None else failures
-    folder = prepared_folder(campaign, out_dir)
-    wanted = list(campaign.runs if names is None else names)
-    files = {name: folder / f"{name}.nc" for name in wanted}
-    make_folder(folder)
+    files = _files(campaign, out_dir, names)
+    wanted = list(files)
+    make_folder(prepared_folder(campaign, out_dir))
     inputs = [path for name in campaign.runs for path in campaign.files_of(name).values()]
     for file in files.values():
         check_output(file, PREPARED, [campaign.path, *inputs])
@@ -114,9 +113,8 @@ def load_prepared(
     RequestError, DataError
         As :meth:`Campaign.prepare`.
     """
-    folder = prepared_folder(campaign, out_dir)
-    wanted = list(campaign.runs if names is None else names)
-    runs = dict(_fresh(campaign, {name: folder / f"{name}.nc" for name in wanted}))
+    wanted = _files(campaign, out_dir, names)
+    runs = dict(_fresh(campaign, wanted))
     if missing := [name for name in wanted if name not in runs]:
         runs |= campaign.prepare(missing, progress)
     if len({run.attrs["dt"] for run in runs.values()}) > 1:  # files of one rate beside others
@@ -128,6 +126,14 @@ def load_prepared(
 def prepared_folder(campaign: Campaign, out_dir: Path | str | None = None) -> Path:
     """Folder of the prepared runs: the one stated, or ``prepared`` beside the campaign file."""
     return campaign.path.parent / "prepared" if out_dir is None else Path(out_dir)
+
+
+def _files(
+    campaign: Campaign, out_dir: Path | str | None, names: Iterable[str] | None
+) -> dict[str, Path]:
+    """File of each run wanted, by default of all that are used."""
+    folder = prepared_folder(campaign, out_dir)
+    return {name: folder / f"{name}.nc" for name in (campaign.runs if names is None else names)}
 
 
 def _fresh(campaign: Campaign, files: Mapping[str, Path]) -> Iterator[tuple[str, xr.Dataset]]:

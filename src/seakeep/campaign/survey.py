@@ -75,7 +75,7 @@ class ReadOnce:
 
     def __call__(self, path: Path, options: Options) -> Columns:
         """Columns of a file."""
-        if (known := self.columns.pop((path, options), None)) is not None:
+        if known := self.columns.pop((path, options), None):
             return known
         columns = read_columns(path, options)
         size = sum(x.nbytes for each in self.columns.values() for x in each.values.values())
@@ -116,8 +116,8 @@ class Survey:
 
     def read(self, name: str) -> Run:
         """Steps 1 and 2: a run's files, their clocks known."""
-        paths = self.files_of(name)
-        return sync(read(name, self.settings, paths, self.reader), self.clocks[name])
+        run = read(name, self.settings, self.files_of(name), self.reader)
+        return sync(run, self.clocks[name])
 
     def channels(self, name: str) -> Run:
         """Steps 1 to 5: the channels of a run by logger, at their own rates."""

@@ -3,8 +3,8 @@
 from collections.abc import Collection, Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
 
-from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings
-from seakeep.conventions import TURNS, canonical_channel, conversion, si_unit
+from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings, units_of
+from seakeep.conventions import TURNS, canonical_channel, conversion
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.signals.expressions import parse
 from seakeep.toml import Mistake, lengths
@@ -40,16 +40,16 @@ def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) 
         turning = ["", "_rate", "_acceleration"]
         if settings.step == "remove_gravity":
             turning = [""]
-        elif (known := canonical_channel(sources[0]) or canonical_channel(name)) is not None:
+        elif known := canonical_channel(sources[0]) or canonical_channel(name):
             turning = turning[: {"m": 1, "m/s": 2}.get(known.units, 3)]
         sources += [turn + kind for kind in turning for turn in TURNS if turn + kind in channels]
     return tuple(dict.fromkeys(each for each in sources if each != name))
 
 
-def needed_channels(settings: CampaignSettings, wanted: Collection[str]) -> set[str]:
-    """Names of channels and of all that they are derived from."""
+def needed_channels(settings: CampaignSettings, wanted: Collection[str] | None) -> set[str]:
+    """Names of channels, by default all, and of all that they are derived from."""
     needed = set()
-    ahead = list(wanted)
+    ahead = list(settings.channel_names if wanted is None else wanted)
     while ahead:
         name = ahead.pop()
         if name not in needed:
@@ -154,10 +154,8 @@ def _unit_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
         tables |= {("runs", run, "channels", n): each for n, each in of_run.channels.items()}
     for place, each in tables.items():
         if each.unit is not None:
-            canonical = canonical_channel(place[-1])
             try:
-                target = canonical.units if canonical else si_unit(each.unit)
-                conversion(each.unit, target, place[-1])
+                conversion(each.unit, units_of(place[-1], each.unit), place[-1])
             except RequestError as error:
                 yield Mistake((*place, "unit"), str(error))
 

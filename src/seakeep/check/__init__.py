@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from inspect import signature
-from typing import Any
 
 import xarray as xr
 
@@ -42,26 +41,27 @@ __all__ = [
     "worth",
 ]
 
-Check = Callable[..., xr.Dataset]
-
-
-CHECKS: dict[str, Check] = {
-    "worth": worth,
-    "response": lambda model, runs: response(model, None, runs),
-    "measured_response": measured_response,
-    "validation": validation,
-    "coherence": coherence,
-    "decay": lambda model, _: decay(model),
-    "measured_decay": measured_decay,
-    "modes": lambda model, _: modes(model),
-    "residuals": residuals,
-    "statistics": statistics,
-    "validity": validity,
-    "drift": drift,
+CHECKS: dict[str, Callable[..., xr.Dataset]] = {
+    each.__name__: each
+    for each in (
+        worth,
+        response,
+        measured_response,
+        validation,
+        coherence,
+        decay,
+        measured_decay,
+        modes,
+        residuals,
+        statistics,
+        validity,
+        drift,
+    )
 }
-"""Checks by name: each takes a model and prepared runs by name, and what checks share.
+"""Checks by name: of what there is, each takes what its parameters are called.
 
-That are `free` runs of model and `baselines`, and the `measured` response.
+There are a `model` and prepared `runs` by name, and what checks share: `free` runs of model and
+`baselines`, and the `measured` response.
 """
 
 
@@ -120,19 +120,19 @@ def check_model(
         check_channels(run, [*model.states, *model.inputs], name)
     results: Groups = {}
     refused, notes = {}, {}
-    shared: dict[str, Any] = {"free": {}, "baselines": baselines}
+    given = {"model": model, "runs": runs, "free": {}, "baselines": baselines}
     for number, (name, check) in enumerate(CHECKS.items()):
         if progress is not None:
             progress(number, len(CHECKS), name)
-        how = {key: shared[key] for key in signature(check).parameters if key in shared}
+        how = {key: given[key] for key in signature(check).parameters if key in given}
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                results[name] = check(model, runs, **how)
+                results[name] = check(**how)
             except SeakeepError as error:
                 refused[name] = str(error)
         if name == "measured_response":
-            shared["measured"] = results.get(name)
+            given["measured"] = results.get(name)
         ours = [str(each.message) for each in caught if issubclass(each.category, SeakeepWarning)]
         notes[name] = tuple(dict.fromkeys(ours))
     trained = of_part(runs, "train")

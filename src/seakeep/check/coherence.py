@@ -7,6 +7,7 @@ import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray, undefined
 from seakeep.check.parts import (
+    HERTZ,
     FreeRun,
     Known,
     beside,
@@ -145,11 +146,7 @@ def coherence(
         coords={
             "state": model.states,
             "input": model.inputs,
-            "frequency": (
-                "frequency",
-                spectra.frequency,
-                {"units": "Hz", "long_name": "frequency"},
-            ),
+            "frequency": ("frequency", spectra.frequency, HERTZ),
         },
         attrs={
             "averages": spectra.averages,

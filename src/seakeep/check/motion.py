@@ -6,6 +6,7 @@ import xarray as xr
 
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, IntArray
 from seakeep.check.parts import (
+    HERTZ,
     driven,
     is_regular,
     read_off,
@@ -102,7 +103,7 @@ def decay(model: Model) -> xr.Dataset:
     motions = _motions(single)
     table = single.modes()
     waves = table["period"].values[table["damping_ratio"].values < 0.7]
-    longest = float(waves[np.isfinite(waves)].max(initial=0.0))
+    longest = waves[np.isfinite(waves)].max(initial=0.0)
     steps = int(np.clip(8 * longest / single.dt, SHORTEST, LONGEST))
     before = single.history_samples
     history = np.tile(single.state_mean, (before, 1))
@@ -112,7 +113,7 @@ def decay(model: Model) -> xr.Dataset:
     rows = []
     for motion in motions:
         column = single.states.index(motion)
-        offset = float(single.state_scale.spread[column])
+        offset = single.state_scale.spread[column]
         moved = history.copy()
         moved[:, column] += offset
         run = single.forecast_arrays(moved, still, ahead, steps)
@@ -171,8 +172,8 @@ def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
         values = values[np.isfinite(values).all(axis=1)]
         spread = dict(zip(model.states, model.signature.state_scale.spread, strict=True))
         moved = (values - values[-1]) / [spread[each] for each in motions]
-        column = int(np.argmax(np.abs(moved).max(axis=0)))
-        first = int(np.argmax(np.abs(moved[:, column])))
+        column = np.argmax(np.abs(moved).max(axis=0))
+        first = np.argmax(np.abs(moved[:, column]))
         released = free_decay(values[first:, column], model.dt)
         numbers = {key: getattr(released, key) for key in ("period", "damping_ratio", "p", "q")}
         cycles = {
@@ -232,8 +233,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
             "waves. Fit one with observables = [seakeep.SlowSquares(…)] for drift."
         )
     reference = reference_probe(model, runs)
-    period = mean_period(runs, model.inputs) * model.dt
-    samples = round(PERIODS * period / model.dt)
+    samples = round(PERIODS * mean_period(runs, model.inputs))
     step = 1.0 / (samples * model.dt)
     bins = _probed(single, step)
     turns = wave_turns(model, runs, step * np.arange(bins[-1] + DIFFERENCES + 1), reference)
@@ -269,7 +269,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
         coords={
             "state": single.states,
             "difference": ("difference", differences, {"units": "Hz"}),
-            "frequency": ("frequency", step * bins, {"units": "Hz", "long_name": "frequency"}),
+            "frequency": ("frequency", step * bins, HERTZ),
             "units": ("state", [f"{unit}/m²" for unit in units_of(model, single.states)]),
         },
         attrs={"amplitude": amplitude, "reference": model.inputs[reference]},
@@ -279,12 +279,10 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
 def _probed(model: HankelDMDcModel, step: float) -> IntArray:
     """Multiples of the step at which waves probe: up to twelve that were trained."""
     every = np.arange(1, int(0.4 / model.dt / step))
-    frequency = step * every.astype(float)
-    known = every[model.coverage.is_trained(frequency).any(axis=0)]
+    known = every[model.coverage.is_trained(step * every.astype(float)).any(axis=0)]
     if not known.size:
         raise DataError("training holds no waves by which the model could be probed.")
-    chosen = np.linspace(0, known.size - 1, min(12, known.size)).round().astype(int)
-    return known[chosen]
+    return known[np.linspace(0, known.size - 1, min(12, known.size)).round().astype(int)]
 
 
 def _wave(samples: int, cycles: int, turns: FloatArray, amplitude: float) -> FloatArray:

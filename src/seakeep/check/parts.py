@@ -60,6 +60,7 @@ class FreeRun(NamedTuple):
     measured: FloatArray
 
 
+HERTZ = {"units": "Hz", "long_name": "frequency"}
 Known = dict[tuple[str, str], FreeRun]
 """Free runs that several checks share, by label of a baseline ("" is the model) and run."""
 
@@ -115,8 +116,7 @@ def used_parts(model: Model, runs: Datasets) -> dict[str, Part]:
             continue
         begin, end = whole_span(run)
         whole = np.isfinite(states).all(axis=1) & np.isfinite(inputs).all(axis=1)
-        inside = whole & (time >= begin - 1e-6) & (time <= end + 1e-6)
-        pieces = stretches(inside)
+        pieces = stretches(whole & (time >= begin - 1e-6) & (time <= end + 1e-6))
         if not pieces:
             warn(f"{name} is left out: no sample of it has all channels of the model.")
             continue
@@ -257,22 +257,23 @@ def samples_in(
     is as good a forecast as any.
     """
     time = run["time"].values
-    last = int(np.searchsorted(time, float(span[1]) + 0.5 * dt)) - 1
+    last = int(np.searchsorted(time, span[1] + 0.5 * dt)) - 1
     # The last step reads the input `lead` samples after the instant that it starts from.
     last = min(last, time.size - max(lead, 1))
     if start is None:
-        first = float(time[min(max(history - 1, _waves_come(run, names)), time.size - 1)])
-        start = max(float(span[0]), first)
+        first = time[min(max(history - 1, _waves_come(run, names)), time.size - 1)]
+        start = max(span[0], first)
     return int(np.argmin(np.abs(time - start))), last
 
 
 def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
     """Sample at which waves have come to each probe, and each motion has begun."""
     begins = [0]
-    for name in (each for each in names if is_elevation(each) or each in MOTIONS):
-        series = run[name].values
-        if np.isfinite(series).all() and np.ptp(series):
-            begins.append(first_wave(series, name in MOTIONS))
+    for name in names:
+        if is_elevation(name) or name in MOTIONS:
+            series = run[name].values
+            if np.isfinite(series).all() and np.ptp(series):
+                begins.append(first_wave(series, name in MOTIONS))
     return max(begins)
 
 
@@ -326,7 +327,7 @@ def regressors(model: Model, part: Part) -> FloatArray:
     out = np.full((size, width), np.nan)
     if stop > first:
         values, surge = channel_matrix(run, model.inputs, "the run"), None
-        if (follows := model.signature.input_map.follows) is not None:
+        if follows := model.signature.input_map.follows:
             surge = channel_matrix(run, [model.states[follows.column]], "the run")[:, 0]
         out[first:stop] = driven(input_map, values, run, first, stop, surge)
     return out
@@ -335,9 +336,9 @@ def regressors(model: Model, part: Part) -> FloatArray:
 def _at_once(input_map: InputMap) -> InputMap:
     """The map without look-ahead and lags, and without limits of what is above training."""
     follows, observed = input_map.follows, input_map.observed
-    if observed is not None:
+    if observed:
         observed = replace(observed, observables=tuple(map(at_once, observed.observables)), tops=())
-    if follows is not None:
+    if follows:
         follows = replace(follows, lead=0)
     return replace(input_map, lead=0, observed=observed, follows=follows, reference=0)
 
@@ -354,7 +355,7 @@ def single_model(model: Model) -> HankelDMDcModel:
             f"or FIR model; received one of kind '{model.kind}'. For free motion of an ensemble, "
             "check a member: seakeep.check.modes(ensemble.member(0))."
         )
-    if (varies := model.variation) is not None:
+    if varies := model.variation:
         warn(
             f"the model varies with {model.signature.parameter}: what is shown is the one in the "
             f"middle of the training, {varies.centre:g}."
@@ -396,9 +397,7 @@ def positions(model: Model, runs: Datasets) -> FloatArray | None:
     """Position of each elevation, m (NaN of another input); None where one is not stated."""
     waves = elevations(model)
     for run in runs.values():
-        places = np.array(
-            [float(run[name].attrs.get("x_position", np.nan)) for name in model.inputs]
-        )
+        places = np.array([run[name].attrs.get("x_position", np.nan) for name in model.inputs])
         if np.isfinite(places[waves]).all():
             return places
     return None
@@ -419,8 +418,8 @@ def wave_turns(
     depths = [run.attrs["water_depth"] for run in runs.values() if "water_depth" in run.attrs]
     if places is None or not depths:
         return None
-    k = wavenumber(2 * np.pi * frequency, float(depths[0]))
-    return np.asarray(k)[:, None] * (places - places[reference])
+    k = wavenumber(2 * np.pi * frequency, depths[0])
+    return k[:, None] * (places - places[reference])
 
 
 def units_of(model: Model, names: Sequence[str]) -> list[str]:

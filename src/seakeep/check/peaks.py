@@ -56,7 +56,7 @@ def statistics(
     waves = irregular(runs, "a statistic of peaks")
     known = free_runs(model, waves, free)
     if duration is None:
-        scale = float(next(iter(waves.values())).attrs.get("scale_factor", 1.0))
+        scale = next(iter(waves.values())).attrs.get("scale_factor", 1.0)
         duration = 3600 * HOURS / np.sqrt(scale)
     moved = {
         kind: [x - x.mean(axis=0) for x in (getattr(run, kind) for run in known.values())]
@@ -113,8 +113,8 @@ def _law(moved: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
     """Statistics of the deviations of several records of a state; peaks largest first."""
     peaks, periods = _peaks(moved, dt)
     rank = np.arange(1, peaks.size + 1)
-    spread = float(np.sqrt(np.mean(np.concatenate(moved) ** 2)))
-    period = float(periods.mean()) if periods.size else np.nan
+    spread = np.sqrt(np.mean(np.concatenate(moved) ** 2))
+    period = periods.mean() if periods.size else np.nan
     law = fit_weibull(peaks)
     extreme, lower, upper = most_probable_extreme(law, duration / period if period else np.nan)
     return xr.Dataset(

@@ -7,6 +7,7 @@ import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
+    HERTZ,
     FreeRun,
     Known,
     free_runs,
@@ -73,21 +74,20 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         "no run can be judged. One-step errors of",
         "left out: one-step errors of",
     )
-    steps = list(stepped.values())
+    every, inputs, measured = zip(*stepped.values(), strict=True)
     squares = np.concatenate([_aged(model, runs[name], name, lags) for name in stepped])
     counted = np.isfinite(squares).sum(axis=0)
     aged = ratio(np.nan_to_num(squares, nan=0.0, posinf=0.0).sum(axis=0), counted)
-    errors = [(error, inputs) for error, inputs, _ in steps]
-    count = sum(len(error) for error, _ in errors)
+    count = sum(map(len, every))
     if count <= 2 * lags:
         raise DataError(
             f"the test parts hold {count} instants, and whiteness over an encounter period takes "
             f"more than {2 * lags}. Test on longer runs."
         )
-    correlation = autocorrelation([error for error, _ in errors], lags)
+    correlation = autocorrelation(every, lags)
     statistic, probability = ljung_box(correlation, count)
-    spread = np.sqrt(np.mean(np.concatenate([m - m.mean(axis=0) for *_, m in steps]) ** 2, axis=0))
-    whole = np.concatenate([error for error, _ in errors])
+    spread = np.sqrt(np.mean(np.concatenate([m - m.mean(axis=0) for m in measured]) ** 2, axis=0))
+    whole = np.concatenate(every)
     variables = {
         "autocorrelation": (("state", "lag"), correlation.T),
         "limit": ((), 1.96 / np.sqrt(count)),
@@ -98,7 +98,7 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         "age_nrmse": (("state", "age"), ratio(np.sqrt(aged), spread + 0 * aged).T),
     }
     if model.inputs:
-        past, limit = input_correlation(errors, lags)
+        past, limit = input_correlation([*zip(every, inputs, strict=True)], lags)
         variables["input_correlation"] = (("state", "input", "lag"), past.transpose(1, 2, 0))
         variables["input_limit"] = (("state", "input"), limit)
     lag = model.dt * np.arange(lags + 1)
@@ -146,9 +146,8 @@ def _aged(model: Model, run: xr.Dataset, name: str, lags: int) -> FloatArray:
 
 def _of_free_runs(model: Model, free: Mapping[str, FreeRun], period: float) -> dict[str, object]:
     """Spectra of error and measurement, and the errors of the bands."""
-    runs = list(free.values())
     pieces = []
-    for each in runs:
+    for each in free.values():
         error = each.forecast - each.measured
         sound = np.isfinite(error).all(axis=1)
         pieces.append((error[sound], each.measured[sound]))
@@ -168,6 +167,6 @@ def _of_free_runs(model: Model, free: Mapping[str, FreeRun], period: float) -> d
     return {
         "error_spectrum": (("state", "frequency"), error.T),
         "measured_spectrum": (("state", "frequency"), power.T),
-        "frequency": ("frequency", spectra.frequency, {"units": "Hz", "long_name": "frequency"}),
+        "frequency": ("frequency", spectra.frequency, HERTZ),
         "band_nrmse": (("state", "band"), np.stack(bands, axis=1)),
     }

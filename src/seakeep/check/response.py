@@ -11,6 +11,7 @@ from scipy.interpolate import interp1d
 
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, as_real, undefined
 from seakeep.check.parts import (
+    HERTZ,
     Part,
     elevations,
     gathered,
@@ -105,7 +106,7 @@ def response(
     names = list(model.inputs)
     waves, size, turns = names, len(names), None
     each = np.stack([transfer(model, one, frequency)[:, :, :size] for one in dynamics])
-    if runs is not None and size > 1:
+    if runs and size > 1:
         probe = reference_probe(model, runs)
         turns = wave_turns(model, runs, frequency, probe)
     if turns is not None:
@@ -124,14 +125,17 @@ def response(
         values["phase_spread"] = np.degrees(np.quantile(turned, LEVEL, axis=0))
     known = coverage.is_trained(frequency)[[coverage.channels.index(name) for name in waves]]
     of = units_of(model, waves)
-    units = [[_ratio(x, u) for u in of] for x in units_of(model, model.states)]
+    units = [
+        [x if u in ("", "1") else f"{x or '1'}/{u}" for u in of]
+        for x in units_of(model, model.states)
+    ]
     out = xr.Dataset(
         {key: (dims, value) for key, value in values.items()}
         | {"trained": (("input", "frequency"), known)},
         coords={
             "state": model.states,
             "input": names,
-            "frequency": ("frequency", frequency, {"units": "Hz", "long_name": "frequency"}),
+            "frequency": ("frequency", frequency, HERTZ),
             "units": (("state", "input"), units),
         },
         attrs={"reference": waves[-1]},
@@ -174,10 +178,6 @@ def _default_frequencies(coverage: Coverage, dt: float) -> FloatArray:
     if known.size:
         low, highest = 0.5 * known[0], min(highest, 1.3 * known[-1])
     return np.geomspace(low, highest, FREQUENCIES)
-
-
-def _ratio(units: str, per: str) -> str:
-    return f"{units or '1'}/{per}" if per and per != "1" else units
 
 
 def measured_response(model: Model, runs: Datasets) -> xr.Dataset:
@@ -242,7 +242,7 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
     frequency = dominant_frequency(both[:, 0], model.dt)
     harmonics, means = harmonic_fits(both, model.dt, frequency)
     amplitude, *answer = np.abs(harmonics).mean(axis=0)
-    accuracy = np.array([float(part.run[each].attrs.get("accuracy", 0.0)) for each in names])
+    accuracy = np.array([part.run[each].attrs.get("accuracy", 0.0) for each in names])
     ratio = np.array(answer) / amplitude
     type_b = np.hypot(accuracy[1:], ratio * accuracy[0]) / amplitude
     estimated = estimate(harmonics[:, 1:] / harmonics[:, :1], type_b)
@@ -251,7 +251,9 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
     return _points(
         model,
         {"run": name, "kind": "regular", "frequency": frequency, "wave_amplitude": amplitude},
-        *(estimated.ratio, estimated.amplitude, estimated.phase),
+        estimated.ratio,
+        estimated.amplitude,
+        estimated.phase,
         # Where a model departs from the means of each run, its mean state is that of the run.
         offset=np.where(model.signature.input_map.reference > 0, np.nan, mean.ratio.real),
         offset_uncertainty=mean.amplitude,
@@ -274,7 +276,9 @@ def _irregular_points(model: Model, parts: list[Part], reference: int, period: f
     return _points(
         model,
         {**names, "frequency": spectra.frequency[at], "wave_amplitude": np.nan},
-        *(gain[at], half, turn),
+        gain[at],
+        half,
+        turn,
         coherence=spectra.ordinary()[at, 0],
     )
 

@@ -103,7 +103,7 @@ def worth(
     # Of the model from a baseline: the other way round, so that the bounds change places.
     for key, other in {"": "change", "_lower": "upper", "_upper": "lower"}.items():
         out[f"change{key}"] = 1 / (1 + both[f"all_{other}"]) - 1
-    out = out.drop_vars([f"all_{key}" for key in ("change", "lower", "upper")])
+    out = out.drop_vars(both, errors="ignore")
     out = out.assign_coords(model=list(every), state=list(groups), waves=list(of_kind))
     upper = out["nrmse_upper"]
     most = upper.where(np.isfinite(upper), out["nrmse"]).sel(model="model", drop=True)
@@ -197,7 +197,11 @@ def validity(model: Model, runs: Datasets) -> xr.Dataset:
                 row[:3] = _sea(part.inputs[inside, reference], model.dt, part.run)
                 row[3] = np.nan if surge is None else part.states[inside, surge].mean()
         facts.append(of_parts)
-        outside.append(_outside(model, part.run, np.isfinite(of_parts[1, 1])))
+        why = []
+        if np.isfinite(of_parts[1, 1]):
+            begin, end = whole_span(part.run, "test")
+            why = outside_training(model, part.run, begin, round((end - begin) / model.dt))
+        outside.append("; ".join(why))
     if not parts:
         raise DataError("no run has all channels of the model: there are no waves to compare.")
     columns = np.moveaxis(np.array(facts), -1, 0)
@@ -218,18 +222,10 @@ def _sea(wave: FloatArray, dt: float, run: xr.Dataset) -> tuple[float, float, fl
     if not np.ptp(wave) > 0:
         return np.nan, np.nan, np.nan
     regular = is_regular(run)
-    height = (2 * np.sqrt(2) if regular else 4.0) * float(wave.std())
+    height = (2 * np.sqrt(2) if regular else 4.0) * wave.std()
     period = 1 / dominant_frequency(wave, dt) if regular else encounter_period(wave, dt)
     depth = run.attrs.get("water_depth")
     steepness = np.nan
-    if depth is not None:
-        k = float(wavenumber(2 * np.pi / period, float(depth)))
-        steepness = height * k / (2 * np.pi)
+    if depth:
+        steepness = height * wavenumber(2 * np.pi / period, depth) / (2 * np.pi)
     return height, period, steepness
-
-
-def _outside(model: Model, run: xr.Dataset, is_test: bool) -> str:
-    if not is_test:
-        return ""
-    begin, end = whole_span(run, "test")
-    return "; ".join(outside_training(model, run, begin, round((end - begin) / model.dt)))

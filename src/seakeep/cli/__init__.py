@@ -54,8 +54,8 @@ def _options(
     """Read the options before the verb; ``main`` looks for --debug itself."""
 
 
-_PACKAGES = ("numpy", "scipy", "xarray", "h5netcdf", "h5py", "pandas", "pydantic", "typer", "pint")
-_EXTRAS = ("matplotlib", "control", "numba")
+_PACKAGES = ("numpy", "scipy", "xarray", "h5netcdf", "h5py", "pandas", "pydantic", "typer", "pint",
+             "matplotlib", "control", "numba")  # fmt: skip
 
 
 def info() -> None:
@@ -66,7 +66,7 @@ def info() -> None:
     typer.echo(f"seakeep {metadata.version('seakeep')}")
     typer.echo(f"Python {platform.python_version()} on {platform.platform()}")
     typer.echo(f"cores {os.cpu_count()}")
-    for name in (*_PACKAGES, *_EXTRAS):
+    for name in _PACKAGES:
         try:
             typer.echo(f"{name} {metadata.version(name)}")
         except metadata.PackageNotFoundError:
@@ -127,7 +127,7 @@ def main(arguments: list[str] | None = None) -> int:
     int
         0 done, 1 the run failed, 2 the request is wrong, 130 interrupted.
     """
-    received = sys.argv[1:] if arguments is None else list(arguments)
+    received = sys.argv[1:] if arguments is None else arguments
     debug = "--debug" in received
     received = [each for each in received if each != "--debug"]
     command = typer.main.get_command(app)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from typer import Argument, Option
 
-from seakeep.cli.console import CampaignFile, progress_bar, results, say
+from seakeep.cli.console import CampaignFile, progress_bar, results, say, say_written
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import check_output, is_there, write_text
 
@@ -149,9 +149,9 @@ def track(
 
     Example: seakeep track side_view.mp4 -o track.csv --contact-sheet sheet.png
     """
-    if out is not None and out.suffix not in (".nc", ".csv"):
+    if out and out.suffix not in (".nc", ".csv"):
         raise RequestError(f"{out} ends in '{out.suffix}'; a track is written as .csv or .nc.")
-    if sheet is not None and sheet.suffix.lower() != ".png":
+    if sheet and sheet.suffix.lower() != ".png":
         raise RequestError(f"a contact sheet is written as PNG; received {sheet}.")
     from seakeep.report.track import (
         CONTACT_SHEET,
@@ -164,9 +164,9 @@ def track(
         write_track,
     )
 
-    inputs = [each for each in (video, mru) if each is not None]
+    inputs = [*filter(None, (video, mru))]
     for place, kind in ((out, TRACK), (sheet, CONTACT_SHEET)):
-        if place is not None:
+        if place:
             check_output(place, kind, inputs, HEADER)
     from seakeep.campaign import read_table
     from seakeep.signals import TrackingSettings, contact_sheet, track_video
@@ -188,15 +188,15 @@ def track(
     reference = None if mru is None else read_table(mru, columns=("heave", "pitch"))
     with progress_bar("Tracking") as progress:
         track = track_video(video, settings, progress)
-    if sheet is not None:
+    if sheet:
         write_contact_sheet(contact_sheet(video, track), sheet)
     if out is None:
         typer.echo(track_text(track), nl=False)
     else:
         write_track(track, out)
     say(track_words(track))
-    if written := [str(path) for path in (out, sheet) if path is not None]:
-        say("Wrote " + ", ".join(written))
+    if written := [*filter(None, (out, sheet))]:
+        say_written(written)
     if reference is not None:
         for words, style in agreement_words(track, reference, max_lag):
             say(words, style=style)
@@ -227,7 +227,7 @@ def init(
     """
     from seakeep.campaign import draft_campaign
 
-    if out is not None:
+    if out:
         if is_there(out) and not force:
             raise RequestError(f"{out} exists already. Give another name, or --force.")
         check_output(out, "draft", files)
@@ -347,7 +347,6 @@ datasets = typer.Typer(
     help=("List the public data sets of the examples, or fetch one.\n\nExample: seakeep datasets"),
     invoke_without_command=True,
     rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 
 

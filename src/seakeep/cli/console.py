@@ -10,7 +10,7 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
@@ -205,24 +205,30 @@ def member_executor(
     """Executor for the members of an ensemble; without either option this process."""
     from seakeep.executor import make_executor
 
-    given = workers is not None or scheduler is not None
-    return make_executor(checked_count(workers, scheduler) if given else 1, scheduler)
+    count = checked_count(workers, scheduler) if workers or scheduler else 1
+    return make_executor(count, scheduler)
+
+
+def say_written(paths: Iterable[Path]) -> None:
+    """Say which files were written."""
+    say(f"Wrote {', '.join(map(str, paths))}")
 
 
 def refuse(given: Mapping[str, bool], words: str) -> None:
     """Refuse the first option that is given."""
-    for option in (each for each, is_given in given.items() if is_given):
-        raise RequestError(f"{option} {words}")
+    for option, is_given in given.items():
+        if is_given:
+            raise RequestError(f"{option} {words}")
 
 
 def checked_count(workers: int | None, scheduler: str | None) -> int:
     """Number of local workers: by default one per core, one where a cluster does the work."""
-    if workers is not None and scheduler is not None:
+    if workers and scheduler:
         raise RequestError(
             f"--workers {workers} counts processes on this machine, and --scheduler {scheduler} "
             "hands all work to a cluster. Give one of the two."
         )
-    if workers is None and scheduler is None:
+    if not workers and not scheduler:
         usable = getattr(os, "sched_getaffinity", None)  # Linux alone has it
         return len(usable(0)) if usable else os.cpu_count() or 1
     return workers or 1

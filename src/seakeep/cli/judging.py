@@ -28,6 +28,7 @@ from seakeep.cli.console import (
     read_files,
     refuse,
     say,
+    say_written,
     show,
 )
 from seakeep.errors import RequestError, SeakeepError
@@ -150,13 +151,13 @@ def forecast(
         result = with_degrees(result)
     write_forecast(result, out)
     status = result.attrs["status"]
-    begin = instant_text(float(result.attrs["start"]), identified.dt)
-    reads = look_ahead_words(float(result.attrs.get("reads_input_until", 0.0)))
+    begin = instant_text(result.attrs["start"], identified.dt)
+    reads = look_ahead_words(result.attrs.get("reads_input_until", 0.0))
     say(
         f"Wrote {out}: {forecast_words(result)}{result.sizes['time']} instants after "
         f"t = {begin} s, status {status}{reads and f'; {reads}'}.{scaled}"
     )
-    members_left = result.sizes.get("member", 0) - int(result.attrs.get("diverged", 0))
+    members_left = result.sizes.get("member", 0) - result.attrs.get("diverged", 0)
     usable = members_left > 0 if "member" in result.dims else "diverged_at" not in result.attrs
     if not usable:
         raise Exit(1)
@@ -280,7 +281,7 @@ def compare(
         show(winner(differences, {n: each.kind for n, each in fitted.items() if n not in names}))
         written.append(write_differences(differences, out / DIFFERENCES))
     written += _draw({name: comparisons[name] for name in names}, figures, differences)
-    say("Wrote " + ", ".join(map(str, written)))
+    say_written(written)
     if not all(each.complete for name in names for each in comparisons[name]):
         raise Exit(1)
 
@@ -289,7 +290,7 @@ def _displayed(each: Comparison, scale: float | None, degrees: bool) -> Comparis
     """A comparison at full scale, where there is a scale, and in degrees, if wanted."""
     from seakeep.study import at_full_scale, in_degrees
 
-    each = each if scale is None else at_full_scale(each, scale)
+    each = at_full_scale(each, scale) if scale else each
     return in_degrees(each) if degrees else each
 
 
@@ -316,9 +317,11 @@ def _nowcast(
     for block in nowcast_blocks(results):
         print_table(block)
     written = [write_nowcasts(results, table)]
-    for name, path in figures.items():
-        written.append(save_figure(nowcast_figure(results, name.removeprefix(NOWCAST)), path))
-    say("Wrote " + ", ".join(map(str, written)))
+    written += [
+        save_figure(nowcast_figure(results, name.removeprefix(NOWCAST)), path)
+        for name, path in figures.items()
+    ]
+    say_written(written)
 
 
 def _named(files: list[Path]) -> dict[str, Path]:
@@ -356,8 +359,7 @@ def _print_comparison(tables: Datasets) -> None:
     from seakeep.report.comparison import band_findings, comparison_blocks, model_blocks
 
     several = len(tables) > 1
-    blocks = model_blocks(tables) if several else comparison_blocks(*tables.values())
-    for block in blocks:
+    for block in model_blocks(tables) if several else comparison_blocks(*tables.values()):
         print_table(block)
     for name, table in tables.items():
         for text in band_findings(table):
@@ -379,7 +381,7 @@ def _draw(
     for of_run in zip(*comparisons.values(), strict=True):
         figure = overlay_figure(dict(zip(comparisons, of_run, strict=True)))
         written.append(save_figure(figure, figures[of_run[0].run]))
-    if differences is not None:
+    if differences:
         written.append(save_figure(error_figure(differences), figures[ERRORS]))
     return written
 
@@ -477,10 +479,7 @@ def check(
     for section in check_sections(checked):
         for text in (*section.points, *section.notices):
             show(f"{section.title}: {text}")
-    kind = ", ".join(
-        counted(len(names), what)
-        for names, what in ((identified.states, "state"), (identified.inputs, "input"))
-    )
-    words = f"{model.name}, a model of kind {identified.kind} ({kind}), on {read.name}."
+    size = f"{counted(len(channels[0]), 'state')}, {counted(len(channels[1]), 'input')}"
+    words = f"{model.name}, a model of kind {identified.kind} ({size}), on {read.name}."
     page = write_check(checked, out, f"{model.stem}: what the model is worth", words)
     say(f"Wrote {page}.")

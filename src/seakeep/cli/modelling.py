@@ -97,8 +97,8 @@ def tune(
         search_result = search(
             replace(spec, select=chosen),
             runs,
-            list(settings.states),
-            list(settings.inputs),
+            settings.states,
+            settings.inputs,
             vary=sorted({*vary}),
             horizon=chosen.horizon,
             folds=chosen.folds,
@@ -332,14 +332,14 @@ def export(
         (noise or role, estimator, "--noise and --role belong to --estimator"),
     )
     service = _service(noise or [], role or [])
-    if estimator and order is not None:
+    if estimator and order:
         raise RequestError(
             "--order reduces the linear system of --mat; an estimator corrects measured states and "
             "their delays, which a reduced system no longer holds. Leave out --order, or "
             "--estimator."
         )
     for path, suffix in ((fmu, ".fmu"), (onnx, ".onnx"), (mat, ".mat")):
-        if path is not None:
+        if path:
             check_place(path, suffix)
     from seakeep.hosts import write_c, write_estimator, write_fmu, write_onnx
     from seakeep.hosts.program import exportable, timing
@@ -347,21 +347,21 @@ def export(
     linear = exportable(_single(model, member), estimator)
     written = []
     bound = ""
-    if c is not None:
+    if c:
         written += (
             write_estimator(linear, c, model.stem, *service)
             if estimator
             else write_c(linear, c, model.stem)
         )
-    if fmu is not None:
+    if fmu:
         written.append(write_fmu(linear, fmu, (steps or 1) if estimator else None, *service))
-    if onnx is not None:
+    if onnx:
         written.append(write_onnx(linear, onnx, steps or 1))
-    if mat is not None:
+    if mat:
         written.append(linear.to_mat(mat, order))
         bound = _bound(mat) if order else ""
     say(f"Wrote {', '.join(map(str, written))}.{bound}")
-    if fmu is not None:
+    if fmu:
         say(_binary(fmu))
     say(timing(linear, estimator and not onnx and not mat))
 
@@ -402,7 +402,7 @@ def _single(file: Path, member: int | None) -> Model:
 def _binary(fmu: Path) -> str:
     from seakeep.hosts.fmu import compiler
 
-    if compiler() is not None:
+    if compiler():
         return f"{fmu} holds a binary for this platform, and the sources for others."
     return (
         f"{fmu} holds sources alone: no C compiler was found (cc, gcc, clang, or CC). Export it "

@@ -108,8 +108,9 @@ def reproduce(
         page = _write_reproduction(out, results, executor)
     print_table(short_table(results))
     show(finding(results))
-    for act in (act for act in ACTS if act.name in results):
-        show(f"{act.title}: {act.sentence}")
+    for act in ACTS:
+        if act.name in results:
+            show(f"{act.title}: {act.sentence}")
     show(f"\nReport: {page}")
 
 

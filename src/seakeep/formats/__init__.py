@@ -72,7 +72,7 @@ def read_columns(path: Path | str, options: Options | None = None) -> Columns:
         If it is empty, damaged or of no kind that is read.
     """
     options = options or Options()
-    if (folder := folder_reader(Path(path))) is not None:
+    if folder := folder_reader(Path(path)):
         return folder.read(Path(path), options)
     with reading(path) as place:
         with place.open("rb") as file:

@@ -16,20 +16,13 @@ from pydantic import Field
 from seakeep.arrays import FloatArray
 from seakeep.conventions import conversion, si_unit
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
-from seakeep.toml import Table, optional
+from seakeep.toml import Table, optional, packaged
 
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*\Z")
 _PARENTHESES = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*\Z")
 
-_ENDINGS = {
-    **{unit: unit for unit in ("mm", "cm", "m", "deg", "rad", "N", "kN", "MN", "kgf", "Nm", "kNm",
-                               "g", "V", "mV", "Pa", "kPa", "bar", "Hz", "rpm", "s", "ms", "us",
-                               "sec")},
-    **{f"{each}_{per}": f"{each}/{unit}" for each in ("mm", "cm", "m", "deg", "rad")
-       for per, unit in (("s", "s"), ("s2", "s^2"), ("per_s", "s"), ("per_s2", "s^2"))},
-    "MM": "mm", "CM": "cm", "DEG": "deg", "RAD": "rad", "KN": "kN",
-}  # fmt: skip
-"""Endings of names that say a unit. Not all units: "min", "in" and "t" mean other things there."""
+UNITS = packaged("formats/units.toml")
+"""Units that names say: ends of names, and fields of messages."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +58,7 @@ class Columns:
         """Name of a column, given by name or by full header; None if there is none."""
         if wanted in self.values or wanted in self.faults:
             return wanted
-        by_header = {header: name for name, header in self.headers.items()}
-        return by_header.get(wanted.strip())
+        return {header: name for name, header in self.headers.items()}.get(wanted.strip())
 
 
 def meant_column(wanted: str, tables: Iterable[Columns]) -> str:
@@ -164,8 +156,8 @@ def named_unit(name: str) -> tuple[str, str | None]:
     """
     words = re.split(r"[_ ]+", name.strip())
     for count in (3, 2, 1):
-        unit = _ENDINGS.get("_".join(words[-count:]))
-        if unit is not None and any(words[:-count]):
+        unit = UNITS["endings"].get("_".join(words[-count:]))
+        if unit and any(words[:-count]):
             return "_".join(words[:-count]), unit
     return name, None
 

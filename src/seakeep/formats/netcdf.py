@@ -44,18 +44,18 @@ def read_netcdf(path: Path, options: Options) -> Columns:
         )
     axis = _time_axis(flat, options.time)
     length = next((array.size for array in flat.values() if array.dims == (axis,)), 0)
-    faults |= {
-        name: f"{path}: '{name}' has {array.size} values along '{array.dims[0]}', and the time "
-        f"{length} along '{axis}'. Save channels of one clock, each as long as the time, or "
-        "put each clock's channels into a file of its own."
-        for name, array in flat.items()
-        if array.dims != (axis,)
-    }
-    flat = {name: array for name, array in flat.items() if array.dims == (axis,)}
-    values = {name: array.values.astype(float) for name, array in flat.items()}
-    units = {
-        name: _text(array.attrs["units"]) for name, array in flat.items() if "units" in array.attrs
-    }
+    values, units = {}, {}
+    for name, array in flat.items():
+        if array.dims != (axis,):
+            faults[name] = (
+                f"{path}: '{name}' has {array.size} values along '{array.dims[0]}', and the time "
+                f"{length} along '{axis}'. Save channels of one clock, each as long as the time, "
+                "or put each clock's channels into a file of its own."
+            )
+            continue
+        values[name] = array.values.astype(float)
+        if "units" in array.attrs:
+            units[name] = _text(array.attrs["units"])
     return Columns(values, units, faults)
 
 

@@ -12,16 +12,9 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
-from seakeep.formats.columns import Columns, Options, decoding
+from seakeep.formats.columns import UNITS, Columns, Options, decoding
 
 _STANDARD = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
-_UNITS = {
-    "angular_velocity": "rad/s", "linear_acceleration": "m/s^2", "force": "N", "torque": "N m",
-    "position": "m", "linear": "m/s", "angular": "rad/s", "translation": "m", "point": "m",
-    "fluid_pressure": "Pa", "range": "m", "min_range": "m", "max_range": "m",
-}  # fmt: skip
-"""Units of fields of the standard messages (ROS Enhancement Proposal 103: SI)."""
-_ACCELERATION = {"linear": "m/s^2", "angular": "rad/s^2"}
 LARGEST_ARRAY = 64
 """Elements of an array field beyond which it is a picture or a cloud, not channels."""
 
@@ -53,7 +46,7 @@ def read_recording(path: Path, options: Options) -> Columns:
         ),
         highlevel.AnyReader([place], default_typestore=store) as reader,
     ):
-        begin = int(reader.start_time)
+        begin = reader.start_time
         rows = _read_topic(path, reader, options.group)
     return _columns(path, begin, *rows)
 
@@ -73,10 +66,10 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> tuple[Any, ...]:
     received, stamps, numbers = [], [], []
     for connection, instant, raw in reader.messages(chosen):
         message = reader.deserialize(raw, connection.msgtype)
-        received.append(int(instant))
+        received.append(instant)
         stamps.append(_stamp(message))
         numbers.append(dict(_flat(message, "")))
-    announced = sum(int(connection.msgcount) for connection in chosen)
+    announced = sum(connection.msgcount for connection in chosen)
     if len(received) < announced:
         raise DataError(
             f"{path} announces {announced} messages of the topic '{wanted}' and holds "
@@ -186,5 +179,5 @@ def _unit(kind: str, name: str) -> str | None:
     """Unit of a field of a standard message; None where the message does not fix it."""
     if not kind.startswith(_STANDARD) or kind.endswith("JointState"):
         return None
-    table = {**_UNITS, **(_ACCELERATION if "Accel" in kind else {})}
+    table = UNITS["ros"] | (UNITS["ros_accelerations"] if "Accel" in kind else {})
     return next((table[part] for part in reversed(name.split(".")) if part in table), None)

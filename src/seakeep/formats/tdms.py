@@ -52,7 +52,7 @@ def read_tdms(path: Path, options: Options) -> Columns:
                 for channel in _chosen(path, file, options.group)
                 if len(channel) > 1 and np.dtype(channel.dtype or object).kind in "fiubM"
             ]
-            data = [np.asarray(channel[:]) for channel in channels]
+            data = [channel[:] for channel in channels]
     return _columns(path, channels, data)
 
 
@@ -119,22 +119,18 @@ def _columns(path: Path, channels: list[Any], data: list[npt.NDArray[Any]]) -> C
     values, units = {}, {}
     for name, channel, numbers in zip(names, channels, data, strict=True):
         if numbers.dtype.kind == "M":
-            values[name], units[name] = _seconds(numbers), "s"
+            after = numbers - numbers[0]  # NaN where one is missing
+            values[name], units[name] = after / np.timedelta64(1, "ns") * 1e-9, "s"
             continue
         values[name] = numbers.astype(float)
-        unit = next((channel.properties[key] for key in _UNITS if key in channel.properties), "")
-        if str(unit).strip():
-            units[name] = str(unit).strip()
+        stated = (channel.properties[key] for key in _UNITS if key in channel.properties)
+        if unit := str(next(stated, "")).strip():
+            units[name] = unit
     time = _waveform_time(path, channels, data[0].size)
     if time is not None and not any(name.lower() == "time" for name in names):
         values = {"time": time, **values}
         units["time"] = "s"
     return Columns(values, units)
-
-
-def _seconds(instants: npt.NDArray[Any]) -> FloatArray:
-    """Seconds after the first instant; a missing one is NaN."""
-    return (instants - instants[0]) / np.timedelta64(1, "ns") * 1e-9
 
 
 def _waveform_time(path: Path, channels: list[Any], count: int) -> FloatArray | None:

@@ -62,7 +62,7 @@ def read_text(path: Path, options: Options) -> Columns:
     if lines[-1]:
         _warn_of_a_short_end(path, lines, layout)
     names, units = unique_names(layout.headers)
-    if layout.units is not None:
+    if layout.units:
         for name, row, unit in zip(names, layout.units, units, strict=True):
             if row and unit and is_unit(unit) and not same_unit(row, unit):
                 raise DataError(
@@ -289,7 +289,7 @@ def _frame(path: Path, lines: list[str], layout: _Layout) -> pd.DataFrame:
                 sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
                 decimal=layout.decimal,
                 header=None,
-                names=list(range(len(layout.headers))),
+                names=range(len(layout.headers)),
                 index_col=False,
                 skip_blank_lines=False,
                 skipinitialspace=" " in body,

@@ -122,7 +122,7 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
     every = [Text(f"u[{place}]", _number) for place in range(len(signature.inputs))]
     u = np.array([every], dtype=object)
     delayed, direct = list(map(str, every)), list[str]()
-    if observed is not None:
+    if observed:
         for each in observed.bound:
             back = max(back, each.before - input_map.lead * each.delayed)
             group = delayed if each.delayed else direct
@@ -147,16 +147,24 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
         else [
             (each.load, *follows.lines(None, (each.load.place,)))
             for each in signature.readouts
-            if each.load is not None
+            if each.load
         ],
     }
     files = {f"{name}.{end}": rendered(f"model.{end}", **content) for end in ("h", "c")}
-    if live is not None:
-        content |= live.equations
-        content |= {"begins": model.history_samples, "memory": MEMORY, "pi": math.pi}
-        content |= {"coverage": model.coverage, "trained": TRAINED, "cycles": CYCLES}
-        content |= {"gravity": GRAVITY, "per_octave": PER_OCTAVE, "is_elevation": is_elevation}
-        content |= {"noise_part": NOISE, "doubted": DOUBTED}
+    if live:
+        content |= live.equations | {
+            "begins": model.history_samples,
+            "memory": MEMORY,
+            "pi": math.pi,
+            "coverage": model.coverage,
+            "trained": TRAINED,
+            "cycles": CYCLES,
+            "gravity": GRAVITY,
+            "per_octave": PER_OCTAVE,
+            "is_elevation": is_elevation,
+            "noise_part": NOISE,
+            "doubted": DOUBTED,
+        }
         for end in ("h", "c"):
             files[f"{name}_estimator.{end}"] = rendered(f"estimator.{end}", **content)
     return files

@@ -24,12 +24,13 @@ from seakeep.models import HankelDMDcModel, Model
 
 KIND = "functional mock-up unit"
 PLATFORMS = {
-    ("Linux", "x86_64"): ("linux64", ".so"),
-    ("Darwin", "x86_64"): ("darwin64", ".dylib"),
-    ("Darwin", "arm64"): ("darwin64", ".dylib"),
-    ("Windows", "AMD64"): ("win64", ".dll"),
+    "Linux x86_64": ("linux64", ".so"),
+    "Darwin x86_64": ("darwin64", ".dylib"),
+    "Darwin arm64": ("darwin64", ".dylib"),
+    "Windows AMD64": ("win64", ".dll"),
 }
 """Folder of a binary in an FMU and its suffix, by system and processor."""
+HERE = f"{platform.system()} {platform.machine()}"
 
 
 def write_fmu(
@@ -77,7 +78,7 @@ def write_fmu(
     linear, name = exportable(model, ahead is not None), identifier(target.stem)
     files = sources(linear, name, None if ahead is None else linear.live(noise=noise, roles=roles))
     digest = hashlib.sha256("".join(files.values()).encode()).digest()
-    content: dict[str, Any] = {
+    content = {
         "name": name,
         "upper": name.upper(),
         "mark": f"{MARK}: {KIND},",
@@ -97,8 +98,8 @@ def write_fmu(
         for file, text in files.items():
             Path(folder, file).write_text(text, encoding="utf-8")
             archive.writestr(f"sources/{file}", text)
-        if (cc := compiler()) is not None:
-            place, suffix = PLATFORMS[platform.system(), platform.machine()]
+        if cc := compiler():
+            place, suffix = PLATFORMS[HERE]
             library = _compiled(cc, Path(folder), name, suffix)
             archive.write(library, f"binaries/{place}/{library.name}")
     return target
@@ -109,7 +110,7 @@ def compiler() -> list[str] | None:
 
     The environment variable ``CC`` names another one than cc, gcc or clang.
     """
-    if (platform.system(), platform.machine()) not in PLATFORMS:
+    if HERE not in PLATFORMS:
         return None
     if named := shlex.split(os.environ.get("CC", "")):
         return named
@@ -177,7 +178,6 @@ def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
         # Structured names are ASCII.
         "convention": "structured" if all(c["name"].isascii() for c in channels) else "flat",
         "channels": channels,
-        "start": [channel["start"] for channel in channels],
         # Histories stand in the order of C: those of the states, row by row, then the inputs'.
         "histories": [
             (channel, row + 1)

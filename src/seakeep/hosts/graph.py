@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from seakeep.arrays import IntArray, whole_number
+from seakeep.arrays import FloatArray, IntArray, whole_number
 from seakeep.core.recursion import Place
 from seakeep.errors import RequestError
 from seakeep.files import MARK, check_output, replacing
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
+from seakeep.models.following import Following
 from seakeep.models.interface import Signature
 from seakeep.models.observables import Observed
 from seakeep.models.terms import SlowSquare, Term
@@ -29,7 +30,6 @@ END = np.iinfo(np.int64).max
 INT64 = 7
 """Number of the type in ONNX."""
 OPERATORS = {
-    "add": "Add",
     "subtract": "Sub",
     "multiply": "Mul",
     "divide": "Div",
@@ -37,13 +37,10 @@ OPERATORS = {
     "power": "Pow",
     "negative": "Neg",
     "absolute": "Abs",
-    "sqrt": "Sqrt",
-    "sin": "Sin",
-    "floor": "Floor",
     "maximum": "Max",
     "minimum": "Min",
 }
-"""Operators of ONNX by the functions of numpy."""
+"""Operators of ONNX by the functions of numpy, where they are called otherwise."""
 
 
 def write_onnx(model: Model, path: str | Path, steps: int = 1) -> Path:
@@ -86,8 +83,7 @@ def write_onnx(model: Model, path: str | Path, steps: int = 1) -> Path:
         ) from error
     target = Path(path)
     check_output(target, KIND)
-    count = whole_number(steps, "steps")
-    proto = _model(exportable(model), int(count))
+    proto = _model(exportable(model), whole_number(steps, "steps"))
     onnx.checker.check_model(proto, full_check=True)
     with replacing(target) as temporary:
         temporary.write_bytes(proto.SerializeToString())
@@ -139,7 +135,8 @@ class _Array(NDArrayOperatorsMixin):
             return self.graph("Mul", *values, *values)
         if function is np.cos:  # onnxruntime knows no cosine in double precision
             return np.sin(values[0] + np.pi / 2)
-        return self.graph(OPERATORS[function.__name__], *values)
+        name = function.__name__
+        return self.graph(OPERATORS.get(name, name.capitalize()), *values)
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> _Value:
         assert function is np.concatenate
@@ -170,24 +167,25 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
     signature, coefficients = model.signature, model.coefficients
     N, s, scale = len(signature.states), signature.state_delays, signature.state_scale
     rows, extended = len(coefficients), N * (s + 1)
+    weights = coefficients[:, extended:]
     size, follows = signature.state_samples, signature.input_map.follows
     graph, step = _Graph(), _Graph("step_")
     history, u = _Array(graph, "x_history"), _Array(graph, "u")
     newest_first = scale.deviations(history[np.arange(size - 1, size - s - 2, -1)])
     # What is handed from step to step, and what each step takes: values and shapes.
     handed: _Values = {"state": (newest_first.reshape(extended), (extended,))}
-    taken: _Values = {"forced": (_forcing(graph, u, model, steps), (rows,))}
+    taken: _Values = {"forced": (_forcing(graph, u, signature, weights, steps), (rows,))}
     added = _Array(step, "forced")
-    if follows is not None:
-        table, remembered = _tables(graph, u, history, signature, steps)
+    if follows:
+        table, remembered = _tables(graph, u, history, signature, follows, steps)
         taken["places"] = (table, (follows.place.count, len(signature.input_scale.mean)))
         handed |= remembered
-        added = _followed(step, model, added)
+        added = _followed(step, signature, follows, weights, added)
     state = _Array(step, "state")
     moved = coefficients[:, :extended] @ state + added
     step("Concat", moved, state[: extended - rows], into="state_after", axis=0)
     newest = step("Slice", moved, [0], [N], [0], into="newest")
-    if follows is not None:
+    if follows:
         surge = newest * scale.std + scale.mean
         line = [surge[follows.column : follows.column + 1], _Array(step, "surge")[:-1]]
         step("Concat", *line, into="surge_after", axis=0)
@@ -248,12 +246,13 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
     return whole
 
 
-def _forcing(graph: _Graph, u: _Value, model: HankelDMDcModel, steps: int) -> _Value:
+def _forcing(
+    graph: _Graph, u: _Value, signature: Signature, weights: FloatArray, steps: int
+) -> _Value:
     """What inputs add at each step, (steps, rows); without what the surge drives."""
-    signature, input_map = model.signature, model.signature.input_map
+    input_map = signature.input_map
     z, n, observed = signature.input_delays, signature.input_scale.mean.size, input_map.observed
     now = input_map.history(z)
-    weights = model.coefficients[:, len(signature.states) * (signature.state_delays + 1) :]
     groups, parts = [], []
     if signature.inputs and input_map.follows is None:
         rows = u[now - z + input_map.lead : now + input_map.lead + steps]
@@ -261,7 +260,7 @@ def _forcing(graph: _Graph, u: _Value, model: HankelDMDcModel, steps: int) -> _V
         windows = values[np.arange(steps)[:, None] + np.arange(z, -1, -1)]
         groups.append(windows.reshape(steps, (z + 1) * n))
         parts.append(weights[:, : (z + 1) * n])
-    if observed is not None and observed.slopes.size:
+    if observed and observed.slopes.size:
         terms = [term for each in observed.groups[1] for term in each.terms]
         values = np.concatenate(
             [_column(graph, term, u, now, steps, observed) for term in terms], axis=1
@@ -271,14 +270,14 @@ def _forcing(graph: _Graph, u: _Value, model: HankelDMDcModel, steps: int) -> _V
         groups.append((values - scale.mean[:count]) / scale.std[:count])
         parts.append(weights[:, (z + 1) * n :][:, :count])
     if not groups:
-        return graph("Identity", np.zeros((steps, len(model.coefficients))))
+        return graph("Identity", np.zeros((steps, len(weights))))
     return np.concatenate(groups, axis=1) @ np.concatenate(parts, axis=1).T
 
 
 def _with_delayed(observed: Observed | None, rows: _Value) -> _Value:
     """Inputs beside the columns that take the input delays."""
     columns = [rows]
-    if observed is not None:
+    if observed:
         terms = [term for each in observed.groups[0] for term in each.terms]
         columns += [term.columns(rows, observed.limits) for term in terms]
     return np.concatenate(columns, axis=1)
@@ -305,24 +304,25 @@ def _column(
 
 
 def _tables(
-    graph: _Graph, u: _Value, history: _Value, signature: Signature, steps: int
+    graph: _Graph,
+    u: _Value,
+    history: _Value,
+    signature: Signature,
+    follows: Following,
+    steps: int,
 ) -> tuple[_Value, _Values]:
     """Standardised rows of the steps at all places, and what the first step remembers.
 
     That are the last surges and the rows before the start, both newest first.
     """
-    follows = signature.input_map.follows
-    assert follows is not None
     place, z, n = follows.place, signature.input_delays, signature.input_scale.mean.size
     count, columns, past = z + steps, [], place.taps.size
     samples = signature.input_map.history(z) - z + np.arange(count)
-    around = samples[:, None] + np.arange(-follows.back, follows.ahead + 1)
     banks = {each.column: each for each in follows.banks(None)}
     for column in range(len(signature.inputs)):
         total = graph("Expand", u[:, column : column + 1][samples], np.array([count, place.count]))
         if bank := banks.get(column):
-            parts = [u[:, at][around] @ bank.taps[:, i].T for i, at in enumerate(bank.columns)]
-            total = sum(parts[1:], parts[0])
+            total = _carried(u, samples, follows, bank.taps, bank.columns)
         columns.append(total.reshape(count * place.count, 1))
     rows = _with_delayed(signature.input_map.observed, np.concatenate(columns, axis=1))
     rows = signature.input_scale.deviations(rows)
@@ -341,17 +341,23 @@ def _wave(u: _Value, place: float, signature: Signature, steps: int) -> _Value:
     assert follows is not None
     taps, probes = follows.lines(None, (place,))
     samples = signature.input_map.history(signature.input_delays) + np.arange(steps)
+    return _carried(u, samples, follows, taps, probes)
+
+
+def _carried(
+    u: _Value, samples: IntArray, follows: Following, taps: FloatArray, probes: tuple[int, ...]
+) -> _Value:
+    """What carriers read off the probes around samples, (samples, columns)."""
     around = samples[:, None] + np.arange(-follows.back, follows.ahead + 1)
     parts = [u[:, at][around] @ taps[:, i].T for i, at in enumerate(probes)]
     return sum(parts[1:], parts[0])
 
 
-def _followed(step: _Graph, model: HankelDMDcModel, forced: _Value) -> _Value:
+def _followed(
+    step: _Graph, signature: Signature, follows: Following, weights: FloatArray, forced: _Value
+) -> _Value:
     """What is added in a step whose waves are read at the place of its surge."""
-    signature, follows = model.signature, model.signature.input_map.follows
-    assert follows is not None
     place, scale = follows.place, signature.direct_scale
-    weights = model.coefficients[:, len(signature.states) * (signature.state_delays + 1) :]
     line = signature.input_delays * signature.input_scale.mean.size
     here = _Array(step, "surge") @ place.taps[:, None]
     row = _between(step, place, here, _Array(step, "places"), np.arange(1))

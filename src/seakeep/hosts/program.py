@@ -54,14 +54,14 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             f"a model of kind '{model.kind}' cannot be exported; those of delayed states and "
             "inputs can: hankel_dmdc, arx, fir."
         )
-    if model.variation is not None:
+    if model.variation:
         raise RequestError(
             f"the model varies with {model.signature.parameter}. Export it at a value: in Python, "
             "model.at(parameter=…)."
         )
     input_map = model.signature.input_map
     aligned, observed = input_map.alignment, input_map.observed
-    if input_map.follows is None and aligned is not None and aligned.settings.carries:
+    if not input_map.follows and aligned and aligned.settings.carries:
         to = " to the measured surge" if input_map.reads_surge else ""
         raise RequestError(
             f"the model is driven by waves that are carried over whole records{to}, which no step "
@@ -91,7 +91,7 @@ def timing(model: HankelDMDcModel, follows: bool = False) -> str:
             f"A step of {model.dt:g} s takes the inputs {ahead} samples ({ahead * model.dt:g} "
             "s) after the instant that it starts from."
         )
-    if model.signature.input_map.follows is not None:
+    if model.signature.input_map.follows:
         said += (
             " They are the probes as measured, where they stood in training: the step carries "
             "the waves to the vessel by its own surge."

@@ -1,13 +1,12 @@
 """Checks of time: clocks, rates and records of the loggers, the common step, the period."""
 
-from collections.abc import Iterator
 from statistics import median_high, median_low
 
 import numpy as np
 
 from seakeep.conventions import MOTIONS, is_elevation
 from seakeep.quality.faults import noise_share
-from seakeep.quality.findings import Finding, Kind, Record, sound, step_of
+from seakeep.quality.findings import Findings, Kind, Record, sound, step_of
 from seakeep.signals.filters import PASSBAND
 from seakeep.signals.synchronisation import ASSUMED
 from seakeep.signals.waves import energy_above
@@ -98,17 +97,17 @@ class ClocksKind(Kind):
     LEFT_OUT = "{words}"
 
 
-def clocks(record: Record) -> Iterator[Finding]:
+def clocks(record: Record) -> Findings:
     """Gaps, jitter, rates that differ from the stated one, clocks that are not certain."""
     for name, group in record.groups.items():
         label, clock, step = name or "time", record.clocks[name], step_of(group)
-        if (gaps := int(group.attrs.get("time_gaps", 0))) > 0:
-            missing = int(group.attrs["time_missing"])
+        if gaps := group.attrs.get("time_gaps"):
+            missing = group.attrs["time_missing"]
             yield record.finding(ClocksKind.TIME_GAPS, label, gaps=gaps, missing=missing)
-        if (jitter := float(group.attrs.get("time_jitter_rms", 0.0))) > 0:
+        if jitter := group.attrs.get("time_jitter_rms"):
             yield record.finding(ClocksKind.JITTER, label, jitter, unit="s", jitter=1e3 * jitter)
-        if (rate := record.rates.get(name)) is not None:
-            aside = float(group.attrs.get("time_column_step", 1 / rate.stated))
+        if rate := record.rates.get(name):
+            aside = group.attrs.get("time_column_step", 1 / rate.stated)
             if abs(aside * rate.stated - 1) > RATE_TOLERANCE:
                 yield record.finding(ClocksKind.TIMES_ASIDE, label, 1 / aside, rate.stated, "Hz")
             elif abs(step * rate.stated - 1) > RATE_TOLERANCE:
@@ -125,18 +124,18 @@ def clocks(record: Record) -> Iterator[Finding]:
             yield record.finding(ClocksKind.CLOCK_DRIFT, label, drift, limit, "1")
 
 
-def rates(record: Record) -> Iterator[Finding]:
+def rates(record: Record) -> Findings:
     """Loggers whose rate is a guess, or whose times may count samples."""
     for name, group in record.groups.items():
         rate, label = record.rates.get(name), name or "time"
         table = f"instruments.{name}" if name else "files"
         if group.attrs.get("time_counts"):
             yield record.finding(ClocksKind.COUNTED, label, table=table)
-        if rate is not None and rate.counted and rate.assumed:
+        if rate and rate.counted and rate.assumed:
             yield record.finding(ClocksKind.RATE, label, rate.stated, unit="Hz", table=table)
 
 
-def records(record: Record) -> Iterator[Finding]:
+def records(record: Record) -> Findings:
     """Loggers that start well after the others of their run, or end well before them.
 
     The others are judged by their median, so that one that was left running speaks against none.
@@ -155,7 +154,7 @@ def records(record: Record) -> Iterator[Finding]:
             yield record.finding(ClocksKind.ENDS_EARLY, name, end, last, "s", end)
 
 
-def steps(record: Record) -> Iterator[Finding]:
+def steps(record: Record) -> Findings:
     """Steps that are too coarse for the waves, or finer than any logger's."""
     if not record.groups:
         return
@@ -171,7 +170,7 @@ def steps(record: Record) -> Iterator[Finding]:
         if not (is_elevation(name) or name in MOTIONS):
             continue
         cuts = [(ClocksKind.COARSE_STEP, edge)] if own[logger] < dt else []
-        if (passed := record.whole[name].attrs.get("low_pass")) is not None:
+        if passed := record.whole[name].attrs.get("low_pass"):
             cuts.append((ClocksKind.LOW_PASS, float(np.mean(passed))))
         x = sound(group, name)
         for kind, cut in cuts:
@@ -182,13 +181,13 @@ def steps(record: Record) -> Iterator[Finding]:
                 )
 
 
-def periods(record: Record) -> Iterator[Finding]:
+def periods(record: Record) -> Findings:
     """A counted period that is not a period of the waves."""
-    if record.period is not None and record.wave_channel is not None:
+    if record.period and record.wave_channel:
         yield record.finding(ClocksKind.PERIOD, record.wave_channel, *record.period, "s")
 
 
-def others(record: Record) -> Iterator[Finding]:
+def others(record: Record) -> Findings:
     """Runs left out of the pooled period and clocks."""
     for run, words in record.left_out.items():
         yield record.finding(ClocksKind.LEFT_OUT, f"run {run}", words=words)

@@ -17,10 +17,8 @@ from seakeep.signals.filters import odd_extension
 from seakeep.signals.time_axis import over_gaps, stretches
 from seakeep.signals.waves import dominant_period
 
-MISSING, BRIDGED, OUTLIER, SATURATED, STUCK, REPLACED = 1, 2, 4, 8, 16, 32
-
-FLAGS = {"missing": MISSING, "bridged": BRIDGED, "outlier": OUTLIER, "saturated": SATURATED,
-         "stuck": STUCK, "replaced": REPLACED}  # fmt: skip
+FLAGS = {"missing": 1, "bridged": 2, "outlier": 4, "saturated": 8, "stuck": 16, "replaced": 32}
+MISSING, BRIDGED, OUTLIER, SATURATED, STUCK, REPLACED = FLAGS.values()
 
 BESIDE = 5
 """Samples on either side whose medians say where a sample should be: they stay right beside a
@@ -124,7 +122,7 @@ def find_outliers(series: npt.ArrayLike) -> BoolArray:
     right = (4 * medians[REACH + 1 :][: x.size] - medians[REACH + 4 :][: x.size]) / 3
     away = np.abs(x - 0.5 * (left + right))
     # Second differences of white noise have six times its variance, and know no slope.
-    noise = 1.4826 * float(np.median(np.abs(np.diff(x, 2)))) / float(np.sqrt(6.0))
+    noise = 1.4826 * np.median(np.abs(np.diff(x, 2))) / np.sqrt(6.0)
     # Where a signal sticks and slips, a sample is far from the middle and belongs to one side.
     outliers = (away > max(ALONE * noise, LEAST * spread)) & (away > np.abs(left - right))
     jumps = np.abs(np.diff(x, prepend=np.inf, append=np.inf))
@@ -132,7 +130,7 @@ def find_outliers(series: npt.ArrayLike) -> BoolArray:
         near = np.median(away[max(begin - AROUND, 0) : end + AROUND])
         apart = min(jumps[begin] / away[begin], jumps[end] / away[end - 1])
         outliers[begin:end] = away[begin:end].max() > ALONE * 1.4826 * near and apart > ABRUPT
-    return np.asarray(outliers | _bursts(x) | (np.abs(x - middle) > FAR * spread) & (spread > 0))
+    return outliers | _bursts(x) | (np.abs(x - middle) > FAR * spread) & (spread > 0)
 
 
 def _bursts(x: FloatArray) -> BoolArray:
@@ -155,7 +153,7 @@ def _starts(x: FloatArray) -> IntArray:
 def _spread(x: FloatArray) -> tuple[float, float]:
     """Median, and standard deviation by percentiles that one sample in twenty does not move."""
     low, middle, high = np.percentile(x, [5, 50, 95])
-    return float(middle), float(high - low) / 3.29  # of a normal series
+    return middle, (high - low) / 3.29  # of a normal series
 
 
 MEMORY = 4
@@ -238,9 +236,9 @@ def find_held(series: npt.ArrayLike, dt: float, witness: npt.ArrayLike | None = 
     lengths = np.diff(np.append(starts, x.size))
     # Of n runs whose length goes on with probability p, the longest is of log n / log(1/p) (Erdős
     # and Rényi). Where all readings repeat, as the frames of a slow camera do, they count as one.
-    frame = max(int(np.sort(lengths)[(lengths.size - 1) // 4]), _frame(x))
-    goes_on = max(float(np.mean(lengths >= 2 * frame)), 1 / lengths.size)
-    expected = frame * float(1 + TIMES * np.log(lengths.size) / np.log(1 / goes_on))
+    frame = max(np.sort(lengths)[(lengths.size - 1) // 4], _frame(x))
+    goes_on = max(np.mean(lengths >= 2 * frame), 1 / lengths.size)
+    expected = frame * (1 + TIMES * np.log(lengths.size) / np.log(1 / goes_on))
     long = lengths > expected
     free = np.repeat(~long, lengths)
     if free.sum() < 2:
@@ -259,30 +257,30 @@ def find_held(series: npt.ArrayLike, dt: float, witness: npt.ArrayLike | None = 
 def _stay(x: FloatArray, starts: IntArray, begin: int, end: int, period: float) -> float:
     """Samples for which the motion beside a run of equal readings may stay within one reading."""
     spread, changes = _spread(x[starts])[1], np.abs(np.diff(x[starts]))
-    smallest, largest = float(changes.min()), STEEP * float(np.percentile(changes, 95))
+    smallest, largest = changes.min(), STEEP * np.percentile(changes, 95)
     path = np.abs(np.diff(x))
     if path[max(begin - 1, 0) : begin].sum() > largest or path[end - 1 : end].sum() > largest:
         return 0.0
     path, beside = np.minimum(path, largest), max(2, round(period))
-    step = float(path.sum()) / np.count_nonzero(path)
+    step = path.sum() / np.count_nonzero(path)
 
     def calm(steps: FloatArray, values: FloatArray) -> bool:
         if not steps.size or steps.mean() < CALM * step:
             return True
-        return values.size > beside and bool(values.std() < CALM * spread)
+        return values.size > beside and values.std() < CALM * spread
 
     gone = calm(path[end - 1 :], x[end:])
-    before = float(x[max(begin - beside, 0) : begin + 1].std())
-    motion = before if gone else max(before, float(x[end - 1 : end + beside].std()))
-    amplitude = float(np.sqrt(2)) * motion
+    before = x[max(begin - beside, 0) : begin + 1].std()
+    motion = before if gone else max(before, x[end - 1 : end + beside].std())
+    amplitude = np.sqrt(2) * motion
     if (
         calm(path[:begin], x[:begin])
         or motion < AT_REST * spread
         or amplitude < RESOLVED * smallest
     ):
-        return float("inf")
-    wave = min(period, 4 * float(np.sqrt(2)) * spread / step)
-    return wave / float(np.pi) * float(np.arccos(max(1 - smallest / amplitude, -1.0)))
+        return np.inf
+    wave = min(period, 4 * np.sqrt(2) * spread / step)
+    return wave / np.pi * np.arccos(max(1 - smallest / amplitude, -1.0))
 
 
 def saturated(series: FloatArray, stuck: BoolArray) -> BoolArray:
@@ -321,7 +319,7 @@ def reading_step(series: npt.ArrayLike) -> float:
     x = as_series(series)
     change = np.diff(x)
     if x.size < 3 or not change.any():
-        return float("nan")
+        return np.nan
     frame = _frame(x)
     steps = []
     for begin, end in stretches(change == 0):  # x[begin] to x[end] are equal
@@ -329,7 +327,7 @@ def reading_step(series: npt.ArrayLike) -> float:
             continue
         steps += [abs(x[begin - frame] - x[begin])] if begin >= frame else []
         steps += [abs(x[end + frame] - x[end])] if end + frame < x.size else []
-    return float(np.median(steps)) if len(steps) >= LEAST_STEPS else float("nan")
+    return float(np.median(steps)) if len(steps) >= LEAST_STEPS else np.nan
 
 
 def _frame(x: FloatArray) -> int:

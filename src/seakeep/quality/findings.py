@@ -109,7 +109,7 @@ def as_json(findings: Iterable[Finding]) -> str:
     return json.dumps(
         [
             vars(each)
-            | {"kind": each.kind.name, "details": dict(each.details), "text": each.text}
+            | {"kind": each.kind.name, "text": each.text}
             | {key: _finite(getattr(each, key)) for key in ("value", "limit", "place")}
             for each in findings
         ],
@@ -167,10 +167,11 @@ def warn_of(
         more = [name for name in names if name not in (each.run, each.channel)]
         others = f" ({', '.join(more)} likewise)" if more else ""
         remedy = f" {each.remedy}" if each.remedy else ""
-        words = f"{each.run}: {each.channel} {each.text}{others}.{remedy}"
-        warn(words)
+        warn(f"{each.run}: {each.channel} {each.text}{others}.{remedy}")
 
 
+Findings = Iterator[Finding]
+"""What a check yields."""
 Redundant = Mapping[tuple[str, ...], float | None]
 """Channels that measure one quantity, the trusted one first: the windows compared, s."""
 

@@ -1,7 +1,5 @@
 """Checks of one channel: flagged samples, constant values, levels, values that cannot be."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import scipy
 
@@ -16,7 +14,7 @@ from seakeep.quality.faults import (
     STUCK,
     noise_share,
 )
-from seakeep.quality.findings import Finding, Kind, Record, channels_of, sound, step_of
+from seakeep.quality.findings import Findings, Kind, Record, channels_of, sound, step_of
 from seakeep.signals.time_axis import stretches
 from seakeep.signals.waves import dominant_period
 
@@ -63,7 +61,7 @@ _FLAGS = {
 }
 
 
-def flagged(record: Record) -> Iterator[Finding]:
+def flagged(record: Record) -> Findings:
     """Samples that carry a flag."""
     for _, group, name, _ in record.recorded():
         if f"{name}_flags" not in group.coords:
@@ -78,7 +76,7 @@ def flagged(record: Record) -> Iterator[Finding]:
             done = ""
             if bit == OUTLIER and (flags & REPLACED).any():
                 done = "; replaced by interpolation"
-            elif bit == MISSING and record.bridged is not None:
+            elif bit == MISSING and record.bridged:
                 limit = f"longest_gap = {record.bridged:g} s in [preparation]"
                 longer = f"a gap of {max(inner, default=0):.3g} s is longer than {limit}"
                 why = longer if inner else "it stands at an end of the record"
@@ -95,7 +93,7 @@ def flagged(record: Record) -> Iterator[Finding]:
             )
 
 
-def constant(record: Record) -> Iterator[Finding]:
+def constant(record: Record) -> Findings:
     """Channels that never change."""
     for _, _, name, channel in record.recorded():
         if not np.ptp(channel.values):
@@ -103,14 +101,14 @@ def constant(record: Record) -> Iterator[Finding]:
             yield record.finding(SamplesKind.CONSTANT, name, float(channel[0]), unit=unit)
 
 
-def noise(record: Record) -> Iterator[Finding]:
+def noise(record: Record) -> Findings:
     """Channels most of whose variance has no memory, such as a record of random readings."""
     for _, group, name, _ in record.recorded():
         if (share := noise_share(sound(group, name))) > 0.5:
             yield record.finding(SamplesKind.NOISE, name, share=100 * share)
 
 
-def levels(record: Record) -> Iterator[Finding]:
+def levels(record: Record) -> Findings:
     """Levels that drift, of channels that have no slow motion of their own."""
     dt = step_of(record.whole)
     for name, channel in channels_of(record.whole).items():
@@ -121,13 +119,13 @@ def levels(record: Record) -> Iterator[Finding]:
             continue
         change, ratio = level_drift(x, dt, dominant_period(x, dt))
         # A level that moves by half the waves' spread shifts means and standardisation visibly.
-        limit = 0.5 * float(x.std())
+        limit = 0.5 * x.std()
         if abs(change) > limit and ratio > 5:
             unit = str(channel.attrs["units"])
             yield record.finding(SamplesKind.DRIFT, name, change, limit, unit)
 
 
-def impossible(record: Record) -> Iterator[Finding]:
+def impossible(record: Record) -> Findings:
     """Values that no floating vessel and no wave reach, and a wrong unit does.
 
     Roll or pitch beyond a right angle; waves or heave that leave their mean by more than the water
@@ -137,14 +135,14 @@ def impossible(record: Record) -> Iterator[Finding]:
     for name, channel in channels_of(record.whole).items():
         x, turns = channel.values, name in ("roll", "pitch")
         x, limit = x[np.isfinite(x)], np.pi / 2 if turns else depth
-        if x.size and limit is not None and (turns or name == "heave" or is_elevation(name)):
+        if x.size and limit and (turns or name == "heave" or is_elevation(name)):
             reached = float(np.percentile(np.abs(x if turns else x - x.mean()), 99))
             kind = SamplesKind.IMPOSSIBLE if turns else SamplesKind.OUT_OF_WATER
             if reached > limit:
                 yield record.finding(kind, name, reached, limit, "rad" if turns else "m")
 
 
-def units(record: Record) -> Iterator[Finding]:
+def units(record: Record) -> Findings:
     """Units that are guesses, and motions that are read from columns of waves."""
     for name, column in record.wave_columns.items():
         yield record.finding(SamplesKind.WAVE_COLUMN, name, column=column)

@@ -14,7 +14,7 @@ import xarray as xr
 
 from seakeep.arrays import BoolArray, FloatArray, as_series
 from seakeep.quality.faults import STUCK, find_held
-from seakeep.quality.findings import Finding, Kind, Record, Redundant, channels_of, filled, step_of
+from seakeep.quality.findings import Findings, Kind, Record, Redundant, channels_of, filled, step_of
 from seakeep.signals import misplaced_probes
 from seakeep.signals.lags import Lags, windowed_lags
 from seakeep.signals.waves import dominant_period
@@ -72,12 +72,12 @@ def compared(run: xr.Dataset, groups: Redundant) -> dict[tuple[str, str], Agreem
             stuck = None
             if f"{name}_flags" in run.coords:
                 stuck = (run[f"{name}_flags"].values & STUCK) > 0
-            step = float(run[name].attrs.get("reading_step", np.nan))
+            step = run[name].attrs.get("reading_step", np.nan)
             out[name, first] = compare_sensors(filled(run[name]), trusted, dt, window, stuck, step)
     return out
 
 
-def redundant(record: Record) -> Iterator[Finding]:
+def redundant(record: Record) -> Findings:
     """Redundant sensors that disagree by more than a model may err, or hold still alone."""
     run = record.whole
     for (name, other), agreement in compared(run, record.redundant).items():
@@ -127,14 +127,14 @@ def _faults(agreement: Agreement, unit: str) -> Iterator[tuple[SensorsKind, floa
             yield SensorsKind.DIFFERENCE, agreement.nrmse, LARGEST_NRMSE, "1"
 
 
-def positions(record: Record) -> Iterator[Finding]:
+def positions(record: Record) -> Findings:
     """Stated positions of wave probes against the phases of the waves that passed them.
 
     Nothing can be said without a water depth, nor of regular waves.
     """
     run, depth = record.whole, record.water_depth
     places = {
-        name: float(channel.attrs["x_position"])
+        name: channel.attrs["x_position"]
         for name, channel in channels_of(run).items()
         if "x_position" in channel.attrs
     }
@@ -228,7 +228,7 @@ class Agreement:
     def spanned(self) -> float:
         """Steps of the sensor that the motion spans from crest to trough (2√2 of its SD)."""
         known = np.isfinite(self.step) and self.step > 0
-        return float(2 * np.sqrt(2) * self.motion / self.step) if known else float("inf")
+        return float(2 * np.sqrt(2) * self.motion / self.step) if known else np.inf
 
 
 def compare_sensors(
@@ -236,8 +236,8 @@ def compare_sensors(
     trusted: npt.ArrayLike,
     dt: float,
     window: float | None = None,
-    stuck_samples: npt.ArrayLike | None = None,
-    step: float = float("nan"),
+    stuck_samples: BoolArray | None = None,
+    step: float = np.nan,
 ) -> Agreement:
     """Compare a sensor with a trusted one of the same motion, window by window.
 
@@ -271,17 +271,13 @@ def compare_sensors(
     x, y = as_series(series), as_series(trusted)
     period = dominant_period(y, dt)
     empty = np.zeros(0)
-    gain = float(x.std() / y.std()) if y.std() > 0 else float("nan")
+    gain = float(x.std() / y.std()) if y.std() > 0 else np.nan
     gain = 0.0 if gain < 1e-6 else gain  # what resampling makes of a constant
-    nothing = Agreement(period, float("nan"), step, *(float("nan"),) * 5, gain, empty, empty)
+    nothing = Agreement(period, np.nan, step, *(np.nan,) * 5, gain, empty, empty)
     length = 4 * period if window is None else window
     if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
         return nothing
-    stuck = (
-        np.zeros(x.size, dtype=bool)
-        if stuck_samples is None
-        else np.asarray(stuck_samples, dtype=bool)
-    )
+    stuck = np.zeros(x.size, bool) if stuck_samples is None else stuck_samples
     windows, motion, gain = _windows(x, y, dt, length, period, stuck)
     if not windows.lag.size:
         return nothing
@@ -326,7 +322,7 @@ def _windows(
     )  # a sensor that sticks all the time is judged all the same
     clear = Lags(lags.centre[moving], lags.lag[moving], lags.correlation[moving])
     if not moving.any():
-        return clear, float("nan"), float("nan")
+        return clear, np.nan, np.nan
     mean = float(np.sqrt(np.mean(motion[moving] ** 2)))
     return clear, mean, float(np.median(own[moving] / motion[moving]))
 

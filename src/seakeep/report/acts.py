@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.results import divergence_table
 from seakeep.report.style import HEADING, model_words
-from seakeep.report.tables import Interval, Number, Table, number, numbers, ratio_of, table, words
+from seakeep.report.tables import WORDS, Interval, Number, Table, number, numbers, ratio_of, table
 from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -56,7 +56,7 @@ def claims_table(results: Results) -> Table:
     verdicts = {True: "holds", False: "does not", None: "cannot tell"}
     limits = {"useful": USEFUL, "aged": 100 * AGED, "almost": 100 * ALMOST}
     acts, rows = Claims(results["paper"], Evidence(results["raw"])), []
-    for key, (claim, how) in words()["claims"].items():
+    for key, (claim, how) in WORDS["claims"].items():
         figure, holds = acts.judge(key)
         rows.append((claim, figure, verdicts[holds], how.format(**limits)))
     return table("claims", rows)
@@ -72,11 +72,6 @@ def all_of(verdicts: Iterable[bool | None]) -> bool | None:
     """
     known = list(verdicts)
     return False if False in known else None if None in known else True
-
-
-def opposite(verdict: bool | None) -> bool | None:
-    """The verdict on the contrary."""
-    return None if verdict is None else not verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +126,8 @@ class Evidence:
         blocks = blocks_of(of_tests, self.result.groups["training"])
         rng = random_stream(int(self.result.attrs["seed"]), "claims")
         bounds = two_way_interval(statistic, *cells, rng=rng, blocks=blocks, signed=signed)
-        value = statistic(*(each[None] for each in cells))[0]
-        return Interval(*map(float, (value, *bounds)))
+        value = statistic(*(each[None] for each in cells))
+        return Interval(*map(float, (*value, *bounds)))
 
     def error(self, tests: Sequence[str] = SEA, *of: Any, **named: str) -> Interval:
         """Median of the errors of :meth:`cells`, averaged over the channels."""
@@ -254,12 +249,12 @@ class Claims(Evidence):
             at = act.result.groups["statistics/trend"].sel(test="irregular", band="all")
             growths.append([ratio_of(at.sel(model=model)) for model in (SINGLE, ENSEMBLE)])
         texts = (" and ".join(each.change() for each in of_act) for of_act in growths)
-        within = [v for e in growths[0] for v in (e.below(1 + AGED), opposite(e.below(1 - AGED)))]
+        within = [v for e in growths[0] for v in (e.below(1 + AGED), e.above(1 - AGED))]
         return "{}; act (b): {}".format(*texts), all_of(within)
 
     def _any_length(self) -> Judged:
         period = self.result.encounter_period
-        length = float(self.result.tests["irregular"]["time"].values[-1])
+        length = self.result.tests["irregular"]["time"].values[-1]
         return f"{length / period:.0f} T̂ were forecast, as in the paper", None
 
     def _who_errs(self) -> Judged:
@@ -267,7 +262,7 @@ class Claims(Evidence):
         listed = ", ".join(f"{each.part()} of {words}" for words, each in shares.items())
         slow = _share(self.raw, "nrmse", SLOW).part()
         words = f"loads make {listed}; act (b): surge and loads {slow} of ANRMSE"
-        return words, all_of(opposite(each.below(0.5)) for each in shares.values())
+        return words, all_of(each.above(0.5) for each in shares.values())
 
     def _load_divergence(self) -> Judged:
         at = self.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
@@ -278,7 +273,7 @@ class Claims(Evidence):
             f"{float(loads['mean']):.4f} against {float(others['mean']):.4f}: a factor of "
             f"{ratio.value:.0f} [{ratio.lower:.1f}, {ratio.upper:.0f}]"
         )
-        return words, opposite(ratio.below(10**0.5))
+        return words, ratio.above(10**0.5)
 
     def _densities(self) -> Judged:
         at = self.result.groups["statistics/divergence"].sel(model=ENSEMBLE, variant="paper")
@@ -286,7 +281,7 @@ class Claims(Evidence):
         count, total = int(within.sum()), within.size
         share = Interval(count / total, *binomtest(count, total).proportion_ci())
         words = f"{count} of {total} motions within the noise of the record: {share.part()}"
-        return words, opposite(share.below(ALMOST))
+        return words, share.above(ALMOST)
 
     def _better(self, statistic: Statistic = _median) -> Judged:
         differences = _against_single(self, statistic=statistic)
@@ -316,7 +311,7 @@ class Claims(Evidence):
 
     def _slow_loads(self) -> Judged:
         result = self.raw.result
-        split = float(result.settings["statistics"]["split_period"])
+        split = result.settings["statistics"]["split_period"]
         test = result.tests["irregular"].sel(channel=list(LOADS))
         forecasts = test["mean"].sel(model=ENSEMBLE).values[self.raw.order]
         measured, forecast = (
@@ -358,7 +353,7 @@ class Claims(Evidence):
             for key, words in HEADING.items()
         }
         return _changes(differences), all_of(
-            [opposite(differences["ANRMSE"].below(1.0)), differences["NAMMAE"].below(1.0)]
+            [differences["ANRMSE"].above(1.0), differences["NAMMAE"].below(1.0)]
         )
 
     def _phase(self) -> Judged:
@@ -368,7 +363,7 @@ class Claims(Evidence):
         interval = partial(self.interval, tests=REGULAR)
         loads, motions = (interval(_middle, each).text(0, "°") for each in both)
         more = interval(lambda a, b: _middle(a) - _middle(b), *both, signed=True)
-        return f"median |phase|: loads {loads}, motions {motions}", opposite(more.below(0.0))
+        return f"median |phase|: loads {loads}, motions {motions}", more.above(0.0)
 
     def _stern(self) -> Judged:
         line = "mooring_stern"
@@ -388,12 +383,12 @@ class Claims(Evidence):
         radii = self.variants("radius")
         ours, none = (self.interval(_middle, radii[k]) for k in ("ridge", "none"))
         words = f"spectral radius {ours.text()} with λ, {none.text()} without"
-        return words, all_of([ours.below(1.0), opposite(none.below(1.0))])
+        return words, all_of([ours.below(1.0), none.above(1.0)])
 
     def _cheaper(self) -> Judged:
         seconds = self.variants("seconds")
         times = self.interval(_middle, seconds["truncated"] / seconds["ridge"])
-        return f"the SVD takes {times.text(0)} times as long", opposite(times.below(1.0))
+        return f"the SVD takes {times.text(0)} times as long", times.above(1.0)
 
     def _robust_to_noise(self) -> Judged:
         data = self.result.groups[f"regularisation/{SINGLE}"]
@@ -429,19 +424,19 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
     stamp = {
         "description": "A study of linear models with delays that forecast a moored vessel in head "
         "seas, on data of a virtual towing tank: six runs, three procedures.",
-        "preset": "",
-        "seed": str(last.attrs["seed"]),
-        "digest": "",
+        "seed": last.attrs["seed"],
         "finished": finished(last),
     }
     sections = [_summary(results)]
     if {"paper", "raw"} <= set(results):
         sections.append(section("claims", claims_table(results)))
-    divergence, beside = divergence_table(first, "bayesian", "paper"), ", beside the paper's"
+    divergence = divergence_table(first, "bayesian", "paper")
     links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
     sections += [
         section("channels", acts_table(results)),
-        Section("densities", f"Divergence of the densities{beside}", tables=(divergence,)),
+        Section(
+            "densities", "Divergence of the densities, beside the paper's", tables=(divergence,)
+        ),
         section("waves", *wave_tables(first)),
         section("studies", links=links),
     ]
@@ -463,7 +458,7 @@ def _summary(results: Results) -> Section:
         more=(finding(results), against_filter(results), NOTE),
         points=[f"{act.title}. {act.sentence}" for act in _played(results)],
         # Once what several studies warn of.
-        notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each is not None)),
+        notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each)),
     )
 
 
@@ -483,7 +478,7 @@ def short_table(results: Results) -> Table:
     last = list(results)[-1]
     rows = [
         (said, *(" / ".join(pair) for pair in _pairs(results[act], model)))
-        for act, model, said in (*words()["rows"], (last, "hold_last", "last measured state"))
+        for act, model, said in (*WORDS["rows"], (last, "hold_last", "last measured state"))
         if act in results
     ]
     first = results[last]
@@ -528,11 +523,11 @@ def still_water(results: Results) -> str:
     parts = []
     for test in REGULAR:
         at = result.tests[test].sel(channel="surge")
-        spread = float(at["measured"].std("time", ddof=1).median())
+        spread = at["measured"].std("time", ddof=1).median()
         error = at["error"].sel(model=SINGLE, measure="training_nrmse").where(at["judged"])
-        metres = float(error.median()) * float(at["training_std"].median())
-        parts.append(f"{number(metres, 3)} m ({number(spread, 3)} m)")
-    trained = number(float(at["training_std"].median()), 3)
+        metres = error.median() * at["training_std"].median()
+        parts.append(f"{number(metres)} m ({number(spread)} m)")
+    trained = number(at["training_std"].median())
     return (
         "In regular waves drift stands nearly still, at a mean far from that of the training. "
         f"There the recommended model errs by {', '.join(parts)} in surge at λ/L 1.5, 2 and 3; in "
@@ -546,27 +541,23 @@ def _pairs(result: StudyResult, model: str) -> list[list[Number]]:
     pairs = []
     for data in result.tests.values():
         cells = data["error"].sel(model=model, measure="nrmse").values[data["judged"].values]
-        slow = np.isin(data["channel"].values.astype(str), SLOW)
+        slow = np.isin(data["channel"].values, SLOW)
         pairs.append(numbers([np.nanmedian(average_of(cells[:, k])) for k in (~slow, slow)], 2))
     return pairs
 
 
 def acts_table(results: Results) -> Table:
     """Median errors of every model of every act, per sea, of wave-frequency and slow channels."""
-    rows, first = [], next(iter(results.values()))
-    for act in _played(results):
-        result = results[act.name]
-        for model in result.models:
-            pairs = _pairs(result, model)
-            rows.append(
-                (act.letter, model_words(model), *(each for pair in pairs for each in pair))
-            )
+    first = next(iter(results.values()))
+    rows = [
+        (act.letter, model_words(model), *chain(*_pairs(results[act.name], model)))
+        for act in _played(results)
+        for model in results[act.name].models
+    ]
     seas = [first.label_of(test).removeprefix("regular, ") for test in first.tests]
     reading = [a.letter for a in _played(results) if results[a.name].attrs["conditional_on"]]
-    conditions = ""
-    if reading:
-        conditions = (
-            f"{' and '.join(reading)}: conditional on measured surge, which the alignment reads."
-        )
+    conditions = (
+        f"{' and '.join(reading)}: conditional on measured surge, which the alignment reads."
+    ) * bool(reading)
     columns = ("act", "model", *(f"{sea}: {part}" for sea in seas for part in ("waves", "slow")))
     return table("acts", rows, more=conditions, columns=columns)

@@ -15,6 +15,7 @@ from seakeep.report.page import Drawing, Section, drawing, section, write_page
 from seakeep.report.style import shown_unit
 from seakeep.report.tables import (
     MISSING,
+    WORDS,
     Number,
     Table,
     change,
@@ -28,7 +29,6 @@ from seakeep.report.tables import (
     short,
     table,
     uncertain,
-    words,
 )
 
 OVERSHOOT = 1.1
@@ -59,17 +59,17 @@ def worth_section(result: xr.Dataset, checked: Checked) -> Section:
         )
     if lost := result.attrs["lost"]:
         points.append(f"Baselines that do not count in all verdicts: {lost}.")
-    if (validity := checked.results.get("validity")) is not None:
+    if validity := checked.results.get("validity"):
         points += [
             f"{run}: outside what trained the model ({why})." for run, why in _outside(validity)
         ]
-    one, runs = str(result.attrs["of"]).removesuffix("s"), result["run"].values
-    errors = [(str(each["channel"].values), *numbers(each)) for each in result["run_nrmse"]]
+    one, runs = result.attrs["of"].removesuffix("s"), result["run"].values
+    errors = [(each["channel"].item(), *numbers(each)) for each in result["run_nrmse"]]
     return section(
         "worth",
         _by_run(result, one),
         _by_state(result),
-        table("worth_of_runs", errors, columns=("state", *map(str, runs))),
+        table("worth_of_runs", errors, columns=("state", *runs)),
         one=one,
         runs=runs.size,
         points=points,
@@ -83,14 +83,14 @@ def _verdicts(result: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
         yield "No run tests the model. All errors are those of training: memory, not skill."
     for kind in result["waves"].values:
         own = result.sel(waves=kind)
-        names = [str(run) for run in result["run"].values[result["kind"].values == kind]]
+        names = result["run"].values[result["kind"].values == kind]
         known = ", ".join(run for run in names if run in repeats)
         memory = f" (memory, not skill: {known} repeat training input)" * bool(known)
         tests = "training" if training else f"test{'s' * (len(names) > 1)}"
         one = own.sel(state="all")
         every = one.sel(model="model")
         beside = ""
-        if best := str(one["best"].values):
+        if best := one["best"].item():
             beside = f"; of the best baseline, {best}, {number(one['nrmse'].sel(model=best))}"
             if (below := _change(one, best)) != MISSING:
                 beside += f" (from there {below})"
@@ -106,13 +106,13 @@ def _verdicts(result: xr.Dataset, repeats: Mapping[str, str]) -> Iterator[str]:
 
 def _verdict(one: xr.Dataset) -> tuple[float, str]:
     """Limit of a state (0 where none can be judged), and what its error allows, in words."""
-    limit, rival = float(one["limit"].fillna(0)), str(one["rival"].values)
+    limit, rival = float(one["limit"].fillna(0)), one["rival"].item()
     if not limit:
         still = "it stands still in one of these runs or more"
         return limit, f"cannot be judged: {still if one['still'] else 'its forecast is lost'}"
-    if not rival or bool(one["better"]):
+    if not rival or one["better"]:
         return limit, USES[limit]
-    worse = float(one["change_lower"].sel(model=rival)) > 0
+    worse = one["change_lower"].sel(model=rival) > 0
     how, by = "worse" if worse else "not shown to be better", _change(one, rival)
     beside = f" ({by})" * (by != MISSING)
     return limit, f"{USES[limit]}; {how} than the baseline {rival}{beside}"
@@ -126,9 +126,9 @@ def _change(one: xr.Dataset, baseline: str) -> Number:
 
 def _by_run(result: xr.Dataset, one: str) -> Table:
     """ANRMSE of each test, of the model with its interval and of the baselines."""
-    rows, averages, models = [], [], [str(name) for name in result["model"].values]
+    rows, averages, models = [], [], result["model"].values
     for own in entries(result, "waves"):
-        kind = str(own["waves"].values)
+        kind = own["waves"].item()
         of_kind = entries(result.sel(run=result["kind"] == kind), "run")
         rows += [(*row(at, "run"), *_cells(at, "anrmse")) for at in of_kind]
         averages.append(len(rows))
@@ -151,8 +151,8 @@ def _by_state(result: xr.Dataset) -> Table:
     """Mean error of each state, the best baseline, and the verdict."""
     rows = []
     for one in entries(result.isel(state=slice(1, None)), "waves", "state"):
-        beside: tuple[str, ...] = (MISSING, MISSING, MISSING)
-        if best := str(one["best"].values):
+        beside = (MISSING, MISSING, MISSING)
+        if best := one["best"].item():
             beside = (best, number(one["nrmse"].sel(model=best)), _change(one, best))
         use = USES.get(float(one["limit"]), "not judged").partition(" (")[0]
         rows.append((*row(one, "state", "waves"), *_cells(one, "nrmse")[:2], *beside, use))
@@ -162,7 +162,7 @@ def _by_state(result: xr.Dataset) -> Table:
 def _outside(validity: xr.Dataset) -> list[tuple[str, str]]:
     """Tests outside the training, and why."""
     pairs = zip(validity["run"].values, validity["outside"].values, strict=True)
-    return [(str(run), str(why)) for run, why in pairs if why]
+    return [(run, why) for run, why in pairs if why]
 
 
 def response_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -176,7 +176,7 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
     unknown = result["amplitude"].isnull().all(["input", "frequency"])
     if read := ", ".join(map(str, result["state"].values[unknown])):
         words.append(f"{read}: read off other states, so that no linear response stands for it.")
-    if measured is not None:
+    if measured:
         kinds = {*measured["kind"].values}
         tables.append(table("measured_response", _points(measured, result)))
     if "irregular" in kinds:
@@ -192,7 +192,7 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
 
 def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
     """Some variables in the units that are shown, and ``shown``: each state with its unit."""
-    factors, units = zip(*map(displayed, result["units"].values.astype(str)), strict=True)
+    factors, units = zip(*map(displayed, result["units"].values), strict=True)
     factor = xr.DataArray(list(factors), dims="state")
     names = [
         f"{state} [{shown_unit(unit)}]"
@@ -240,12 +240,12 @@ def possible_section(result: xr.Dataset, checked: Checked) -> Section:
     unjudged = defaultdict(list)
     worth, segment = checked.results.get("worth"), result.attrs["segment"]
     ahead = worth is not None and bool((worth["look_ahead"] > 0).any())
-    for state in map(str, result["state"].values):
+    for state in result["state"].values:
         own = result.sel(state=state)
-        rows += [_bounds(each.sel(state=state)) for each in (result, trained) if each is not None]
-        if bool(own["still"]):
+        rows += [_bounds(each.sel(state=state)) for each in (result, trained) if each]
+        if own["still"]:
             unjudged["it stands still in these runs"].append(state)
-        elif float(own["period"]) > segment / 3:
+        elif own["period"] > segment / 3:
             why = (
                 f"its slow period of {float(own['period']):.3g} s exceeds a third of a segment of "
                 f"{segment:.3g} s"
@@ -259,7 +259,7 @@ def possible_section(result: xr.Dataset, checked: Checked) -> Section:
             advice[_advice(model, linear, more, ahead)].append(beside)
     points = [f"{'; '.join(states)}. {words}" for words, states in advice.items()]
     points += [f"{', '.join(of)}: cannot be judged: {why}." for why, of in unjudged.items()]
-    if worth is not None and (state := worth.attrs["conditional_on"]):
+    if worth and (state := worth.attrs["conditional_on"]):
         points.append(
             f"The inputs are carried by measured {state} and so hold part of it: with waves alone "
             f"the bounds of {state}, and of what follows it, are higher."
@@ -300,7 +300,7 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
     """Return free decay, beside measured ones, and the modes."""
     words, points = [], []
     parts: list[Drawing | Table] = []
-    if (result := checked.results.get("decay")) is not None:
+    if result := checked.results.get("decay"):
         parts = [
             drawing("decay", checks.decay, result),
             _decay_table(result, checked.results.get("measured_decay")),
@@ -326,8 +326,8 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
 def _decay_table(result: xr.Dataset, measured: xr.Dataset | None) -> Table:
     """Period and damping of each motion of the model, and of each measured decay."""
     cases = [(own, "model") for own in entries(result.assign(q=0), "motion")]
-    if measured is not None:
-        cases += [(own, str(own["run"].values)) for own in entries(measured, "run")]
+    if measured:
+        cases += [(own, own["run"].item()) for own in entries(measured, "run")]
     rows = [
         (*row(own, "motion", period=3, damping_ratio=3, p=3, q=0 if of == "model" else 3), of)
         for own, of in cases
@@ -346,7 +346,7 @@ def _modes_table(result: xr.Dataset) -> Table:
 
 def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return whiteness, past inputs, bands and age of the errors."""
-    lag, period = result["lag"].values, float(result.attrs["encounter_period"])
+    lag, period = result["lag"].values, result.attrs["encounter_period"]
     trained = checked.results.get("training_residuals")
     shown = [result] if trained is None else [result, trained]
     rows = []
@@ -449,16 +449,15 @@ def check_sections(checked: Checked) -> list[Section]:
     out = []
     for make, needed in CHECK_SECTIONS.items():
         result = checked.results.get(needed[0])
-        title = words()["sections"][needed[0]]["title"]
+        title = WORDS["sections"][needed[0]]["title"]
         built = Section(needed[0], title) if result is None else make(result, checked)
         refused = [checked.refused[name] for name in needed if name in checked.refused]
         texts = [f"Cannot be judged: {text}" for text in dict.fromkeys(refused)]
         texts += dict.fromkeys(note for name in needed for note in checked.notes.get(name, ()))
-        out.append(replace(built, notices=tuple(texts)))
+        out.append(replace(built, notices=texts))
     return out
 
 
 def write_check(checked: Checked, folder: Path, title: str, description: str) -> Path:
     """Write ``report.html`` with ``figures/`` and ``tables/`` into a folder; return the page."""
-    stamp = {"description": description, "finished": ""}
-    return write_page(folder, title, stamp, check_sections(checked))
+    return write_page(folder, title, {"description": description}, check_sections(checked))

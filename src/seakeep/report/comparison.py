@@ -20,9 +20,11 @@ from seakeep.files import MARK, replacing, write_netcdf, write_text
 from seakeep.models import HankelEnsemble
 from seakeep.models.forecasts import counted
 from seakeep.report.tables import (
+    WORDS,
     Number,
     Table,
     band_verdict,
+    band_words,
     change,
     entries,
     interval,
@@ -32,7 +34,6 @@ from seakeep.report.tables import (
     ratio_of,
     row,
     short,
-    words,
 )
 from seakeep.study.judge import verdict
 
@@ -44,18 +45,17 @@ HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
 
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Comparison of forecasts with measurements, tables per run that fit a terminal."""
-    shown = {name: each for name, each in words()["comparison"].items() if name in table}
-    heads, _, of_all = zip(*shown.values(), strict=True)
-    digits = {name: each[1] for name, each in shown.items()}
+    shown = {name: each for name, each in WORDS["comparison"].items() if name in table}
+    heads, places, of_all = zip(*shown.values(), strict=True)
+    cells = partial(row, **dict(zip(shown, places, strict=True)))
     for at in entries(table, "run"):
         title = "forecast against measurement"
         if "scale" in at:
             title += f", full scale (1:{float(at['scale_factor']):g})"
         if "level" in at:
-            title += f", {_band_words(at)}"
-        decimals = zip(of_all, digits.values(), strict=True)
-        means = [number(at[mean], places) if mean else "" for mean, places in decimals]
-        cells = partial(row, **digits)
+            title += f", {band_words(at['level'].item(), at['band'].item())}"
+        decimals = zip(of_all, places, strict=True)
+        means = [number(at[mean], digits) if mean else "" for mean, digits in decimals]
         yield _by_channel(at, "comparison", title, heads, cells, means, _note(at))
         yield _by_channel(
             at,
@@ -83,29 +83,26 @@ def _by_channel(
     last = [len(rows)] if averages else []
     if averages:
         rows.append(("average", *averages))
-    columns = ("channel", *heads)
-    return Table(f"{name}_{run}", f"{run}: {title}", columns, rows, note, averages=last)
+    return Table(f"{name}_{run}", f"{run}: {title}", ("channel", *heads), rows, note, averages=last)
 
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
-    shown = {name: heading for name, heading in words()["extremes"].items() if name in at}
-    forms = dict.fromkeys(shown, short)
-    cells = partial(row, **forms)
+    shown = {name: heading for name, heading in WORDS["extremes"].items() if name in at}
+    cells = partial(row, **dict.fromkeys(shown, short))
     heads = ("unit", *shown.values())
     return _by_channel(at, "extremes", title, heads, lambda one: cells(one, "channel_units"))
 
 
 def _note(at: xr.Dataset) -> str:
-    slack, offset, spread = (
-        float(at[key]) for key in ("slack_channels", "probe_offset", "probe_offset_spread")
-    )
-    condition, status = (str(at[key].values) for key in ("conditional_on", "status"))
+    keys = ("slack_channels", "probe_offset", "probe_offset_spread", "look_ahead")
+    slack, offset, spread, ahead = (at[key].item() for key in keys)
+    condition, status = row(at, "conditional_on", "status")
     known = f" ± {spread:.2g}" if np.isfinite(spread) else ""
     said = (
         f"{slack:.0f} still channel{'s' * (slack > 1)} left out of the average" * (slack > 0),
         status * (status != "ok"),
         f"conditional on measured {condition}" * bool(condition),
-        look_ahead_words(float(at["look_ahead"])),
+        look_ahead_words(ahead),
         f"probe offset {offset:.3g}{known} m" * bool(np.isfinite(offset)),
     )
     return "; ".join(filter(None, said))
@@ -117,7 +114,8 @@ def model_blocks(tables: Datasets) -> Iterator[Table]:
     heads = ("model", "ANRMSE", "95 %", "in training SD", "NAMMAE")
     for run in first["run"].values:
         rows, status, ahead = [], [], []
-        for model, at in ((model, table.sel(run=run)) for model, table in tables.items()):
+        for model, table in tables.items():
+            at = table.sel(run=run)
             error, *others = row(at, anrmse=3, training_anrmse=3, mean_nammae=3)
             rows.append((model, error, interval(at, "anrmse"), *others))
             if at["status"] != "ok":
@@ -164,8 +162,8 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
 
     The table is that of :func:`seakeep.study.difference_table`; `baselines` are kinds by name.
     """
-    best = table.isel(model=int(np.argmin(table["all_anrmse"].fillna(np.inf).values)))
-    name, first = (str(each["model"].values) for each in (best, table.isel(model=0)))
+    best = table.isel(model=table["all_anrmse"].fillna(np.inf).argmin("model"))
+    name, first = (each["model"].item() for each in (best, table.isel(model=0)))
     said = f"Least error: {name}, ANRMSE {number(best['all_anrmse'])}"
     if name != first:
         value, low, high = ratio_of(best, "all_")
@@ -226,12 +224,11 @@ def plain_cells(table: pd.DataFrame) -> pd.DataFrame:
 def nowcast_blocks(nowcasts: Datasets) -> Iterator[Table]:
     """Lead times and errors per channel in service, a table per model and run."""
     for model, of_model in nowcasts.items():
-        share, lead = float(of_model.attrs["share"]), of_model["lead"].values
+        share, lead = of_model.attrs["share"], of_model["lead"].values
         places = [max(round(len(lead) * part) - 1, 0) for part in (0.05, 0.2, 0.5, 1.0)]
-        times = [f"at {number(each)} s" for each in lead[places]]
-        heads = ("lead time s", *times, "in band %")
+        heads = ("lead time s", *(f"at {number(each)} s" for each in lead[places]), "in band %")
         note = (
-            f"errors in training SD over {int(of_model.attrs['starts'])} forecasts, no wave after "
+            f"errors in training SD over {of_model.attrs['starts']} forecasts, no wave after "
             f"a start known; lead time: error below {share:g} SD"
         )
 
@@ -256,18 +253,13 @@ def band_findings(table: xr.Dataset) -> list[str]:
         if not np.isfinite(inside):
             said.append(f"{run}: there is no band to judge{left_out}.")
             continue
-        words = band_verdict(inside / 100, float(at["level"]))
+        level, band = at["level"].item(), at["band"].item()
+        words = band_verdict(inside / 100, level)
         said.append(
-            f"{run}: the {_band_words(at)} of {members - lost:.0f} members holds {inside:.0f} % of "
-            f"the measured instants, {words}. {_CARRIES[str(at['band'].values)]}{left_out}."
+            f"{run}: the {band_words(level, band)} of {members - lost:.0f} members holds "
+            f"{inside:.0f} % of the measured instants, {words}. {_CARRIES[band]}{left_out}."
         )
     return said
-
-
-def _band_words(at: xr.Dataset) -> str:
-    """Level of a band, and its kind where it is not that of the members."""
-    kind = "calibrated " * (str(at["band"].values) == "calibrated")
-    return f"{100 * float(at['level']):g} % {kind}band"
 
 
 _CARRIES = {
@@ -306,7 +298,7 @@ def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
 def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
     dim = next((each for each in ("statistic", "member") if each in forecast.dims), None)
     parts, kind = {"": forecast}, "member " * (dim == "member")
-    if dim is not None:
+    if dim:
         places = forecast[dim].values
         parts = {f" {kind}{p}".removesuffix(" mean"): forecast.sel({dim: p}) for p in places}
     columns = {
@@ -315,10 +307,10 @@ def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
         if "time" in variable.dims
         for words, part in parts.items()
     }
-    if (ahead := float(forecast.attrs.get("reads_input_until", 0.0))) > 0.0:
+    if (ahead := forecast.attrs.get("reads_input_until", 0.0)) > 0.0:
         columns[UNTIL] = (forecast["time"].values + ahead).round(9)
     if forecast.attrs.get("scale") == "full":
-        scale = float(forecast.attrs["scale_factor"])
+        scale = forecast.attrs["scale_factor"]
         columns["scale_factor"] = np.full(forecast.sizes["time"], scale)
     return columns
 
@@ -326,9 +318,9 @@ def _columns(forecast: xr.Dataset) -> dict[str, FloatArray]:
 def forecast_words(forecast: xr.Dataset) -> str:
     """What a forecast of an ensemble holds, for a message; empty for a single model's."""
     if "statistic" in forecast.dims:
-        attrs = {"band": "members", **forecast.attrs}
-        count = int(attrs["members"]) - int(attrs["diverged"])
-        words = _band_words(xr.Dataset({key: attrs[key] for key in ("band", "level")}))
+        attrs = forecast.attrs
+        count = attrs["members"] - attrs["diverged"]
+        words = band_words(attrs["level"], attrs.get("band"))
         return f"mean, std and {words} of {count} members at "
     return f"{forecast.sizes['member']} members at " if "member" in forecast.dims else ""
 
@@ -365,4 +357,4 @@ def margins_table(ensemble: HankelEnsemble) -> Table:
         )
     names = ("margin",) if floor is None else ("k", "f")
     columns = ("channel", "unit", *names, "in SD", "blocks", "warranted %")
-    return Table("margins", title, columns, tuple(rows), numeric=tuple(range(2, len(columns))))
+    return Table("margins", title, columns, rows, numeric=range(2, len(columns)))

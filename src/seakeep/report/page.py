@@ -16,13 +16,12 @@ from markupsafe import Markup, escape
 
 from seakeep.arrays import Progress
 from seakeep.files import MARK, check_output, write_text
-from seakeep.report.style import figure_style, save_figure
-from seakeep.report.tables import Table, shade, words, write_csv, write_latex
+from seakeep.report.style import Figure, figure_style, save_figure
+from seakeep.report.tables import WORDS, Table, shade, write_csv, write_latex
 from seakeep.study.store import storing
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from matplotlib.figure import Figure
 
 UNFINISHED = f"""<!DOCTYPE html>
 <meta name="generator" content="{MARK}: report">
@@ -100,7 +99,7 @@ def drawing(key: str, draw: Callable[..., Figure], *given: Any, **values: Any) -
 
     `draw` takes what is `given`; the value ``name`` is that of its files, by default the key.
     """
-    caption = words()["figures"][key].format(**values)
+    caption = WORDS["figures"][key].format(**values)
     return Drawing(values.get("name", key), caption, partial(draw, *given))
 
 
@@ -112,7 +111,7 @@ def section(
     `parts` are its figures and tables; a table without rows is left out. Of what is `given`, parts
     of a :class:`Section` are its own, and the rest is what the paragraphs hold in braces.
     """
-    entry = words()["sections"][key]
+    entry = WORDS["sections"][key]
     paragraphs = [each.format(**given) for each in entry.get("words", ())]
     return Section(
         key,
@@ -166,11 +165,12 @@ def write_page(
     with storing(folder), figure_style():
         if not page.exists():  # figures of an interrupted report are known as ours
             write_text(page, UNFINISHED)
-        for each in ("figures", "tables"):
-            (folder / each).mkdir(exist_ok=True)
-        for table in (each for section in sections for each in section.tables):
-            write_csv(table, folder / "tables" / f"{table.name}.csv")
-            write_latex(table, folder / "tables" / f"{table.name}.tex")
+        for kind in ("figures", "tables"):
+            (folder / kind).mkdir(exist_ok=True)
+        for each in sections:
+            for table in each.tables:
+                write_csv(table, folder / "tables" / f"{table.name}.csv")
+                write_latex(table, folder / "tables" / f"{table.name}.tex")
         for number, drawing in enumerate(drawings):
             tell(number, len(drawings), f"drawing {drawing.name.replace('_', ' ')}")
             drawn[drawing.name] = _drawn(drawing, folder / "figures")
@@ -214,7 +214,7 @@ def _drawn(drawing: Drawing, folder: Path) -> Markup:
     """Draw a figure, write its files, and return it as an element of the page."""
     figure = drawing.draw()
     engine = figure.get_layout_engine()
-    if engine is not None:  # laid out once, not again for each file
+    if engine:  # laid out once, not again for each file
         engine.execute(figure)
         # Without any engine; "none" stands for one, for which each file would be drawn twice.
         figure.set_layout_engine(None)

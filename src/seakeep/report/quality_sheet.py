@@ -30,7 +30,7 @@ def channel_rows(run: xr.Dataset) -> list[tuple[str, ...]]:
     """
     findings, rows = findings_of(run), []
     for name, channel in run.data_vars.items():
-        factor, unit = displayed(str(channel.attrs.get("units", "")))
+        factor, unit = displayed(channel.attrs.get("units", ""))
         x = factor * channel.values
         known = x[np.isfinite(x)]
         numbers = (np.nan,) * 4
@@ -59,16 +59,16 @@ def clock_rows(run: xr.Dataset) -> list[tuple[str, str, str, str]]:
         clock = key.removesuffix("_method")
         logger, texts = clock.removeprefix("clock_"), []
         if method in (Clock.method, ASSUMED):
-            rows.append((logger, "", "", str(method)))
+            rows.append((logger, "", "", method))
             continue
         for what, error, factor, digits, unit in (
             ("offset", "offset_error", 1e3, 2, "ms"),
             ("drift_ppm", "drift_error_ppm", 1.0, 1, "ppm"),
         ):
-            value, spread = (factor * float(run.attrs[f"{clock}_{k}"]) for k in (what, error))
+            value, spread = (factor * run.attrs[f"{clock}_{k}"] for k in (what, error))
             known = f" ± {spread:.{digits}f}" if np.isfinite(spread) else ""
             texts.append(f"{value:+z.{digits}f}{known} {unit}")
-        rows.append((logger, *texts, f"{method}, n = {int(run.attrs[f'{clock}_count'])}"))
+        rows.append((logger, *texts, f"{method}, n = {run.attrs[f'{clock}_count']}"))
     return rows
 
 
@@ -84,8 +84,7 @@ def write_quality_sheet(
         if not is_newer(path, folder / f"{name}.nc"):
             run, period = runs[name], runs[name].attrs.get("encounter_period", np.nan)
             pairs = compared(run, redundant_pairs(settings, period))
-            agreements = {channel: each for (channel, _), each in pairs.items()}
-            figure = quality_figure(run, agreements)
+            figure = quality_figure(run, {channel: each for (channel, _), each in pairs.items()})
             with figure_style(), replacing(path) as temporary:  # all colours: marks are small
                 mark, small = {"Software": f"{MARK}: {SHEET}"}, {"optimize": True}
                 figure.savefig(temporary, format="png", dpi=100, metadata=mark, pil_kwargs=small)
@@ -98,8 +97,8 @@ def write_quality_sheet(
         path.stem: inline_picture(path.read_bytes(), f"channels of {name}")
         for name, path in pictures.items()
     }
-    page, stamp = folder / "quality.html", {"description": "", "finished": ""}
-    content = {"stamp": stamp, "sections": sections, "drawn": drawn, "files": False}
+    page = folder / "quality.html"
+    content = {"stamp": {}, "sections": sections, "drawn": drawn, "files": False}
     title = f"Data quality: {title}"
     write_text(page, rendered("report.html", kind=SHEET, title=title, **content))
     return [page, *pictures.values()]
@@ -120,11 +119,7 @@ def other_findings(run: xr.Dataset) -> list[str]:
 
 def _section(name: str, run: xr.Dataset) -> Section:
     """Clocks, findings, channels and picture of a run."""
-    clocks = [
-        f"clock of {logger}: {', '.join(filter(None, (offset, drift)))}"
-        f"{f' ({origin})' if offset else origin}"
-        for logger, offset, drift, origin in clock_rows(run)
-    ]
+    clocks = [f"clock of {key}: {run.attrs[f'clock_{key}']}" for key, *_ in clock_rows(run)]
     rows = channel_rows(run)
     marked = [k for k, each in enumerate(rows) if each[-1]]
     shown = table("channels_of_run", rows, name=f"channels_{name}", marked=marked, run=name)
@@ -141,7 +136,7 @@ def is_newer(path: Path, source: Path) -> bool:
 
 def steps_of(run: xr.Dataset) -> str:
     """Step, rate and, where it is known, encounter period of a prepared run, in words."""
-    dt, period = float(run.attrs["dt"]), run.attrs.get("encounter_period")
+    dt, period = run.attrs["dt"], run.attrs.get("encounter_period")
     words = f"time step {dt:.4g} s ({1 / dt:.4g} Hz)"
     if period is None:
         return f"{words}, encounter period not needed"

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import textwrap
-import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -16,18 +14,19 @@ from seakeep.campaign.settings import long_name_of
 from seakeep.conventions import canonical_channel, displayed
 from seakeep.errors import RequestError
 from seakeep.files import MARK, replacing
+from seakeep.toml import packaged
 
 if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Figure
 
     from seakeep.study import StudyResult
 
-    Places = Sequence[Axes] | Axes | None
+Figure: TypeAlias = "matplotlib.figure.Figure"
+Places: TypeAlias = "Sequence[matplotlib.axes.Axes] | matplotlib.axes.Axes | None"
 
-_FILE = resources.files("seakeep.report").joinpath("templates/style.toml")
-_STYLE = tomllib.loads(_FILE.read_text("utf-8"))
+_STYLE = packaged("report/templates/style.toml")
 
 
 def _line(colour: str, width: float, dash: Sequence[float] = ()) -> dict[str, Any]:
@@ -49,6 +48,11 @@ THIN = {**LINES["measured"], "linewidth": 0.8}
 
 SERIES = [_line(**each) | {"marker": marker} for marker, each in _STYLE["series"].items()]
 """Colour, dash and marker of each of several things of one kind."""
+
+FLAGGED = {
+    word: {"color": PALETTE[colour], "marker": marker}
+    for word, (colour, marker) in _STYLE["flags"].items()
+}
 
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 """Names of the paper for the averages of the two measures over the channels."""
@@ -100,7 +104,7 @@ def panels(
         for spare in every[count:]:
             spare.remove()
         return figure, every[:count]
-    given = list(np.ravel(np.array(axes, dtype=object)))
+    given = np.ravel(np.array(axes, dtype=object)).tolist()
     if len(given) != count:
         raise RequestError(
             f"axes holds {len(given)} Axes and the figure draws {count} panels. Give as many, or "
@@ -118,9 +122,8 @@ def legend_outside(figure: Any, *places: Any, side: str = "lower center", **opti
     if not unique:
         return None
     across = max(1, int(13 * figure.get_figwidth() / (6 + max(map(len, unique)))))  # letters
-    columns = min(len(unique), across)
-    loc = f"outside {side}"
-    return figure.legend(unique.values(), unique, loc=loc, ncols=columns, **options)
+    options |= {"loc": f"outside {side}", "ncols": min(len(unique), across)}
+    return figure.legend(unique.values(), unique, **options)
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
@@ -153,7 +156,7 @@ def line_of(result: StudyResult, model: str) -> dict[str, Any]:
     """Line of a model: that of a forecast or an ensemble, in its own colour beyond the first."""
     kinds = {name: "ensemble" if name in result.ensembles else "forecast" for name in result.models}
     line = LINES[kinds[model]]
-    first = [name for kind in LINES for name in [n for n in kinds if kinds[n] == kind][:1]]
+    first = {kind: name for name, kind in reversed(kinds.items())}.values()
     if model in first:
         return line
     others = [name for name in kinds if name not in first]
@@ -174,7 +177,7 @@ def model_words(model: str) -> str:
 
 def shown(channel: xr.DataArray) -> tuple[float, str]:
     """Factor to the unit in which a channel is shown, and its label for an axis."""
-    factor, units = displayed(str(channel.attrs.get("units", "")))
+    factor, units = displayed(channel.attrs.get("units", ""))
     return factor, axis_label(str(channel.name), units, channel.attrs.get("long_name"))
 
 

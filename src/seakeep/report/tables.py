@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
-import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
-from functools import cache, cached_property, partial
-from importlib import resources
+from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, SupportsFloat
@@ -18,6 +16,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.files import replacing, write_text
+from seakeep.toml import packaged
 
 if TYPE_CHECKING:
     from rich.console import JustifyMethod
@@ -90,11 +89,8 @@ class Table:
         )
 
 
-@cache
-def words() -> dict[str, Any]:
-    """Words of the pages: sections, figures and tables by name."""
-    file = resources.files("seakeep.report").joinpath("templates/words.toml")
-    return tomllib.loads(file.read_text("utf-8"))
+WORDS = packaged("report/templates/words.toml")
+"""Words of the pages: sections, figures and tables by name."""
 
 
 def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any) -> Table:
@@ -116,7 +112,7 @@ def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any)
     -------
     Table
     """
-    entry = {"name": key, "columns": (), "note": "", **words()["tables"][key], **given}
+    entry = {"name": key, "columns": (), "note": "", **WORDS["tables"][key], **given}
     entry["columns"] = tuple(each.format(**given) for each in entry["columns"])
     for part in ("title", "note"):
         entry[part] = entry[part].format(**given)
@@ -280,6 +276,10 @@ class Interval(NamedTuple):
         """Whether it lies below a bound; None where the interval holds the bound."""
         return self.below_other(Interval(bound, bound, bound))
 
+    def above(self, bound: float) -> bool | None:
+        """Whether it lies above a bound; None where the interval holds the bound."""
+        return Interval(bound, bound, bound).below_other(self)
+
     def below_other(self, other: Interval) -> bool | None:
         """Whether it lies below another number; None where the intervals meet."""
         if self.upper < other.lower:
@@ -341,6 +341,17 @@ def change(*ratios: SupportsFloat) -> Number:
     if round(max(values), 2) >= 2:
         return Number(f"{to(values, lambda each: short(each, 3))} times")
     return Number(f"{to([100 * (each - 1) for each in values], signed)} %".replace("-", "−"))
+
+
+def band_words(level: float, kind: str | None) -> str:
+    """Level of a band, and its kind where it is not that of the members.
+
+    Examples
+    --------
+    >>> band_words(0.95, "members"), band_words(0.9, "calibrated")
+    ('95 % band', '90 % calibrated band')
+    """
+    return f"{100 * level:g} % {'calibrated ' * (kind == 'calibrated')}band"
 
 
 def band_verdict(inside: float, level: float) -> str:
@@ -448,7 +459,7 @@ def latex_text(text: str) -> str:
     '$-$0.12 [$-$0.3, 0.1] a-1'
     """
     text = re.sub(r"(?<![\w)])-(?=\d)", "−", text)
-    known = words()["latex"]
+    known = WORDS["latex"]
     signs = "|".join(map(re.escape, sorted(known, key=len, reverse=True)))
     return re.sub(signs, lambda match: known[match[0]], text)
 

@@ -25,7 +25,7 @@ def track_text(track: Track) -> str:
     """CSV with units in brackets; angles in degrees, as loggers write them; NaN is empty."""
     columns = {}
     for name, values in {"time": track.time, **track.channels}.items():
-        unit = "s" if name == "time" else LABELS[name][0]
+        unit = "s" if name == "time" else LABELS[name]["units"]
         numbers = np.asarray(values)
         if unit == "rad":
             unit, numbers = "deg", np.rad2deg(numbers)
@@ -40,10 +40,7 @@ def write_track(track: Track, path: Path) -> None:
     if path.suffix != ".nc":
         write_text(path, track_text(track))
         return
-    data = {
-        name: ("time", values, dict(zip(("units", "long_name"), LABELS[name], strict=True)))
-        for name, values in track.channels.items()
-    }
+    data = {name: ("time", values, LABELS[name]) for name, values in track.channels.items()}
     time = ("time", track.time, {"units": "s", "long_name": "time"})
     out = xr.Dataset(data, {"time": time}, {**track.attributes, MARK: TRACK})
     out["flag"].attrs |= {"flag_values": list(FLAGS.values()), "flag_meanings": " ".join(FLAGS)}
@@ -61,12 +58,12 @@ def write_contact_sheet(picture: bytes, path: Path) -> None:
 
 def track_words(track: Track) -> str:
     """Frames, flags and calibration of a track in one sentence."""
-    counts = {name: int((track["flag"] == code).sum()) for name, code in FLAGS.items()}
+    counts = {name: (track["flag"] == code).sum() for name, code in FLAGS.items()}
     flagged = [f"{count} {name}" for name, count in counts.items() if count and name != "good"]
     facts = track.attributes
     return (
         f"{track.time.size} frames at {facts['frame_rate']:g} Hz; flagged: "
-        f"{', '.join(flagged) or 'none'} ({int(track['bridged'].sum())} bridged); "
+        f"{', '.join(flagged) or 'none'} ({track['bridged'].sum()} bridged); "
         f"{1e3 * facts['metres_per_pixel']:.4g} mm per pixel ({facts['calibration']}); "
         f"{facts['camera']}."
     )
@@ -77,8 +74,8 @@ def agreement_words(
 ) -> Iterator[tuple[str, str | None]]:
     """Agreement of heave and pitch with a reference; in yellow, why its lag may be wrong."""
     for name in ("heave", "pitch"):
-        other, unit = reference[name], LABELS[name][0]
-        factor = conversion(str(other.attrs.get("units", unit)), unit, f"'{name}'")
+        other, unit = reference[name], LABELS[name]["units"]
+        factor = conversion(other.attrs.get("units", unit), unit, f"'{name}'")
         time = reference["time"].values
         agreement = compare_motion(track[name], track.time, factor * other.values, time, max_lag)
         shown, unit = (1e3, "mm") if unit == "m" else displayed(unit)

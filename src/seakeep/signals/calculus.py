@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -69,8 +70,7 @@ def autoregression(series: FloatArray, order: int, noise: float = 0.0) -> tuple[
 def continued(past: FloatArray, whitening: FloatArray, count: int) -> FloatArray:
     """The `count` values that are expected after a series of zero mean."""
     order = len(whitening) - 1
-    lags = scipy.linalg.toeplitz(past[: -order - 1 : -1], np.zeros(order))
-    state = -whitening[1:] @ lags
+    state = -whitening[1:] @ scipy.linalg.toeplitz(past[: -order - 1 : -1], np.zeros(order))
     return scipy.signal.lfilter([1.0], whitening, np.zeros(count), zi=state)[0]
 
 
@@ -113,8 +113,8 @@ def _transformed(
         )
     # Eight periods outlast the ringing of a flank there; a prediction needs to look back one and
     # a half of them to separate the slowest wave from a trend.
-    padding = int(np.ceil(8.0 / (slowest * dt)))
-    order = min(int(np.ceil(1.6 / (slowest * dt))), 2000)
+    padding = math.ceil(8.0 / (slowest * dt))
+    order = min(math.ceil(1.6 / (slowest * dt)), 2000)
     extended = predicted_extension(array, padding, fitted=padding, order=order)
     frequency = fft.rfftfreq(len(extended), dt)
 
@@ -355,7 +355,7 @@ def complementary_filter(
             f"frequency); received {crossover:g} Hz. Set it below the slowest wave."
         )
     at = np.arange(x.size) - 0.5 * (x.size - 1)
-    slope = float(at @ x / (at @ at))
+    slope = at @ x / (at @ at)
     trend = x.mean() + slope * at
     both = np.column_stack([x - trend, a - a.mean()])
     frequency, spectrum, back = _transformed(both, dt, crossover, "the crossover")

@@ -118,7 +118,7 @@ def carriers(
         phase = np.outer(place, k) - np.outer(instant, omega)
         return np.concatenate([np.cos(phase) * amplitude, np.sin(phase) * amplitude], 1)
 
-    places = np.repeat(np.asarray(probes, dtype=float), lags.size)
+    places = np.repeat(probes, lags.size)
     read = waves(places, np.tile(lags * dt, len(probes)))
     wanted = waves(targets, leads.astype(float) * dt)
     products = read @ read.T

@@ -23,7 +23,7 @@ from seakeep.errors import DataError, RequestError, did_you_mean
 
 GREATEST_EXPONENT = 16
 """A physical law has no higher power; 9**9**9 has."""
-_OPERATORS: dict[type[ast.operator], str] = {
+_OPERATORS = {
     ast.Add: "add",
     ast.Sub: "subtract",
     ast.Mult: "multiply",

@@ -6,6 +6,8 @@ array of the shape they were given.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 import scipy
@@ -224,7 +226,7 @@ def _sinc_sums(
     """
     attenuation = max(positive(attenuation, "the attenuation", "dB"), 50.0)
     width = edges[1] - edges[0]
-    half = int(np.ceil((attenuation - 7.95) / (4.57 * np.pi * width) + 1))  # by Kaiser's formula
+    half = math.ceil((attenuation - 7.95) / (4.57 * np.pi * width) + 1)  # by Kaiser's formula
     bank = _kernels(half, 0.1102 * (attenuation - 8.7), sum(edges))
     base = np.floor(position).astype(int)
     place = (position - base) * PHASES

@@ -95,7 +95,7 @@ def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float
     length = reference.size
     views = np.lib.stride_tricks.sliding_window_view(stretch, length)
     centred = reference - reference.mean()
-    scale = float(np.sqrt(centred @ centred))
+    scale = np.sqrt(centred @ centred)
     spread = views.std(axis=1) * np.sqrt(length)
     moving = (spread > 0) & (scale > 0)
     with undefined():
@@ -253,7 +253,7 @@ class MotionAgreement:
         """Whether at `rival_lag` the difference is less than twice that at `lag`."""
         # Root mean square difference of two series of SD 1.
         misfit, rival = (
-            float(np.sqrt(max(2.0 * (1.0 - each), 0.0)))
+            math.sqrt(max(2.0 * (1.0 - each), 0.0))
             for each in (self.correlation, self.rival_correlation)
         )
         return rival < 2.0 * max(misfit, FINEST)
@@ -298,7 +298,7 @@ def compare_motion(
     first = record(series, time, "the video")
     second = record(reference, reference_time, "the reference")
     (y1, t1), (y2, t2) = ((y[np.isfinite(y)], t[np.isfinite(y)]) for y, t in (first, second))
-    reach = min(LONGEST, 0.25 * float(min(np.ptp(t1), np.ptp(t2))))
+    reach = min(LONGEST, 0.25 * min(np.ptp(t1), np.ptp(t2)))
     if max_lag is not None:
         reach = positive(max_lag, "max_lag", "s")
     # Only instants whose partner lies inside the other record at every lag searched.
@@ -319,7 +319,7 @@ def compare_motion(
         return float(np.corrcoef(y1, spline(t1 - lag))[0, 1])
 
     step = min(usual_step(t1), usual_step(t2))
-    lags = np.linspace(-reach, reach, 2 * int(np.ceil(reach / step)) + 1)
+    lags = np.linspace(-reach, reach, 2 * math.ceil(reach / step) + 1)
     values = np.array([correlation(lag) for lag in lags])
     best = int(np.argmax(values))
     lag, at_limit = float(lags[best]), best in (0, lags.size - 1)
@@ -340,7 +340,7 @@ def compare_motion(
         samples=int(t1.size),
         at_limit=at_limit,
         max_lag=reach,
-        period=2.0 * float(t1[-1] - t1[0]) / max(crossings, 1),
+        period=float(2.0 * (t1[-1] - t1[0]) / max(crossings, 1)),
         rival_lag=np.nan if rival is None else float(lags[rival]),
         rival_correlation=np.nan if rival is None else float(values[rival]),
     )

@@ -114,7 +114,7 @@ class TrackingSettings:
     @property
     def stop(self) -> float | None:
         """Edge of the stop band in use, Hz; None where nothing is filtered."""
-        return None if self.passband is None else 1.5 * self.passband
+        return self.passband and 1.5 * self.passband
 
 
 def opencv(doing: str = "reading") -> Any:
@@ -146,8 +146,8 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     panel = {
         "area": 0.0,
         "cut": 0.0,
-        "saturation": float(cv2.countNonZero(cv2.inRange(part, (SATURATED,) * 3, (255,) * 3))),
-        "brightness": float(np.mean(cv2.mean(part)[:3])),
+        "saturation": cv2.countNonZero(cv2.inRange(part, (SATURATED,) * 3, (255,) * 3)),
+        "brightness": np.mean(cv2.mean(part)[:3]),
     }
     mask = cv2.inRange(part, how.lower[::-1], (255,) * 3)
     for side, step in ((OPENING, cv2.MORPH_OPEN), (CLOSING, cv2.MORPH_CLOSE)):
@@ -162,7 +162,7 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     patch = part[y0 : y + high + MARGIN, x0 : x + wide + MARGIN]
     filled = np.zeros(patch.shape[:2], np.uint8)
     cv2.drawContours(filled, [outline], -1, 255, cv2.FILLED, offset=(-x0, -y0))
-    area = float(cv2.countNonZero(filled))
+    area = cv2.countNonZero(filled)
     if area < SMALLEST:
         return panel
     weights = _weights(patch, filled)
@@ -170,9 +170,9 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     mass = moments["m00"]
     centre = moments["m10"] / mass, moments["m01"] / mass
     xx, xy, yy = (moments[name] / mass for name in ("mu20", "mu11", "mu02"))
-    angle = float(0.5 * np.arctan2(2 * xy, xx - yy))
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
     mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    long_side, short_side = (float(np.sqrt(12 * (mean + sign * half))) for sign in (1, -1))
+    long_side, short_side = (np.sqrt(12 * (mean + sign * half)) for sign in (1, -1))
     _, sides, _ = cv2.minAreaRect(outline)  # runs through the centres of the outermost pixels
     cut = min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0]
     return panel | {
@@ -183,7 +183,7 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
         "height": short_side,
         "area": area,
         "fill": area / ((sides[0] + 1.0) * (sides[1] + 1.0)),
-        "cut": float(cut),
+        "cut": cut,
         **_corners(weights, centre, angle, long_side, short_side),
     }
 
@@ -201,8 +201,7 @@ def _corners(
         # Pixels that a border divides count in part, or the sum would depend on the grid.
         near = np.clip(end * along - (0.5 * length - side) + 0.5, 0.0, 1.0)
         for half in (-1.0, 1.0):
-            inside = near * np.clip(half * down + 0.5, 0.0, 1.0)
-            out.append(float(np.sum(inside * seen)) / side**2)
+            out.append(np.sum(near * np.clip(half * down + 0.5, 0.0, 1.0) * seen) / side**2)
     return dict(zip(CORNERS, out, strict=True))
 
 
@@ -220,7 +219,7 @@ def _weights(patch: Image, filled: Image) -> Weights:
     outside = cv2.dilate(filled, clear) == 0
     grey = cv2.cvtColor(patch, cv2.COLOR_BGR2GRAY).astype(np.float32)
     if inside.any() and outside.any():
-        bright, dark = float(np.median(grey[inside])), float(np.median(grey[outside]))
+        bright, dark = np.median(grey[inside]), np.median(grey[outside])
         if bright > dark:
             part = np.clip((grey - dark) / (bright - dark), 0.0, 1.0)
             return np.where(inside, 1.0, np.where(near, part, 0.0)).astype(np.float32)

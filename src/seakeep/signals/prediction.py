@@ -149,14 +149,14 @@ def foresee(
         expected[:, column] = values.mean() + continued(deviations, whitening, number)
         departures[column, :, column] = scipy.signal.lfilter([1.0], whitening, first)
 
-    places = np.broadcast_to(np.asarray(positions, dtype=float), channels)
-    order = [int(each) for each in np.argsort(places) if np.isfinite(places[each])]
+    places = np.broadcast_to(positions, channels)
+    order = np.argsort(places)[: np.isfinite(places).sum()].tolist()
     for column in set(range(channels)) - set(order[1:]):
         follow(column, array[:, column])
     for before, here in pairwise(order):
         left = array[:, here]
         if np.ptp(array[:, before]) > 0:
-            apart, limit = float(places[here] - places[before]), band_limit(array[:, before], dt)
+            apart, limit = places[here] - places[before], band_limit(array[:, before], dt)
             # Prediction and departures from it, beside one another: carrying is linear.
             past = np.zeros((size, channels + 1))
             past[:, 0] = array[:, before]
@@ -247,5 +247,5 @@ def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: f
     >>> round(predictable_time(wave, 0.05, 2.0, np.inf), 1)  # 2 d ω / g
     1.2
     """
-    edge = band_limit(series, dt, QUICKLY)
-    return float(distance / group_speed(2 * np.pi * edge, depth))
+    edge = 2 * np.pi * band_limit(series, dt, QUICKLY)
+    return float(distance / group_speed(edge, depth))

@@ -9,6 +9,7 @@ them. The wavenumber follows linear dispersion, or one celerity c for all freque
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -364,7 +365,7 @@ def _telling(series: FloatArray) -> bool:
     if series.size < 64 or np.ptp(series) == 0:
         return False
     rises = np.diff(np.sign(series - series.mean())) > 0
-    return int(rises.sum()) >= LEAST_WAVES and not is_regular(series)
+    return bool(rises.sum() >= LEAST_WAVES) and not is_regular(series)
 
 
 def probe_separation(
@@ -425,8 +426,8 @@ def probe_separation(
     cross, k = _spectra(a, b, interval, depth)
     period = encounter_period(a, interval)
     reach = float(group_speed(2 * np.pi / period, depth)) * REACH * a.size * interval
-    reach = max(reach, abs(place) + np.pi / float(k[np.argmax(np.abs(cross))]))
-    step = 2 * np.pi / float(k[-1]) / PLACES
+    reach = max(reach, abs(place) + np.pi / k[np.argmax(np.abs(cross))])
+    step = 2 * np.pi / k[-1] / PLACES
     if not 2 * reach / step <= MOST_PLACES:
         raise RequestError(
             f"the stated separation of {place:g} m is too far for waves of {16 * step:.3g} m and a "
@@ -434,7 +435,7 @@ def probe_separation(
         )
     coarse = np.arange(-reach, reach, step)
     scores = _scores(cross, k, coarse)
-    best = coarse[_chosen(scores, int(np.argmin(np.abs(coarse - place))))]
+    best = coarse[_chosen(scores, np.argmin(np.abs(coarse - place)))]
     fine = best + step * np.arange(-2 * FINER, 2 * FINER + 1) / FINER
     scores = _scores(cross, k, fine)
     total = scores.sum(axis=0)
@@ -448,7 +449,7 @@ def probe_separation(
         spread=float(_jackknife(np.array(without))),
         correlation=float(total.max()),
         stated=place,
-        input_error=float(np.sqrt(np.sum(weight * turned) / np.sum(weight))),
+        input_error=math.sqrt(np.sum(weight * turned) / np.sum(weight)),
     )
 
 
@@ -471,7 +472,7 @@ def _scores(cross: ComplexArray, k: FloatArray, distances: FloatArray) -> FloatA
     Distances are equally spaced: each is a start and an offset, whose phases multiply.
     """
     group = (np.arange(k.size) // NEIGHBOURS) % GROUPS
-    length = int(np.sqrt(distances.size))
+    length = math.isqrt(distances.size)
     starts, offsets = distances[::length], distances[:length] - distances[0]
     out = np.empty((GROUPS, distances.size))
     for each, row in enumerate(out):
@@ -486,7 +487,7 @@ def _jackknife(values: FloatArray) -> FloatArray:
     return np.sqrt((GROUPS - 1) / GROUPS * np.sum((values - values.mean(axis=0)) ** 2, axis=0))
 
 
-def _chosen(scores: FloatArray, stated: int) -> int:
+def _chosen(scores: FloatArray, stated: np.intp) -> np.intp:
     """Of the maxima that may be the highest, the one nearest to what is stated."""
     total = scores.sum(axis=0)
     peaks = scipy.signal.find_peaks(total)[0]
@@ -494,7 +495,7 @@ def _chosen(scores: FloatArray, stated: int) -> int:
     parts = scores[:, [best]] - scores[:, peaks]
     alike = total[peaks] >= NEARLY * total[best]
     near = peaks[alike & (parts.sum(axis=0) <= SURELY * _jackknife(parts))]
-    return int(near[np.argmin(np.abs(near - stated))])
+    return near[np.argmin(np.abs(near - stated))]
 
 
 WAVE_SHARE = 0.999
@@ -591,18 +592,18 @@ def _carried(
     centre, half = 0.5 * (lowest + highest), 0.5 * (highest - lowest)
     # The slowest energy of interest travels at half the lowest phase speed. What is predicted at
     # either end fades out once no delay reaches it. In samples:
-    top = float(numbers(np.array([np.pi / step]))[0])
+    top = numbers(np.array([np.pi / step]))[0]
     delay = 2.0 * max(abs(lowest), abs(highest)) * top / np.pi
     period = 1.0 / max(band_limit(flat, 1.0, 0.5), 2.0 / len(flat))
-    whole, order = int(np.ceil(delay + period)), min(int(np.ceil(2.0 * period)), 500)
-    padding, fitted = whole + int(np.ceil(4.0 * period)), max(8 * order, 64)
+    whole, order = math.ceil(delay + period), min(math.ceil(2.0 * period), 500)
+    padding, fitted = whole + math.ceil(4.0 * period), max(8 * order, 64)
     extended = predicted_extension(flat - mean, padding, fitted, order, whole)
     size = fft.next_fast_len(len(extended), real=True)
     spectrum = fft.rfft(extended, n=size, axis=0)
     k = numbers(2 * np.pi * fft.rfftfreq(size, step))
-    reach = float(k[-1]) * half
+    reach = k[-1] * half
     # Bessel functions of order p fall below 1e-9 from here on.
-    count = int(np.ceil(reach + 8.0 * np.cbrt(reach) + 9.0)) if half > 0 else 1
+    count = math.ceil(reach + 8.0 * np.cbrt(reach) + 9.0) if half > 0 else 1
     if count > MOST_TERMS:
         raise RequestError(
             f"distances from {lowest:g} to {highest:g} m span {reach / np.pi:.0f} of the shortest "

@@ -7,6 +7,7 @@ between two related signals, window by window.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -64,7 +65,7 @@ class Clock:
     method: str = "the same clock"
     count: int = 0
     residual: float = 0.0
-    modulus: float = float("inf")
+    modulus: float = np.inf
     centre: float = 0.0
 
     def reference(self, readings: npt.ArrayLike) -> FloatArray:
@@ -103,19 +104,19 @@ def _line(own: FloatArray, reference: FloatArray, errors: FloatArray, method: st
     for _ in range(5):
         centre, level = float(reference[inliers].mean()), float(late[inliers].mean())
         away = reference - centre
-        spread = float(away[inliers] @ away[inliers])
-        drift = float(away[inliers] @ late[inliers]) / spread if spread > 0 else 0.0
+        spread = away[inliers] @ away[inliers]
+        drift = float(away[inliers] @ late[inliers] / spread) if spread > 0 else 0.0
         residual = late - level - drift * away
-        scale = 1.4826 * float(np.median(np.abs(residual[inliers]))) + 1e-9
+        scale = 1.4826 * np.median(np.abs(residual[inliers])) + 1e-9
         updated = np.abs(residual) <= 5.0 * scale
         if inliers.sum() < 5 or updated.sum() < 3 or np.array_equal(updated, inliers):
             break
         inliers = updated
     count = int(inliers.sum())
-    rms = float(np.sqrt(np.mean(residual[inliers] ** 2)))
-    formal = float(np.sqrt(np.mean(errors[inliers] ** 2)))
+    rms = math.sqrt(np.mean(residual[inliers] ** 2))
+    formal = np.sqrt(np.mean(errors[inliers] ** 2))
     sigma = max(rms * np.sqrt(count / (count - 2)) if count > 2 else 0.0, formal)
-    drift_error = sigma / np.sqrt(spread) if spread > 0 else float("nan")
+    drift_error = float(sigma / np.sqrt(spread)) if spread > 0 else np.nan
     offset_error = float(np.hypot(sigma / np.sqrt(count), centre * drift_error))
     offset = level - drift * centre
     return Clock(offset, drift, offset_error, drift_error, method, count, rms, centre=centre)
@@ -328,7 +329,7 @@ def clock_from_shared(
     whiteness = float(left[1:] @ left[:-1]) / max(power, 1e-300)
     inflation = np.sqrt((1 + max(whiteness, 0.0)) / max(1 - whiteness, 1e-3))
     level_error, drift_error = (errors * inflation).tolist()
-    rms = float(np.sqrt(power / left.size) / (abs(gain) * float(np.std(slope)) + 1e-300))
+    rms = float(np.sqrt(power / left.size) / (abs(gain) * np.std(slope) + 1e-300))
     if turned:
         offset, rate = -offset / rate, 1 / rate
     offset_error = float(np.hypot(level_error, centre * drift_error))
@@ -368,17 +369,17 @@ def pool_drift(clocks: Sequence[Clock]) -> list[Clock]:
     drifts = np.array([c.drift for c in known])
     mean = float(weights @ drifts / weights.sum())
     error = float(weights.sum() ** -0.5)
-    if float(weights @ (drifts - mean) ** 2) > scipy.stats.chi2.ppf(0.999, len(known) - 1):
+    if weights @ (drifts - mean) ** 2 > scipy.stats.chi2.ppf(0.999, len(known) - 1):
         return list(clocks)
 
     def pooled(clock: Clock) -> Clock:
         if not clock.known:
             return clock
-        own = float(np.nan_to_num(clock.drift_error))
+        own = np.nan_to_num(clock.drift_error)
         level = max(clock.offset_error**2 - (clock.centre * own) ** 2, 0.0)
         return replace(
             clock.with_drift(mean, f"drift of {len(known)} runs"),
-            offset_error=float(np.sqrt(level + (clock.centre * error) ** 2)),
+            offset_error=math.sqrt(level + (clock.centre * error) ** 2),
             drift_error=error,
         )
 
@@ -429,10 +430,10 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str) -> tuple[Float
     x = trigger - np.nanmedian(trigger)
     x[~np.isfinite(x)] = 0.0
     x = x if x.max() >= -x.min() else -x
-    noise = 1.4826 * float(np.median(np.abs(x)))
+    noise = 1.4826 * np.median(np.abs(x))
     # Wide stretches outvote spikes: the height is that of the sample in the middle of the time
     # spent above the noise.
-    top = float(x.max())
+    top = x.max()
     level = max(8 * noise, 0.02 * top)
     for _ in range(3):
         whole = [(a, b) for a, b in stretches(x > level) if a > 0 and b < x.size]
@@ -440,7 +441,7 @@ def find_pulses(trigger: FloatArray, time: FloatArray, name: str) -> tuple[Float
             break
         edges = np.array(whole)
         peaks = np.array([x[a:b].max() for a, b in whole])
-        top = float(np.quantile(np.repeat(peaks, np.ptp(edges, axis=1)), 0.5, method="lower"))
+        top = np.quantile(np.repeat(peaks, np.ptp(edges, axis=1)), 0.5, method="lower")
         level = 0.5 * top
     if not whole or top < 6 * noise:
         raise DataError(
@@ -499,7 +500,7 @@ def pulse_template(
 ) -> scipy.interpolate.CubicSpline:
     """Mean pulse of a record over the time from its centre, 1.5 widths to each side."""
     step = usual_step(time)
-    count = int(np.ceil(1.5 * width / step)) + 2
+    count = math.ceil(1.5 * width / step) + 2
     away = step * np.arange(-count, count + 1)
     x = np.where(np.isfinite(trigger), trigger, np.nanmedian(trigger))
     inside = (centres + away[0] >= time[0]) & (centres + away[-1] <= time[-1])
@@ -518,17 +519,17 @@ def time_pulses(
 
     By least squares of height, level and instant of a template.
     """
-    reach = float(template.x[-1])
+    reach = template.x[-1]
     instants, errors = np.full((2, centres.size), np.nan)
     for pulse, centre in enumerate(centres):
-        at = float(centre)
+        at = centre
         for _ in range(8):
             near = (np.abs(time - at) < reach) & np.isfinite(trigger)
             if near.sum() < 5:
                 break
             away = time[near] - at
             (shift,), (error,), *_ = _adjusted(trigger[near], template(away), -template(away, 1))
-            move = float(np.clip(shift, -0.25 * reach, 0.25 * reach))
+            move = np.clip(shift, -0.25 * reach, 0.25 * reach)
             at += move
             if abs(move) < 1e-9:
                 break

@@ -31,18 +31,13 @@ def instant_text(instant: float, dt: float) -> str:
     """
     known = 15 - len(f"{abs(instant):.0f}")  # digits of a double
     wanted = 3 - math.floor(math.log10(dt)) if dt > 0 else known
-    return fixed(instant, max(0, min(wanted, known)))
+    decimals = max(0, min(wanted, known))
+    return np.format_float_positional(instant, decimals, unique=False, trim="-")
 
 
 def span_text(begin: float, end: float, dt: float) -> str:
     """Write a span of time, with its unit; instants as :func:`instant_text`."""
     return f"{instant_text(begin, dt)} to {instant_text(end, dt)} s"
-
-
-def fixed(value: float, decimals: int) -> str:
-    """Write a number to so many decimals, without zeros at its end."""
-    text = f"{value:.{decimals}f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
@@ -78,7 +73,7 @@ def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
 
 def _shown(t: FloatArray, sample: int | np.intp) -> str:
     """Instant of a sample in a message."""
-    return f"{instant_text(t[sample], float(np.median(np.abs(np.diff(t)))))} s"
+    return f"{instant_text(t[sample], np.median(np.abs(np.diff(t))))} s"
 
 
 def record(series: npt.ArrayLike, time: npt.ArrayLike, owner: str) -> tuple[FloatArray, FloatArray]:
@@ -150,18 +145,18 @@ def _tolerance(t: FloatArray, step: float) -> float:
 
 def _irregularity(t: FloatArray, name: str) -> str:
     steps = np.diff(t)
-    usual = float(np.median(steps))
+    usual = np.median(steps)
     counts = steps / usual
     gaps = np.flatnonzero(counts > 1.5)
     if gaps.size and np.max(np.abs(counts - np.rint(counts))) < 0.1:
         longest = gaps[np.argmax(steps[gaps])]
         return (
             f"the times of {name} have {gaps.size} gap(s): after t = {_shown(t, gaps[0])}, "
-            f"{int(np.rint(counts[gaps[0]])) - 1} sample(s) of {usual:g} s are missing; the "
+            f"{np.rint(counts[gaps[0]]) - 1:.0f} sample(s) of {usual:g} s are missing; the "
             f"longest gap, after t = {_shown(t, longest)}, lasts {steps[longest]:g} s. Fill the "
             "gap, or use the record before or after it."
         )
-    at = int(np.argmax(np.abs(steps - usual)))
+    at = np.argmax(np.abs(steps - usual))
     return (
         f"the times of {name} are not uniform: steps run from {steps.min():g} to {steps.max():g} s "
         f"(median {usual:g} s), the oddest after t = {_shown(t, at)}. Interpolate the series onto "
@@ -236,7 +231,7 @@ def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
         count=t.size,
         missing=int(place[-1]) + 1 - t.size,
         gaps=tuple((float(t[i]), float(round(t[i + 1] - t[i], 9))) for i in at),
-        jitter_rms=float(np.sqrt(np.mean(away**2))),
+        jitter_rms=math.sqrt(np.mean(away**2)),
         jittered=bool(np.abs(away).max() > _tolerance(t, step)),
     )
 
@@ -294,7 +289,7 @@ def onto_uniform(
             "record. Split the file where the logger paused, or state its sampling rate."
         )
     place, step, begin = _grid(t)
-    out = np.full((int(place[-1]) + 1, *x.shape[1:]), np.nan)
+    out = np.full((place[-1] + 1, *x.shape[1:]), np.nan)
     grid = begin + step * np.arange(out.shape[0])
     out[place] = x
     if report.uniform:
@@ -318,7 +313,7 @@ def stretches(wanted: BoolArray) -> list[tuple[int, int]]:
     >>> stretches(np.array([False, True, True, False, True]))
     [(1, 3), (4, 5)]
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]]).astype(np.int8)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 

@@ -29,38 +29,14 @@ from seakeep.files import existing_file
 from seakeep.signals.filters import low_pass
 from seakeep.signals.panel import CORNERS, FIELDS, Image, TrackingSettings, find_panel, opencv
 from seakeep.signals.time_axis import stretches
+from seakeep.toml import packaged
 
 Seen = dict[str, FloatArray]
 """Fields of all frames."""
-FLAGS = {
-    "good": 0,
-    "lost": 1,  # nothing of the panel's colour
-    "occluded": 2,  # too small, a corner hidden, or cut by the border of the picture
-    "overexposed": 3,  # shape off, or much more of the picture saturated than usual
-    "misshapen": 4,  # too large or no rectangle, without saturation
-    "jump": 5,  # further from its neighbours than the vessel can move
-    "dropped": 6,  # not in the file
-}
+_TRACK = packaged("signals/track.toml")
+FLAGS = _TRACK["flags"]
 """Flags of a frame."""
-
-LABELS = {
-    "surge": ("m", "surge"),
-    "heave": ("m", "heave"),
-    "pitch": ("rad", "pitch"),
-    "centroid_x": ("pixel", "panel centroid, to the right"),
-    "centroid_y": ("pixel", "panel centroid, downwards"),
-    "panel_angle": ("rad", "panel orientation, clockwise as seen"),
-    "panel_length": ("pixel", "panel length as seen"),
-    "panel_height": ("pixel", "panel height as seen"),
-    "panel_area": ("pixel^2", "panel area as seen"),
-    "panel_fill": ("1", "panel area by that of the rectangle around it"),
-    "saturation": ("1", "saturated fraction of the picture"),
-    "quality": ("1", "quality of the frame"),
-    "bridged": ("1", "whether the frame is bridged"),
-    "picture": ("1", "count of the frame in the file"),
-    "flag": ("1", "flag of the frame"),
-    "lamp": ("1", "brightness of the lamp"),
-}
+LABELS = _TRACK["channels"]
 """Unit and long name of each channel of a track."""
 
 FRAMES = 12
@@ -149,7 +125,7 @@ class _Video:
                     f"{1 / self.rate:.4g} s apart, so the frame rate varies. Encode the video "
                     "again with a constant rate."
                 )
-            yield number, np.asarray(read[1], dtype=np.uint8)
+            yield number, read[1]
             previous, count = number, count + 1
         if count == 0:
             raise DataError(f"{self.path} holds no frame that can be decoded. Export it again.")
@@ -230,9 +206,9 @@ def track_video(
     if count < 2:
         raise DataError(f"{path} holds one frame; a motion needs at least two. Export it again.")
     usual = _usual_panel(seen, how, str(path))
-    pixels = int(np.prod(size if how.region is None else how.region[2:]))
+    pixels = int(np.prod(how.region[2:] if how.region else size))
     flag, quality = _judge(seen, usual, how, 1.0 / rate, pixels)
-    counts = {name: int(np.sum(flag == code)) for name, code in FLAGS.items()}
+    counts = {name: np.sum(flag == code) for name, code in FLAGS.items()}
     bad = count - counts["good"]
     if 2 * bad > count:
         words = ", ".join(f"{number} {name}" for name, number in counts.items() if number)
@@ -254,7 +230,7 @@ def track_video(
         "picture": np.nan_to_num(seen["picture"], nan=-1.0).astype(int),
         "flag": flag.astype(np.int8),
     }
-    if how.lamp is not None:
+    if how.lamp:
         channels["lamp"] = seen["lamp"]
     attributes = {
         "source": Path(path).name,
@@ -262,7 +238,7 @@ def track_video(
         "camera": f"downstream to the {how.downstream} of the picture",
         "frame_rate": rate,
         "metres_per_pixel": usual["scale"],
-        "calibration": "stated" if how.metres_per_pixel is not None else "size of the panel",
+        "calibration": "stated" if how.metres_per_pixel else "size of the panel",
         "panel_length_seen": usual["length"],
         "panel_height_seen": usual["height"],
         "settings": json.dumps(asdict(how)),
@@ -272,14 +248,14 @@ def track_video(
 
 def _check_fit(video: _Video, how: TrackingSettings) -> None:
     width, height = video.size
-    if how.region is not None:
+    if how.region:
         left, top, wide, high = how.region if len(how.region) == 4 else (0, 0, 0, 0)
         if min(left, top) < 0 or not (0 < wide <= width - left and 0 < high <= height - top):
             raise RequestError(
                 f"region = {how.region} is no part of the picture of {video.path}, {width} × "
                 f"{height} pixels. State left, top, width and height of one."
             )
-    if how.lamp is not None:
+    if how.lamp:
         x, y, radius = how.lamp
         if not (0 <= x < width and 0 <= y < height and radius > 0):
             raise RequestError(
@@ -287,7 +263,7 @@ def _check_fit(video: _Video, how: TrackingSettings) -> None:
                 f"{width} × {height} pixels. Correct its place."
             )
     stop = how.stop
-    if stop is not None and stop >= 0.5 * video.rate:
+    if stop and stop >= 0.5 * video.rate:
         raise RequestError(
             f"{video.path} has {video.rate:g} frames per second, so the low-pass filter cannot "
             f"stop at {stop:g} Hz. Lower the passband (--passband) so that the stopband, 1.5 times "
@@ -301,7 +277,7 @@ def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) ->
     numbers: list[int] = []
     rows: list[list[float]] = []
     at_rest = how.origin is None
-    if how.lamp is not None:
+    if how.lamp:
         x, y, radius = how.lamp
         below, right = np.ogrid[: video.size[1], : video.size[0]]
         disc = np.nonzero((right - x) ** 2 + (below - y) ** 2 <= radius**2)
@@ -317,7 +293,7 @@ def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) ->
             where = f"first {how.rest:g} s (unless the origin is stated, zero lies there)"
             _usual_panel(seen(), how, f"{video.path}, {where}")
         row = find_panel(frame, how) | {"picture": len(rows)}
-        if how.lamp is not None:
+        if how.lamp:
             row["lamp"] = float(np.mean(frame[disc])) / 255.0
         numbers.append(number)
         rows.append([row.get(field, np.nan) for field in FIELDS])
@@ -337,13 +313,13 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
     panel, known = how.panel, how.metres_per_pixel
     aspect = (seen["length"] / seen["height"]) / (panel[0] / panel[1])
     like = (abs(aspect - 1) < ASPECT_BAND) & (seen["fill"] > LEAST_FILL) & (seen["cut"] == 0)
-    if known is not None:
+    if known:
         like &= abs(seen["length"] / (panel[0] / known) - 1) < SIZE_BAND
     if not like.any():
         raise DataError(_not_found(seen, how, name))
     usual = {field: float(np.median(values[like])) for field, values in seen.items()}
     lowest = np.min([seen[corner][like] - usual[corner] for corner in CORNERS], axis=0)
-    usual["corner_noise"] = 1.4826 * float(np.median(abs(lowest - np.median(lowest))))
+    usual["corner_noise"] = 1.4826 * np.median(abs(lowest - np.median(lowest)))
     square = panel[0] * panel[1] / (usual["length"] * usual["height"])
     usual["scale"] = known or float(np.sqrt(square))
     return usual
@@ -352,7 +328,7 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
 def _not_found(seen: Seen, how: TrackingSettings, name: str) -> str:
     there, panel, known = seen["area"] > 0, how.panel, how.metres_per_pixel
     wanted = f"{panel[0]:g} × {panel[1]:g} m"
-    if known is not None:
+    if known:
         wanted += f", {panel[0] / known:.0f} × {panel[1] / known:.0f} pixels"
     start = f"{name}: the panel ({wanted}) was not found in any of {there.size} frames: "
     if not there.any():
@@ -403,8 +379,7 @@ def _judge(
         middle = scipy.ndimage.median_filter(place, (1, NEIGHBOURS), mode="nearest")
         flag[at[np.hypot(*(place - middle)) > reach]] = FLAGS["jump"]
     quality = np.clip(1.0 - 0.5 * shape, 0.0, 1.0)
-    most = np.where(flag == FLAGS["good"], 1.0, FLAGGED_QUALITY)
-    return flag, np.minimum(quality, most)
+    return flag, np.minimum(quality, np.where(flag == FLAGS["good"], 1.0, FLAGGED_QUALITY))
 
 
 def _motions(
@@ -423,7 +398,7 @@ def _motions(
     x = side * scale * seen["x"] - along * np.cos(pitch) - up * np.sin(pitch)
     z = -scale * seen["y"] + along * np.sin(pitch) - up * np.cos(pitch)
     table = np.stack([x, z, pitch], axis=1)
-    if how.origin is not None:
+    if how.origin:
         table[:, :2] -= side * scale * how.origin[0] - along, -scale * how.origin[1] - up
     else:
         rest = good & (np.arange(good.size) < max(1, round(how.rest * rate)))
@@ -442,7 +417,7 @@ def _motions(
         there = np.flatnonzero(good)
         between = scipy.interpolate.PchipInterpolator(there, table[there], axis=0)
         table[filled] = between(np.flatnonzero(filled))
-    if how.passband is not None:
+    if how.passband:
         for begin, end in stretches(good | filled):
             if end - begin > 1:
                 table[begin:end] = low_pass(table[begin:end], 1.0 / rate, how.passband, how.stop)
@@ -506,4 +481,4 @@ def _tile(cv2: Any, frame: Image, track: Track, index: int) -> Image:
     text = f"{track.time[index]:.2f} s  {name}  quality {here['quality']:.2f}"
     cv2.putText(small, text, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
     cv2.rectangle(small, (0, 0), (small.shape[1] - 1, small.shape[0] - 1), colour, 3)
-    return np.asarray(small, dtype=np.uint8)
+    return small

@@ -163,12 +163,12 @@ def repeated_waves(records: Mapping[str, npt.ArrayLike], dt: float) -> dict[str,
 def _are_alike(one: FloatArray, other: FloatArray) -> bool:
     """Whether two records, less their means, hold the same waves."""
     lags = scipy.signal.correlation_lags(len(one), len(other))
-    lag = int(lags[np.argmax(scipy.signal.correlate(one, other, method="fft"))])
+    lag = lags[np.argmax(scipy.signal.correlate(one, other, method="fft"))]
     begin, end = max(lag, 0), min(len(one), len(other) + lag)
     if end - begin < OVERLAP * min(len(one), len(other)):
         return False
     one, other = one[begin:end], other[begin - lag : end - lag]
-    small, large = sorted((float(one.std()), float(other.std())))
+    small, large = sorted((one.std(), other.std()))
     return 0 < small >= ALIKE * large and bool(np.corrcoef(one, other)[0, 1] >= ALIKE)
 
 
@@ -190,11 +190,11 @@ def _spectrum(series: npt.ArrayLike, dt: float) -> tuple[FloatArray, FloatArray,
     """Power of a series, its frequencies, and the period at the peak, as `dominant_period`."""
     x = as_series(series)
     if x.size < 8 or not np.ptp(x):
-        return x, x, float("nan")
-    power, lines = tapered_power(x), np.asarray(np.fft.rfftfreq(x.size, dt), dtype=float)
+        return x, x, np.nan
+    power, lines = tapered_power(x), fft.rfftfreq(x.size, dt)
     smooth = np.convolve(power, [0.25, 0.5, 0.25], mode="same")
     smooth[:3] = 0.0
-    return power, lines, float(1.0 / lines[int(np.argmax(smooth))])
+    return power, lines, float(1.0 / lines[np.argmax(smooth)])
 
 
 def tapered_power(x: FloatArray) -> FloatArray:
@@ -206,7 +206,7 @@ def _dominant_period(x: FloatArray) -> float:
     """Period at the highest line of the spectrum, in samples; half the record at most."""
     power = tapered_power(x)
     power[:2] = 0.0
-    return float(x.size / max(int(np.argmax(power)), 2))
+    return x.size / max(int(np.argmax(power)), 2)
 
 
 def zero_up_crossings(
@@ -256,7 +256,7 @@ def zero_up_crossings(
     x = x - x.mean()
     before = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
     if hysteresis > 0:
-        before = _clear(x, before, hysteresis * float(x.std()))
+        before = _clear(x, before, hysteresis * x.std())
     first = before - x[before] / (x[before + 1] - x[before])
     return (part.start + first) * time_step(dt)
 
@@ -336,7 +336,7 @@ def energy_period(series: npt.ArrayLike, dt: float) -> float:
     x = as_series(series)
     power = tapered_power(x)[4:]
     lines = np.fft.rfftfreq(x.size, time_step(dt))[4:]
-    return float((power / lines).sum() / power.sum()) if power.any() else float("nan")
+    return float((power / lines).sum() / power.sum()) if power.any() else np.nan
 
 
 def significant_height(series: npt.ArrayLike) -> float:
@@ -546,7 +546,7 @@ def wave_statistics(series: npt.ArrayLike, dt: float) -> WaveStatistics:
     peak = peak_period(series, dt)
     frequency, density = wave_spectrum(series, dt)
     below = frequency <= 5.0 / peak  # beyond, noise times f² would rule the second moment
-    moments = [float(np.sum(frequency[below] ** n * density[below])) for n in (0, 2)]
+    moments = [np.sum(frequency[below] ** n * density[below]) for n in (0, 2)]
     return WaveStatistics(
         significant_height=significant_height(series),
         peak_period=peak,
@@ -581,7 +581,7 @@ def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, 
     """
     power, lines, period = _spectrum(series, time_step(dt))
     if not np.isfinite(period):
-        return float("nan"), float("nan")
+        return np.nan, np.nan
     waves = (lines >= WAVES[0] / period) & (lines <= WAVES[1] / period)
     return float(power[waves & (lines > edge)].sum() / power[waves].sum()), period
 
@@ -725,7 +725,7 @@ def find_leakage(
     length = min(max(length, 1), record.size)
     if _even(waves):
         return None
-    found: list[Leakage] = []
+    found = []
     repeated = np.zeros(record.size, dtype=bool)
     pool = [as_series(each, minimum=8) for each in training]
     ready = [(index, _analytic(each)) for index, each in enumerate(pool) if each.size >= length]
@@ -746,8 +746,7 @@ def find_leakage(
 
 def _analytic(series: FloatArray) -> ComplexArray:
     centred = series - series.mean()
-    out = scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))
-    return out[: centred.size]
+    return scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))[: centred.size]
 
 
 def is_regular(series: npt.ArrayLike) -> bool:
@@ -766,5 +765,5 @@ def _correlation(reference: ComplexArray, piece: ComplexArray) -> ComplexArray:
     summed = np.conj(scipy.signal.correlate(reference, piece, mode="valid", method="fft"))
     power = np.cumsum(np.concatenate([[0.0], np.abs(reference) ** 2]))
     energy = power[piece.size :] - power[: -piece.size]
-    norm = np.sqrt(np.maximum(energy * float(np.sum(np.abs(piece) ** 2)), 1e-300))
+    norm = np.sqrt(np.maximum(energy * np.sum(np.abs(piece) ** 2), 1e-300))
     return summed / norm

@@ -65,7 +65,7 @@ typedef struct {
 } Instance;
 
 static const double start_values[X_HISTORY] = {
-{{ start | numbers }}
+{{ channels | map(attribute="start") | list | numbers }}
 };
 
 static Status report(Instance *instance, Status status, const char *message)

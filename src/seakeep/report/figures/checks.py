@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,17 +15,14 @@ from seakeep.report.style import (
     DOTTED,
     LINES,
     PALETTE,
+    Figure,
+    Places,
     figure_style,
     legend_outside,
     panels,
     short_label,
     shown_unit,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from seakeep.report.style import Places
 
 SHADE = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
 SOLID = {**LINES["forecast"], "linestyle": "-"}
@@ -66,8 +63,8 @@ def by_state(
 
 def _shown(own: xr.Dataset) -> tuple[float, str, str]:
     """Factor and unit in which a state is shown, and its short label."""
-    factor, units = displayed(str(own["units"].values))
-    return factor, shown_unit(units) or "?", short_label(str(own["state"].values))
+    factor, units = displayed(own["units"].item())
+    return factor, shown_unit(units) or "?", short_label(own["state"].item())
 
 
 def _end(spectrum: xr.DataArray) -> float:
@@ -79,7 +76,7 @@ def _end(spectrum: xr.DataArray) -> float:
 def _answering(values: xr.DataArray) -> list[str]:
     """States that have a response."""
     others = [dim for dim in values.dims if dim != "state"]
-    return [str(name) for name in values["state"].values[values.notnull().any(others)]]
+    return values["state"].values[values.notnull().any(others)].tolist()
 
 
 def response(
@@ -122,7 +119,7 @@ def response(
             at = measured.sel(state=own["state"])
             at = at.where(at["amplitude_uncertainty"] < at["amplitude"])  # the rest is noise
             for kind, mark in MARKS.items():
-                one = at.isel(point=np.flatnonzero(measured["kind"].values == kind))
+                one = at.isel(point=measured["kind"].values == kind)
                 if one["amplitude"].notnull().any():
                     style = {**mark, **POINTS, "label": f"measured, {kind} waves"}
                     for place, key, scale in ((gain, "amplitude", factor), (turn, "phase", 1.0)):
@@ -134,7 +131,7 @@ def response(
         turn.set(ylabel=f"phase of {label} [°]", ylim=(-190, 190), yticks=range(-180, 181, 90))
 
     most = 2 + 2 * (len(states) % 2 == 0)
-    entry = "wave" if "wave" in result["input"] else str(result.attrs["reference"])
+    entry = "wave" if "wave" in result["input"] else result.attrs["reference"]
     return by_state(result.sel(input=entry, state=states), axes, (2.9, 1.75), draw, 2, most)
 
 
@@ -165,7 +162,7 @@ def coherence(result: xr.Dataset, *, axes: Places = None) -> Figure:
             line = {**LINES["forecast"], "label": "with observables too"}
             place.plot(frequency, own["multiple_observables"], **line)
         place.set(xlim=(0, top), ylim=(0, 1.02), xlabel="frequency [Hz]")
-        place.set_ylabel(f"coherence, {short_label(str(own['state'].values))} [1]")
+        place.set_ylabel(f"coherence, {short_label(own['state'].item())} [1]")
 
     return by_state(result, axes, (3.0, 1.9), draw)
 
@@ -188,21 +185,20 @@ def modes(result: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     Figure
     """
     at = result.isel(mode=slice(0, most))
-    states, shares = [str(name) for name in at["state"].values], at["participation"].values
+    states, shares = at["state"].values.tolist(), at["participation"].values
     words = [
         f"{period:.3g} s, {ratio:.3f}" if np.isfinite(period) else f"decays in {time:.3g} s"
         for period, ratio, time in zip(
             *(at[key].values for key in ("period", "damping_ratio", "decay_time")), strict=True
         )
     ]
-    size = (2.8 + 0.5 * len(states), 0.9 + 0.24 * len(words))
-    figure, (place,) = panels(axes, 1, 1, size)
+    figure, (place,) = panels(axes, 1, 1, (2.8 + 0.5 * len(states), 0.9 + 0.24 * len(words)))
     picture = place.imshow(shares, cmap="Greys", vmin=0, vmax=1, aspect="auto")
     for (row, column), value in np.ndenumerate(shares):
         if value >= 0.05:
             style = {"ha": "center", "va": "center", "fontsize": 7}
             place.text(column, row, f"{value:.2f}", color="w" if value > 0.5 else "k", **style)
-    place.set_xticks(range(len(states)), [short_label(name) for name in states])
+    place.set_xticks(range(len(states)), list(map(short_label, states)))
     place.set_yticks(range(len(words)), words)
     place.grid(False)
     place.set_ylabel("mode: period, damping ratio")
@@ -232,7 +228,7 @@ def decay(result: xr.Dataset, *, axes: Places = None) -> Figure:
         moving = np.flatnonzero(np.abs(left) > 0.01)
         place.set_xlim(0, float(own["time"][min(moving[-1] + 2, left.size - 1)]))
         place.set_xlabel("time after the release [s]")
-        place.set_ylabel(f"{short_label(str(own['state'].values))} over offset [1]")
+        place.set_ylabel(f"{short_label(own['state'].item())} over offset [1]")
 
     return by_state(result.rename(motion="state"), axes, (3.0, 1.8), draw)
 
@@ -258,13 +254,13 @@ def residuals(result: xr.Dataset, *, axes: Places = None) -> Figure:
         white.axhspan(-limit, limit, **SHADE)
         white.plot(own["lag"][1:], own["autocorrelation"][1:], **LINES["measured"])
         white.set(xlabel="lag [s]", ylabel="autocorrelation [1]")
-        white.set_title(f"{short_label(str(own['state'].values))}: errors of one step")
+        white.set_title(f"{short_label(own['state'].item())}: errors of one step")
         dashes = ("-", DASHED, ":") * 9
         for each, dash in zip(own.get("input_correlation", ()), dashes, strict=False):
             wide = float(own["input_limit"].sel(input=each["input"]))
             past.axhspan(-wide, wide, **SHADE)
             line = {"color": COLOURS["measured"], "linewidth": 1.0, "linestyle": dash}
-            past.plot(own["lag"], each, **line, label=str(each["input"].values))
+            past.plot(own["lag"], each, **line, label=each["input"].item())
         past.set(xlabel="lag of the input [s]", ylabel="correlation [1]")
         past.set_title("with past inputs")
         frequency, power = own["frequency"][1:], own["measured_spectrum"].values
@@ -303,7 +299,7 @@ def exceedance(result: xr.Dataset, *, axes: Places = None) -> Figure:
 
     def draw(own: xr.Dataset, place: Any) -> None:
         factor, unit, label = _shown(own)
-        level = np.linspace(0, 1.1 * float(np.nanmax(own["peak"], initial=0.0)) or 1.0, 200)
+        level = np.linspace(0, 1.1 * np.nanmax(own["peak"], initial=0.0) or 1.0, 200)
         scale, shape, width = (
             float(own[key].sel(kind="measured"))
             for key in ("rayleigh_scale", "weibull_shape", "weibull_scale")
@@ -372,7 +368,7 @@ def validity(result: xr.Dataset, *, axes: Places = None) -> Figure:
         for run in test["run"].values[outside]:
             spot = tuple(float(test[key].sel(run=run)) for key in (x, y))
             if np.isfinite(spot).all():
-                place.annotate(str(run), spot, (6, 4), textcoords="offset points", fontsize=7)
+                place.annotate(run, spot, (6, 4), textcoords="offset points", fontsize=7)
         place.set(xlabel=across, ylabel=up)
         place.margins(x=0.15)
         place.set_ylim(0, 1.2 * float(result[y].max()))
@@ -412,5 +408,5 @@ def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
             place.errorbar(own["point_frequency"], *offsets, **style)
         place.set(xlabel="frequency [Hz]", ylabel=f"{label} [{unit}]")
 
-    states = _answering(result["slow_response"])
-    return by_state(result.sel(state=states), axes, (3.0, 2.0), draw)
+    shown = result.sel(state=_answering(result["slow_response"]))
+    return by_state(shown, axes, (3.0, 2.0), draw)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,8 @@ from seakeep.report.style import (
     HEADING,
     PALETTE,
     SERIES,
+    Figure,
+    Places,
     figure_style,
     judged_models,
     legend_outside,
@@ -30,11 +32,6 @@ from seakeep.report.style import (
 from seakeep.report.tables import ratio_of
 from seakeep.study import StudyResult
 from seakeep.study.judge import average_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from seakeep.report.style import Places
 
 NARROW = 14
 """Letters of a test set's label on one line."""
@@ -83,14 +80,13 @@ def draw_box_violin(
         patch_artist=True, manage_ticks=False, zorder=3, boxprops=box, whiskerprops=line,
         capprops=line, medianprops={"color": colour, "linewidth": 1.8, "solid_capstyle": "butt"},
     )  # fmt: skip
-    return float(drawn["whiskers"][1].get_ydata()[1])
+    return drawn["whiskers"][1].get_ydata()[1]
 
 
 def _cells(result: StudyResult, test: str, model: str, measure: str) -> FloatArray:
     """Errors of all judged cells, shape (cell, channel)."""
     data = result.tests[test]
-    errors = data["error"].sel(model=model, measure=measure).values
-    return errors[data["judged"].values]
+    return data["error"].sel(model=model, measure=measure).values[data["judged"].values]
 
 
 @figure_style()
@@ -112,7 +108,7 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
 def channel_boxes(result: StudyResult, test: str) -> Figure:
     """NRMSE and NAMMAE of all cells of a test set, channel by channel."""
     figure = new_figure(8.5, 5.6)
-    models, labels = judged_models(result), [short_label(name) for name in result.channels]
+    models, labels = judged_models(result), list(map(short_label, result.channels))
     errors = [[_cells(result, test, model, measure) for model in models] for measure in HEADING]
     scale = "log" if any(_spans_decades(np.concatenate(cells)) for cells in errors) else "linear"
     for axes, measure, cells in zip(
@@ -248,14 +244,13 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
         style = {
             "s": 9 if single else 5,
             "color": line_of(result, model)["color"],
-            "alpha": 0.9 if single else float(np.clip(12 / data.sizes["member"], 0.12, 0.6)),
+            "alpha": 0.9 if single else np.clip(12 / data.sizes["member"], 0.12, 0.6),
             "linewidths": 0,
             "rasterized": True,
             "label": model_words(model),
         }
         plane.scatter(values.real, values.imag, **style)
-        frequency = np.angle(values) / (2 * np.pi * result.dt)
-        decay.scatter(frequency, np.abs(values), **style)
+        decay.scatter(np.angle(values) / (2 * np.pi * result.dt), np.abs(values), **style)
     plane.set(aspect="equal", ylim=(0, 1.05), xticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
     plane.set(xlabel="real part", ylabel="imaginary part")
     decay.axhline(1.0, color=PALETTE["slate"], linewidth=0.8)
@@ -282,7 +277,7 @@ def errors(table: xr.Dataset, *, axes: Places = None) -> Figure:
     -------
     Figure
     """
-    labels = [short_label(str(name)) for name in table["channel"].values]
+    labels = list(map(short_label, table["channel"].values))
     figure, (place,) = panels(axes, 1, 1, (max(4.0, 1.2 + 0.8 * len(labels)), 2.8))
     _draw_points(place, table.transpose("run", ...), "run", "nrmse", labels)
     place.set_ylim(bottom=0)
@@ -300,7 +295,7 @@ def error_figure(table: xr.Dataset) -> Figure:
     """
     table = table.sortby("wave_period")
     labels = [
-        plain_text(str(run)) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
+        plain_text(run) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
         for run, period in zip(table["run"].values, table["wave_period"].values, strict=True)
     ]
     figure = new_figure(max(4.5, 1.5 + 0.8 * len(labels)), 3.2)
@@ -319,7 +314,7 @@ def error_figure(table: xr.Dataset) -> Figure:
 
 def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Sequence[str]) -> None:
     """Draw an error with its interval at each label, entries of a dimension beside each other."""
-    names = [str(each) for each in table[dim].values]
+    names = table[dim].values.tolist()
     for number, name in enumerate(names):
         at = table.sel({dim: name})
         reach = [np.abs(at[f"{key}_{bound}"] - at[key]) for bound in ("lower", "upper")]
@@ -333,7 +328,7 @@ def _draw_points(axes: Any, table: xr.Dataset, dim: str, key: str, labels: Seque
 def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
     """Error, and the model's own estimate of it, against lead time, a panel per channel."""
     first = next(iter(nowcasts.values()))
-    names, share = list(map(str, first["channel"].values)), float(first.attrs["share"])
+    names, share = first["channel"].values, first.attrs["share"]
     figure, places = panels(None, len(names), 4, (2.125, 1.7))
     for axes, name in zip(places, names, strict=True):
         for number, (model, of_model) in enumerate(nowcasts.items()):
@@ -344,7 +339,7 @@ def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
             axes.plot(at["lead"], at["claimed"], **claimed, label=f"{model}: claimed")
         axes.axhline(share, color="0.4", linewidth=0.8, linestyle=":", label=f"{share:g} SD")
         axes.set_title(short_label(name))
-        axes.set(xlim=(0, float(first["lead"].max())), xlabel="lead time [s]")
+        axes.set(xlim=(0, first["lead"].max()), xlabel="lead time [s]")
         axes.set_ylim(bottom=0)
         if axes.get_subplotspec().is_first_col():
             axes.set_ylabel("error [training SD]")
@@ -375,12 +370,12 @@ def tuning_figure(table: xr.Dataset) -> Figure:
     figure = new_figure(7.0, 4.2)
     axes = figure.subplots()
     for number, name in enumerate(dict.fromkeys(names)):
-        part = table.isel(trial=np.flatnonzero(np.array(names) == name))
+        part = table.isel(trial=np.array(names) == name)
         line = {**SERIES[number % len(SERIES)], "linestyle": "-"}
         axes.semilogx(part["ridge"], part["score"], **line, markersize=4, label=name)
         band = {"color": line["color"], "alpha": 0.12}
         axes.fill_between(part["ridge"], part["lower"], part["upper"], **band)
-    best = table.isel(trial=np.flatnonzero(table["chosen"].values))
+    best = table.isel(trial=table["chosen"].values)
     ring = {"markersize": 11, "fillstyle": "none", "color": "k"}
     axes.semilogx(best["ridge"], best["score"], "o", **ring, label="chosen")
     axes.set_xlabel("ridge per snapshot pair (1)")

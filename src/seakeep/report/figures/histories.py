@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,10 +21,13 @@ from seakeep.report.style import (
     COLOURS,
     DASHED,
     DOTTED,
+    FLAGGED,
     LINES,
     PALETTE,
     SERIES,
     THIN,
+    Figure,
+    Places,
     axis_label,
     figure_style,
     judged_models,
@@ -39,17 +42,12 @@ from seakeep.report.style import (
     shown,
     shown_unit,
 )
+from seakeep.report.tables import band_words
 from seakeep.signals.time_axis import over_gaps
 from seakeep.study import Comparison, StudyResult, comparison_table
 from seakeep.study.comparison import wave_period
 from seakeep.study.judge import band_of
 from seakeep.study.reproduce import ACTS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from seakeep.report.style import Places
-
 
 LONG = 60
 """A record of more periods than this is drawn as an envelope, with a part of it enlarged."""
@@ -101,14 +99,16 @@ def draw_history(
         pale = {"color": PALETTE["pale"], "linewidth": 0, "label": "measured, envelope"}
         _envelope(axes, time, (measured, measured), period, fill=True, **pale)
     alpha = 0.3 if len(curves) == 1 else 0.2
-    for each in (each for each in curves if len(each.band)):
+    for each in curves:
+        if not each.band:
+            continue
         edge = {"color": each.line["color"], "linewidth": 0.6, "label": each.words}
         if period is None:
             axes.fill_between(time, *each.band, alpha=alpha, **edge)
         else:
             _envelope(axes, time, each.band, period, alpha=2 * alpha, **edge | {"label": None})
     if period is None:
-        banded = any(len(each.band) for each in curves)
+        banded = any(each.band for each in curves)
         axes.plot(time, measured, label="measured", **(THIN if banded else LINES["measured"]))
     for each in curves:
         if period is not None:
@@ -144,7 +144,7 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
     states, time = list(map(str, first.measured.data_vars)), first.measured["time"].values
     groups = defaultdict(list)
     for name, each in first.inputs.data_vars.items():
-        groups[str(each.attrs.get("units", ""))].append(str(name))
+        groups[each.attrs.get("units", "")].append(str(name))
     period = _period_if_long(first)
     spans = [None] if period is None else [period, None]
     rows = len(states) + len(groups)
@@ -157,7 +157,7 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
         parts = [part for each in compared for part in (each.measured, each.forecast, each.band)]
         largest = max(float(np.abs(part[name]).max()) for part in parts if part is not None)
         attrs = first.measured[name].attrs
-        factor, units = prefixed(str(attrs.get("units", "")), largest)
+        factor, units = prefixed(attrs.get("units", ""), largest)
         curves = [_curve(each, key, name, factor, several) for key, each in several.items()]
         for place, span in zip(row, spans, strict=True):
             draw_history(place, time, factor * first.measured[name], curves, span)
@@ -193,8 +193,7 @@ def _curve(
         line, label = LINES["ensemble"], "ensemble mean"
         band = [factor * each.band[name].sel(statistic=key) for key in ("lower", "upper")]
         attrs = each.forecast.attrs
-        kind = "calibrated " if attrs.get("band") == "calibrated" else ""
-        words = f"{100 * float(attrs['level']):g} % {kind}band"
+        words = band_words(attrs["level"], attrs.get("band"))
     if len(several) > 1:
         style = SERIES[list(several).index(key) % len(SERIES)]
         line = {what: value for what, value in style.items() if what != "marker"}
@@ -208,7 +207,7 @@ def _judgement(rows: Sequence[xr.Dataset]) -> str:
     if not np.isfinite(errors).any():
         return "not judged"
     words = "NRMSE " + " · ".join(f"{e:.3f}" if np.isfinite(e) else "lost" for e in errors)
-    if len(rows) == 1 and "coverage" in rows[0] and np.isfinite(float(rows[0]["coverage"])):
+    if len(rows) == 1 and "coverage" in rows[0] and np.isfinite(rows[0]["coverage"]):
         words += f", {float(rows[0]['coverage']):.0f} % in the band"
     return words
 
@@ -216,7 +215,7 @@ def _judgement(rows: Sequence[xr.Dataset]) -> str:
 def _title(comparisons: Sequence[Comparison]) -> str:
     first = comparisons[0]
     parts = [first.run, first.sea_state]
-    if first.full_scale is not None:
+    if first.full_scale:
         stated = f"sea state as stated: {first.sea_state}" if first.sea_state else ""
         parts[1:] = [f"full scale, λ = {first.full_scale:g}", stated]
     if len(comparisons) == 1:
@@ -248,7 +247,7 @@ def _draw_inputs(axes: Any, inputs: xr.Dataset, period: float | None) -> None:
 
 def _input_label(inputs: xr.Dataset) -> str:
     first, *others = inputs.data_vars.values()
-    units = str(first.attrs.get("units", ""))
+    units = first.attrs.get("units", "")
     if not others:
         return axis_label(str(first.name), units, first.attrs.get("long_name"))
     waves = all(is_elevation(str(name)) for name in inputs.data_vars)
@@ -342,12 +341,12 @@ def _histories(
 
 def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
     """Cells that are drawn: test set, training set and window."""
-    count = int(result.settings["output"]["shown_windows"])
+    count = result.settings["output"]["shown_windows"]
     cells = []
     for number, (name, test) in enumerate(result.tests.items()):
         judged = test["judged"].values
         total = judged.shape[1]
-        wanted = min(count if number == 0 else min(count, 1), total)
+        wanted = min(count, total, 1 if number else total)
         for window in np.linspace(0, total - 1, wanted).round().astype(int).tolist():
             cells.append((name, int(np.argmax(judged[:, window])), window))
     return cells
@@ -358,12 +357,13 @@ def history_figure(
     result: StudyResult, test: str, training: int, window: int, names: Sequence[str] | None = None
 ) -> Figure:
     """Channels of one cell over time; all of them unless `names` are given."""
-    names = result.channels if names is None else names
+    names = names or result.channels
     figure = new_figure(7.5, 0.9 + (0.95 if len(names) > 1 else 1.4) * len(names))
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     cell = result.tests[test].isel(training=[training], window=[window])
     calibration = result.groups.get("calibration")
-    calibration = calibration if calibration is None else calibration.isel(training=[training])
+    if calibration:
+        calibration = calibration.isel(training=[training])
     for each, name in zip(axes, names, strict=True):
         _draw_channel(each, result, cell, name, calibration)
     words = "deviation from the training mean, in training SD" if len(names) > 1 else "training SD"
@@ -371,9 +371,8 @@ def history_figure(
     axes[-1].set_xlabel("time after the last measured state, in encounter periods")
     legend_outside(figure, axes[0], side="upper right")
     run, learnt, start = (cell[key].item() for key in ("run", "training", "start"))
-    left_out = str(result.groups["training"]["left_out"].values[training])
-    title = f"{run}, from {start:.1f} s; trained {'' if left_out else 'on '}{learnt}"
-    axes[0].set_title(title)
+    left_out = result.groups["training"]["left_out"].values[training]
+    axes[0].set_title(f"{run}, from {start:.1f} s; trained {'' if left_out else 'on '}{learnt}")
     return figure
 
 
@@ -422,7 +421,7 @@ def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
     for row, act in zip(grid, acts, strict=True):
         result = results[act.name]
         test = result.tests["irregular"]
-        training = int(test["judged"].values[:, 0].argmax())
+        training = test["judged"].values[:, 0].argmax()
         for axes, name in zip(row, CHANNELS, strict=True):
             _draw_channel(axes, result, test.isel(training=[training], window=[0]), name)
             axes.set_title(f"{act.title}: {name}")
@@ -435,15 +434,6 @@ def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
 
 DRAWN = 50
 """Channels that a picture shows at most, each in a row of its own; the table lists all."""
-MARKS = {
-    "missing": (PALETTE["vermilion"], "x"),
-    "bridged": (PALETTE["amber"], "+"),
-    "outlier": (PALETTE["pink"], "o"),
-    "saturated": (PALETTE["blue"], "^"),
-    "stuck": (PALETTE["green"], "s"),
-    "replaced": (PALETTE["sky"], "d"),
-}
-"""Colour and shape of each flag: shapes distinguish them in grey print."""
 LABELS = -0.06
 """Where labels of the vertical axes stand, in widths of the axes: beyond six figures."""
 WELCH = {"paper": (COLOURS["forecast"], DASHED), "recommended": (COLOURS["ensemble"], "-")}
@@ -469,10 +459,10 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
         at.plot(time, x, color=COLOURS["measured"], linewidth=0.6)
         at.set_ylabel(label, fontsize=8)
         if f"{name}_flags" in run.coords:
-            _mark(at, time, x, run[f"{name}_flags"].values.astype(int))
+            _mark(at, time, x, run[f"{name}_flags"].values)
         known = x[np.isfinite(x)]
         if known.size and np.ptp(known) <= 1e-9 * max(np.abs(known).max(), 1e-300):
-            value = float(known[0])  # an axis that shows no rounding
+            value = known[0]  # an axis that shows no rounding
             reach = 0.1 * abs(value) or 1.0
             at.set_ylim(value - reach, value + reach)
             place = {"xy": (0.5, 0.8), "xycoords": "axes fraction", "ha": "center"}
@@ -486,7 +476,7 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
         instants = np.insert(each.centre + time[0], holes, np.nan)  # no line across a hole
         lags = np.insert(each.lags, holes, np.nan)
         at.plot(instants, lags, "o-", color=COLOURS["ensemble"], markersize=3)
-        reach = max(1.5 * limit, 1.1 * float(np.nanmax(np.abs(each.lags), initial=0.0)))
+        reach = max(1.5 * limit, 1.1 * np.nanmax(np.abs(each.lags), initial=0.0))
         at.set_ylim(-reach, reach)
         at.set_ylabel(f"lag of\n{name.replace('_', ' ')} [s]", fontsize=8)
     for at in axes:
@@ -505,9 +495,8 @@ def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
     for word, bit in FLAGS.items():
         hit = (flags & bit) > 0
         if hit.any():
-            colour, shape = MARKS[word]
-            style = {"color": colour, "markersize": 3.5, "zorder": 3, "label": word}
-            at.plot(time[hit], filled[hit], shape, **style)
+            style = {**FLAGGED[word], "markersize": 3.5, "linestyle": "none", "zorder": 3}
+            at.plot(time[hit], filled[hit], label=word, **style)
     if flags.any():
         place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
         at.legend(**place, fontsize=7, ncols=6, borderpad=0.1)
@@ -517,7 +506,7 @@ def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
 def spectrum_figure(result: StudyResult) -> Figure:
     """Mean spectrum of the irregular runs of a study, and the frequencies of the regular ones."""
     spectra, runs = result.groups["spectra"], result.groups["runs"]
-    every = runs["run"].values.astype(str)
+    every = runs["run"].values
     # Where no run is irregular the mean over all of them is drawn.
     irregular = every[runs["waves"].values != "regular"]
     names = irregular if irregular.size else every
@@ -540,9 +529,9 @@ def spectrum_figure(result: StudyResult) -> Figure:
     figure = new_figure(8.5, 4.2)
     axes = figure.subplots()
     draw_spectra(axes, nominal, measured, runs["wave_frequency"].values)
-    peaks = [float(f[np.argmax(density)]) for f, density in curves("recommended", every)]
+    peaks = [f[np.argmax(density)] for f, density in curves("recommended", every)]
     axes.set_xlim(0, 2.2 * max(peaks, default=1.0))
-    channel = plain_text(result.words_of(str(spectra.attrs["channel"])))
+    channel = plain_text(result.words_of(spectra.attrs["channel"]))
     axes.set(xlabel="frequency [Hz]", ylabel=f"spectral density of {channel} [m²/Hz]")
     return figure
 
@@ -561,8 +550,7 @@ def draw_spectra(
             f, (colour, dash) = curves[0][0], WELCH[kind]
             mean = np.mean([np.interp(f, *each) for each in curves], axis=0)
             axes.plot(f, mean, label=label, color=colour, linestyle=dash)
-    known = sorted({round(float(f), 3) for f in regular[np.isfinite(regular)]})
-    for number, frequency in enumerate(known):
+    for number, frequency in enumerate(np.unique(regular[np.isfinite(regular)].round(3))):
         style = {"color": COLOURS["start"], "linewidth": 0.9, "linestyle": "--"}
         axes.axvline(frequency, **style, label=None if number else "regular waves")
     axes.set_ylim(bottom=0)

@@ -1,15 +1,14 @@
 """The report of a study: its sections, each a function of the result, in their order."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 from seakeep.arrays import Progress
-from seakeep.report.page import Section, write_page
+from seakeep.report.page import write_page
 from seakeep.report.sections import data, histories, results
 from seakeep.study import StudyResult
 from seakeep.study.store import storing
 
-SECTIONS: list[Callable[[StudyResult], Section | None]] = [
+SECTIONS = [
     results.summary,
     results.errors,
     results.scales,
@@ -48,9 +47,8 @@ def write_report(result: StudyResult, progress: Progress | None = None) -> Path:
     Path
         The page; errors as of :func:`seakeep.report.page.write_page`.
     """
-    made = [make(result) for make in SECTIONS]
-    sections = [each for each in made if each is not None and not each.is_empty]
-    stamp = {key: str(result.attrs[key]) for key in ("preset", "seed", "digest", "description")}
+    sections = [each for make in SECTIONS if not (each := make(result)).is_empty]
+    stamp = {key: result.attrs[key] for key in ("preset", "seed", "digest", "description")}
     stamp["finished"] = data.finished(result)
     with storing(result.folder):
         histories.write_histories(result)

@@ -12,7 +12,7 @@ from seakeep.report.figures.histories import spectrum_figure
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.quality_sheet import clock_rows, other_findings, run_row
 from seakeep.report.style import model_words, shown_unit
-from seakeep.report.tables import Table, entries, number, percent, row, table
+from seakeep.report.tables import WORDS, Table, entries, number, percent, row, table
 from seakeep.study import StudyResult
 from seakeep.study.judge import window_spans
 from seakeep.study.plan import windows_overlap
@@ -23,8 +23,8 @@ def waves(result: StudyResult) -> Section:
     """Return the waves that were tested, where they were measured, and their spectra."""
     figure = None
     if "spectra" in result.groups:
-        regular = bool(np.isfinite(result.groups["runs"]["wave_frequency"].values).any())
-        words = " Vertical lines: the regular waves." * regular
+        regular = np.isfinite(result.groups["runs"]["wave_frequency"]).any()
+        words = " Vertical lines: the regular waves." * bool(regular)
         figure = drawing("spectrum", spectrum_figure, result, regular=words)
     return section("waves", figure, *wave_tables(result))
 
@@ -35,14 +35,14 @@ def wave_tables(result: StudyResult) -> list[Table]:
     places = [
         (
             str(name),
-            str(channel.attrs.get("long_name", name)),
+            channel.attrs.get("long_name", name),
             number(channel.attrs["x_position"], 2),
             "yes" * (name in channels["name"]),
         )
         for name, channel in run.data_vars.items()
         if "x_position" in channel.attrs
     ]
-    frame = str(channels.attrs.get("frame", ""))
+    frame = channels.attrs.get("frame", "")
     spectra = result.groups.get("spectra", xr.Dataset())
     rows = [_wave_row(result, name) for name in result.prepared if spectra]
     return [table("waves", rows, **spectra.attrs), table("positions", places, frame=frame)]
@@ -52,8 +52,8 @@ def _wave_row(result: StudyResult, name: str) -> tuple[str, ...]:
     """Waves of a run: height, frequency, length and speed, and what they are used for."""
     at = result.groups["runs"].sel(run=name)
     frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
-    known = bool(np.isfinite(frequency + depth))
-    speed = float(phase_speed(2 * np.pi * frequency, depth)) if known else np.nan
+    known = np.isfinite(frequency + depth)
+    speed = phase_speed(2 * np.pi * frequency, depth) if known else np.nan
     # A sine has a height of 2√2 standard deviations, a sea one of 4.
     factor = np.sqrt(0.5) if np.isfinite(frequency) else 1.0
     spans = ", ".join(
@@ -63,8 +63,8 @@ def _wave_row(result: StudyResult, name: str) -> tuple[str, ...]:
     )
     return (
         name,
-        str(at["sea_state"].values) or str(at["waves"].values),
-        number(factor * float(result.groups["spectra"]["significant_height"].sel(run=name))),
+        at["sea_state"].item() or at["waves"].item(),
+        number(factor * result.groups["spectra"]["significant_height"].sel(run=name)),
         number(frequency),
         number(speed / frequency, 2),
         number(speed, 2),
@@ -96,17 +96,13 @@ def data(result: StudyResult) -> Section:
 
 APART = 0.005
 """Windows that share less than this part of their length are apart."""
-UNITS = {
-    **dict.fromkeys(("length", "split_period"), "T̂"),
-    **dict.fromkeys(("state_delays", "input_delays", "window", "lead"), "samples"),
-    **dict.fromkeys(("startup", "encounter_period"), "s"),
-}
+UNITS = WORDS["units"]
 """Units of settings, by the last part of their key."""
 
 
 def settings(result: StudyResult) -> Section:
     """Return settings, training sets and test windows."""
-    note = str(result.attrs.get("waves_note", ""))
+    note = result.attrs.get("waves_note")
     waves = f"Waves of the virtual tank: {note}." if note else ""
     models = [
         (
@@ -212,8 +208,7 @@ def _windows_table(result: StudyResult) -> Table:
         for run, begin, end in window_spans(result.tests[test])
     ]
     whole = f" (all of it: {every})" if every else ""
-    reads = float(result.attrs["longest_training"])
-    return table("windows", rows, reads=reads, whole=whole)
+    return table("windows", rows, reads=result.attrs["longest_training"], whole=whole)
 
 
 Spans = list[tuple[str, float, float]]
@@ -222,7 +217,7 @@ Spans = list[tuple[str, float, float]]
 def training_spans(result: StudyResult) -> list[Spans]:
     """Run, start and end (s) of each span of each training set."""
     training = result.groups["training"]
-    runs = [str(run) for run in training["of_run"].values]
+    runs = training["of_run"].values
     return [
         [(run, b, e) for run, b, e in zip(runs, *edges, strict=True) if np.isfinite(b)]
         for edges in zip(training["begin"].values, training["end"].values, strict=True)
@@ -270,7 +265,7 @@ def training_overlap(result: StudyResult) -> tuple[bool, str]:
     training = result.groups["training"]
     if result.settings["training"]["scheme"] != "halves" or "stop" not in training:
         return False, ""
-    period, length = (float(result.attrs[k]) for k in ("encounter_period", "longest_training"))
+    period, length = result.encounter_period, result.attrs["longest_training"]
     spans = [span for (span,) in training_spans(result)]
     runs, readers = result.groups["runs"], whole_readers(result)
     longest = float((runs["train_end"] - runs["train_begin"]).max())
@@ -316,7 +311,7 @@ def test_overlap(result: StudyResult) -> str:
 
 def finished(result: StudyResult) -> str:
     """Day and time at which the study was finished, as people read them."""
-    return f"{datetime.fromisoformat(str(result.attrs['created'])):%Y-%m-%d %H:%M:%S %Z}"
+    return f"{datetime.fromisoformat(result.attrs['created']):%Y-%m-%d %H:%M:%S %Z}"
 
 
 def versions(result: StudyResult) -> Section:

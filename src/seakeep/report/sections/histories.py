@@ -131,8 +131,7 @@ def write_histories(result: StudyResult) -> None:
 
 def _elevations(result: StudyResult) -> list[str]:
     """Inputs that are wave elevations."""
-    names = map(str, result.groups["channels"]["name"].values)
-    return [name for name in names if is_elevation(name)]
+    return list(filter(is_elevation, result.groups["channels"]["name"].values))
 
 
 def _shown(result: StudyResult) -> dict[str, tuple[float, str]]:
@@ -180,8 +179,7 @@ def _cell(
 
 def _waves(result: StudyResult, data: xr.Dataset, window: int) -> list[dict[str, Any]]:
     """Measured elevations at the instants of a window."""
-    run = result.prepared[str(data["run"].values[window])]
-    start = float(data["start"].values[window])
-    at = int(np.argmin(np.abs(run["time"].values - start))) + 1
+    run = result.prepared[data["run"].values[window]]
+    at = np.argmin(np.abs(run["time"].values - data["start"].values[window])) + 1
     part = slice(at, at + data.sizes["time"])
     return [pack(run[name].values[part]) for name in _elevations(result)]

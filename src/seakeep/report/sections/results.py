@@ -1,6 +1,7 @@
 """Results of a study: their summary in sentences, errors, bands and densities, and a glossary."""
 
 import re
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
@@ -25,6 +26,7 @@ from seakeep.report.sections.data import test_overlap, training_overlap, unequal
 from seakeep.report.style import HEADING, judged_models, model_words
 from seakeep.report.tables import (
     MISSING,
+    WORDS,
     Number,
     Table,
     band_verdict,
@@ -39,7 +41,6 @@ from seakeep.report.tables import (
     signed,
     small_number,
     table,
-    words,
 )
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
@@ -51,9 +52,9 @@ def summary(result: StudyResult) -> Section:
     shares, words = training_overlap(result)
     lost, repeats = (result.groups.get(key) for key in ("statistics/lost", "repeats"))
     notices = [
-        str(result.attrs.get("preparation_note", "")),
-        words_of_lost(lost) if lost is not None else "",
-        words_of_repeats(repeats) if repeats is not None else "",
+        result.attrs.get("preparation_note"),
+        words_of_lost(lost) if lost else "",
+        words_of_repeats(repeats) if repeats else "",
         _few_cells(result),
         words if shares else "",
         test_overlap(result),
@@ -62,7 +63,10 @@ def summary(result: StudyResult) -> Section:
     figures = [
         drawing(
             "first_history",
-            *(history_figure, result, *place, (name,)),
+            history_figure,
+            result,
+            *place,
+            (name,),
             channel=result.words_of(name).capitalize(),
             test=result.label_of(place[0]),
         )
@@ -84,7 +88,7 @@ def _tested(result: StudyResult) -> str:
     sets = result.groups["training"].sizes["training"]
     seas = [
         f"{result.label_of(test)} ({data.sizes['window']} windows of "
-        f"{float(data['time'].values[-1]) / period:.3g} T̂)"
+        f"{data['time'].values[-1] / period:.3g} T̂)"
         for test, data in result.tests.items()
     ]
     words = (
@@ -93,7 +97,7 @@ def _tested(result: StudyResult) -> str:
         "channels. Errors are in measured SDs of the window: 0 is perfect, 1 is no better than its "
         "mean."
     )
-    if condition := str(result.attrs.get("conditional_on", "")).replace("_", " "):
+    if condition := result.attrs["conditional_on"].replace("_", " "):
         words += (
             f" Every number is conditional on measured {condition}: the alignment of the waves "
             "reads it after the start of a forecast. It is no forecast in the strict sense."
@@ -154,7 +158,7 @@ def overview_table(result: StudyResult) -> Table:
 
 def conditional(result: StudyResult) -> str:
     """Sentence for tables whose forecasts read a measured output after the start."""
-    words = str(result.attrs.get("conditional_on", "")).replace("_", " ")
+    words = result.attrs.get("conditional_on", "").replace("_", " ")
     return f" Conditional on measured {words}." if words else ""
 
 
@@ -203,7 +207,7 @@ def _coverage_findings(result: StudyResult, model: str) -> list[str]:
     level = result.level
     at = {"test": first, "model": model, "against": "measured", "channel": "average"}
     row = result.groups["statistics/coverage"].sel(at)
-    inside = float(row["inside"].sel(band="members"))
+    inside = row["inside"].sel(band="members").item()
     words = band_verdict(inside, level)
     calibrated = ""
     if "calibrated" in row["band"] and np.isfinite(held := row["inside"].sel(band="calibrated")):
@@ -250,7 +254,6 @@ def _few_cells(result: StudyResult) -> str:
     )
 
 
-_LETTERS = {r"\theta": "θ", r"\phi": "φ", r"\psi": "ψ", r"\eta": "η"}
 _ACCENTS = {"dot": "\N{COMBINING DOT ABOVE}", "ddot": "\N{COMBINING DIAERESIS}"}
 
 
@@ -266,8 +269,8 @@ def plain_symbol(channel: str) -> str:
     if known is None:
         return channel.replace("_", " ")
     text = re.sub(r"\\mathrm\{([^}]*)\}|\\mathrm ?(\w+)", r"\1\2", known.symbol)
-    for tex, letter in _LETTERS.items():
-        text = text.replace(tex, letter)
+    greek = r"\\(theta|phi|psi|eta)"
+    text = re.sub(greek, lambda m: unicodedata.lookup(f"GREEK SMALL LETTER {m[1]}"), text)
     return re.sub(r"\\(d?dot)\{(\w)\}", lambda m: m[2] + _ACCENTS[m[1]], text)
 
 
@@ -290,7 +293,7 @@ def glossary(result: StudyResult) -> Section:
     }
     terms = [
         (term, meaning.format(**values))
-        for term, meaning in words()["terms"].items()
+        for term, meaning in WORDS["terms"].items()
         if not left_out.get(term)
     ]
     return section("words", terms=terms)
@@ -304,15 +307,30 @@ def errors(result: StudyResult) -> Section:
     """Return the errors of every model in every test set."""
     tests = list(result.tests)
     groups = [tests[:1], tests[1:]] if len(tests) <= 9 else [tests]
-    figures = []
-    for group in filter(None, groups):
-        words = {"tests": ", ".join(map(result.label_of, group)), "fewest": FEWEST}
-        words["name"] = f"errors_{group[0] if len(group) == 1 else 'others'}"
-        figures.append(drawing("errors", average_boxes, result, group, **words))
-    for test in tests:
-        words = {"tests": result.label_of(test), "fewest": FEWEST}
-        words["name"] = f"errors_{test}_by_channel"
-        figures.append(drawing("errors_by_channel", channel_boxes, result, test, **words))
+    figures = [
+        drawing(
+            "errors",
+            average_boxes,
+            result,
+            group,
+            tests=", ".join(map(result.label_of, group)),
+            fewest=FEWEST,
+            name=f"errors_{group[0] if len(group) == 1 else 'others'}",
+        )
+        for group in filter(None, groups)
+    ]
+    figures += [
+        drawing(
+            "errors_by_channel",
+            channel_boxes,
+            result,
+            test,
+            tests=result.label_of(test),
+            fewest=FEWEST,
+            name=f"errors_{test}_by_channel",
+        )
+        for test in tests
+    ]
     tables = (error_table(result, test) for test in tests)
     return section("errors", *figures, overview_table(result), *tables)
 
@@ -361,13 +379,13 @@ def _scales_table(result: StudyResult, test: str) -> Table:
     return by_channel(result, "scales", cells, heads, test=test)
 
 
-def regular(result: StudyResult) -> Section | None:
+def regular(result: StudyResult) -> Section:
     """Return the errors in regular waves, taken apart."""
     if (response := result.groups.get("statistics/response")) is None:
-        return None
-    tests = [str(test) for test in response["test"].values]
-    table = _response_table(result, tests)
-    return section("regular", table, more=[_slack_words(result, tests)])
+        return section("regular")
+    tests = response["test"].values.tolist()
+    more = [_slack_words(result, tests)]
+    return section("regular", _response_table(result, tests), more=more)
 
 
 def _response_table(result: StudyResult, tests: list[str]) -> Table:
@@ -381,7 +399,7 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
         cells = [result.words_of(of_model["channel"].item()), model_words(of_model["model"].item())]
         for at in entries(of_model, "test"):
             offset, *others = (float(at[f"error_{key}"]) for key in ("offset", "wave", "rest"))
-            total = float(np.sum(np.square([offset, *others])))
+            total = np.sum(np.square([offset, *others]))
             share = Number(f"{percent(offset**2 / total)} %") if total > 0 else MISSING
             cells += [*row(at, amplitude_ratio=2, phase_lead=signed, error_offset=2), share]
         rows.append(tuple(cells))
@@ -390,10 +408,10 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
 
 def _slack_words(result: StudyResult, tests: list[str]) -> str:
     """Name the lines that lose their load, run by run."""
-    runs = dict.fromkeys(str(run) for test in tests for run in result.tests[test]["run"].values)
+    runs = dict.fromkeys(run for test in tests for run in result.tests[test]["run"].values)
     slack = result.groups["runs"]["slack"].sel(run=list(runs), name=result.channels)
     listed = [
-        f"{result.words_of(str(line['name'].values))} in {percent(line)} % of {run}"
+        f"{result.words_of(line['name'].item())} in {percent(line)} % of {run}"
         for run in runs
         for line in slack.sel(run=run)
         if line >= SELDOM
@@ -413,7 +431,7 @@ def bands(result: StudyResult) -> Section:
     for model in result.ensembles if groups else ():
         for at in entries(groups.sel(model=model), "band"):
             at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
-            band = str(at["band"].values)
+            band = at["band"].item()
             kind = "calibrated " * (band == "calibrated")
             title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
             name = f"bands_{band}_{model}"
@@ -429,8 +447,8 @@ def _by_part(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Tabl
         inside = one["inside"]
         if inside.isnull().all():
             continue
-        least = inside[int(np.nanargmin(inside.values))]
-        named = result.words_of(str(least["channel"].values))
+        least = inside[np.nanargmin(inside.values)]
+        named = result.words_of(least["channel"].item())
         moving = one[["relative_width", "winkler", "crps"]].map(lambda x: x.where(np.isfinite(x)))
         means = row(moving.mean("channel"), relative_width=2, winkler=2, crps=2)
         covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
@@ -456,12 +474,12 @@ def _of_all(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table
 
 def age(result: StudyResult) -> Section:
     """Return the error over the age of a forecast."""
-    split = float(result.settings["statistics"]["split_period"])
+    split = result.settings["statistics"]["split_period"]
     trend = result.groups["statistics/trend"].sel(model=judged_models(result))
     rows = [
         (
             result.label_of(at["test"].item()),
-            BAND_WORDS[str(at["band"].values)],
+            BAND_WORDS[at["band"].item()],
             model_words(at["model"].item()),
             number(at["error_mean"].mean()),
             ratio_of(at).change(),
@@ -507,7 +525,10 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
     heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
     return by_channel(
         result,
-        *("coverage", cells, heads, more),
+        "coverage",
+        cells,
+        heads,
+        more,
         name=f"coverage_{prefix}{model}",
         kind=prefix.replace("_", " "),
         level=short(100 * level),
@@ -532,7 +553,7 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
         f" Calibrated: {words} on training data that the members had not read, in windows as long "
         "as the first test set's. "
     )
-    lengths = {test: float(each["length"]) for test, each in result.settings["tests"].items()}
+    lengths = {test: each["length"] for test, each in result.settings["tests"].items()}
     first = lengths[next(iter(result.tests))]
     others = [f"{result.label_of(k)} ({n:g} T̂)" for k, n in lengths.items() if n != first]
     if others:
@@ -555,10 +576,17 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
 
 def densities(result: StudyResult) -> Section:
     """Return densities of measurement and forecasts, and their divergence."""
-    figures = []
-    for model in result.ensembles or result.models[:1]:
-        words = {"name": f"densities_{model}", "model": model_words(model)}
-        figures.append(drawing("densities", density_figure, result, model, **words))
+    figures = [
+        drawing(
+            "densities",
+            density_figure,
+            result,
+            model,
+            name=f"densities_{model}",
+            model=model_words(model),
+        )
+        for model in result.ensembles or result.models[:1]
+    ]
     order = sorted(judged_models(result), key=lambda model: model not in result.ensembles)
     tables = (divergence_table(result, m, variant) for m in order for variant in VARIANTS)
     return section("densities", *figures, *tables)
@@ -577,7 +605,7 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
         yield from (small_number(one[key]) for key in keys)
         yield "" if of_all else number(one["block_length"], 0)
         if comparable:
-            yield from words()["published"].get(name, (MISSING,) * 4)
+            yield from WORDS["published"].get(name, (MISSING,) * 4)
 
     quantiles = ("EV", "q0.025", "q0.975", "U")
     heads = [*quantiles, "noise floor", "block (samples)"]
@@ -591,18 +619,19 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
         cells,
         [*heads, *published],
         " The paper's columns are of another vessel in another tank." * comparable,
-        test=str(data.attrs["test"]),
+        test=data.attrs["test"],
         name=f"jsd_{model}_{variant}",
         elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
-        folded=bool(result.ensembles) and model not in result.ensembles,
+        folded=model not in (result.ensembles or [model]),
         model=model_words(model),
         variant=variant,
         how=how,
     )
 
 
-def eigenvalues(result: StudyResult) -> Section | None:
+def eigenvalues(result: StudyResult) -> Section:
     """Return the eigenvalues of the models of the first training set."""
-    if not any(name.startswith("eigenvalues/") for name in result.groups):
-        return None
-    return section("eigenvalues", drawing("eigenvalues", eigenvalue_figure, result, lowest=LOWEST))
+    figure = None
+    if any(name.startswith("eigenvalues/") for name in result.groups):
+        figure = drawing("eigenvalues", eigenvalue_figure, result, lowest=LOWEST)
+    return section("eigenvalues", figure)
