@@ -76,7 +76,7 @@ def test_the_recommended_preset_uses_all_of_the_runs_and_exact_rows():
         lead=24,
         readouts="auto",
         select={
-            **dict.fromkeys(("observables", "alignment", "lead", "memory", "kind"), True),
+            **dict.fromkeys(("observables", "alignment", "lead", "memory"), True),
             "horizon": (15, 45),
             "period": 1.64,
         },

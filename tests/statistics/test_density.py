@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import gaussian_kde, norm
 
+from seakeep.core.density import bootstrapped_densities
 from seakeep.statistics import density_grid, kernel_bandwidth, kernel_density
 
 RNG = np.random.default_rng(0)
@@ -61,3 +62,16 @@ def test_the_mass_is_one_on_the_stated_grid():
     assert grid[0] == pytest.approx(low - 3 * h, rel=1e-14)
     # Three bandwidths beyond the last sample leave 0.13 % of its kernel outside.
     assert np.trapezoid(kernel_density(NORMAL, grid), grid) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_redraw_that_is_constant_has_the_bandwidth_of_its_series_beside_a_narrow_one():
+    slack = np.zeros(400)
+    slack[200:220] = np.linspace(1, 2, 20)
+    positions = np.array([np.arange(400), np.full(400, 5), np.r_[np.full(399, 5), 205]])
+    grid = density_grid(slack)
+    own = kernel_bandwidth(slack)
+    found = bootstrapped_densities(slack, positions, grid, "paper")
+    for density, where in zip(found, positions, strict=True):
+        h = kernel_bandwidth(slack[where]) if np.ptp(slack[where]) else own
+        exact = norm.pdf(grid[:, None], slack[where], h).mean(axis=1)
+        assert density == pytest.approx(exact, abs=rounding_of_bins(h))

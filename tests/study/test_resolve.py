@@ -110,15 +110,3 @@ def test_the_reference_period_of_each_run_counts_in_encounter_periods(centre, co
     own = {"state_delays": 4, "input_delays": 8, "ridge": 1.0, "centre": centre}
     table = {"states": ("heave",), "inputs": ("eta_fwd",), **own}
     assert counts_in_periods(ModelSettings.model_validate(table)) is counts
-
-
-@pytest.mark.parametrize(
-    ("stated", "chosen"),
-    [
-        ({}, True),
-        ({"kind": "hankel_dmdc"}, False),
-        ({"kind": "hankel_dmdc", "select": {"kind": True}}, True),
-    ],
-)
-def test_a_kind_that_is_stated_is_not_chosen(stated, chosen):
-    assert resolved(stated, preset="recommended").spec.select.kind == chosen

@@ -152,11 +152,12 @@ def _densities(ordered: FloatArray, times: IntArray, grid: FloatArray, h: FloatA
     points = int(fft.next_fast_len(grid.size + 2 * beyond, real=True))
     bins = points * fine
     if even and len(times) > 1 and len(times) * bins > MOST_BINS:  # room for few at a time
-        halves = np.array_split(np.arange(len(times)), 2)
-        return np.concatenate([_densities(ordered, times[k], grid, h[k]) for k in halves])
+        out = np.empty((len(times), grid.size))
+        for rows in np.array_split(np.argsort(h), 2):  # so that a narrow one slows few others
+            out[rows] = _densities(ordered, times[rows], grid, h[rows])
+        return out
     if not even or bins > MOST_BINS:
-        rows = (np.repeat(ordered, each) for each in times)
-        every = zip(rows, h, strict=True)
+        every = zip((np.repeat(ordered, each) for each in times), h, strict=True)
         return np.stack([gaussian_kde(x, width / x.std(ddof=1))(grid) for x, width in every])
     # Share each sample between the two nearest of fine bins, then convolve with the kernel.
     bin_width = span / (steps * fine)

@@ -13,7 +13,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray, whole_number
+from seakeep.arrays import FloatArray, whole_number
 from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
@@ -23,7 +23,7 @@ from seakeep.models.forecasts import Model, counted
 from seakeep.models.interface import Needs, Role, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs, common_step, mean_period
 from seakeep.models.linear import HankelDMDcModel, LinearKind, packed, unpacked
-from seakeep.models.readouts import FittedReadOut, ReadOuts
+from seakeep.models.readouts import ReadOuts
 from seakeep.models.selection import RIDGES, select
 from seakeep.models.settings import DelayRows, HankelSettings, RidgeScale, periods_to_samples
 from seakeep.models.store import unpack
@@ -166,7 +166,8 @@ class LinearSpec(LinearKind, Plain):
         named = as_runs(runs)
         spec = self.resolved_in(named, inputs)
         if self.ridge != "rollout":
-            return spec._fitted(until(named, stop), states, inputs)
+            data = gather(named, states, inputs, stop, spec)
+            return HankelDMDcModel.fitted(spec, data, spec.solve(data), named)
         read = named = until(named, stop)
         if spec.window is not None:  # what the model reads, and no more
             dt = common_step(named)
@@ -184,17 +185,6 @@ class LinearSpec(LinearKind, Plain):
         )
         model = replace(chosen.settings, window=spec.window).fit(named, states, inputs)
         return replace(model, selection=chosen.describe())
-
-    def _fitted(
-        self,
-        runs: Datasets,
-        states: Sequence[str],
-        inputs: Sequence[str],
-        readouts: tuple[FittedReadOut, ...] = (),
-    ) -> HankelDMDcModel:
-        """What settings that leave nothing to be chosen give of runs cut where training ends."""
-        data = gather(runs, states, inputs, None, self)
-        return HankelDMDcModel.fitted(self, data, self.solve(data), runs, readouts)
 
     def solve(self, data: TrainingData) -> Solution:
         """Coefficients on standardised deviations, shape (N, N(s+1) + n(z+1) + m)."""

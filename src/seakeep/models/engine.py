@@ -762,8 +762,8 @@ def member_series(
 
         def tell(done: int, of: int, what: str) -> None:
             if progress is not None:
-                number = parts[done - 1].stop
-                progress(number, total, f"member {number}")
+                number = min(parts[done - 1].stop, count)
+                progress(number, count, f"member {number}")
 
         computed = in_order(_run_members, (model, groups), parts, executor, tell)
         for part, every in zip(parts, computed, strict=True):

@@ -419,6 +419,7 @@ class HankelEnsemble(Model):
         # Weights take errors of all members, and what follows its surge is stepped together.
         if (windows.departures or windows.table is not None) and not self.identified:
             held = self.hold(executor=executor, progress=progress)
+            progress = None  # the rest is a small part
         with member_series(held, [windows, *windows.departures], executor, progress) as parts:
             if windows.departures:
                 runs, signature = [series for series, _ in parts], self.signature

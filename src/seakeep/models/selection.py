@@ -382,8 +382,7 @@ class Problem:
         delayed, direct = self.parts(candidate)
         models = self.models(candidate, levels, others or rest)
         states = data.signature.state_scale.physical(data.states[run])
-        if data.zeros:
-            states += data.zeros[run]
+        zeros: dict[int, FloatArray] = {}
         known: dict[int, FloatArray] = {}  # by start: a longer run begins with the shorter one
         every: dict[int, FreeRuns] = {}
         read = self.windows(run, horizons)
@@ -392,8 +391,11 @@ class Problem:
             if steps in read:
                 new, windows = read[steps]
                 last = windows.delayed.shape[1] - self.ahead(candidate)
+                if windows.zero is not None:
+                    zeros |= zip(new, data.zeros[run] - windows.zero, strict=True)
                 windows = replace(
                     windows,
+                    zero=None,  # read-outs are learnt from departures
                     delayed=windows.delayed[:, :last, delayed],
                     direct=windows.direct[..., direct[: windows.direct.shape[2]]],
                     table=None if windows.table is None else windows.table[..., delayed],
@@ -403,6 +405,8 @@ class Problem:
             if starts:
                 predicted = np.stack([known[at][:, :steps] for at in starts], axis=1)
                 measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
+                if zeros:
+                    measured += np.stack([zeros[at] for at in starts])[:, None]
                 every[steps] = FreeRuns(predicted, measured, models[0].state_scale.std)
         yield from (every[steps] for steps in horizons if steps in every)
 
@@ -741,8 +745,8 @@ def select(
     period : float, optional
         Encounter period, s; by default that of the runs.
     kinds : sequence of HankelSettings, optional
-        Other kinds of models, which take what they have of the settings that were chosen: one that
-        errs less, by more than the noise, is chosen.
+        Other kinds of models, which take what they have of the settings that were chosen. One that
+        errs less, by more than the noise, is named; it is chosen where `vary` names "kind".
     executor : Executor, optional
         Judges candidates and folds side by side; the result is the same.
     progress : callable, optional
@@ -1064,18 +1068,16 @@ def _rivalled(
     kinds: Sequence[HankelSettings],
     alike: float,
 ) -> tuple[Any, float, str]:
-    """A candidate and λ, of another kind where one errs less by more than the noise, in words too.
+    """A candidate and λ, of another kind where that is varied and better, and words on the better.
 
-    It is the best that does not grow. What a fit leaves open is not tried beside a model that only
-    its own surge makes good, which no other kind follows.
+    The better one is the best that errs less by more than the noise and does not grow.
     """
-    rest, words = search.at_rest(taken), ""
-    plain, limit = trials.made.get(rest), NEAR * trials.made[taken].best
-    if "kind" not in search.vary and (plain is None or plain.best > limit):
-        return taken, level, words
-    own = {key: value for key, value in vars(rest).items() if key != "ridge"}
+    # Beside a fit only the waves themselves are tried, which takes a hundredth of its time.
+    is_varied, words = "kind" in search.vary, ""
+    own = {"ridge"} if is_varied else {"ridge", "observables"}
+    plain = {key: v for key, v in vars(search.at_rest(taken)).items() if key not in own}
     both = replace(trials, made=dict(trials.made))
-    both.judge(each.having(**own) for each in kinds if search.given[2])
+    both.judge(each.having(**plain) for each in kinds if search.given[2])
     others = [each for each in both.made if each not in trials.made]
     for other in sorted(others, key=lambda each: both.made[each].best):
         if trials.made[taken].is_as_good_as(both.made[other]):
@@ -1086,9 +1088,10 @@ def _rivalled(
         if not problem.grows(other, own_level):
             score = both.made[other].at(own_level)
             words = f"; kind = '{other.kind}' errs {score:.3f}, less by more than the noise"
-            taken, level = other, own_level
+            taken, level = (other, own_level) if is_varied else (taken, level)
             break
-    trials.made.update(both.made)
+    if is_varied:
+        trials.made.update(both.made)
     return taken, level, words
 
 

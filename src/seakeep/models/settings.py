@@ -155,10 +155,6 @@ class Select:
     memory : bool, optional
         Whether they choose between the memory that is stated and one of eight encounter periods,
         unless the waves are carried to the predicted surge.
-    kind : bool, optional
-        Whether they choose a filter of the waves (:class:`seakeep.baselines.FIR`) of the same
-        input delays where it errs less by more than the noise. It is tried where a model that does
-        not follow its own surge errs at most half as much again as the best. An ensemble stays one.
     horizon : float or sequence of float, optional
         Lengths of the free runs, encounter periods.
     period : float, optional
@@ -177,14 +173,13 @@ class Select:
     alignment: bool = False
     lead: bool = False
     memory: bool = False
-    kind: bool = False
     horizon: tuple[float, ...] = (15.0, 45.0)
     period: float | None = None
     folds: Folds = "auto"
 
     def __post_init__(self) -> None:
         check_choice("select: folds", self.folds, FOLDS)
-        for name in (*OPENED, "kind"):
+        for name in OPENED:
             check_flag(f"select: {name}", getattr(self, name))
         given = self.horizon if isinstance(self.horizon, tuple | list) else (self.horizon,)
         for value in (*given, *(() if self.period is None else (self.period,))):
@@ -197,7 +192,7 @@ class Select:
     @property
     def opened(self) -> tuple[str, ...]:
         """Settings that are left open beside λ."""
-        return tuple(name for name in (*OPENED, "kind") if getattr(self, name))
+        return tuple(name for name in OPENED if getattr(self, name))
 
     @classmethod
     def of(cls, value: object) -> Self | None:

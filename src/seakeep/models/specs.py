@@ -151,9 +151,7 @@ class Choosing(HankelSettings, Generic[Fitted]):
         check_names(states, inputs)
         spec = self.resolved_in(named, inputs)
         central = spec.central(labelled.common_step(named))
-        how: dict[str, Any] = {"executor": executor, "progress": progress}
-        if spec.select is not None and spec.select.kind and not central.parameter:
-            how["kinds"] = (FIR(0),)
+        how: dict[str, Any] = {"kinds": (FIR(0),), "executor": executor, "progress": progress}
         return spec._adopt(settle(central, named, list(states), list(inputs), **how))
 
     def fit(
@@ -408,11 +406,11 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
             dispersion to the surge that the model predicts step by step, where surge is a state
             and the runs state water depth and positions of the probes.
             Observables (none, slow squares and powers of the elevations, or both), whether waves
-            are carried and read ahead at all, a memory of eight periods or none, a filter of the
-            waves (FIR) in the model's place, λ, and read-outs of the loads are chosen by free runs
-            of 15 and 45 periods on training runs that are held out in turn: the simplest that errs
-            at most 5 % more than the best, or is as good but for the noise. Where nothing can be
-            held out there are no observables, and λ is 1e-3 per snapshot pair.
+            are carried and read ahead at all, a memory of eight periods or none, λ, and read-outs
+            of the loads are chosen by free runs of 15 and 45 periods on training runs that are held
+            out in turn: the simplest that errs at most 5 % more than the best, or is as good
+            but for the noise. Where nothing can be held out there are no observables, and λ is
+            1e-3 per snapshot pair.
         """
         step = _step_of(dt, runs)
 
@@ -423,7 +421,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
             state_delays=samples(STATE_PERIODS),
             input_delays=samples(INPUT_PERIODS),
             lead=samples(look_ahead),
-            **_open_settings(encounter_period, kind=True),
+            **_open_settings(encounter_period),
         )
 
     def central(self, dt: float) -> HankelDMDc:
@@ -431,7 +429,7 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
         return self
 
     def _adopt(self, choice: Selected[HankelDMDc]) -> Selected[HankelDMDc]:
-        return replace(choice, settings=choice.settings.having(select=None))
+        return replace(choice, settings=replace(choice.settings, select=None))
 
     def variants(
         self,
@@ -665,8 +663,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
                 value = self.at(name, 1.0 - 1e-6)  # of a prior without an upper end
             values[name] = None if value is None else self.samples(name, value, dt)
         values["ridge"] = self.ridge if isinstance(self.ridge, str) else self.at("ridge", 0.5)
-        select = None if self.select is None else replace(self.select, kind=False)
-        return replace(self.shared(dt), **values, select=select)
+        return replace(self.shared(dt), **values, select=self.select)
 
     def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that its largest draw asks of its runs: the upper ends of the priors count."""
@@ -868,7 +865,7 @@ def left_open(spec: Spec) -> HankelDMDc | BayesianHankelDMDc | None:
     return spec if isinstance(spec, HankelDMDc | BayesianHankelDMDc) and spec.is_open else None
 
 
-def _open_settings(encounter_period: float, kind: bool = False) -> dict[str, Any]:
+def _open_settings(encounter_period: float) -> dict[str, Any]:
     """What both kinds of models that we recommend share; free runs choose in it."""
     return {
         "ridge": "rollout",
@@ -876,7 +873,7 @@ def _open_settings(encounter_period: float, kind: bool = False) -> dict[str, Any
         "ridge_scale": "per_snapshot",
         "alignment": ALIGNMENT,
         "readouts": "auto",
-        "select": Select(True, True, True, True, kind, period=encounter_period),
+        "select": Select(True, True, True, True, period=encounter_period),
     }
 
 

@@ -167,7 +167,7 @@ def resolve_model(
     )
     filled: Any = None
     if preset is not None:
-        filled = _filled(settings, preset, encounter_period, dt)
+        filled = getattr(kind, preset)(encounter_period, dt)
         # That of the preset is optional: windows of runs that allow none have no room for it.
         if "alignment" in known and (alignment or (not aligned and "alignment" not in stated)):
             filled = replace(filled, alignment=alignment)
@@ -223,15 +223,6 @@ def _kind_of(settings: ModelSettings) -> type[Spec]:
             f"Kinds: {', '.join(KINDS)}."
         )
     return KINDS[settings.kind]
-
-
-def _filled(settings: ModelSettings, preset: str, period: float | None, dt: float) -> Any:
-    """What a preset states; a kind that the table states is not chosen."""
-    filled: Any = getattr(_kind_of(settings), preset)(period, dt)
-    select = getattr(filled, "select", None)
-    if select is None or "kind" not in settings.model_fields_set:
-        return filled
-    return replace(filled, select=replace(select, kind=False))
 
 
 def _spec_of(
