@@ -169,6 +169,7 @@ CHANGES = (
     ("models/following.py", "back=round(BACK * period)", "back=round(0.5 * BACK * period)", "models/test_following.py::test_settings_know_the_history_that_carriers_read"),
     ("models/following.py", "np.tile([0, 1, 2], len(places))", "np.tile([2, 1, 0], len(places))", "models/test_readouts.py::test_the_wave_at_the_line_is_that_of_the_tank"),
     ("models/forecasts.py", '"diverged_at": lost, ', "", "models/test_stability.py::test_a_forecast_that_diverges_ends_in_nan_with_its_status"),
+    ("models/following.py", "enumerate(at) if each <= place]", "enumerate(at)]", "models/test_live.py::test_a_dead_probe_is_filled_by_no_more_than_waves"),
     ("models/growth.py", "return float((n + p) / (n - p))", "return 1.0", "models/test_live.py::test_errors_are_those_of_data_that_were_not_trained_on"),
     ("models/growth.py", "self.at(np.arange(1, steps + 1) + since) ** 2", "self.at(np.arange(steps) + 1) ** 2", "models/test_live.py::test_without_states_the_estimate_and_its_error_are_those_of_the_open_loop"),
     ("models/labelled.py", "*filter(is_elevation, inputs), *lengths", "*inputs", "models/test_selection.py::test_periods_are_counted_in_the_first_elevation"),

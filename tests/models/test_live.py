@@ -323,6 +323,19 @@ def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(models
     assert filled[1][1] < 0.5 * filled[0][1]
 
 
+def test_a_dead_probe_is_filled_by_no_more_than_waves(models, drift):
+    """Also the one up-wave, for which what it was filled by is read again and again."""
+    waves = table(drift, INPUTS)
+    for dead in range(2):
+        live = started(models["aligned"], drift)
+        lost = waves.copy()
+        lost[:, dead] = np.nan
+        for sample, states in zip(lost[START:], table(drift, STATES)[START:], strict=True):
+            live.step(sample, states)
+        filled = live._known_inputs()[-200:, dead]
+        assert np.abs(filled).max() < np.abs(waves[:, dead]).max()
+
+
 def test_skill_against_lead_time_is_that_of_forecasts_by_hand(models, drift):
     model, steps = models["plain"], 10
     spread, truth = model.state_scale.spread, table(drift, STATES)

@@ -172,7 +172,9 @@ class Following:
         return computed
 
     def foresight(self, run: xr.Dataset | None, count: int) -> tuple[FloatArray, tuple[int, ...]]:
-        """Filters that predict placed elevations from all of them, in the rig of a run.
+        """Filters that predict placed elevations, each from itself and those up-wave of it.
+
+        They are those of the rig of a run.
 
         Returns
         -------
@@ -183,9 +185,14 @@ class Following:
         """
         rig, placed = self.alignment.rig(run), self._placed
         at = [rig.positions[column] or 0.0 for column in placed]
-        leads = np.repeat(np.arange(1, count + 1), len(at))
-        taps, _ = self._carriers(rig, placed, np.tile(at, count), 0, leads)
-        return taps.reshape(count, len(at), *taps.shape[1:]), placed
+        taps = np.zeros((count, len(at), len(at), self.back + 1))
+        for probe, place in enumerate(at):
+            # What a probe down-wave adds makes filters that grow once they read what they filled.
+            read = [k for k, each in enumerate(at) if each <= place]
+            columns, leads = [placed[k] for k in read], np.arange(1, count + 1)
+            own, _ = self._carriers(rig, columns, np.full(count, place), 0, leads)
+            taps[:, probe, read] = own
+        return taps, placed
 
     def lines(
         self, run: xr.Dataset | None, places: tuple[float, ...]
