@@ -15,6 +15,7 @@ from seakeep.hosts import start_rows
 
 DT, PERIOD = 0.1, 8  # s, samples
 STATES, INPUTS = ["surge", "load"], ["eta", "wave probe"]
+POWERS = (Powers("eta", (2,)),)
 OBSERVABLES = (
     SlowSquares(("eta", "wave probe"), orders=(0, 1, 2), lags=(0, 1), period=PERIOD * DT),
     Powers("eta"),
@@ -70,6 +71,7 @@ def cases():
         "full": full,
         "short": short,
         "arx": ARX(0, 0).fit(runs, STATES, INPUTS),
+        "powers": HankelDMDc(3, 6, 1.0, observables=POWERS).fit(runs, STATES, INPUTS),
         "autonomous": HankelDMDc(4, 0, 1.0, delay_rows="exact").fit(runs, STATES, []),
         "unstable": replace(short, coefficients=1.3 * short.coefficients),
     }

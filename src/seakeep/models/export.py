@@ -148,7 +148,7 @@ def _shifted(rows: list[dict[tuple[int, int], float]], inputs: int) -> dict[str,
             row[at] = weight
     size = length * inputs
     return {
-        "A": sparse.eye_array(size, k=-inputs, format="csc"),
+        "A": sparse.eye_array(size, k=-min(inputs, size), format="csc"),
         "B": sparse.eye_array(size, inputs, format="csc"),
         "C": weights[:, 1:].reshape(len(rows), size),
         "D": weights[:, 0],
