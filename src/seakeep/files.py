@@ -367,6 +367,11 @@ def read_sealed(path: Path | str) -> io.BytesIO:
     file = read_bytes(path)
     at = max(file.rfind(b"seakeep ", -len(_seal_before(memoryview(b"")))), 0)
     content, stated = memoryview(file)[:at], file[at:]
+    if file and not file.startswith((b"\x89HDF", b"CDF")):
+        raise DataError(
+            f"{path} is no NetCDF file, as seakeep writes. Name one that it wrote, such as "
+            "model.nc of seakeep fit; runs are described by a campaign file."
+        )
     if stated not in (_seal_of(content), *([] if SEAL in stated else [_seal_before(content)])):
         why = "its checksum is another one" if at else "it has no checksum at its end"
         raise DataError(

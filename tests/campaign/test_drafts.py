@@ -71,6 +71,13 @@ def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path):
     assert "# Hz; guessed: about 32 samples per wave of 0.6 s, the shortest" in text
 
 
+def test_a_draft_without_waves_says_so(tmp_path):
+    path = regular(tmp_path, "a", 1.6)
+    path.write_text(path.read_text("utf-8").replace("WP fwd", "CH7"), "utf-8")
+    text, _ = drafted(tmp_path, [path])
+    assert "inputs = [] # CORRECT IT: no name tells the waves" in text
+
+
 def test_motions_are_the_states_and_loads_are_named_beside_them(tmp_path):
     columns = tank_columns()
     columns["Tension_SB [N]"] = columns["Heave [mm]"]

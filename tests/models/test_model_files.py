@@ -28,6 +28,9 @@ def test_a_truncated_file_is_refused(saved, part):
 
 
 def test_a_file_of_another_kind_is_named(run, saved, tmp_path):
+    (tmp_path / "run.csv").write_text("t,heave\n0,1\n")
+    with pytest.raises(DataError, match=r"run\.csv is no NetCDF file, as seakeep writes"):
+        load_model(tmp_path / "run.csv")
     write_netcdf(tmp_path / "table.nc", run)
     write_sealed(run, tmp_path / "run.nc", "prepared run")
     for name, kind in (("table", "table"), ("run", "prepared run")):

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import warnings
 
 import numpy as np
@@ -69,6 +70,19 @@ def test_runs_that_train_and_test_apart(halves):
     alone = campaign(halves, EXACT, train)
     with pytest.raises(RequestError, match="no run of the campaign tests a model"):
         compare(fit_campaign(alone), alone)
+
+
+def test_a_model_of_other_channels_and_one_that_nothing_drives_are_said(halves):
+    whole = campaign(halves, EXACT)
+    model = fit_campaign(whole)
+    (halves / "campaign.toml").write_text(whole.path.read_text().replace("eta_fwd", "eta_1"))
+    other = seakeep.read_campaign(halves / "campaign.toml")
+    with pytest.raises(RequestError, match=r"no channel 'eta_fwd'\. Did you mean 'eta_1'"):
+        compare(model, other)
+    text = re.sub(r"inputs = .*", "inputs = []", whole.path.read_text())
+    (halves / "campaign.toml").write_text(text)
+    with pytest.warns(SeakeepWarning, match="the model has no inputs: .* no waves drive"):
+        fit_campaign(seakeep.read_campaign(halves / "campaign.toml"))
 
 
 ENSEMBLE = """

@@ -387,7 +387,10 @@ def _model(guesses: Guesses) -> Iterator[str]:
     if loads:
         yield f"""# Loads ({", ".join(loads)}) may be added to the states: they are read off the
 # motions where a line goes slack and that is better. Judge their extremes."""
-    yield f"""inputs = {_value(inputs)} # guessed: the waves that drive it
+    said = "guessed: the waves that drive it"
+    if not inputs:
+        said = "CORRECT IT: no name tells the waves; without inputs nothing drives the model"
+    yield f"""inputs = {_value(inputs)} # {said}
 # kind = 'bayesian_hankel_dmdc' # an ensemble: its forecasts have a band"""
     if behind:
         yield f"# {', '.join(behind)} left out: behind the vessel, by name, where its own waves are"

@@ -97,8 +97,8 @@ def read(path: str | Path) -> xr.Dataset:
     source = Path(path)
     if source.suffix.lower() == ".toml":
         raise RequestError(
-            f"{source} is a campaign file, and a model file is expected here. The model comes "
-            "first: seakeep compare MODEL.nc CAMPAIGN.toml."
+            f"{source} is a campaign file, and a model file is expected here: the model comes "
+            "first, and then the campaign."
         )
     try:
         return load_sealed(source, MODEL)

@@ -29,7 +29,7 @@ from seakeep.errors import DataError, RequestError, warn
 from seakeep.models import Model, is_ensemble
 from seakeep.models.calibration import Band
 from seakeep.models.forecasts import status_text
-from seakeep.models.labelled import channel_matrix
+from seakeep.models.labelled import channel_matrix, check_channels
 from seakeep.models.live import Servable, held_samples
 from seakeep.models.registry import is_linear
 from seakeep.signals import encounter_period
@@ -251,6 +251,8 @@ def compare_models(
     check_alike(models)
     used = list(dict.fromkeys(c for m in models.values() for c in (*m.states, *m.inputs)))
     prepared = load_prepared(campaign, names=wanted, progress=progress, channels=used)
+    for name, run in prepared.items():
+        check_channels(run, used, name)
     known_runs = list(prepared.values())
     first = None if start is None else instant_of(start, campaign, known_runs, "start")
     history = max(model.history_samples for model in models.values())

@@ -131,6 +131,11 @@ def fit_campaign(
             f"forecasts of this model read the waves up to {latest:.3g} s after the instant that "
             "they forecast: it needs these waves ahead of time."
         )
+    if not settings.inputs and identified.settings.role == "model":
+        warn(
+            "the model has no inputs: it continues the states from themselves, and no waves drive "
+            "it. Name the channels of the waves in inputs of [model]."
+        )
     if spec.standardize:
         _warn_of_slow_model(identified, runs)
     single: Any = identified.centre if is_ensemble(identified) else identified

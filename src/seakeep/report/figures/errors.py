@@ -361,7 +361,7 @@ def tuning_figure(table: xr.Dataset) -> Figure:
     Figure
         One line per candidate with its 95 % intervals; the choice is marked.
     """
-    keys = ("observables", "lead", "state_delays", "input_delays", "alignment", "memory")
+    keys = ("kind", "observables", "lead", "state_delays", "input_delays", "alignment", "memory")
     varied = [key for key in keys if len(np.unique(table[key].values)) > 1]
     names = [
         ", ".join(f"{key.replace('_', ' ')} {table[key].values[row]}" for key in varied) or "error"
