@@ -11,6 +11,7 @@ python benchmarks/live.py chain MODEL.nc CAMPAIGN.toml RUN    # live chain again
 import resource
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -147,7 +148,7 @@ def _served(model, run, steps, starts):
     u = np.stack([run[each].values for each in model.signature.inputs], axis=1)
     y = np.stack([run[each].values for each in model.signature.states], axis=1)
     placed, alone = model.live(like=run), model.live(like=run)
-    alone._places = np.full(u.shape[1], np.nan)  # as if no position were known
+    alone._foreseen = partial(alone._foreseen, positions=np.nan)  # as if none were known
     lives = {"known": placed, "probe up-wave": placed, "each probe alone": alone}
     sums = {words: np.zeros((2, steps, y.shape[1])) for words in lives}
     last = len(y) - steps - model.signature.lead_samples - 60

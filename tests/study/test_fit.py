@@ -72,6 +72,19 @@ def test_runs_that_train_and_test_apart(halves):
         compare(fit_campaign(alone), alone)
 
 
+def test_a_state_that_was_not_measured_is_named(halves):
+    table = pd.read_csv(halves / "run.csv")
+    model = fit_campaign(campaign(halves, EXACT))
+    table.loc[1500:1540, "z [m]"] = np.nan
+    table.to_csv(halves / "run.csv", index=False)
+    masked = "\n[preparation]\ngaps = 'mask'\n"
+    message = r"all: heave was not measured at 41 of 1000 instants"
+    gap = pytest.warns(SeakeepWarning, match="heave missing: 41 samples")
+    with gap, pytest.warns(SeakeepWarning, match=message):
+        (judged,) = compare(model, campaign(halves, EXACT + masked))
+    assert np.isnan(judged.anrmse)
+
+
 def test_a_model_of_other_channels_and_one_that_nothing_drives_are_said(halves):
     whole = campaign(halves, EXACT)
     model = fit_campaign(whole)

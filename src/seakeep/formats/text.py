@@ -397,7 +397,10 @@ def _number(cell: str, decimal: str) -> float | None:
 
 def _mend(cell: str) -> str:
     if re.search(r"\d[-/:]\d", cell):
-        return "Write dates and clock times as seconds from the start of the run."
+        return (
+            "Write dates and clock times as seconds from the start of the run, or leave the column "
+            "out and state sampling_rate (Hz) in [files]."
+        )
     if re.search(r"\d([.,' ])\d{3}(\1\d{3}|[.,]\d)*\b", cell):
         return "If its mark divides thousands, export the file without such marks."
     return (

@@ -328,6 +328,13 @@ def _judged(model: Model, run: xr.Dataset, name: str, forecast: xr.Dataset) -> C
             f"{end:g} s. Choose an earlier start or more steps."
         )
     there = run.sel({"time": inside["time"]})
+    for state in model.states:
+        if gone := int(there[state].isnull().sum()):
+            warn(
+                f"{name}: {state} was not measured at {gone} of {known} instants of the forecast, "
+                "and is not judged. Fill the gap in [preparation], or choose another start or "
+                "fewer steps."
+            )
     has_band = "statistic" in inside.dims
     return Comparison(
         run=name,
