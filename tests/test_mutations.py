@@ -10,7 +10,8 @@ HERE = Path(__file__).parent
 def test_lines_and_tests_of_all_changes_exist():
     changes = runpy.run_path(str(HERE / "mutations.py"))["CHANGES"]
     stale, names = [], {}
-    for file, old, _, tests in changes:
+    every = [(file, *row) for file, rows in changes.items() for row in rows]
+    for file, old, _, tests in every:
         path = HERE.parent / "src/seakeep" / file
         if not path.exists() or path.read_text("utf-8").count(old) != 1:
             stale.append((file, old))
@@ -23,4 +24,4 @@ def test_lines_and_tests_of_all_changes_exist():
             if name not in names[place]:
                 stale.append((place, name))
     assert not stale, f"correct the table of tests/mutations.py: {stale}"
-    assert len({change[:3] for change in changes}) == len(changes)
+    assert len({change[:3] for change in every}) == len(every)
