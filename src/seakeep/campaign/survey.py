@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from seakeep.arrays import Progress
 from seakeep.campaign.pipeline import (
     Run,
@@ -25,11 +27,13 @@ from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, w
 from seakeep.signals.synchronisation import without_doubtful_drift
 from seakeep.signals.waves import energy_period
 
-NOISY = 1.15
+NOISY = 1.2
 """Part by which the count may grow once crossings lower than a tenth of the SD are left out.
 
-It grows by 5 to 10 % in Pierson-Moskowitz and JONSWAP seas, and by 25 to 37 % with white noise of
+It grows by 5 to 10 % in Pierson-Moskowitz and JONSWAP seas, and by 24 to 37 % with white noise of
 a twentieth of their SD, which takes 17 to 23 % off the count."""
+FEW = 40
+"""Waves of which a few that are low may be a fifth."""
 Failures = dict[str, SeakeepError]
 """Errors by run: a run that cannot be read must not stop the others."""
 
@@ -211,7 +215,12 @@ def _period(run: Run, channel: str) -> tuple[float, float, float]:
     series = series[used] if used.sum() > 2 else series
     try:
         stated = run.settings.campaign.period_hysteresis
-        counted, steady = (encounter_period(series, step, h) for h in (stated, max(stated, 0.1)))
+        counted = encounter_period(series, step, stated)
+        steady = counted
+        if series.size * step > FEW * counted:
+            # A spike would make the SD so large that no wave is left.
+            clipped = np.clip(series, *np.quantile(series, [0.001, 0.999]))
+            steady = encounter_period(clipped, step, max(stated, 0.1))
     except DataError as error:
         raise DataError(f"run '{run.name}', channel '{channel}': {error}") from None
     return counted, energy_period(series[waves_part(series, step)], step), steady
