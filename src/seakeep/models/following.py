@@ -172,9 +172,7 @@ class Following:
         return computed
 
     def foresight(self, run: xr.Dataset | None, count: int) -> tuple[FloatArray, tuple[int, ...]]:
-        """Filters that predict placed elevations, each from itself and those up-wave of it.
-
-        They are those of the rig of a run.
+        """Filters, in the rig of a run, that predict placed elevations from those up-wave and itself.
 
         Returns
         -------
