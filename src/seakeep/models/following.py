@@ -172,7 +172,7 @@ class Following:
         return computed
 
     def foresight(self, run: xr.Dataset | None, count: int) -> tuple[FloatArray, tuple[int, ...]]:
-        """Filters, in the rig of a run, that predict placed elevations from those up-wave and itself.
+        """Filters that predict placed elevations from themselves and those up-wave, in a rig.
 
         Returns
         -------
