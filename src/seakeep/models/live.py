@@ -209,7 +209,7 @@ class Live:
         # Samples after an instant whose input is needed before its estimate is final.
         self._ahead = signature.lead_samples
         # Of a model that follows its own surge: the map with its carriers in this rig, and filters
-        # that predict the probes from one another; rows at all places of the samples to come.
+        # that predict each probe from those up-wave too; rows at all places of the samples to come.
         self._table = (0, np.empty(0))
         self._foresight: tuple[FloatArray, tuple[int, ...]] | None = None
         if self._follows is not None:

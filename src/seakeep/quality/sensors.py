@@ -236,7 +236,7 @@ def compare_sensors(
     trusted: npt.ArrayLike,
     dt: float,
     window: float | None = None,
-    stuck_samples: BoolArray | None = None,
+    stuck_samples: npt.ArrayLike | None = None,
     step: float = np.nan,
 ) -> Agreement:
     """Compare a sensor with a trusted one of the same motion, window by window.
@@ -277,7 +277,7 @@ def compare_sensors(
     length = 4 * period if window is None else window
     if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
         return nothing
-    stuck = np.zeros(x.size, bool) if stuck_samples is None else stuck_samples
+    stuck = np.zeros(x.size, bool) if stuck_samples is None else np.asarray(stuck_samples, bool)
     windows, motion, gain = _windows(x, y, dt, length, period, stuck)
     if not windows.lag.size:
         return nothing

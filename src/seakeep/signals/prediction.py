@@ -149,7 +149,7 @@ def foresee(
         expected[:, column] = values.mean() + continued(deviations, whitening, number)
         departures[column, :, column] = scipy.signal.lfilter([1.0], whitening, first)
 
-    places = np.broadcast_to(positions, channels)
+    places = np.broadcast_to(np.asarray(positions, dtype=float), channels)
     order = np.argsort(places)[: np.isfinite(places).sum()].tolist()
     for column in set(range(channels)) - set(order[1:]):
         follow(column, array[:, column])

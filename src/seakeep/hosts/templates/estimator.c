@@ -40,7 +40,7 @@ enum {
 static const int waves[] = { {% for q in range(Q) %}{{ 1 if q in waves else 0 }}, {% endfor %}0 };
 static const int wave[] = { {% for q in waves %}{{ q }}, {% endfor %}0 };
 {% if foresight %}
-/* Weights that predict placed probes from one another: row, probe, probe, sample, oldest first. */
+/* Weights that predict placed probes from themselves and those up-wave: row, probe, probe, sample, oldest first. */
 {{ array("foresight", foresight[0]) -}}
 {{ array("input_mean", means) }}
 static const int placed[] = { {{ foresight[1] | join(", ") }} };
