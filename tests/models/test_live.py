@@ -339,18 +339,20 @@ def test_a_dead_probe_is_filled_by_no_more_than_waves(models, drift):
 def test_skill_against_lead_time_is_that_of_forecasts_by_hand(models, drift):
     model, steps = models["plain"], 10
     spread, truth = model.state_scale.spread, table(drift, STATES)
+    truth[START + 5, 1] = np.nan  # not measured, and not judged
     span = tuple(float(drift.time[at]) for at in (START, START + 1 + steps))
-    found = nowcast(model, drift.assign_attrs(test_span=span), steps)
+    known = drift.assign({n: ("time", truth[:, k], drift[n].attrs) for k, n in enumerate(STATES)})
+    found = nowcast(model, known.assign_attrs(test_span=span), steps)
     assert found.attrs["starts"] == 2
-    squares, claimed, inside = np.zeros((3, steps, len(STATES)))
+    judged = []
     live = started(model, drift)
     for at in (START, START + 1):
         play(live, drift, at, at + 1)
         forecast, measured = live.forecast(steps), truth[at + 1 : at + 1 + steps]
-        squares += ((mean(forecast) - measured) / spread) ** 2 / 2
-        claimed += (std(forecast) / spread) ** 2 / 2
         held = (mean(forecast, "lower") <= measured) & (measured <= mean(forecast, "upper"))
-        inside += 50 * held
+        squares = ((mean(forecast) - measured) / spread) ** 2, (std(forecast) / spread) ** 2
+        judged.append(np.where(np.isfinite(measured), [*squares, 100.0 * held], np.nan))
+    squares, claimed, inside = np.nanmean(judged, axis=0)
     np.testing.assert_allclose(found.error, np.sqrt(squares), rtol=1e-12)
     np.testing.assert_allclose(found.claimed, np.sqrt(claimed), rtol=1e-12)
     np.testing.assert_array_equal(found.coverage, inside)

@@ -138,6 +138,8 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
     assert changes.rows[1] == ("theirs", "0.200", "2 times", "2 to 2 times", "worse")
     assert winner(table, {"theirs": "fir"}) == "Least error: ours, ANRMSE 0.100."
     turned = difference_table(dict(reversed(found.items())))
+    nothing = table.assign(all_anrmse=np.nan * table["all_anrmse"])
+    assert winner(nothing, {}) == "No model could be judged."
     told = winner(turned, {})
     assert told == "Least error: ours, ANRMSE 0.100, −50 % [−50 to −50 %] from theirs."
     unsure = turned.assign(all_upper=abs(turned["all_upper"]))

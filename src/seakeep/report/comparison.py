@@ -162,6 +162,8 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
 
     The table is that of :func:`seakeep.study.difference_table`; `baselines` are kinds by name.
     """
+    if not np.isfinite(table["all_anrmse"]).any():
+        return "No model could be judged."
     best = table.isel(model=table["all_anrmse"].fillna(np.inf).argmin("model"))
     name, first = (each["model"].item() for each in (best, table.isel(model=0)))
     said = f"Least error: {name}, ANRMSE {number(best['all_anrmse'])}"

@@ -773,7 +773,7 @@ def nowcast(model: Servable, run: xr.Dataset, steps: int, *, level: float = 0.95
     y = channel_matrix(run, signature.states, name)
     spread = signature.state_scale.spread
     live = model.live(like=run)
-    squares, claimed, inside = np.zeros((3, steps, len(spread)))
+    squares, claimed, inside, judged = np.zeros((4, steps, len(spread)))
     for at in range(last + 1):
         live.step(u[at], y[at])
         if at in starts:
@@ -781,17 +781,20 @@ def nowcast(model: Servable, run: xr.Dataset, steps: int, *, level: float = 0.95
             statistics = np.stack([forecast[each].values for each in signature.states], axis=-1)
             mean, std, lower, upper = statistics
             truth = y[at + 1 : at + steps + 1]
-            squares += ((mean - truth) / spread) ** 2
-            claimed += (std / spread) ** 2
+            known = np.isfinite(truth)
+            squares += np.where(known, ((mean - truth) / spread) ** 2, 0.0)
+            claimed += np.where(known, (std / spread) ** 2, 0.0)
             inside += (lower <= truth) & (truth <= upper)
-    error = np.sqrt(squares / len(starts))
+            judged += known
+    judged[judged == 0] = np.nan
+    error = np.sqrt(squares / judged)
     over, sd = ("lead", "channel"), {"units": "training SD"}
     leads = signature.dt * np.arange(1, steps + 1)
     return xr.Dataset(
         {
             "error": (over, error, sd),
-            "claimed": (over, np.sqrt(claimed / len(starts)), sd),
-            "coverage": (over, 100.0 * inside / len(starts), {"units": "%"}),
+            "claimed": (over, np.sqrt(claimed / judged), sd),
+            "coverage": (over, 100.0 * inside / judged, {"units": "%"}),
             "lead_time": ("channel", signature.dt * held_samples(error <= SHARE), {"units": "s"}),
         },
         coords={
