@@ -7,7 +7,7 @@ import pytest
 from matrices import Problem
 
 from seakeep.core import solve, training_window
-from seakeep.core.solve import GRAM_LIMIT, REFINED_LIMIT
+from seakeep.core.solve import CORRECTED_LIMIT, GRAM_LIMIT, REFINED_LIMIT
 
 LONG, WIDE, SQUARE = (1, 1, 40), (9, 19, 6), (4, 9, 20)
 """Delays of two states and one input, and columns: 6, 40 and 20 regressors."""
@@ -46,10 +46,7 @@ def largest_squared(y):
 @pytest.mark.parametrize("shape", [LONG, WIDE, SQUARE])
 @pytest.mark.parametrize("part", [1.01e-6, 1e-3, 1.0])
 @pytest.mark.parametrize("all_rows", [True, False])
-def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(
-    shape, part, all_rows, monkeypatch
-):
-    monkeypatch.setattr(solve, "PART", 7)  # residuals are summed over several parts
+def test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen(shape, part, all_rows):
     made = linear(shape)
     ridge = part * largest_squared(made.matrices()[0])
     chosen = made.solved(ridge, all_rows=all_rows)
@@ -81,8 +78,17 @@ def test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below(sha
     assert made.solved(0.0, all_rows=all_rows).method == "svd"
 
 
-@pytest.mark.parametrize("part", [1.01 * REFINED_LIMIT, 1e-9, 0.99 * GRAM_LIMIT])
-def test_corrections_give_newest_rows_the_accuracy_of_singular_values(part):
+@pytest.mark.parametrize(
+    ("part", "digits"),
+    [
+        (1.01 * REFINED_LIMIT, 10),
+        (1e-9, 10),
+        (0.99 * CORRECTED_LIMIT, 10),
+        (1.01 * CORRECTED_LIMIT, 8),
+    ],
+)
+def test_corrections_give_newest_rows_the_accuracy_of_singular_values(part, digits, monkeypatch):
+    monkeypatch.setattr(solve, "PART", 7)  # residuals are summed over several parts
     made = linear((3, 4, 200))
     # Twice summed noise is smooth: singular values of its delays spread over five decades.
     made = replace(made, inputs=[made.inputs[0].cumsum(axis=0).cumsum(axis=0)])
@@ -92,8 +98,10 @@ def test_corrections_give_newest_rows_the_accuracy_of_singular_values(part):
     svd = made.solved(part * trace, all_rows=False, method="svd").coefficients
     assert found.method == "primal"
     # Singular values of regressors of condition 3e5 (the root of 1 / REFINED_LIMIT) leave ten
-    # digits; without corrections the least λ leaves six.
-    np.testing.assert_allclose(found.coefficients, svd, rtol=0, atol=1e-10 * np.abs(svd).max())
+    # digits; without corrections the least λ leaves six. From CORRECTED_LIMIT on there are none,
+    # and a condition number of 3e7 leaves eight digits of sixteen.
+    atol = 10.0**-digits * np.abs(svd).max()
+    np.testing.assert_allclose(found.coefficients, svd, rtol=0, atol=atol)
     assert made.solved(0.99 * REFINED_LIMIT * trace, all_rows=False).method == "svd"
 
 

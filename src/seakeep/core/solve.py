@@ -7,8 +7,8 @@ is chosen by shape and conditioning:
   :math:`G = X' (Y^T Y + \lambda I)^{-1} Y^T`, the same matrix, whichever is less work;
 * singular values, where forming a Gram matrix would square away the accuracy: the effective λ is
   below 1e-6 of the largest squared singular value, or λ = 0 (minimum norm), or a rank is given.
-  Where the newest rows alone are regressed, corrections by residuals of the data bring the primal
-  form back to their accuracy, down to 1e-11.
+  Where the newest rows alone are regressed, the primal form serves down to 1e-11: below 3e-8,
+  corrections by residuals of the data bring it back to their accuracy.
 
 All rows of the next extended state need rows of the inverse of :math:`M = C + \lambda I`. Let Z
 move the lags down by one, newest first, filling with zeros. The recursion of the Gram matrix says
@@ -65,8 +65,12 @@ GRAM_LIMIT = 1e-6
 
 Its condition number is then below 1e6, and ten digits are left of sixteen."""
 
+CORRECTED_LIMIT = 3e-8
+"""λ, as a part of the trace, from which the newest rows need no corrections.
+
+Eight digits are left at least, ten on the virtual tank."""
 REFINED_LIMIT = 1e-11
-"""The same where residuals correct the coefficients.
+"""Least λ, as a part of the trace, where residuals correct the coefficients.
 
 Each correction gains four digits or more, up to those of singular values."""
 CORRECTIONS = 2
@@ -300,7 +304,7 @@ class _Delayed:
         if self.all_rows:
             return _all_rows(system, factor, ridge)
         solution = solve_rows(factor, system.right)
-        if ridge >= GRAM_LIMIT * self.trace:
+        if ridge >= CORRECTED_LIMIT * self.trace:
             return solution
         # λ is small: residuals of the data correct what the Gram matrix lost.
         for _ in range(CORRECTIONS):
