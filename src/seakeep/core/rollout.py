@@ -233,7 +233,7 @@ def _propagator(
     a: FloatArray, b: Arrays, count: int, channels: tuple[int, ...], windows: int, steps: int
 ) -> _Propagator:
     """The propagator that costs least; of one step where a longer one overflows."""
-    if len(a) == count < a.shape[1]:
+    if len(a) == count and (a.shape[1] > count or not a.any()):  # of a filter A is zero
         propagator = _shifting_propagator(a, b, channels, _shifting_steps(count, steps))
         if np.isfinite(propagator.output_state).all():
             return propagator
