@@ -5,9 +5,11 @@ python benchmarks/live.py service CAMPAIGN.toml                   # what `recomm
 python benchmarks/live.py bands CAMPAIGN.toml [KIND [STARTS]]     # errors and bands; KIND of SPECS
 python benchmarks/live.py higher CAMPAIGN.toml HIGHER.toml        # bands in seas that did not train
 python benchmarks/live.py lost CAMPAIGN.toml                      # filling of lost samples of waves
+python benchmarks/live.py outage CAMPAIGN.toml [KIND [STARTS]]    # forecasts after lost samples
 python benchmarks/live.py chain MODEL.nc CAMPAIGN.toml RUN    # live chain against the offline one
 """
 
+import copy
 import resource
 import sys
 import time
@@ -215,6 +217,64 @@ def lost(campaign, gaps=100):
         print(f"{words}: SD at 1 and 16 samples {error[[0, -1]].round(3).tolist()}, {spent:.0f} ms")
 
 
+OUTAGES = {
+    "nothing": (0, 0, False),
+    "2 samples": (2, 0, False),
+    "20 samples": (20, 0, False),
+    "40 samples": (40, 0, False),
+    "80 samples": (80, 0, False),
+    "80 samples of waves": (80, 0, True),
+    "40 samples, then 20 of waves": (40, 20, False),
+}
+"""Samples without waves, then with them; and whether states are measured in the first ones."""
+
+
+def outage(campaign, kind="recommended", starts=40):
+    """Errors and bands of forecasts after lost samples, in a run by a model of the others."""
+    read = seakeep.read_campaign(campaign)
+    names, channels = read.training_runs, read.model()
+    runs = load_prepared(read, names=names)
+    run, period = runs[names[-1]], read.seconds("1 T")
+    dt = float(run.attrs["dt"])
+    model = SPECS[kind](period, dt).fit(
+        [runs[each] for each in names[:-1]], list(channels.states), list(channels.inputs)
+    )
+    u = np.stack([run[each].values for each in model.signature.inputs], axis=1)
+    y = np.stack([run[each].values for each in model.signature.states], axis=1)
+    steps, spread = round(3 * period / dt), model.signature.state_scale.spread
+    leads = [max(round(each * period / dt), 1) - 1 for each in LEADS if each <= 3]
+    begins = np.linspace(model.signature.history_samples + 400, len(u) - steps - 130, int(starts))
+    holes = np.random.default_rng(0).random(len(u)) < 0.1
+    holes[:8] = False
+    found = {words: [] for words in (*OUTAGES, "a tenth of all samples")}
+
+    def judge(words, live, at):
+        made = live.forecast(steps)
+        values = np.stack([made[each].values for each in model.signature.states], axis=-1)
+        truth = y[at + 1 : at + 1 + steps]
+        inside = (values[2] <= truth) & (truth <= values[3])
+        found[words].append([((values[0] - truth) / spread) ** 2, inside])
+
+    whole, holed = (model.live(like=run) for _ in range(2))
+    for at in range(int(begins.max()) + 1):
+        whole.step(u[at], y[at])
+        gone = holes[at]
+        holed.step(None if gone else u[at], None if gone else y[at])
+        if at in begins.astype(int):
+            judge("a tenth of all samples", holed, at)
+            for words, (dark, light, is_seen) in OUTAGES.items():
+                live = copy.deepcopy(whole, {id(model): model})
+                for later in range(at + 1, at + 1 + dark + light):
+                    is_dark = later <= at + dark
+                    live.step(None if is_dark else u[later], y[later] if is_seen else None)
+                judge(words, live, at + dark + light)
+    print("lost | error, training SD, at T:", *LEADS[: len(leads)], "| in the band")
+    for words, each in found.items():
+        squares, inside = np.mean(each, axis=0)
+        error = np.sqrt(squares.mean(axis=1))
+        print(words, "|", *error[leads].round(2), f"| {100 * inside.mean():.0f} %")
+
+
 def chain(model, campaign, name, until=120.0):
     """Difference of live and offline samples, and of forecasts that start from them."""
     fitted, read = seakeep.load_model(model), seakeep.read_campaign(campaign)
@@ -261,5 +321,5 @@ def chain(model, campaign, name, until=120.0):
 
 
 if __name__ == "__main__":
-    calls = (steps, service, bands, higher, lost, chain)
+    calls = (steps, service, bands, higher, lost, outage, chain)
     {each.__name__: each for each in calls}[sys.argv[1]](*sys.argv[2:])

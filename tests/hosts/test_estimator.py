@@ -96,7 +96,7 @@ def measured(run, model, lost_inputs=True):
     lost[:8], lost[150:200, 0], lost[230:310] = True, True, True
     y[lost] = np.nan
     if lost_inputs:
-        u[[30, 160, 161, 162], 1:], u[315:320] = np.nan, np.nan
+        u[[30, 160, 161, 162], 1:], u[[*range(302, 310), *range(315, 320)]] = np.nan, np.nan
     return u, y
 
 
@@ -115,7 +115,11 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
         if at > 20:
             expected = np.sqrt(np.maximum(np.diagonal(live.covariance), 0.0))
             np.testing.assert_allclose(found.deviations, expected, rtol=1e-9, atol=1e-12)
-        if at in (5, 190, 290, 325, 640):
+        if at in (190, 305, 317, 640):
+            lost = live.validity & Validity.LOST
+            assert found.calls["validity"](found.memory) & Validity.LOST == lost
+            assert bool(lost) == (lost_inputs and at in (305, 317))
+        if at in (5, 190, 290, 309, 317, 320, 325, 640):
             status, forecast = found.forecast(30, u[at + 1 : at + 30])
             assert status == (1 if at == 5 else 0)
             if status == 0:
@@ -266,7 +270,7 @@ def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
     for at in range(340):
         assert found.step(u[at], y[at]) == 0
         np.testing.assert_allclose(found.state, live.step(u[at], y[at]), **close, err_msg=str(at))
-        if at in (148, 190, 290, 339):
+        if at in (148, 190, 290, 309, 317, 339):
             given = live._known_inputs()[-40:]  # of 40 samples before
             for known in (None, given) if model.inputs else (None,):
                 status, forecast = found.forecast(20, known)

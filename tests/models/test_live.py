@@ -15,6 +15,7 @@ from seakeep import HankelDMDc, ProbeAlignment, RequestError, load_live
 from seakeep.models.live import LEAST_RECORD
 from seakeep.models.validity import Validity
 from seakeep.signals import predict_waves
+from seakeep.signals.prediction import foresee
 from seakeep.study.comparison import nowcast
 from seakeep.waves import group_speed
 
@@ -323,6 +324,40 @@ def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(models
     assert filled[1][1] < 0.5 * filled[0][1]
 
 
+@pytest.mark.parametrize("key", ["plain", "aligned"])
+def test_in_the_dark_a_forecast_is_that_of_the_last_sample(models, drift, key):
+    """Mean and band go on; whatever is measured, the service says that waves are lost."""
+    live, count = started(models[key], drift), 12
+    before = live.forecast(STEPS)
+    assert not live.validity & Validity.LOST
+    for _ in range(count):
+        live.step()
+    found = live.forecast(STEPS - count)
+    assert "lost" in found.attrs["validity"]
+    assert found.attrs["known_input"] == 0
+    for each in ("mean", "std"):
+        # What is predicted from is the same: the record holds all samples.
+        expected = mean(before, each)[count:]
+        np.testing.assert_allclose(mean(found, each), expected, rtol=0, atol=1e-9)
+    play(live, drift, START + count, START + count + 8)
+    assert live.validity & Validity.LOST  # twelve samples are no gap that is closed
+    play(live, drift, START + count + 8, START + count + models[key].history_samples)
+    assert not live.validity & Validity.LOST  # nothing that is read was lost
+
+
+def test_forecasts_read_waves_whose_short_gaps_are_closed(models, drift, monkeypatch):
+    live, waves, seen = models["aligned"].live(like=drift), table(drift, INPUTS)[:START], []
+    lost = np.random.default_rng(8).uniform(size=START) < 0.1
+    lost[:4], lost[-2:] = False, [True, False]  # the newest gap has one sample behind it
+    for at in range(START):
+        live.step(None if lost[at] else waves[at], table(drift, STATES)[at])
+    filled = np.square(live._known_inputs() - waves)[lost].mean()
+    monkeypatch.setattr(live, "_foreseen", lambda of, count: seen.append(of) or foresee(of, count))
+    live.forecast(5)
+    assert np.square(seen[0] - waves)[lost].mean() < 0.1 * filled
+    np.testing.assert_array_equal(seen[0][~lost], waves[~lost])
+
+
 def test_a_dead_probe_is_filled_by_no_more_than_waves(models, drift):
     """Also the one up-wave, for which what it was filled by is read again and again."""
     waves = table(drift, INPUTS)
@@ -403,6 +438,8 @@ def test_a_restarted_process_goes_on_bit_for_bit(models, drift, tmp_path, key):
     for at in range(START, START + 20):  # all that wait to be judged are in the state
         gone = {"lost": range(START, at, 2), "dead": ["heave"]} if at >= START + 10 else {}
         play(live, drift, at, at + 1, **gone)
+        if at == START + 5:
+            live.step()
         again = load_live(models[key], live.save(path))
         np.testing.assert_array_equal(again.consistency_by_state, live.consistency_by_state)
     for each in (live, again):

@@ -6,7 +6,13 @@ import seas
 from scipy.signal import lfilter
 
 from seakeep.signals import predict_waves
-from seakeep.signals.prediction import Foreseen, fill_future, foresee, predictable_time
+from seakeep.signals.prediction import (
+    Foreseen,
+    close_gaps,
+    fill_future,
+    foresee,
+    predictable_time,
+)
 
 
 def test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on():
@@ -45,6 +51,21 @@ def test_what_is_missing_is_filled_from_the_record_after_the_last_gap():
     moved[:, [0, 1, 4], 1] = 0.0  # what is measured does not depart
     np.testing.assert_array_equal(futures[1:3, 7:] - filled[7:], moved)
     np.testing.assert_array_equal(futures[3:] + futures[1:3], [2 * filled] * 2)
+
+
+def test_short_gaps_are_closed_by_cubics_and_the_newest_by_what_there_is():
+    t = np.arange(40.0)
+    cubic, square = 1.0 - 0.3 * t + 0.02 * t**2 - 4e-4 * t**3, 2.0 - 0.1 * t + 0.01 * t**2
+    lost = np.zeros(40, bool)
+    lost[[0, 5, *range(8, 16), *range(20, 29), 37, 38]] = True  # one, eight, nine; one sample after
+    left = np.isin(t, [0, *range(20, 29)])
+    for series, places in ((cubic, t < 30), (square, t > 30)):
+        record, gone = np.where(lost, 9.0, series), lost.copy()
+        close_gaps(record, gone)
+        np.testing.assert_array_equal(gone, left)
+        np.testing.assert_array_equal(record[left], 9.0)
+        closed = places & ~left
+        np.testing.assert_allclose(record[closed], series[closed], rtol=1e-12)
 
 
 def test_columns_are_continued_alone_and_a_still_one_stays():

@@ -26,7 +26,7 @@ from seakeep.models.live import Live
 from seakeep.models.terms import SlowSquare, Term
 from seakeep.models.validity import CYCLES, TRAINED
 from seakeep.signals.expressions import Text
-from seakeep.signals.prediction import MEMORY, NOISE
+from seakeep.signals.prediction import GAP, MEMORY, NOISE
 from seakeep.waves import GRAVITY
 
 if TYPE_CHECKING:
@@ -163,6 +163,7 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
             "per_octave": PER_OCTAVE,
             "is_elevation": is_elevation,
             "noise_part": NOISE,
+            "gap": GAP,
             "doubted": DOUBTED,
         }
         for end in ("h", "c"):

@@ -230,7 +230,8 @@ def weighed(
         Runs from the inputs that are expected, then from departures from them and from their
         opposites. Innovations of later samples do the same later, so that effects add up over the
         leads: what squares of waves move the mean by, and the variance. Inputs may depart by the
-        same waves, so that effects of one innovation of each count with one sign.
+        same waves, so that effects of one innovation of each count with one sign. Steps before
+        those of `given` only add up.
     errors : ndarray, shape (steps, N)
         Mean squares of the model's errors.
     scale : Scale
@@ -244,10 +245,13 @@ def weighed(
         The mean; the variance over members and waves, before it is weighed; and the weight of the
         forecast against the mean of training.
     """
+    late = runs.shape[-2] - given.shape[-1]
     middle, (plus, minus) = runs[:, 0], np.split(runs[:, 1:], 2, axis=1)
     apart = 0.5 * np.abs(plus - minus).sum(axis=1)
     moved = (0.5 * (plus + minus) - middle[:, None]).sum(axis=1)
-    spread: FloatArray = np.cumsum(np.mean(apart**2, axis=0), axis=-2)
+    spread: FloatArray = np.cumsum(np.mean(apart**2, axis=0), axis=-2)[..., late:, :]
+    away = np.nan_to_num(np.cumsum(moved.mean(axis=0), axis=-2))[..., late:, :]
+    middle = middle[..., late:, :]
     if len(middle) > 1:
         spread += middle.var(axis=0, ddof=1)
     low, high = DOUBTED
@@ -257,7 +261,6 @@ def weighed(
     trust = np.nan_to_num((high - claimed) / (high - low), nan=0.0)
     lasting = np.minimum.accumulate(np.clip(trust, 0.0, 1.0), axis=-2)
     known, mean, centre = given[..., None], middle.mean(axis=0), scale.centre
-    away = np.nan_to_num(np.cumsum(moved.mean(axis=0), axis=-2))
     shrunk = centre + lasting * (mean + away - centre)
     return np.where(known, mean, shrunk), spread, np.where(known, 1.0, lasting)
 

@@ -48,7 +48,12 @@ from seakeep.models.interface import Signature
 from seakeep.models.labelled import Span
 from seakeep.models.summaries import statistic_coordinate
 from seakeep.models.validity import Conditions, Coverage, Validity
-from seakeep.signals.prediction import fill_future, predict_waves, predictable_time
+from seakeep.signals.prediction import (
+    close_gaps,
+    fill_future,
+    predict_waves,
+    predictable_time,
+)
 
 STATE = "live state"
 """Kind of the files of :meth:`Live.save`."""
@@ -222,6 +227,7 @@ class Live:
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
         delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
         widths = {"u": len(signature.inputs), "x": count, "y": count}
+        widths["lost"] = widths["u"]
         widths |= {"delayed": delayed, "direct": direct}
         self._first, room = 0, 2 * self._record
         self._recent = {name: np.full((room, width), np.nan) for name, width in widths.items()}
@@ -312,15 +318,18 @@ class Live:
 
     @property
     def validity(self) -> Validity:
-        """What lies outside the training: waves, mean surge, or errors of late.
+        """What lies outside the training: waves, mean surge, or errors of late; or lost waves.
 
         Errors do where :attr:`consistency_by_state` exceeds two for a state, one step ahead or in
-        free runs.
+        free runs. Waves are lost while a forecast reads any that were not measured, and that no
+        gap of up to eight samples closed.
         """
         return self._validity(self.conditions)
 
     def _validity(self, conditions: Conditions | None) -> Validity:
         outside = Validity(0) if conditions is None else conditions.validity
+        if self._closed()[1][-self._begins :].any():
+            outside |= Validity.LOST
         alarm = bool(np.any(self.consistency_by_state > ALARM))
         return outside | Validity.CONSISTENCY if alarm else outside
 
@@ -395,12 +404,14 @@ class Live:
         """
         signature, at = self.signature, self._count.taken
         instant = self._instant(time)
-        states, inputs = _sample("y", y, signature.states), self._inputs(u)
+        states, sample = _sample("y", y, signature.states), _sample("u", u, signature.inputs)
+        inputs = self._filled(sample)
         if at - self._first == 2 * self._record:  # all room is used up
             for values in self._recent.values():
                 values[: self._record] = values[self._record :]
             self._first += self._record
         self._rows("u", at, at + 1)[:] = inputs
+        self._rows("lost", at, at + 1)[:] = np.isnan(sample)
         self._rows("y", at, at + 1)[:] = states
         # Held until it is estimated: an alignment reads where the vessel is.
         last = self._recent["x"][at - 1 - self._first]
@@ -432,10 +443,9 @@ class Live:
             "was lost; resample the rest to the model's step."
         )
 
-    def _inputs(self, u: npt.ArrayLike | Mapping[str, float] | None) -> FloatArray:
+    def _filled(self, inputs: FloatArray) -> FloatArray:
         """Inputs of a sample; what was lost comes from each record, and from the probe up-wave."""
-        inputs, taken = _sample("u", u, self.signature.inputs), self._count.taken
-        lost = np.isnan(inputs)
+        taken, lost = self._count.taken, np.isnan(inputs)
         if not lost.any():
             return inputs
         if taken < 4:
@@ -464,9 +474,16 @@ class Live:
             out[:, waves] = predict_waves(known[:, waves], count)
         return out
 
-    def _known_inputs(self) -> FloatArray:
+    def _known_inputs(self, name: str = "u") -> FloatArray:
         """Inputs that waves are predicted from: the last ones, always as many once there are."""
-        return self._rows("u", max(self._count.taken - self._record, 0), self._count.taken)
+        return self._rows(name, max(self._count.taken - self._record, 0), self._count.taken)
+
+    def _closed(self) -> tuple[FloatArray, BoolArray]:
+        """The same with short gaps closed, and which waves are not measured then."""
+        record, lost = self._known_inputs().copy(), self._known_inputs("lost") > 0
+        for column in self._waves:
+            close_gaps(record[:, column], lost[:, column])
+        return record, lost[:, self._waves]
 
     def _filtered(self, at: int, seen: BoolArray) -> None:
         """Covariance and gain of a sample."""
@@ -688,15 +705,17 @@ class Live:
                 f"there are {self._count.taken} samples of history and the model needs "
                 f"{self._begins}. Call step {self._begins - self._count.taken} more times first."
             )
-        futures, freedom, known = self._futures(count, future)
-        taken = self._count.taken
+        futures, freedom, known, dark = self._futures(count, future)
+        # In the dark the errors of what was filled grow as those of what is to come.
+        dark = 0 if self._count.partly else min(dark, self._count.since, len(self.errors.rms))
+        taken = self._count.taken - dark
         history = self._rows("x", taken - signature.state_samples, taken)
-        back = signature.input_map.history(signature.input_delays) + 1
+        back = signature.input_map.history(signature.input_delays) + 1 + dark
         windows = engine.array_windows(
             signature,
             np.broadcast_to(history, (len(futures), *history.shape)),
-            futures[:, min(taken, self._record) - back :],
-            count,
+            futures[:, min(self._count.taken, self._record) - back :],
+            dark + count,
             None if self._follows is None else self._rig,
         )
         with engine.member_series(self.model, [windows]) as ((values, lost),):
@@ -727,7 +746,8 @@ class Live:
             variables[label.name][2]["lead_time"] = int(samples) * signature.dt
         words = "the mean minus and plus a quantile times std"
         time = self._time + signature.dt * np.arange(1, count + 1)
-        attrs: dict[str, Any] = {"start": self._time, "level": level, "known_input": known}
+        attrs: dict[str, Any] = {"start": self._time, "level": level}
+        attrs |= {"known_input": max(known, 0)}
         attrs |= {"diverged": len(values) - len(complete)}
         attrs |= {"predictable": self._predictable()}
         if conditions is not None:
@@ -753,14 +773,17 @@ class Live:
         apart = float(np.ptp(self._places[placed]))
         return predictable_time(record, self.signature.dt, apart, self._depth)
 
-    def _futures(self, steps: int, future: Any) -> tuple[FloatArray, float, int]:
+    def _futures(self, steps: int, future: Any) -> tuple[FloatArray, float, int, int]:
         """Inputs of the record and after it, shape (1 + 2 departures, time, Q).
 
         First those that are expected, then departures from them and their opposites, of each wave
-        by an innovation where it is first not known; the degrees of freedom of these, and how many
-        rows were given.
+        by an innovation where it is first not known; the degrees of freedom of these; how many
+        rows were given, below zero where the last ones of the record were lost; and how many of
+        these there are.
         """
-        names, record, waves = self.signature.inputs, self._known_inputs(), self._waves
+        names, waves, (record, lost) = self.signature.inputs, self._waves, self._closed()
+        tail = np.logical_and.accumulate(lost.all(axis=1)[::-1]) if waves else np.empty(0)
+        dark = min(int(tail.sum()), len(record) // 2)
         given = _plan(future, names, steps - 1 + self._ahead)
         for column in sorted(set(range(len(names))) - set(waves)):
             lost = np.isnan(given[:, column])
@@ -774,14 +797,17 @@ class Live:
             at = np.where(np.isfinite(whole), np.arange(whole.size), 0)
             given[:, column] = whole[np.maximum.accumulate(at)][1:]
         inputs, begin = np.concatenate([record, given]), len(record)
-        if not np.isnan(given).any():
-            return inputs[None], math.inf, len(given)
+        inputs[begin - dark : begin, waves] = np.nan
+        if not np.isnan(inputs).any():
+            return inputs[None], math.inf, len(given), dark
         filled, first, freedom = fill_future(
-            inputs[:, waves], begin, lambda of, steps: self._foreseen(of[-self._record :], steps)
+            inputs[:, waves],
+            begin - dark,
+            lambda of, steps: self._foreseen(of[-self._record :], steps),
         )
         futures = np.repeat(inputs[None], len(filled), axis=0)
         futures[:, :, waves] = filled
-        return futures, freedom, first - begin
+        return futures, freedom, first - begin, dark
 
     def save(self, path: str | Path) -> Path:
         """Write all that the object needs to go on (NetCDF), to a temporary name first.
@@ -830,10 +856,10 @@ class Live:
         taps = 0 if self._follows is None else self._follows.place.taps.size
         longest = max(signature.state_delays, signature.input_delays, taps)
         tail = max(taken - (self._ahead + LATE + longest + 4), 0)
-        rows = [self._rows(each, tail, taken) for each in self._recent if each != "u"]
+        rows = [self._rows(each, tail, taken) for each in {*self._recent} - {"u", "lost"}]
         updates = [update for update in self._pending() if update is not self._as_it_is]
         state = [self._history, self._free, self._innovation, self._squares]
-        state.append(self._known_inputs())
+        state += [self._known_inputs(), self._known_inputs("lost")]
         if self._surge is not None:
             state.append(self._surge)
         return [*rows, *(each for update in updates for each in update), *state]

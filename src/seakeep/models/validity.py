@@ -32,8 +32,8 @@ CYCLES = 5.0
 class Validity(IntFlag):
     """What lies outside the training; 0 where nothing does.
 
-    Period, height and steepness are those of waves, surge is its mean, and consistency that of
-    errors of late, of a model in service.
+    Period, height and steepness are those of waves, and surge is its mean. In service consistency
+    is that of errors of late, and lost says that waves a forecast reads were filled for long.
     """
 
     PERIOD = 1
@@ -41,6 +41,7 @@ class Validity(IntFlag):
     STEEPNESS = 4
     SURGE = 8
     CONSISTENCY = 16
+    LOST = 32
 
     @property
     def words(self) -> str:

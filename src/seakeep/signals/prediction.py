@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, as_series, whole_number
+from seakeep.arrays import BoolArray, FloatArray, as_series, whole_number
 from seakeep.signals.calculus import autoregression, continued
 from seakeep.signals.propagation import LEAST_CORRELATION, band_limit, carry_by_dispersion
 from seakeep.waves import group_speed
@@ -25,6 +25,9 @@ UNLIKE = math.sqrt(1.0 - LEAST_CORRELATION**2)
 NOISE = 1e-6
 """Part of a record's variance that counts as noise: a sum of tones, as of a simulated sea, would
 seem to be known for good without it."""
+GAP = 8
+"""Samples of a gap that is closed. With 32 to a wave period, a cubic across eight errs by 0.04 SD,
+and what the samples before it tell by 0.3."""
 SLOWLY, QUICKLY = 0.99, 0.05
 """Shares of a record's variance below the waves that arrive last, and below the first ones."""
 
@@ -173,6 +176,32 @@ def foresee(
                 continue
         follow(here, left)
     return Foreseen(expected, departures, size / max(orders, default=1.0))
+
+
+def close_gaps(record: FloatArray, lost: BoolArray) -> None:
+    """Close gaps of up to ``GAP`` samples, by a cubic through two measured samples on either side.
+
+    Parameters
+    ----------
+    record : ndarray, shape (time,)
+        Uniformly sampled; changed in place.
+    lost : ndarray of bool, shape (time,)
+        Which samples were not measured; closed ones are taken out.
+    """
+    known, rows = np.flatnonzero(~lost), np.flatnonzero(lost)
+    after = np.searchsorted(known, rows)
+    rows, after = (each[(after > 0) & (after < known.size)] for each in (rows, after))
+    is_short = known[after] - known[after - 1] <= GAP + 1
+    rows, places = rows[is_short, None], after[is_short, None] + np.arange(-2, 2)
+    there = (places >= 0) & (places < known.size)  # one may lack at either end of the record
+    near = known[np.clip(places, 0, known.size - 1)]
+    weights = np.where(there, record[near], 0.0)
+    for own in range(4):  # Lagrange's polynomials
+        others = there & there[:, own : own + 1] & (np.arange(4) != own)
+        apart = np.where(others, near[:, own : own + 1] - near, 1)
+        weights[:, own] *= np.where(others, (rows - near) / apart, 1.0).prod(axis=1)
+    record[rows[:, 0]] = weights.sum(axis=1)
+    lost[rows] = False
 
 
 def fill_future(

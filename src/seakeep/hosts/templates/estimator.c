@@ -22,6 +22,8 @@ enum {
     LEADS = {{ errors | length }},
     SETTLED = LEADS + OLD / N,  /* samples without a measurement after which errors stay as they are */
     FORE = {{ fore }},                  /* inputs that are predicted before each is from its own record */
+    GAP = {{ gap }},
+    PAST = {{ upper }}_U_ROWS - {{ lead_samples }},     /* rows of inputs that a forecast starts with, but the last */
     RUNS = 1 + 2 * {{ waves | length }}             /* of expected waves, and of departures from each */
 };
 
@@ -392,6 +394,9 @@ int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *
     memcpy(e->y[e->slot], y, N * sizeof(double));
     memmove(e->inputs, e->inputs + Q, (RECORD - 1) * Q * sizeof(double));
     memcpy(e->inputs + (RECORD - 1) * Q, sample, Q * sizeof(double));
+    memmove(e->lost, e->lost + Q, (RECORD - 1) * Q);
+    for (int q = 0; q < Q; q++)
+        e->lost[(RECORD - 1) * Q + q] = isnan(u[q]) != 0;
     e->filled += e->filled < RECORD;
     memmove(e->delayed, e->delayed + DELAYED, (ROWS - 1) * DELAYED * sizeof(double));
     memmove(e->x, e->x + N, (X_ROWS - 1) * N * sizeof(double));
@@ -443,9 +448,58 @@ static void spectrum({{ name }}_estimator *e, int q, double mean, int beyond, do
     }
 }
 
+/* The next row on from this one, forwards or backwards, in which an input was measured. */
+static int measured(const {{ name }}_estimator *e, int row, int by, int q)
+{
+    while (row >= RECORD - e->filled && row < RECORD && e->lost[row * Q + q])
+        row += by;
+    return row;
+}
+
+/* Whether a gap between measured rows is closed. */
+static int is_closed(const {{ name }}_estimator *e, int before, int after)
+{
+    return before >= RECORD - e->filled && after < RECORD && after - before <= GAP + 1;
+}
+
+/* Copy the record into `planned` and close its short gaps, by a cubic through two measured rows on
+ * either side. */
+static void close_gaps({{ name }}_estimator *e)
+{
+    memcpy(e->planned, e->inputs, RECORD * Q * sizeof(double));
+    for (int row = RECORD - e->filled; row < RECORD; row++)
+        for (int q = 0; q < Q; q++) {
+            int first = RECORD - e->filled, near[4], count = 0;
+            int before = measured(e, row, -1, q), after = measured(e, row, 1, q);
+            double value = 0.0;
+            if (!waves[q] || !e->lost[row * Q + q] || !is_closed(e, before, after))
+                continue;
+            near[count++] = before;
+            near[count++] = after;
+            if ((before = measured(e, before - 1, -1, q)) >= first)
+                near[count++] = before;
+            if ((after = measured(e, after + 1, 1, q)) < RECORD)
+                near[count++] = after;
+            for (int i = 0; i < count; i++) {
+                double part = e->inputs[near[i] * Q + q];
+                for (int k = 0; k < count; k++)
+                    if (k != i)
+                        part *= (double)(row - near[k]) / (near[i] - near[k]);
+                value += part;
+            }
+            e->planned[row * Q + q] = value;
+        }
+    e->is_planned = 1;
+}
+
 int {{ name }}_validity({{ name }}_estimator *e)
 {
     int size = e->filled, outside = 0;
+    for (int row = RECORD - (size < BEGINS ? size : BEGINS); row < RECORD; row++)
+        for (int q = 0; q < Q; q++)
+            if (waves[q] && e->lost[row * Q + q]
+                && !is_closed(e, measured(e, row, -1, q), measured(e, row, 1, q)))
+                outside |= {{ upper }}_LOST;
     for (int q = 0; size >= 4 && q < Q; q++) {
         double mean = 0.0, square = 0.0, fourth = 0.0, sum = 0.0, grown = 0.0;
         double energy[BANDS] = { 0.0 }, total = 0.0, unseen = 0.0, height, steepness, repeats, margin;
@@ -513,7 +567,7 @@ double {{ name }}_deviation(const {{ name }}_estimator *e, int state)
 
 static int is_given(const double *future, int at, int q)
 {
-    return !waves[q] || (future && !isnan(future[at * Q + q]));
+    return !waves[q] || (future && at >= 0 && !isnan(future[at * Q + q]));
 }
 
 /* Rows of the future, `most` of them, before the first in which a wave is not given. */
@@ -535,17 +589,16 @@ static void plan({{ name }}_estimator *e, const double *future, int known)
         for (int q = 0; q < Q; q++) {
             double last = row > 0 && at > 0 ? out[q - Q] : e->inputs[(RECORD - 1) * Q + q];
             if (at < 0)
-                out[q] = e->inputs[(row + known) * Q + q];
+                out[q] = out[known * Q + q];
             else
                 out[q] = isnan(future[at * Q + q]) ? last : future[at * Q + q];
         }
     }
     e->filled = e->filled + known < RECORD ? e->filled + known : RECORD;
-    e->is_planned = 1;
 }
 
-/* From the inputs of an instant those of the next one, which is so many after the first to come,
- * and what one innovation of each wave, where it is first not known, adds to them. */
+/* From the inputs of an instant those of the next one, which is so many after the first to come or
+ * before it, and what one innovation of each wave, where it is first not known, adds to them. */
 static void coming({{ name }}_estimator *e, const double *future, int known, int at, double *u,
                    double *apart)
 {
@@ -560,7 +613,9 @@ static void coming({{ name }}_estimator *e, const double *future, int known, int
                 apart[q] = is_given(future, at, q) ? 0.0 : away;
             }
         }
-        if (future && !isnan(future[at * Q + q]))
+        if (at < 0 && !waves[q])
+            u[q] = e->inputs[(RECORD + at) * Q + q];
+        else if (at >= 0 && future && !isnan(future[at * Q + q]))
             u[q] = future[at * Q + q];
     }
 }
@@ -598,11 +653,24 @@ static void reach_on(double *reach)
     }
 }
 
-static int run_on({{ name }}_estimator *e, int n, const double *future, int known, double *x, double *std)
+/* Samples at the end of the record without any wave. */
+static int in_the_dark(const {{ name }}_estimator *e)
+{
+    int dark = 0, lost = RUNS > 1;
+    while (lost && dark < e->filled / 2) {
+        for (int q = 0; q < Q; q++)
+            lost = lost && (!waves[q] || e->lost[(RECORD - 1 - dark) * Q + q]);
+        dark += lost;
+    }
+    return dark;
+}
+
+/* Run from so many samples `back`; `dark` samples before the newest, waves are not known. */
+static int run_on({{ name }}_estimator *e, int n, const double *future, int known, int dark, int back,
+                  double *x, double *std)
 {
     double u[Q + 1], apart[Q + 1] = { 0.0 }, row[Q + 1], moved[N] = { 0.0 }, spreads[N] = { 0.0 };
     double weight[N], *reach = e->cross;
-    int begins = {{ upper }}_U_ROWS - {{ lead_samples }};
     int runs = known < n - 1 + {{ lead_samples }} ? RUNS : 1;
     if (runs > 1) {
         expect(e, FORE);
@@ -613,27 +681,30 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
     }
     memset(e->apart, 0, sizeof e->apart);
     memset(e->departs, 0, sizeof e->departs);
-    memcpy(e->u_history, e->inputs + (RECORD - 1 - begins) * Q, begins * Q * sizeof(double));
-    memcpy(u, e->inputs + (RECORD - 1) * Q, Q * sizeof(double));
-    for (int at = 0; at < {{ lead_samples }}; at++) {
-        if (at > 0)
-            coming(e, future, known, at - 1, u, apart);
-        memcpy(e->first + at * Q, u, Q * sizeof(double));
-        memcpy(e->first_apart + at * Q, apart, Q * sizeof(double));
+    memcpy(u, e->inputs + (RECORD - 1 - dark) * Q, Q * sizeof(double));
+    for (int at = -dark; at < {{ lead_samples }} - 1 - back; at++) {
+        int to = PAST + back + 1 + at;
+        coming(e, future, known, at, u, apart);
+        if (to >= 0) {
+            memcpy(e->first + to * Q, u, Q * sizeof(double));
+            memcpy(e->first_apart + to * Q, apart, Q * sizeof(double));
+        }
     }
     for (int run = 0; run < runs; run++) {
-        for (int at = 0; at < {{ lead_samples }}; at++)
-            depart(e->first + at * Q, e->first_apart + at * Q, run, e->u_history + (begins + at) * Q);
-        if ({{ name }}_start(&e->models[run], e->x + (X_ROWS - {{ upper }}_X_ROWS) * N, e->u_history))
+        int from = PAST + back + 1 - dark;
+        for (int to = from > 0 ? from : 0; to < {{ upper }}_U_ROWS; to++)
+            depart(e->first + to * Q, e->first_apart + to * Q, run, e->u_history + to * Q);
+        if ({{ name }}_start(&e->models[run], e->x + (X_ROWS - back - {{ upper }}_X_ROWS) * N, e->u_history))
             return 1;
     }
     memcpy(reach, on_states, sizeof on_states);
     for (int i = 0; i < N; i++)
         weight[i] = 1.0;
-    for (int step = 0; step < n; step++) {
-        const double *own = errors + (step < LEADS ? step : LEADS - 1) * N;
-        const double *bound = errors + (step + e->since < LEADS ? step + e->since : LEADS - 1) * N;
-        if (step + {{ lead_samples }} > 0)
+    for (int step = -back; step < n; step++) {
+        int at = step > 0 ? step : 0;
+        const double *own = errors + (at < LEADS ? at : LEADS - 1) * N;
+        const double *bound = errors + (at + e->since < LEADS ? at + e->since : LEADS - 1) * N;
+        if (step + {{ lead_samples }} > -dark)
             coming(e, future, known, step + {{ lead_samples }} - 1, u, apart);
         for (int run = 0; run < runs; run++) {
             depart(u, apart, run, row);
@@ -641,13 +712,16 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
                 return 2;
         }
         for (int i = 0; i < N; i++) {
-            double middle = e->models[0].x[i], away = 0.0, variance = bound[i] * bound[i];
+            double middle = e->models[0].x[i], away = 0.0, variance;
             for (int run = 1; run < runs; run += 2) {
                 double more = e->models[run].x[i], less = e->models[run + 1].x[i];
                 moved[i] += 0.5 * (more + less) - middle;
                 away += 0.5 * fabs(more - less);
             }
             spreads[i] += away * away;
+            if (step < 0)
+                continue;
+            variance = bound[i] * bound[i];
             if (e->partly)
                 variance = fmin(variance, own[i] * own[i] + carried_error(e, reach + i * M));
             variance += spreads[i];
@@ -670,11 +744,22 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x, double *std)
 {
     int most = n - 1 + {{ lead_samples }}, known = given_rows(future, most), filled = e->filled, status;
+    int dark = in_the_dark(e), back = e->partly ? 0 : dark;
+    back = back > e->since ? e->since : back;
+    back = back > LEADS ? LEADS : back;
     if (e->taken < BEGINS)
         return 1;
-    if (future && known > 0 && known < most)
+    close_gaps(e);
+    memcpy(e->u_history, e->planned + (RECORD - 1 - PAST - back) * Q,
+           (PAST + ({{ lead_samples }} > back ? back + 1 : {{ lead_samples }})) * Q * sizeof(double));
+    if (dark > 0) { /* waves are predicted from the record before */
+        known = -dark;
+        memmove(e->planned + dark * Q, e->planned, (RECORD - dark) * Q * sizeof(double));
+        e->filled -= dark;
+    } else if (future && known > 0 && known < most) {
         plan(e, future, known);
-    status = run_on(e, n, future, known, x, std);
+    }
+    status = run_on(e, n, future, known, dark, back, x, std);
     e->filled = filled;
     e->is_planned = 0;
     return status;

@@ -25,11 +25,12 @@ enum {
     {{ upper }}_EXTENDED = {{ N * (s + 1) }},
     {{ upper }}_RECORD = {{ record }},
     {{ upper }}_ORDER = {{ (record + fore) // 3 }},
-    {{ upper }}_ESTIMATES = {{ late + ([s + 1, x_rows, past + z + 1] | max) }}
+    {{ upper }}_ESTIMATES = {{ late + (errors | length) + ([s + 1, x_rows, past + z + 1] | max) }}
 };
 
-/* What of the waves, or of the mean surge, lies outside the training. */
-enum { {{ upper }}_INSIDE = 0, {{ upper }}_PERIOD = 1, {{ upper }}_HEIGHT = 2, {{ upper }}_STEEPNESS = 4, {{ upper }}_SURGE = 8 };
+/* What of the waves, or of the mean surge, lies outside the training; or whether waves that a
+ * forecast reads were lost, beyond gaps of up to {{ gap }} samples that are closed. */
+enum { {{ upper }}_INSIDE = 0, {{ upper }}_PERIOD = 1, {{ upper }}_HEIGHT = 2, {{ upper }}_STEEPNESS = 4, {{ upper }}_SURGE = 8, {{ upper }}_LOST = 32 };
 
 /* All that an estimator remembers. To save and restore it, copy it as it is. */
 typedef struct {
@@ -40,6 +41,7 @@ typedef struct {
     double history[{{ upper }}_EXTENDED]; /* estimates that no wave to come moves */
     double delayed[{{ [n, 1] | max * (late + z + 1) }}];
     double surge[{{ upper }}_RECORD];
+    unsigned char lost[{{ upper }}_RECORD * {{ [Q, 1] | max }}]; /* whether an input was not measured */
     /* Of the samples that waves to come move: */
     double y[{{ late + 1 }}][{{ upper }}_STATES], gains[{{ late + 1 }}][{{ upper }}_EXTENDED * {{ upper }}_STATES];
     int plain[{{ late + 1 }}], slot, pending, begun;
@@ -54,7 +56,7 @@ typedef struct {
     double u_history[{{ [u_rows * Q, 1] | max }}];
     double planned[({{ upper }}_RECORD + {{ fore }}) * {{ [Q, 1] | max }}];
     int is_planned;
-    double first[{{ [lead_samples * Q, 1] | max }}], first_apart[{{ [lead_samples * Q, 1] | max }}];
+    double first[{{ [u_rows * Q, 1] | max }}], first_apart[{{ [u_rows * Q, 1] | max }}];
     {{ name }}_model models[{{ 1 + 2 * waves | length }}];
 } {{ name }}_estimator;
 
