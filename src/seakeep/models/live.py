@@ -782,7 +782,7 @@ class Live:
         these there are.
         """
         names, waves, (record, lost) = self.signature.inputs, self._waves, self._closed()
-        tail = np.logical_and.accumulate(lost.all(axis=1)[::-1]) if waves else np.empty(0)
+        tail = np.logical_and.accumulate(lost[::-1].all(axis=1)) if waves else np.empty(0)
         dark = min(int(tail.sum()), len(record) // 2)
         given = _plan(future, names, steps - 1 + self._ahead)
         for column in sorted(set(range(len(names))) - set(waves)):
