@@ -102,11 +102,12 @@ from seakeep.report import comparison
 from seakeep.study import store as study
 from seakeep.tank import delivery
 
-folder, run = Path(sys.argv[1]), xr.Dataset({"heave": ("time", np.random.rand(50_000))})
+folder = Path(sys.argv[1])
+run = xr.Dataset({"heave": ("time", np.random.rand(50_000), {"units": "m"})})
 writers = {
     "model": lambda path: write_sealed(run, path, "model"),
     "forecast": lambda path: comparison.write_forecast(run, path),
-    "raw file": lambda path: delivery.write_dataset(run, path),
+    "raw file": lambda path: delivery.write_record(run, path),
     "study": lambda path: study.write_result(folder, {}, {"prepared": run}, lambda _: None),
 }
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -20,7 +20,7 @@ from hull import HullMesh, hull_mesh, hydrostatics
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, SeakeepError
-from seakeep.tank.delivery import write_dataset
+from seakeep.files import write_netcdf
 from seakeep.tank.hydrodynamics import CONVENTIONS, POOL_MODES, RIGID
 from seakeep.tank.settings import HullSettings, default_settings, read_tank
 from seakeep.waves import GRAVITY, group_speed, wavenumber
@@ -203,7 +203,7 @@ def main(arguments: list[str] | None = None) -> int:
             settings.facility.density,
             progress=sys.stderr.isatty(),
         )
-        write_dataset(data, options.out)
+        write_netcdf(options.out, data)
     except SeakeepError as error:
         sys.stderr.write(f"Error: {error}\n")
         return error.exit_status

@@ -263,7 +263,7 @@ def write_netcdf(path: Path, dataset: xr.Dataset, groups: Datasets | None = None
     Parameters
     ----------
     path : Path
-        The file, such as :func:`replacing` gives it; overwritten.
+        The file.
     dataset : Dataset
         What goes into its root.
     groups : mapping of str to Dataset, optional
@@ -271,8 +271,8 @@ def write_netcdf(path: Path, dataset: xr.Dataset, groups: Datasets | None = None
 
     Raises
     ------
-    OSError
-        If it cannot be written; :func:`replacing` puts it into words.
+    RequestError
+        As :func:`replacing`.
     """
     # Here, so that commands that write no such file start without HDF5.
     import h5py
@@ -284,8 +284,8 @@ def write_netcdf(path: Path, dataset: xr.Dataset, groups: Datasets | None = None
             _write_group(file.create_group(name, track_order=True) if name else file, part)
         contents = {name: _contents(part) for name, part in parts.items()}
         file.attrs[CONTENTS] = json.dumps(contents, default=lambda value: value.tolist())
-    with buffer.getbuffer() as content, path.open("wb") as sealed:
-        sealed.writelines([content, _seal_of(content)])
+    with replacing(path) as temporary, temporary.open("wb") as file, buffer.getbuffer() as content:
+        file.writelines([content, _seal_of(content)])
 
 
 def _write_group(place: h5py.Group, data: xr.Dataset) -> None:
@@ -409,8 +409,7 @@ def write_sealed(
     """
     target = Path(path)
     check_output(target, kind)
-    with replacing(target) as temporary:
-        write_netcdf(temporary, dataset.assign_attrs(head_of(kind)))
+    write_netcdf(target, dataset.assign_attrs(head_of(kind)))
     return target
 
 

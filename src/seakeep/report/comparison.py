@@ -287,8 +287,7 @@ def look_ahead_words(seconds: float) -> str:
 def write_forecast(forecast: xr.Dataset, path: Path) -> Path:
     """Write a forecast as NetCDF, or as CSV with a column per channel, full precision."""
     if path.suffix == ".nc":
-        with replacing(path) as temporary:
-            write_netcdf(temporary, forecast.assign_attrs({MARK: "forecast"}))
+        write_netcdf(path, forecast.assign_attrs({MARK: "forecast"}))
         return path
     # Instants are multiples of a step; nine decimals hide the rounding of the product.
     time = pd.Index(forecast["time"].values.round(9), name="time [s]")

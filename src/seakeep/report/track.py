@@ -44,8 +44,7 @@ def write_track(track: Track, path: Path) -> None:
     time = ("time", track.time, {"units": "s", "long_name": "time"})
     out = xr.Dataset(data, {"time": time}, {**track.attributes, MARK: TRACK})
     out["flag"].attrs |= {"flag_values": list(FLAGS.values()), "flag_meanings": " ".join(FLAGS)}
-    with replacing(path) as temporary:
-        write_netcdf(temporary, out)
+    write_netcdf(path, out)
 
 
 def write_contact_sheet(picture: bytes, path: Path) -> None:

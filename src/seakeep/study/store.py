@@ -24,7 +24,6 @@ from seakeep.files import (
     is_there,
     load_groups,
     read_bytes,
-    replacing,
     write_netcdf,
     write_text,
 )
@@ -65,8 +64,8 @@ def storing(folder: Path) -> Iterator[None]:
 
 def write_groups(path: Path, kind: str, attrs: Mapping[str, Any], groups: Datasets) -> None:
     """Write groups into one sealed file, renamed into place; errors as :func:`storing`."""
-    with storing(path.parent), replacing(path) as temporary:
-        write_netcdf(temporary, xr.Dataset(attrs={**head_of(kind), **attrs}), groups)
+    with storing(path.parent):
+        write_netcdf(path, xr.Dataset(attrs={**head_of(kind), **attrs}), groups)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import SeakeepError
-from seakeep.files import MARK, replacing, write_netcdf, write_text
+from seakeep.files import MARK, write_netcdf, write_text
 from seakeep.signals.panel import opencv
 from seakeep.tank.instruments import Played, clock_instants, trigger
 from seakeep.tank.settings import RunPlan, TankSettings
@@ -45,7 +45,7 @@ def write_record(record: xr.Dataset, path: Path) -> Path:
     """
     rounded = record.map(lambda column: column.round(_decimals(column)), keep_attrs=True)
     if path.suffix == ".nc":
-        write_dataset(rounded.assign_attrs({MARK: RAW}), path)
+        write_netcdf(path, rounded.assign_attrs({MARK: RAW}))
         return path
     time = record["time"].values
     # As many decimals as the clock's readings need, up to six.
@@ -64,12 +64,6 @@ def write_record(record: xr.Dataset, path: Path) -> Path:
 def _decimals(column: xr.DataArray) -> int:
     """Decimals that a logger writes."""
     return {"m": 5, "mm": 2}.get(column.attrs["units"], 4)
-
-
-def write_dataset(data: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to NetCDF under a temporary name, then rename it."""
-    with replacing(path) as temporary:
-        write_netcdf(temporary, data)
 
 
 def _filtered(settings: TankSettings) -> dict[str, str]:

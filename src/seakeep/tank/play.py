@@ -13,7 +13,7 @@ from seakeep.arrays import Progress
 from seakeep.conventions import canonical_channel
 from seakeep.errors import RequestError, did_you_mean
 from seakeep.executor import in_order
-from seakeep.files import MARK, check_output, is_there, make_folder, write_text
+from seakeep.files import MARK, check_output, is_there, make_folder, write_netcdf, write_text
 from seakeep.signals.panel import opencv
 from seakeep.tank.delivery import (
     CAMPAIGN,
@@ -23,7 +23,6 @@ from seakeep.tank.delivery import (
     TRUTH,
     campaign_text,
     render_side_view,
-    write_dataset,
     write_record,
 )
 from seakeep.tank.dynamics import Rig, assemble_rig, simulate
@@ -260,7 +259,7 @@ def _record_run(
     settings, rig, folder, kind, one_logger, filmed = asked
     played = play_run(settings, name, rig)
     raw, hidden = make_folder(folder / "raw" / name), make_folder(folder / "truth")
-    write_dataset(truth(played, name), hidden / f"{name}.nc")
+    write_netcdf(hidden / f"{name}.nc", truth(played, name))
     rng = generator(settings, name, "instruments")
     records = record_run(played, rng, SINGLE_RATE if one_logger else None)
     files = {each: write_record(record, raw / f"{each}.{kind}") for each, record in records.items()}
