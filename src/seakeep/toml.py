@@ -147,13 +147,6 @@ Duration = Annotated[_OrLength[Positive], _is("finite and positive", lambda x: 0
 """A positive duration: seconds or a :class:`Length`."""
 Instant = Annotated[_OrLength[Finite], _is("finite", math.isfinite)]
 """An instant: seconds or a :class:`Length`."""
-Delay = Annotated[
-    _OrLength[Annotated[int, Field(ge=0)]],
-    _is("finite and not negative", lambda x: 0 <= x < math.inf),
-]
-"""A number of samples, or a :class:`Length` that becomes samples once the step is known."""
-Window = Annotated[_OrLength[Annotated[int, Field(ge=2)]], _is("positive", lambda x: x > 0)]
-"""The same, of at least two samples; ``"inf T"`` stands for all there are."""
 _Edge = _OrLength[float]
 Span = Annotated[tuple[_Edge, _Edge], Field(strict=False), AfterValidator(_rising)]
 """Start and end, each in seconds or a :class:`Length`."""
