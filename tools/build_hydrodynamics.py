@@ -16,13 +16,14 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 import xarray as xr
-from hull import HullMesh, hull_mesh, hydrostatics
+from hull import Built, HullMesh, HullSettings, hull_mesh, hydrostatics
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import write_netcdf
 from seakeep.tank.hydrodynamics import CONVENTIONS, POOL_MODES, RIGID
-from seakeep.tank.settings import HullSettings, default_settings, read_tank
+from seakeep.tank.settings import default_settings, read_tank
+from seakeep.toml import validated
 from seakeep.waves import GRAVITY, group_speed, wavenumber
 
 DIRECTIONS = 96
@@ -196,8 +197,9 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         settings = default_settings() if options.settings is None else read_tank(options.settings)
+        built = validated(Built, {"hull": settings.hull}, options.settings or "the default", "tank")
         data = build_hydrodynamics(
-            settings.hull,
+            built.hull,
             options.frequencies,
             settings.facility.water_depth,
             settings.facility.density,

@@ -10,17 +10,70 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from typing import Annotated, Self
 
 import numpy as np
 import numpy.typing as npt
 import scipy
+from pydantic import BeforeValidator, Field, model_validator
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError
-from seakeep.tank.settings import HullSettings, PoolGeometry
+from seakeep.toml import Finite, Positive, Table
 from seakeep.waves import GRAVITY
 
 IntArray = npt.NDArray[np.int64]
+Below = Annotated[float, Field(lt=0, ge=-1e4)]
+Panels = Annotated[int, Field(ge=4)]
+
+
+class PoolGeometry(Table):
+    """Moon pool: a basin at the free surface above a shelf, a narrower opening below it (m)."""
+
+    centre: Finite = -0.09
+    length: Positive = 0.45
+    beam: Positive = 0.36
+    bottom_length: Positive = 0.36
+    bottom_beam: Positive = 0.28
+    shelf: Below = -0.035
+    lid: Below = -0.01
+
+    @model_validator(mode="after")
+    def _nested(self) -> Self:
+        if self.bottom_length > self.length or self.bottom_beam > self.beam:
+            raise ValueError("the pool's bottom opening must fit inside its free surface")
+        if self.shelf >= self.lid:
+            raise ValueError("the pool's shelf must lie below its lid")
+        return self
+
+
+class HullSettings(Table):
+    """Dimensions of the hull and the panels of its mesh; read by the mesh builder alone.
+
+    ``pool = false`` in TOML is a hull without a moon pool.
+    """
+
+    mass: Positive
+    centre_of_gravity: Finite
+    pitch_gyradius: Positive
+    length_waterline: Positive
+    beam_waterline: Positive
+    waterplane_area: Positive
+    bottom_taper: Annotated[float, Field(ge=0, lt=0.6)]
+    pool: Annotated[
+        PoolGeometry | None, BeforeValidator(lambda value: None if value is False else value)
+    ] = PoolGeometry()
+    internal_lid: Below = -0.005
+    panels_along: Panels = 14
+    panels_across: Panels = 10
+    panels_down: Annotated[int, Field(ge=2)] = 5
+    panels_bottom: Annotated[int, Field(ge=2)] = 4
+
+
+class Built(Table):
+    """What the builder reads of the settings of a tank."""
+
+    hull: HullSettings
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@ import shutil
 import numpy as np
 import pytest
 import xarray as xr
-from hull import hull_mesh, hydrostatics
+from hull import Built, HullSettings, hull_mesh, hydrostatics
 
 from seakeep.errors import RequestError
 from seakeep.tank.hydrodynamics import (
@@ -15,9 +15,10 @@ from seakeep.tank.hydrodynamics import (
     shipped_hydrodynamics,
 )
 from seakeep.tank.settings import default_settings
+from seakeep.toml import validated
 from seakeep.waves import GRAVITY, phase_speed
 
-HULL = default_settings().hull
+HULL = HullSettings.model_validate(default_settings().hull)
 
 
 def test_mesh_is_the_one_of_the_shipped_coefficients(hydro):
@@ -32,6 +33,20 @@ def test_mesh_has_the_mass_area_and_trim_asked_for():
     assert statics.waterplane == pytest.approx(0.9035, rel=1e-9)
     assert statics.buoyancy[0] == pytest.approx(0.0, abs=1e-9)
     assert mesh.draft == pytest.approx(0.0830, abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("pool", "message"),
+    [
+        ({"bottom_length": 0.6}, r"hull\.pool: .*bottom opening must fit inside its free surface"),
+        ({"shelf": -0.005}, "shelf must lie below its lid"),
+        ({"shelv": -0.005}, r"hull\.pool\.shelv: unknown key, .* Did you mean 'shelf'"),
+    ],
+)
+def test_a_pool_that_cannot_be_built_is_refused(pool, message):
+    hull = default_settings().hull
+    with pytest.raises(RequestError, match=message):
+        validated(Built, {"hull": hull | {"pool": hull["pool"] | pool}}, "mine.toml", "tank")
 
 
 def test_low_frequency_limits(hydro):

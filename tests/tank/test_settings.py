@@ -40,8 +40,6 @@ def test_a_file_changes_what_it_states_and_keeps_the_rest(tmp_path):
         "[runs.a]\nspectrum = { kind = 'table', frequencies = [1, 0.5], densities = [1, 1] }":
             "frequencies of a spectrum must increase",
         "[instruments]\ntrigger_width = 30.0": "must be shorter than trigger_period",
-        "[hull.pool]\nbottom_length = 0.6": "bottom opening must fit inside its free surface",
-        "[hull.pool]\nshelf = -0.005": "shelf must lie below its lid",
         "seed = 18446744073709551616": r"seed: .* Give a number from 0 to 2\^64",
         "[channels.a]\ncolumn = 'a'\n[rig]\n": "is a campaign file",
     }.items(),

@@ -8,9 +8,7 @@ moves in a plane of 2.5 mm per pixel. A lamp in the upper left corner shows the 
 
 import io
 import tempfile
-import tomllib
 from collections.abc import Iterator, Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +23,7 @@ from seakeep.files import MARK, write_netcdf, write_text
 from seakeep.signals.panel import opencv
 from seakeep.tank.instruments import Played, clock_instants, trigger
 from seakeep.tank.settings import RunPlan, TankSettings
+from seakeep.toml import packaged
 
 CAMPAIGN, RAW, TRUTH = "campaign", "raw file", "truth"
 """Kinds of files, as their marks say it."""
@@ -106,8 +105,7 @@ def campaign_text(
         near = min(place, key=lambda name: abs(place[name] - settings.vessel.position))
         inputs = list(dict.fromkeys(filtered[n] for n in (min(place, key=place.__getitem__), near)))
     lines = [f"mooring_{name}" for name in settings.moorings]
-    data = resources.files("seakeep.tank").joinpath("data/campaign.toml").read_text("utf-8")
-    fixed = tomllib.loads(data)
+    fixed = packaged("tank/data/campaign.toml")
     columns = {f"eta_{name}": (name, "mm") for name in probes} | fixed["columns"]
     columns |= {line: (line, "N") for line in lines}
     channels = {

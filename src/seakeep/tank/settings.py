@@ -3,23 +3,30 @@
 The default numbers stand, with their units and reasons, in ``data/ck14e.toml``.
 """
 
-import tomllib
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from seakeep.campaign.settings import Band, ChannelName, RunName
 from seakeep.errors import RequestError
 from seakeep.files import read_bytes
-from seakeep.toml import Count, Finite, NotNegative, Pair, Positive, Table, read_toml, validated
+from seakeep.toml import (
+    Count,
+    Finite,
+    NotNegative,
+    Pair,
+    Positive,
+    Table,
+    packaged,
+    read_toml,
+    validated,
+)
 
+DEFAULT = "tank/data/ck14e.toml"
 Logger = Literal["wave_probes", "mru", "loads", "video"]
 Point = Annotated[tuple[Finite, Finite], Field(strict=False)]
-Below = Annotated[float, Field(lt=0, ge=-1e4)]
-Panels = Annotated[int, Field(ge=4)]
 Depth = Annotated[float, Field(ge=0.01, le=1e4, description="a depth of 0.01 to 10 000 m")]
 
 
@@ -35,49 +42,6 @@ class LineSettings(Table):
     damping: NotNegative = 0.15
     eye: Point
     pole: Point
-
-
-class PoolGeometry(Table):
-    """Moon pool: a basin at the free surface above a shelf, a narrower opening below it (m)."""
-
-    centre: Finite = -0.09
-    length: Positive = 0.45
-    beam: Positive = 0.36
-    bottom_length: Positive = 0.36
-    bottom_beam: Positive = 0.28
-    shelf: Below = -0.035
-    lid: Below = -0.01
-
-    @model_validator(mode="after")
-    def _nested(self) -> Self:
-        if self.bottom_length > self.length or self.bottom_beam > self.beam:
-            raise ValueError("the pool's bottom opening must fit inside its free surface")
-        if self.shelf >= self.lid:
-            raise ValueError("the pool's shelf must lie below its lid")
-        return self
-
-
-class HullSettings(Table):
-    """Dimensions of the hull and the panels of its mesh; read by the mesh builder alone.
-
-    ``pool = false`` in TOML is a hull without a moon pool.
-    """
-
-    mass: Positive
-    centre_of_gravity: Finite
-    pitch_gyradius: Positive
-    length_waterline: Positive
-    beam_waterline: Positive
-    waterplane_area: Positive
-    bottom_taper: Annotated[float, Field(ge=0, lt=0.6)]
-    pool: Annotated[
-        PoolGeometry | None, BeforeValidator(lambda value: None if value is False else value)
-    ] = PoolGeometry()
-    internal_lid: Below = -0.005
-    panels_along: Panels = 14
-    panels_across: Panels = 10
-    panels_down: Annotated[int, Field(ge=2)] = 5
-    panels_bottom: Annotated[int, Field(ge=2)] = 4
 
 
 class FacilitySettings(Table):
@@ -249,24 +213,14 @@ class TankSettings(Table):
     seed: Annotated[int, Field(ge=0, lt=2**64, description="a number from 0 to 2^64 − 1")]
     scale_factor: Positive
     facility: FacilitySettings
-    hull: HullSettings
+    hull: dict[str, Any]
+    """Dimensions and mesh of the hull; ``tools/build_hydrodynamics.py`` alone reads them."""
     vessel: VesselSettings
     drift: DriftSettings
     moorings: dict[ChannelName, LineSettings]
     simulation: SimulationSettings
     instruments: InstrumentPlan
     runs: dict[RunName, RunPlan]
-
-
-def validate_tank(table: dict[str, Any], source: Path | str = "the tank settings") -> TankSettings:
-    """Validate a table of settings, as read from TOML.
-
-    Raises
-    ------
-    RequestError
-        With one line per mistake: key, value received, remedy.
-    """
-    return validated(TankSettings, table, source, "tank")
 
 
 def read_tank(path: Path | str) -> TankSettings:
@@ -290,7 +244,7 @@ def read_tank(path: Path | str) -> TankSettings:
         If the file does not exist, is not TOML, or holds a wrong setting.
     """
     source = Path(path)
-    merged = _merge(_default_table(), read_toml(source, "tank"), ())
+    merged = _merge(packaged(DEFAULT), read_toml(source, "tank"), ())
     for name, run in merged["runs"].items() if isinstance(merged["runs"], dict) else ():
         spectrum = run.get("spectrum") if isinstance(run, dict) else None
         if isinstance(spectrum, dict) and spectrum.get("file"):
@@ -299,7 +253,7 @@ def read_tank(path: Path | str) -> TankSettings:
     vessel = merged["vessel"]
     if isinstance(vessel, dict) and vessel["hydrodynamics"]:
         vessel["hydrodynamics"] = str(source.parent / str(vessel["hydrodynamics"]))
-    return validate_tank(merged, source)
+    return validated(TankSettings, merged, source, "tank")
 
 
 def _spectrum_of(path: Path, where: str) -> dict[str, Any]:
@@ -343,12 +297,7 @@ def with_waves(
     for run in table["runs"].values():
         if spacing is not None and run["spectrum"] is not None:
             run["spectrum"]["spacing"] = spacing
-    return validate_tank(table)
-
-
-def _default_table() -> dict[str, Any]:
-    text = resources.files("seakeep.tank").joinpath("data", "ck14e.toml").read_text("utf-8")
-    return tomllib.loads(text)
+    return TankSettings.model_validate(table)
 
 
 def default_settings() -> TankSettings:
@@ -360,4 +309,4 @@ def default_settings() -> TankSettings:
     >>> sorted(settings.runs)[:3]
     ['irregular_1', 'irregular_2', 'irregular_3']
     """
-    return validate_tank(_default_table())
+    return TankSettings.model_validate(packaged(DEFAULT))
