@@ -23,6 +23,7 @@ from seakeep.errors import DataError, MissingFileError, RequestError, did_you_me
 if TYPE_CHECKING:
     import h5py
     import xarray as xr
+    from jinja2 import Environment
 
     from seakeep.arrays import Datasets, Groups
 
@@ -196,6 +197,21 @@ def _missing(path: Path) -> MissingFileError:
         listed = f"{len(beside)} names, the nearest of them {listed}"
     return MissingFileError(
         f"{path} does not exist.{near} Its folder holds {listed}. Correct the name."
+    )
+
+
+@functools.cache
+def templates(room: str) -> Environment:
+    """Templates of a room; what they name must be given, and is escaped in HTML."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+
+    return Environment(
+        loader=PackageLoader(f"seakeep.{room}"),
+        autoescape=select_autoescape(),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
 
 

@@ -7,21 +7,18 @@ import io
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import cache, partial
+from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from markupsafe import Markup, escape
 
 from seakeep.arrays import Progress
-from seakeep.files import MARK, check_output, write_text
+from seakeep.files import MARK, check_output, templates, write_text
 from seakeep.report.style import Figure, figure_style, save_figure
 from seakeep.report.tables import WORDS, Table, shade, write_csv, write_latex
 from seakeep.study.store import storing
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 UNFINISHED = f"""<!DOCTYPE html>
 <meta name="generator" content="{MARK}: report">
@@ -182,26 +179,13 @@ def write_page(
 
 def rendered(template: str, **content: Any) -> str:
     """Page of a template of ``seakeep.report.templates``; what is not ours is escaped."""
-    return _environment().get_template(template).render(**content)
-
-
-@cache
-def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("seakeep.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     folder = resources.files("seakeep.report").joinpath("templates")
+    environment = templates("report")
     environment.globals["source"] = lambda name: Markup(folder.joinpath(name).read_text("utf-8"))
     environment.filters["shade"] = shade
     environment.filters["breakable"] = lambda text: escape(text).replace("_", Markup("_<wbr>"))
     environment.filters["minus"] = lambda text: re.sub(r"(?<![\w)])-(?=\d)", "−", text)
-    return environment
+    return environment.get_template(template).render(**content)
 
 
 def inline_picture(png: bytes, words: str) -> Markup:

@@ -19,22 +19,16 @@ import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import SeakeepError
-from seakeep.files import MARK, write_netcdf, write_text
+from seakeep.files import MARK, templates, write_netcdf, write_text
 from seakeep.signals.panel import opencv
 from seakeep.tank.instruments import Played, clock_instants, trigger
-from seakeep.tank.settings import RunPlan, TankSettings
-from seakeep.toml import packaged
+from seakeep.tank.settings import TankSettings
 
 CAMPAIGN, RAW, TRUTH = "campaign", "raw file", "truth"
 """Kinds of files, as their marks say it."""
 
 FIRST_LINE = r"time \[s\],(trigger \[V\]|lamp \[-\]|\w+ \[mm\]),.*"
 """First line of a raw text file."""
-HEADING = (
-    f"{MARK}: {CAMPAIGN}",
-    "Written by `seakeep tank`. Spans are in seconds of the reference clock (wave probes);",
-    "what lies before them is the start-up of the waves: cut it from every analysis.",
-)
 
 
 def write_record(record: xr.Dataset, path: Path) -> Path:
@@ -73,20 +67,6 @@ def _filtered(settings: TankSettings) -> dict[str, str]:
     return {name: f"eta_{short[name]}" if unique else f"eta_{name}_filtered" for name in short}
 
 
-def _run(run: RunPlan, files: Mapping[str, str], one_logger: bool) -> dict[str, Any]:
-    waves = "regular" if run.spectrum is None else "irregular"
-    begin, end = run.startup, run.length
-    middle = 0.5 * (begin + end)
-    loggers = {key: path for key, path in files.items() if key != SIDE_VIEW}
-    named = {"file": next(iter(loggers.values()))} if one_logger else {"files": loggers}
-    table: dict[str, Any] = {"sea_state": run.sea_state or waves, "waves": waves}
-    if run.role == "both":
-        table |= {"train": [begin, middle], "test": [middle, end]}
-    else:
-        table |= {"role": run.role, "span": [begin, end]}
-    return named | table if one_logger else table | named
-
-
 def campaign_text(
     settings: TankSettings, files: Mapping[str, Mapping[str, str]], kind: str, one_logger: bool
 ) -> str:
@@ -96,71 +76,32 @@ def campaign_text(
     comment, since it is no table of a logger. `kind` is the format of the raw files.
     """
     # A single logger's file is for readers that know no gaps: its probes with drop-outs stay out.
-    every = settings.instruments.probes
-    probes = [name for name in every if not (one_logger and every[name].dropouts)]
-    filtered = _filtered(settings)
-    place = {name: every[name].position for name in filtered}
+    every, filtered = settings.instruments.probes, _filtered(settings)
     inputs = []
-    if place:  # the first probe downstream, and the one nearest to the vessel
+    if place := {name: every[name].position for name in filtered}:
+        # The first probe downstream, and the one nearest to the vessel.
         near = min(place, key=lambda name: abs(place[name] - settings.vessel.position))
         inputs = list(dict.fromkeys(filtered[n] for n in (min(place, key=place.__getitem__), near)))
-    lines = [f"mooring_{name}" for name in settings.moorings]
-    fixed = packaged("tank/data/campaign.toml")
-    columns = {f"eta_{name}": (name, "mm") for name in probes} | fixed["columns"]
-    columns |= {line: (line, "N") for line in lines}
-    channels = {
-        channel: {"column": f"{name} [{unit}]" if kind == "csv" else name, "unit": unit}
-        for channel, (name, unit) in columns.items()
+    environment = templates("tank")
+    environment.filters |= {
+        "toml": lambda value: tomlkit.item(value).as_string(),
+        "key": lambda name: tomlkit.key(name).as_string(),
     }
-    channels["surge"]["long_name"] = "surge, tracked in the video"
-    instruments: dict[str, Any] = {"reference": "wave_probes"}
-    for logger, clock in settings.instruments.clocks.items():  # all record the same pulses
-        trigger, unit = ("lamp", "-") if logger == "video" else ("trigger", "V")
-        instruments[logger] = {
-            "sampling_rate": clock.rate,
-            "trigger": trigger,
-            "trigger_unit": unit,
-        }
-    instruments["video"] |= {
-        "metres_per_pixel": METRES_PER_PIXEL,
-        "panel": list(PANEL),
-        "panel_height": PANEL_HEIGHT,
-    }
-    tables: dict[str, Any] = {
-        "campaign": {
-            "name": settings.name,
-            "description": f"Virtual towing tank, seed {settings.seed}",
-            "scale_factor": settings.scale_factor,
-        },
-        "rig": {
-            "water_depth": settings.facility.water_depth,
-            "wave_direction": 0.0,
-            "frame": "x downstream, z up, pitch positive bow up; surge from the place at rest",
-            "positions": {f"eta_{name}": every[name].position for name in probes}
-            | {filtered[name]: position for name, position in place.items()},
-        },
-        "channels": channels,
-        "derived": {filtered[n]: {"from": f"eta_{n}"} | fixed["filter"] for n in filtered}
-        | fixed["derived"],
-        "instruments": instruments,
-        "runs": {n: _run(run, files[n], one_logger) for n, run in settings.runs.items()},
-        "preparation": fixed["preparation"],
-        "model": fixed["model"] | {"inputs": inputs},
-    }
-    tables["model"]["states"] += lines
-    if one_logger:
-        del tables["instruments"], tables["preparation"]["gaps"]
-    document = tomlkit.document()
-    for line in HEADING:
-        document.add(tomlkit.comment(line))
-    for name, table in tables.items():
-        document.add(tomlkit.nl())
-        document.add(name, tomlkit.item(table))
-    for name, paths in files.items():
-        if SIDE_VIEW in paths:
-            filmed = f"Filmed: {paths[SIDE_VIEW]}, for `seakeep track`."
-            document["runs"][name].comment(filmed)
-    return tomlkit.dumps(document)
+    return environment.get_template("campaign.toml").render(
+        mark=f"{MARK}: {CAMPAIGN}",
+        tank=settings,
+        files_of=files,
+        kind=kind,
+        one_logger=one_logger,
+        probes={name: each for name, each in every.items() if not (one_logger and each.dropouts)},
+        filtered=filtered,
+        lines=[f"mooring_{name}" for name in settings.moorings],
+        inputs=inputs,
+        metres_per_pixel=METRES_PER_PIXEL,
+        panel=list(PANEL),
+        panel_height=PANEL_HEIGHT,
+        side_view=SIDE_VIEW,
+    )
 
 
 Image = npt.NDArray[np.uint8]
