@@ -29,7 +29,7 @@ from pydantic import (
 )
 
 from seakeep.errors import SHOWN, MissingFileError, RequestError, did_you_mean, wanted
-from seakeep.files import read_bytes
+from seakeep.files import read_bytes, templates
 
 KNOWN_BY = {
     "campaign": ("channels", "rig", "preparation"),
@@ -51,6 +51,16 @@ Settings = TypeVar("Settings", bound=BaseModel)
 def packaged(path: str) -> dict[str, Any]:
     """Content of a TOML file that comes with seakeep."""
     return tomllib.loads(resources.files("seakeep").joinpath(path).read_text("utf-8"))
+
+
+def rendered(room: str, template: str, **content: Any) -> str:
+    """Text of a TOML file from a template of a room, with the filters ``toml`` and ``key``."""
+    import tomlkit
+
+    environment = templates(room)
+    environment.filters["toml"] = lambda value: tomlkit.item(value).as_string()
+    environment.filters["key"] = lambda name: tomlkit.key(name).as_string()
+    return environment.get_template(template).render(**content)
 
 
 @dataclass(frozen=True)

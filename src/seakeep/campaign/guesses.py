@@ -12,7 +12,14 @@ import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.campaign.readers import time_column, time_step_of, time_unit_of
-from seakeep.conventions import MOTIONS, canonical_channel, conversion, is_elevation, si_unit
+from seakeep.conventions import (
+    MOTIONS,
+    Channel,
+    canonical_channel,
+    conversion,
+    is_elevation,
+    si_unit,
+)
 from seakeep.errors import DataError
 from seakeep.formats import Columns
 from seakeep.formats.columns import is_unit, named_unit
@@ -65,10 +72,19 @@ class File:
         return self.table.sampling_rate if step is None else 1.0 / step
 
     @property
+    def time_unit(self) -> str:
+        """Unit of the times."""
+        return time_unit_of(self.table, self.time)
+
+    @property
+    def time_is_named(self) -> bool:
+        """Whether a column has a usual name of times."""
+        return time_column(self.table) is not None
+
+    @property
     def start(self) -> float:
         """First instant, s; zero where the file states none."""
-        times = self.table.values.get(self.time, np.zeros(1))
-        unit = time_unit_of(self.table, self.time)
+        times, unit = self.table.values.get(self.time, np.zeros(1)), self.time_unit
         factor = conversion(unit, "s") if is_unit(unit) else 1.0
         return factor * times[0] if np.isfinite(times[0]) else 0.0
 
@@ -100,6 +116,16 @@ class Guess:
     gaps: Literal["", "short", "long"] = ""
     at_rest: bool = False
     behind: bool = False
+
+    @property
+    def canonical(self) -> Channel | None:
+        """The canonical channel, if it is one."""
+        return canonical_channel(self.channel)
+
+    @property
+    def name(self) -> str:
+        """Name of the column, without a unit that it ends on."""
+        return named_unit(self.column)[0] if self.unit_from == "name" else self.column
 
     @property
     def is_motion(self) -> bool:

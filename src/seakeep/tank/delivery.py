@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import tomlkit
 import xarray as xr
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import SeakeepError
-from seakeep.files import MARK, templates, write_netcdf, write_text
+from seakeep.files import MARK, write_netcdf, write_text
 from seakeep.signals.panel import opencv
 from seakeep.tank.instruments import Played, clock_instants, trigger
 from seakeep.tank.settings import TankSettings
+from seakeep.toml import rendered
 
 CAMPAIGN, RAW, TRUTH = "campaign", "raw file", "truth"
 """Kinds of files, as their marks say it."""
@@ -82,12 +82,9 @@ def campaign_text(
         # The first probe downstream, and the one nearest to the vessel.
         near = min(place, key=lambda name: abs(place[name] - settings.vessel.position))
         inputs = list(dict.fromkeys(filtered[n] for n in (min(place, key=place.__getitem__), near)))
-    environment = templates("tank")
-    environment.filters |= {
-        "toml": lambda value: tomlkit.item(value).as_string(),
-        "key": lambda name: tomlkit.key(name).as_string(),
-    }
-    return environment.get_template("campaign.toml").render(
+    return rendered(
+        "tank",
+        "campaign.toml",
         mark=f"{MARK}: {CAMPAIGN}",
         tank=settings,
         files_of=files,
