@@ -26,6 +26,7 @@ from seakeep.study.plan import named
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
 from seakeep.study.store import StudyResult, read_result, storing, versions
+from seakeep.toml import rendered
 
 NOTE = (
     "Virtual tank: a made-up vessel in made-up seas, so no number here replicates the paper's. Its "
@@ -320,111 +321,7 @@ def detrended_text(campaign: str) -> str:
     return "\n".join([head + text, *texts])
 
 
-STUDY = """\
-# The paper's study on the virtual tank, {title}; written by `seakeep reproduce`.
-# {mark}: {kind}
-[study]
-name = "Virtual CK-14e, {title}"
-description = "HDMDc and BHDMDc of a moored vessel with a moon pool in head seas; data of the \
-virtual towing tank"
-campaign = "../campaign/{campaign}"{truth}
-preset = "{preset}"
-seed = {seed}
-
-[training]
-{training}
-
-[models.deterministic]
-kind = "hankel_dmdc"{alignment}
-
-[models.bayesian]
-kind = "bayesian_hankel_dmdc"
-n_members = {members}{alignment}
-
-[models.mean]
-kind = "mean"
-
-[models.hold_last]
-kind = "hold_last"
-
-[models.fir]  # with the data, the look-ahead and the input map of the models above
-kind = "fir"{beside}
-
-[models.fir_ahead]
-kind = "fir"
-lead = "2 T"  # the same windows in all acts
-input_delays = "5 T"  # of them 3 T before the instant{ahead}
-
-[tests.irregular]
-waves = "irregular"
-label = "irregular"
-length = 15
-windows = {tests}
-part = "test"
-{regular}
-[statistics]
-n_series = {series}
-
-[output]
-paper = true{regularisation}
-"""
-RECOMMENDED_FIR = """
-input_delays = "3 T"
-lead = "0.75 T"
-alignment = { mode = "dispersion", surge = "predicted" }
-observables = [
-    { kind = "slow_squares", of = "eta_cog", cutoff = "1 /T", lead = "0.75 T" },
-    { kind = "powers", of = ["eta_fwd", "eta_cog"], powers = [2, 3] },
-]"""
-REGULAR_TEST = """
-[tests.{name}]
-runs = ["{name}"]
-label = "regular, λ/L {ratio}"
-length = 5
-windows = {tests}
-startup = {startup}  # s: all acts have room for their delays, and the same windows
-"""
-
-
 def study_text(act: Act, size: Size, seed: int) -> str:
     """Study file of an act."""
-    training = 'scheme = "leave_out"\nleave_out = "run"'
-    alignment, members = "", min(size.members, CALIBRATED)
-    beside = RECOMMENDED_FIR
-    ahead = '\nalignment = { mode = "dispersion", surge = "measured" }'
-    if act.preset == "paper":
-        training = f'scheme = "halves"\nwindows = {size.training}\nplacement = "random"'
-        surge, members = "surge_with_drift" if act.without_drift else "surge", size.members
-        how = f'mode = "effective", surge = "measured", surge_channel = "{surge}"'
-        alignment = ahead = f"\nalignment = {{ {how} }}"
-        beside = f'\ninput_delays = "5 T"\nwindow = "20 T"{alignment}'
-    regular = [
-        REGULAR_TEST.format(name=name, ratio=ratio, tests=size.tests, startup=STARTUP)
-        for name, ratio in REGULAR.items()
-    ]
-    return STUDY.format(
-        title=act.title,
-        mark=MARK,
-        kind=STUDY_FILE,
-        campaign="detrended/campaign.toml" if act.without_drift else "campaign.toml",
-        truth="" if act.without_drift else '\ntruth = "../campaign/truth"',
-        preset=act.preset,
-        seed=seed,
-        training=training,
-        alignment=alignment,
-        beside=beside,
-        ahead=ahead,
-        members=members,
-        tests=size.tests,
-        regular="".join(regular),
-        series=size.series,
-        regularisation="\nregularisation = true" * act.without_drift,
-    )
-
-
-REGULAR = {"regular_1_5": "1.5", "regular_2": "2", "regular_3": "3"}
-"""Runs in regular waves, and their λ/L."""
-CALIBRATED = 20
-"""Members at most of the third act: its band is as wide as calibration says, not as they spread."""
-STARTUP = 20
-"""s of a run in regular waves before the first window: longer than any model's history."""
+    given = {"act": act, "size": size, "seed": seed, "mark": MARK, "kind": STUDY_FILE}
+    return rendered("study", "study.toml", **given)
