@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from concurrent.futures import ProcessPoolExecutor as Pool
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from importlib import metadata
 from itertools import islice
 from multiprocessing.connection import wait as wait_for
@@ -201,41 +201,25 @@ def on_this_machine(executor: Executor | None) -> Executor | None:
     return executor if isinstance(executor, Pool) else None
 
 
-def make_executor(
-    workers: int = 1, scheduler: str | None = None
-) -> AbstractContextManager[Executor | None]:
-    """Executor of a command: None for one worker, a pool of processes, or a Dask cluster.
+@contextmanager
+def cluster(scheduler: str) -> Iterator[Executor]:
+    """Executor of a running Dask cluster.
 
     Parameters
     ----------
-    workers : int, optional
-        Processes on this machine; 1 works in this process.
-    scheduler : str, optional
-        Address of the scheduler of a running Dask cluster, such as ``tcp://host:8786``, whose
-        workers do the work instead.
+    scheduler : str
+        Address of its scheduler, such as ``tcp://host:8786``.
 
-    Returns
-    -------
-    context manager
-        Yields the executor.
+    Yields
+    ------
+    concurrent.futures.Executor
+        For the keyword ``executor`` of an ensemble's methods.
 
     Raises
     ------
     RequestError
-        If a value does not exist, both are given, or the cluster cannot be used.
+        If the cluster cannot be used.
     """
-    if scheduler is not None:
-        if workers != 1:
-            raise RequestError(
-                f"workers = {workers} counts workers on this machine, and scheduler = "
-                f"{scheduler!r} hands all work to a cluster. Give one of the two."
-            )
-        return _dask(scheduler)
-    return nullcontext() if workers == 1 and not isinstance(workers, bool) else processes(workers)
-
-
-@contextmanager
-def _dask(scheduler: str) -> Iterator[Executor]:
     try:
         import dask
         from distributed import Client

@@ -17,7 +17,7 @@ from ensembles import INPUTS, STATES, few, wave_run
 
 import seakeep
 from seakeep import executor as executors
-from seakeep.executor import WorkerLostError, as_finished, in_order, make_executor
+from seakeep.executor import WorkerLostError, as_finished, in_order
 from seakeep.models import processes
 
 posix = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system knows no SIGKILL")
@@ -164,7 +164,7 @@ class TestCluster:
         ensemble, run = ensemble_and_run
         monkeypatch.setattr(executors, "PATIENCE", 300.0)  # a busy machine answers in minutes
         with contextlib.closing(Cluster(tmp_path, workers=2)) as cluster:
-            with make_executor(scheduler=cluster.address) as executor:
+            with executors.cluster(cluster.address) as executor:
                 found = ensemble.forecast_summary(run, start=31.0, steps=30, executor=executor)
                 for _, threads in in_order(side_work.blas_threads, None, range(8), executor):
                     assert set(threads) == {1}

@@ -11,7 +11,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Annotated, Any, Literal
@@ -199,14 +199,27 @@ def read_files(campaign: Campaign, *others: Path) -> list[Path]:
     return files
 
 
-def member_executor(
-    workers: int | None, scheduler: str | None
+def executor_of(
+    workers: int | None, scheduler: str | None, usual: int = 1
 ) -> AbstractContextManager[Executor | None]:
-    """Executor for the members of an ensemble; without either option this process."""
-    from seakeep.executor import make_executor
+    """Executor of a command: a Dask cluster, processes, or for one worker this process."""
+    from seakeep.executor import cluster, processes
 
-    count = checked_count(workers, scheduler) if workers or scheduler else 1
-    return make_executor(count, scheduler)
+    if workers and scheduler:
+        raise RequestError(
+            f"--workers {workers} counts processes on this machine, and --scheduler {scheduler} "
+            "hands all work to a cluster. Give one of the two."
+        )
+    if scheduler is not None:
+        return cluster(scheduler)
+    count = workers or usual
+    return nullcontext() if count == 1 else processes(count)
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    usable = getattr(os, "sched_getaffinity", None)  # Linux alone has it
+    return len(usable(0)) if usable else os.cpu_count() or 1
 
 
 def say_written(paths: Iterable[Path]) -> None:
@@ -219,16 +232,3 @@ def refuse(given: Mapping[str, bool], words: str) -> None:
     for option, is_given in given.items():
         if is_given:
             raise RequestError(f"{option} {words}")
-
-
-def checked_count(workers: int | None, scheduler: str | None) -> int:
-    """Number of local workers: by default one per core, one where a cluster does the work."""
-    if workers and scheduler:
-        raise RequestError(
-            f"--workers {workers} counts processes on this machine, and --scheduler {scheduler} "
-            "hands all work to a cluster. Give one of the two."
-        )
-    if not workers and not scheduler:
-        usable = getattr(os, "sched_getaffinity", None)  # Linux alone has it
-        return len(usable(0)) if usable else os.cpu_count() or 1
-    return workers or 1

@@ -22,7 +22,7 @@ from seakeep.cli.console import (
     Scheduler,
     Steps,
     Workers,
-    member_executor,
+    executor_of,
     print_table,
     progress_bar,
     read_files,
@@ -127,7 +127,7 @@ def forecast(
     warn_of_waves(identified, prepared, run, first, left if count is None else count)
     if is_ensemble(identified):
         with (
-            member_executor(workers, scheduler) as executor,
+            executor_of(workers, scheduler) as executor,
             progress_bar("Forecasting") as progress,
         ):
             play = identified.forecast if members else identified.forecast_summary
@@ -254,7 +254,7 @@ def compare(
         serving = {n: each for n, each in fitted.items() if n in names or served(each)}
         _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
         return
-    with member_executor(workers, scheduler) as executor, progress_bar("Comparing") as progress:
+    with executor_of(workers, scheduler) as executor, progress_bar("Comparing") as progress:
         comparisons = compare_models(
             fitted,
             read,

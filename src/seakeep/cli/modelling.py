@@ -18,7 +18,7 @@ from seakeep.cli.console import (
     ModelKey,
     Scheduler,
     Workers,
-    member_executor,
+    executor_of,
     print_table,
     progress_bar,
     read_files,
@@ -93,7 +93,7 @@ def tune(
     scores = target.with_suffix(".scores.json")
     chosen = spec.select or Select(period=period)
     vary = vary or ["observables"]
-    with member_executor(workers, scheduler) as executor, progress_bar("Tuning") as progress:
+    with executor_of(workers, scheduler) as executor, progress_bar("Tuning") as progress:
         search_result = search(
             replace(spec, select=chosen),
             runs,
@@ -149,7 +149,7 @@ def fit(
 
     read = read_campaign(campaign)
     check_output(out, "model", read_files(read))
-    with member_executor(workers, scheduler) as executor:
+    with executor_of(workers, scheduler) as executor:
         with progress_bar("Fitting") as progress:
             identified = fit_campaign(read, model, progress, executor=executor)
         if is_ensemble(identified):
@@ -245,7 +245,7 @@ def calibrate(
         prepared = load_prepared(read, names=wanted, progress=progress, channels=used)
     parts = calibration_parts(read, prepared, fitted.dt, start, stop)
     count = samples_of(steps, read, prepared.values(), fitted.dt, "--steps")
-    with member_executor(workers, scheduler) as executor, progress_bar("Calibrating") as progress:
+    with executor_of(workers, scheduler) as executor, progress_bar("Calibrating") as progress:
         calibrated = fitted.calibrate(
             parts,
             count,

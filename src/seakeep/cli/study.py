@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from typer import Argument, Option
 
-from seakeep.cli.console import Scheduler, checked_count, print_table, progress_bar, show
+from seakeep.cli.console import Scheduler, cores, executor_of, print_table, progress_bar, show
 
 if TYPE_CHECKING:
     from seakeep.study import StudyResult
@@ -42,13 +42,12 @@ def study(
 
     Example: seakeep study examples/ntnu_ship_section/study.toml -o ship-study
     """
-    from seakeep.executor import make_executor
     from seakeep.report.sections.results import findings, overview_table
     from seakeep.study import read_study, run_study
 
     asked = read_study(study_file)
     folder = out or study_file.parent / f"{study_file.stem}-results"
-    with make_executor(checked_count(workers, scheduler), scheduler) as executor:
+    with executor_of(workers, scheduler, cores()) as executor:
         with progress_bar("Study") as tell:
             result = run_study(asked, folder, executor=executor, progress=tell)
         page = _write_study(result)
@@ -85,14 +84,14 @@ def reproduce(
 
     Example: seakeep reproduce --quick --out quick
     """
-    from seakeep.executor import make_executor, on_this_machine, submitting
+    from seakeep.executor import on_this_machine, submitting
     from seakeep.report.acts import finding, short_table
     from seakeep.study.reproduce import ACTS, Size
     from seakeep.study.reproduce import reproduce as reproduce_study
 
     size = Size.quick() if quick else Size()
     pages = []
-    with make_executor(checked_count(workers, scheduler), scheduler) as executor:
+    with executor_of(workers, scheduler, cores()) as executor:
         with progress_bar("Study") as tell:
             play = partial(
                 reproduce_study, out, preset, size=size, seed=seed, executor=executor, progress=tell
