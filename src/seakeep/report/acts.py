@@ -482,7 +482,7 @@ def short_table(results: Results) -> Table:
         if act in results
     ]
     first = results[last]
-    seas = [first.label_of(test).removeprefix("regular, ") for test in first.tests]
+    seas = [*map(first.sea_of, first.tests)]
     return table("short", rows, columns=("model", *seas), numeric=range(1, 1 + len(seas)))
 
 
@@ -538,10 +538,9 @@ def still_water(results: Results) -> str:
 
 def _pairs(result: StudyResult, model: str) -> list[list[Number]]:
     """Median errors of a model per sea, of the wave channels and of the slow ones."""
-    pairs = []
-    for data in result.tests.values():
-        cells = data["error"].sel(model=model, measure="nrmse").values[data["judged"].values]
-        slow = np.isin(data["channel"].values, SLOW)
+    slow, pairs = np.isin(result.channels, SLOW), []
+    for test in result.tests:
+        cells = result.errors(test, model)
         pairs.append(numbers([np.nanmedian(average_of(cells[:, k])) for k in (~slow, slow)], 2))
     return pairs
 
@@ -554,7 +553,7 @@ def acts_table(results: Results) -> Table:
         for act in _played(results)
         for model in results[act.name].models
     ]
-    seas = [first.label_of(test).removeprefix("regular, ") for test in first.tests]
+    seas = [*map(first.sea_of, first.tests)]
     reading = [a.letter for a in _played(results) if results[a.name].attrs["conditional_on"]]
     conditions = (
         f"{' and '.join(reading)}: conditional on measured surge, which the alignment reads."

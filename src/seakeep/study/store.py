@@ -16,7 +16,7 @@ from typing import Any
 import xarray as xr
 from filelock import FileLock, Timeout
 
-from seakeep.arrays import Datasets, Groups
+from seakeep.arrays import Datasets, FloatArray, Groups
 from seakeep.errors import RequestError, SeakeepError, warn
 from seakeep.files import (
     check_report,
@@ -285,6 +285,15 @@ class StudyResult:
     def label_of(self, test: str) -> str:
         """Words for a test set."""
         return str(self.settings["tests"][test]["label"] or test.replace("_", " "))
+
+    def sea_of(self, test: str) -> str:
+        """Words for a test set beside others: its label without that the waves are regular."""
+        return self.label_of(test).removeprefix("regular, ")
+
+    def errors(self, test: str, model: str, measure: str = "nrmse") -> FloatArray:
+        """Errors of a model in all judged cells of a test set, shape (cell, channel)."""
+        data = self.tests[test]
+        return data["error"].sel(model=model, measure=measure).values[data["judged"].values]
 
     def words_of(self, channel: str) -> str:
         """Words for a channel of the study: what the campaign calls it."""

@@ -83,12 +83,6 @@ def draw_box_violin(
     return drawn["whiskers"][1].get_ydata()[1]
 
 
-def _cells(result: StudyResult, test: str, model: str, measure: str) -> FloatArray:
-    """Errors of all judged cells, shape (cell, channel)."""
-    data = result.tests[test]
-    return data["error"].sel(model=model, measure=measure).values[data["judged"].values]
-
-
 @figure_style()
 def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
     """ANRMSE and NAMMAE of all cells of some test sets, a box-violin per model."""
@@ -96,7 +90,7 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
     labels = [_narrow(result.label_of(test)) for test in tests]
     for axes, (measure, heading) in zip(figure.subplots(1, 2), HEADING.items(), strict=True):
         columns = {
-            model: [average_of(_cells(result, test, model, measure)) for test in tests]
+            model: [average_of(result.errors(test, model, measure)) for test in tests]
             for model in result.models
         }
         _draw_boxes(axes, result, columns, labels, heading)
@@ -109,7 +103,7 @@ def channel_boxes(result: StudyResult, test: str) -> Figure:
     """NRMSE and NAMMAE of all cells of a test set, channel by channel."""
     figure = new_figure(8.5, 5.6)
     models, labels = judged_models(result), list(map(short_label, result.channels))
-    errors = [[_cells(result, test, model, measure) for model in models] for measure in HEADING]
+    errors = [[result.errors(test, model, measure) for model in models] for measure in HEADING]
     scale = "log" if any(_spans_decades(np.concatenate(cells)) for cells in errors) else "linear"
     for axes, measure, cells in zip(
         figure.subplots(2, 1, sharex=True), HEADING, errors, strict=True

@@ -392,8 +392,8 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
     """Amplitude ratio, phase lead and offset of each channel, test set by test set."""
     rows, columns, response = [], ["channel", "model"], result.groups["statistics/response"]
     for test in tests:
-        label = result.label_of(test).removeprefix("regular, ")
-        columns += [f"{label}: {key}" for key in ("amplitude", "phase [°]", "offset [SD]", "share")]
+        sea = result.sea_of(test)
+        columns += [f"{sea}: {key}" for key in ("amplitude", "phase [°]", "offset [SD]", "share")]
     judged = response.sel(channel=result.channels, model=judged_models(result))
     for of_model in entries(judged, "channel", "model"):
         cells = [result.words_of(of_model["channel"].item()), model_words(of_model["model"].item())]
