@@ -96,9 +96,7 @@ def _source(campaign: Campaign, name: str) -> str:
         known = each.unit is None or (each.column or "").endswith(f"[{each.unit}]")
         unit = "" if known else f" [{each.unit}]"
         return f"{sign}column {each.column or name}{unit}{offset}"
-    derived = settings.derived.get(name)
-    if derived is None:
-        return ""
+    derived = settings.derived[name]
     if derived.expression is not None:
         return derived.expression
     words = {"integrate": "integral", "differentiate": "derivative"}
