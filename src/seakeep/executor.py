@@ -35,7 +35,7 @@ Data = TypeVar("Data")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 Function = Callable[[Data, Item], Result]
-"""Called as ``progress(done, total, what)``."""
+"""What a worker does with one item, and data that all items share."""
 
 BATCHES = 32
 """Pieces, at most, into which small items are handed out: each carries the data once."""

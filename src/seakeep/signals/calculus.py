@@ -14,14 +14,12 @@ from seakeep.arrays import FloatArray, as_pair, as_series, time_step
 from seakeep.errors import RequestError
 
 SHORTEST_RECORD = 0.05
+"""Part of the slowest period kept that a record must last."""
 
 
 def rising(place: FloatArray) -> FloatArray:
     """Raised cosine from 0 at places up to zero to 1 at those from one on."""
     return 0.5 - 0.5 * np.cos(np.pi * np.clip(place, 0.0, 1.0))
-
-
-"""Part of the slowest period kept that a record must last."""
 
 
 def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
