@@ -9,7 +9,8 @@ from __future__ import annotations
 import difflib
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 __all__ = [
     "SHOWN",
@@ -51,6 +52,18 @@ class DataError(SeakeepError, ValueError):
 
 class SeakeepWarning(UserWarning):
     """A result was produced, but something about it needs attention."""
+
+
+@contextmanager
+def needing(doing: str, extra: str) -> Iterator[None]:
+    """Say how to install a package that an import within lacks: with an extra of seakeep."""
+    try:
+        yield
+    except ImportError as error:
+        raise RequestError(
+            f"{doing} needs {error.name}, which is not installed. Install it with: pip install "
+            f"'seakeep[{extra}]'"
+        ) from error
 
 
 def warn(message: str) -> None:

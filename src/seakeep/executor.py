@@ -29,7 +29,7 @@ from typing import Any, TypeVar
 import threadpoolctl
 
 from seakeep.arrays import Progress
-from seakeep.errors import RequestError, SeakeepError
+from seakeep.errors import RequestError, SeakeepError, needing
 
 Data = TypeVar("Data")
 Item = TypeVar("Item")
@@ -220,14 +220,9 @@ def cluster(scheduler: str) -> Iterator[Executor]:
     RequestError
         If the cluster cannot be used.
     """
-    try:
+    with needing("work on a Dask cluster", "cluster"):
         import dask
         from distributed import Client
-    except ImportError as error:
-        raise RequestError(
-            f"work on a Dask cluster needs {error.name}, which is not installed. Install it with: "
-            "pip install 'seakeep[cluster]'"
-        ) from error
     if re.fullmatch(r"(tcp|tls|ucx|wss?)://\S+:\d+/?|inproc://\S+", scheduler) is None:
         raise RequestError(
             f"'{scheduler}' is not the address of a Dask scheduler. Give protocol, host and port, "

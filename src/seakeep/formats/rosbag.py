@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from seakeep.arrays import FloatArray
-from seakeep.errors import DataError, RequestError, did_you_mean, warn
+from seakeep.errors import DataError, RequestError, did_you_mean, needing, warn
 from seakeep.formats.columns import UNITS, Columns, Options, decoding
 
 _STANDARD = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
@@ -28,13 +28,8 @@ def read_recording(path: Path, options: Options) -> Columns:
     beside it in the first case. Both count seconds from the recording's first message, of
     any topic. `group` is the topic; it may be left out where only one holds numbers.
     """
-    try:
+    with needing(f"{path} is a recording of ROS 2; reading it", "ros"):
         from rosbags import highlevel, typesys
-    except ImportError as error:
-        raise RequestError(
-            f"{path} is a recording of ROS 2; reading it needs rosbags, which is not installed. "
-            "Install the extra: pip install 'seakeep[ros]'."
-        ) from error
     beside = path.parent / "metadata.yaml"
     place = path.parent if path.suffix.lower() == ".db3" and beside.is_file() else path
     store = typesys.get_typestore(typesys.Stores.LATEST)

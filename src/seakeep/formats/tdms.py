@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
-from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.errors import DataError, RequestError, did_you_mean, needing
 from seakeep.formats.columns import Columns, Options, check_lengths, decoding
 
 LEAD_IN = 28
@@ -28,13 +28,9 @@ def read_tdms(path: Path, options: Options) -> Columns:
     ``wf_increment``. Instants (channels of time stamps) are seconds after their first. `group` may
     be left out where one group has channels, or all are sampled alike.
     """
-    try:
+    with needing(f"{path} is a TDMS file; reading it", "tdms"):
         import nptdms
-    except ImportError as error:
-        raise RequestError(
-            f"{path} is a TDMS file; reading it needs nptdms, which is not installed. "
-            "Install the extra: pip install 'seakeep[tdms]'."
-        ) from error
+
     logging.getLogger("nptdms").setLevel(logging.ERROR)  # the error says what is wrong
     # Opened here, since nptdms leaves a file open whose head it cannot read.
     with (

@@ -11,7 +11,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from seakeep.arrays import FloatArray, IntArray, whole_number
 from seakeep.core.recursion import Place
-from seakeep.errors import RequestError
+from seakeep.errors import needing
 from seakeep.files import MARK, check_output, replacing
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
@@ -75,12 +75,8 @@ def write_onnx(model: Model, path: str | Path, steps: int = 1) -> Path:
     -----
     A run that diverges is not cut to NaN, as ``forecast_arrays`` does.
     """
-    try:
+    with needing("writing a graph", "onnx"):
         import onnx
-    except ImportError as error:
-        raise RequestError(
-            "onnx is not installed. Install it with: pip install 'seakeep[onnx]'"
-        ) from error
     target = Path(path)
     check_output(target, KIND)
     proto = _model(exportable(model), whole_number(steps, "steps"))

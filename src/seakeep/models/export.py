@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy import sparse
 
 from seakeep.arrays import FloatArray
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, needing
 from seakeep.files import MARK, check_output, replacing
 from seakeep.models.interface import Signature
 from seakeep.models.terms import SlowSquare
@@ -180,12 +180,8 @@ def initial_state(signature: Signature, x_history: FloatArray, u_history: FloatA
 
 def to_control(system: System, signature: Signature) -> control.StateSpace:
     """The system for python-control, with the names of inputs and outputs."""
-    try:
+    with needing("a system of python-control", "control"):
         import control
-    except ImportError as error:
-        raise RequestError(
-            "python-control is not installed. Install it with: pip install 'seakeep[control]'"
-        ) from error
     return control.ss(
         *system, signature.dt, inputs=signature.inputs, outputs=signature.states, name="seakeep"
     )

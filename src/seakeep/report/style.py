@@ -12,7 +12,7 @@ import numpy as np
 
 from seakeep.campaign.settings import long_name_of
 from seakeep.conventions import canonical_channel, displayed
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, needing
 from seakeep.files import MARK, replacing
 from seakeep.toml import packaged
 
@@ -69,13 +69,8 @@ _WITH_PREFIX = ("N", "N m", "Pa", "W")
 @contextmanager
 def figure_style() -> Iterator[None]:
     """Draw in our style, without touching anybody's global settings; a decorator too."""
-    try:
+    with needing("drawing figures", "figures"):
         import matplotlib as mpl
-    except ImportError as error:
-        raise RequestError(
-            "figures need matplotlib, which is not installed. "
-            "Install it with: pip install 'seakeep[figures]'"
-        ) from error
     with mpl.rc_context(_STYLE["rc"]):
         yield
 

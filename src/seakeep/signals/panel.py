@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import positive
-from seakeep.errors import RequestError
+from seakeep.errors import RequestError, needing
 
 Image = npt.NDArray[np.uint8]
 Weights = npt.NDArray[np.float32]
@@ -128,13 +128,8 @@ def opencv(doing: str = "reading") -> Any:
     # What FFmpeg prints about a damaged file, our own message says in a sentence.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
-    try:
+    with needing(f"{doing} a video", "video"):
         import cv2
-    except ImportError as error:
-        raise RequestError(
-            f"{doing} a video needs OpenCV, which is not installed. "
-            "Install the extra: pip install 'seakeep[video]'."
-        ) from error
     return cv2
 
 

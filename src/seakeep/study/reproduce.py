@@ -19,7 +19,7 @@ import xarray as xr
 
 from seakeep.arrays import Progress
 from seakeep.campaign import read_campaign, write_prepared
-from seakeep.errors import RequestError
+from seakeep.errors import needing
 from seakeep.executor import on_this_machine, submitting
 from seakeep.files import MARK, check_output, check_report, is_there, write_text
 from seakeep.study.plan import named
@@ -238,15 +238,10 @@ def _play(
     folder: Path, seed: int, executor: Executor | None, progress: Progress | None
 ) -> xr.Dataset:
     """Play the campaign unless it lies there already; return its nominal spectra."""
-    try:
+    with needing("the virtual tank", "tank"):
         from seakeep.tank.play import play
         from seakeep.tank.seas import pierson_moskowitz
         from seakeep.tank.settings import default_settings, with_waves
-    except ImportError as error:
-        raise RequestError(
-            f"the virtual tank needs {error.name}, which is not installed. Install it with: pip "
-            "install 'seakeep[tank]'"
-        ) from error
     settings = with_waves(default_settings(), seed, "equal")
     content = json.dumps({"settings": settings.model_dump(mode="json"), "versions": versions()})
     digest = hashlib.sha256(content.encode()).hexdigest()

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seakeep.arrays import ComplexArray, FloatArray, IntArray
-from seakeep.errors import RequestError, SeakeepError
+from seakeep.errors import RequestError, SeakeepError, needing
 from seakeep.tank.hydrodynamics import (
     Hydrodynamics,
     Kernel,
@@ -114,13 +114,8 @@ class Motion:
 
 
 def _loop() -> ModuleType:
-    try:
+    with needing("the virtual tank", "tank"):
         from seakeep.tank import _loop
-    except ImportError as error:
-        raise RequestError(
-            "the virtual tank needs numba for its time loop, which is not installed. "
-            "Install the extra: pip install 'seakeep[tank]'."
-        ) from error
     return _loop
 
 
