@@ -203,7 +203,7 @@ class InstrumentsSettings(Table):
 
 
 _STEPS = packaged("campaign/steps.toml")
-"""Steps by name: a key that each needs, others that it knows, and what a message asks for."""
+"""Steps by name: keys that each needs, others that it knows, and what a message asks for."""
 Step = Literal[
     "integrate", "differentiate", "band_pass", "low_pass", "envelope_squared",
     "complementary_filter", "transfer", "remove_gravity",
@@ -252,8 +252,8 @@ class DerivedSettings(Table):
     def _one_way(self) -> DerivedSettings:
         if (self.expression is None) == (self.step is None):
             raise ValueError("a derived channel needs either 'expression', or 'from' and 'step'")
-        keys = {"position"}.union(*({needed, *others} for needed, others, _ in _STEPS.values()))
-        given = {key for key in keys - {""} if getattr(self, key) is not None}
+        keys = {key for needed, others, _ in _STEPS.values() for key in (*needed, *others)}
+        given = {key for key in keys if getattr(self, key) is not None}
         if self.step is None:
             if self.source is not None or given:
                 raise ValueError("'from' and the keys of steps do not go with 'expression'")
@@ -261,10 +261,9 @@ class DerivedSettings(Table):
         if self.source is None:
             raise ValueError(f"step '{self.step}' needs 'from', the channel it works on")
         needed, others, words = _STEPS[self.step]
-        if extra := given.difference(others, {needed}):
+        if extra := given.difference(needed, others):
             raise ValueError(f"step '{self.step}' has no key {sorted(extra)[0]!r}; remove it")
-        lacks_position = self.step == "complementary_filter" and self.position is None
-        if (needed and needed not in given) or lacks_position:
+        if not given.issuperset(needed):
             raise ValueError(f"step '{self.step}' needs {words}")
         return self
 
@@ -389,11 +388,8 @@ class RunSettings(Table):
     @property
     def serves(self) -> str:
         """Role of the run: "train", "test", "train and test" or "unused"."""
-        if self.train and self.test:
-            return "train and test"
-        if self.train or self.test:
-            return "train" if self.train else "test"
-        return self.role or "train"
+        spans = [use for use in ("train", "test") if getattr(self, use)]
+        return " and ".join(spans) or self.role or "train"
 
     @model_validator(mode="after")
     def _one_use(self) -> RunSettings:
