@@ -78,7 +78,7 @@ from seakeep.signals import (
     uniform_step,
 )
 from seakeep.signals.synchronisation import ASSUMED
-from seakeep.signals.time_axis import instant_text, span_text, stretches, usual_step
+from seakeep.signals.time_axis import inside, instant_text, span_text, stretches, usual_step
 from seakeep.toml import Length, number
 
 Reader = Callable[[Path, Options], Columns]
@@ -675,12 +675,6 @@ def cropped(run: Run) -> Run:
         for key in parts:
             used(key, (time[0], time[-1]), np.inf)
     return replace(run, data=data)
-
-
-def inside(time: FloatArray, span: tuple[float, float], dt: float) -> BoolArray:
-    """Instants in a span, both ends included."""
-    slack = 1e-6 * dt
-    return (time >= span[0] - slack) & (time <= span[1] + slack)
 
 
 def _part(

@@ -11,7 +11,6 @@ from seakeep.campaign.pipeline import (
     Run,
     cleaned,
     derived,
-    inside,
     mapped,
     read,
     resampled,
@@ -25,6 +24,7 @@ from seakeep.quality import Finding, warn_of
 from seakeep.quality.clocks import ClocksKind
 from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, waves_part
 from seakeep.signals.synchronisation import without_doubtful_drift
+from seakeep.signals.time_axis import inside
 from seakeep.signals.waves import energy_period
 
 NOISY = 1.2

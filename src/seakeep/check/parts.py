@@ -16,7 +16,7 @@ from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
 from seakeep.models.labelled import Span, channel_matrix, check_step
 from seakeep.models.observables import at_once
 from seakeep.models.registry import is_linear
-from seakeep.signals.time_axis import stretches
+from seakeep.signals.time_axis import inside, stretches
 from seakeep.signals.waves import first_wave
 from seakeep.waves import wavenumber
 
@@ -114,9 +114,8 @@ def used_parts(model: Model, runs: Datasets) -> dict[str, Part]:
         except DataError as error:
             warn(f"{name} is left out: {error}")
             continue
-        begin, end = whole_span(run)
         whole = np.isfinite(states).all(axis=1) & np.isfinite(inputs).all(axis=1)
-        pieces = stretches(whole & (time >= begin - 1e-6) & (time <= end + 1e-6))
+        pieces = stretches(whole & inside(time, whole_span(run), model.dt))
         if not pieces:
             warn(f"{name} is left out: no sample of it has all channels of the model.")
             continue
@@ -320,7 +319,7 @@ def regressors(model: Model, part: Part) -> FloatArray:
         NaN where a row reads what is not there.
     """
     input_map = _at_once(model.signature.input_map)
-    run = part.run.sel(time=slice(part.time[0] - 1e-6, part.time[-1] + 1e-6))
+    run = part.run.sel(time=part.time)
     size, reach = run.sizes["time"], input_map.reads(Span(0, 0, 1))
     first, stop = -reach.first, size - (reach.stop - 1)
     width = sum(map(len, input_map.regressors(model.signature.input_labels)))

@@ -23,6 +23,7 @@ from seakeep.errors import DataError
 from seakeep.metrics import anrmse_differences
 from seakeep.models import Model, outside_training
 from seakeep.signals import encounter_period
+from seakeep.signals.time_axis import inside
 from seakeep.waves import wavenumber
 
 LIMITS = (0.1, 0.3, 0.7)
@@ -191,11 +192,10 @@ def validity(model: Model, runs: Datasets) -> xr.Dataset:
             tested = (part.time[0], part.time[-1])
         of_parts = np.full((2, 4), np.nan)
         for row, span in zip(of_parts, (trained, tested), strict=True):
-            begin, end = (np.inf, -np.inf) if span is None else span
-            inside = (part.time >= begin - 1e-6) & (part.time <= end + 1e-6)
-            if inside.sum() >= 16:
-                row[:3] = _sea(part.inputs[inside, reference], model.dt, part.run)
-                row[3] = np.nan if surge is None else part.states[inside, surge].mean()
+            used = inside(part.time, (np.inf, -np.inf) if span is None else span, model.dt)
+            if used.sum() >= 16:
+                row[:3] = _sea(part.inputs[used, reference], model.dt, part.run)
+                row[3] = np.nan if surge is None else part.states[used, surge].mean()
         facts.append(of_parts)
         why = []
         if np.isfinite(of_parts[1, 1]):

@@ -84,6 +84,12 @@ def record(series: npt.ArrayLike, time: npt.ArrayLike, owner: str) -> tuple[Floa
     return x, t
 
 
+def inside(time: FloatArray, span: tuple[float, float], dt: float) -> BoolArray:
+    """Instants in a span, both ends included."""
+    slack = 1e-6 * dt
+    return (time >= span[0] - slack) & (time <= span[1] + slack)
+
+
 def usual_step(time: npt.ArrayLike) -> float:
     """Median step of instants, s."""
     return float(np.median(np.diff(time)))
