@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -213,15 +212,12 @@ def _registry() -> pint.UnitRegistry[Any]:
 
 
 _RAISED = str.maketrans("⁻¹²³⁴", "-1234")
-_SPELLINGS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...] = (
-    (re.compile(r"[·⋅×]"), "*"),
-    (re.compile(r"µ|μ"), "µ"),
-    (re.compile(r"%"), "percent"),
-    (re.compile("[⁻¹²³⁴]+"), lambda match: "^" + match[0].translate(_RAISED)),
-    (re.compile(r"(?<=[A-Za-z°])(-?[1-9])"), r"^\1"),
-    (re.compile(r"\^"), "**"),
-    (re.compile(r"(?<=[A-Za-z°0-9])[ .](?=[A-Za-z°])"), "*"),
-)
+_SIGNS = str.maketrans({"·": "*", "⋅": "*", "×": "*", "μ": "µ", "%": "percent"})
+_SPELLINGS = {
+    r"(?<=[A-Za-z°])(-?[1-9])": r"^\1",
+    r"\^": "**",
+    r"(?<=[A-Za-z°0-9])[ .](?=[A-Za-z°])": "*",
+}
 
 
 # A header is foreign text: powers of powers in it would keep the parser busy forever.
@@ -240,11 +236,12 @@ def _is_plain(text: str) -> bool:
 
 @lru_cache(maxsize=256)
 def _parsed(unit: str) -> Any:
-    text = unit.strip()
+    text = unit.strip().translate(_SIGNS)
     if text in ("", "-", "1", "none", "nondimensional", "dimensionless"):
         return _registry().dimensionless
-    for pattern, replacement in _SPELLINGS:
-        text = pattern.sub(replacement, text)
+    text = re.sub("[⁻¹²³⁴]+", lambda match: "^" + match[0].translate(_RAISED), text)
+    for pattern, replacement in _SPELLINGS.items():
+        text = re.sub(pattern, replacement, text)
     try:
         if not _is_plain(text):
             raise ValueError(text)

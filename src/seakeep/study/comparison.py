@@ -526,11 +526,10 @@ def _seconds(
     return length.value * (next(known, None) or campaign.encounter_period())
 
 
-ATTRIBUTES = {"dt": "s", "start": "s", "encounter_period": "s", "train_span": "s",
-               "test_span": "s", "water_depth": "m",
-               "reads_input_until": "s", "input_predicted_from": "s", "diverged_at": "s",
-               "probe_offset": "m", "probe_offset_spread": "m"}  # fmt: skip
-"""Times and lengths among the attributes of a run, with their units."""
+TIMES = {"dt", "start", "encounter_period", "train_span", "test_span", "reads_input_until",
+         "input_predicted_from", "diverged_at"}  # fmt: skip
+LENGTHS = {"water_depth", "probe_offset", "probe_offset_spread"}
+"""Attributes of a run that are times and lengths."""
 
 
 def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> xr.Dataset:
@@ -579,8 +578,8 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
         if "x_position" in variable.attrs:
             variable.attrs["x_position"] = scale * float(variable.attrs["x_position"])
     out.attrs = dict(run.attrs) | {"scale": "full", "scale_factor": float(scale)}
-    for key in ATTRIBUTES.keys() & run.attrs:
-        by, value = clock if ATTRIBUTES[key] == "s" else scale, run.attrs[key]
+    for key in (TIMES | LENGTHS) & run.attrs.keys():
+        by, value = clock if key in TIMES else scale, run.attrs[key]
         pair = isinstance(value, tuple | list)
         out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
     if "status" in run.attrs:
