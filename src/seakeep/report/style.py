@@ -54,6 +54,9 @@ FLAGGED = {
     for word, (colour, marker) in _STYLE["flags"].items()
 }
 
+MARKS = _STYLE["marks"]
+"""Measured points, by the kind of the waves."""
+
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 """Names of the paper for the averages of the two measures over the channels."""
 

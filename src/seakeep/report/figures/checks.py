@@ -14,6 +14,7 @@ from seakeep.report.style import (
     DASHED,
     DOTTED,
     LINES,
+    MARKS,
     PALETTE,
     Figure,
     Places,
@@ -28,17 +29,6 @@ SHADE = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
 SOLID = {**LINES["forecast"], "linestyle": "-"}
 ZERO = {"color": COLOURS["input"], "linewidth": 0.5}
 POINTS = {"linestyle": "none", "elinewidth": 0.8}
-MARKS = {
-    "regular": {"color": COLOURS["measured"], "marker": "o", "markersize": 5, "zorder": 4},
-    "irregular": {
-        "color": COLOURS["input"],
-        "marker": "s",
-        "markersize": 3,
-        "markerfacecolor": "none",
-        "zorder": 3,
-    },
-}
-"""Measured points: filled and open, so that grey print tells them apart."""
 
 
 @figure_style()
