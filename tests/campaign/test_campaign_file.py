@@ -222,7 +222,6 @@ def test_named_models_are_found_by_their_names(changed):
             'states = ["heave"]\nn_members = 10\nridge = { log_uniform = [0.1, 1] }',
         ),
     )
-    assert campaign.models == ["small", "band"]
     band = campaign.model("band")
     assert band.inputs == ()
     assert band.arguments() == {"ridge": {"log_uniform": (0.1, 1)}, "n_members": 10}

@@ -66,11 +66,6 @@ class Campaign:
         """Names of the runs of which all or a part tests."""
         return [n for n in self.runs if "test" in self.settings.runs[n].serves]
 
-    @property
-    def models(self) -> list[str]:
-        """Names of the models in ``[models.NAME]``."""
-        return list(self.settings.models)
-
     def model(self, name: str | None = None) -> ModelSettings:
         """Return the settings of a model.
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +16,7 @@ from seakeep.arrays import FloatArray
 from seakeep.conventions import is_elevation
 from seakeep.core.readouts import SOFT
 from seakeep.core.spectra import PER_OCTAVE
-from seakeep.files import MARK, check_output, make_folder, write_text
+from seakeep.files import MARK, check_output, make_folder, templates, write_text
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
@@ -28,9 +27,6 @@ from seakeep.models.validity import CYCLES, TRAINED
 from seakeep.signals.expressions import Text
 from seakeep.signals.prediction import GAP, MEMORY, NOISE
 from seakeep.waves import GRAVITY
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 KIND = "C source"
 
@@ -173,23 +169,9 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
 
 def rendered(template: str, **content: Any) -> str:
     """Text of a template of this room."""
-    return _environment().get_template(template).render(**content)
-
-
-@cache
-def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-
-    environment = Environment(
-        loader=PackageLoader("seakeep.hosts"),
-        autoescape=select_autoescape(["xml"]),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    environment = templates("hosts")
     environment.filters |= {"hex": _number, "numbers": _numbers, "text": _text}
-    return environment
+    return environment.get_template(template).render(**content)
 
 
 def _number(value: float) -> str:

@@ -36,7 +36,6 @@ BandScale = Literal["spread", "constant", "learnt"]
 
 PARTS = 3
 """Parts of a run that trains alone, each of which is forecast by what the others teach."""
-NUMBERS = ("margin", "block_length", "blocks", "warranted")
 
 
 class Judged(NamedTuple):

@@ -17,10 +17,6 @@ from seakeep.models.labelled import ChannelLabel
 
 ReadOutKind = Literal["none", "wave"]
 Asked = Literal["wave", "auto"]
-ARRAYS = ("mean", "std", "low", "high", "knots", "weights", "span")
-"""Parts of a load map that are arrays."""
-
-
 ReadOuts = tuple[tuple[str, Asked], ...] | Literal["auto"]
 """Kinds of read-outs by channel; "auto" for every load among the states."""
 
