@@ -173,7 +173,7 @@ CHANGES = {
         ("right = -ridge * solution", "right = 0.0 * solution", "core/test_solve.py::test_corrections_give_newest_rows_the_accuracy_of_singular_values"),
         ("first=piece.first + at, count", "first=piece.first, count", "core/test_solve.py::test_corrections_give_newest_rows_the_accuracy_of_singular_values"),
         ("min(count, rank)", "min(count, rank + 1)", "core/test_fast_paths.py::test_a_rank_is_that_of_the_truncated_matrix"),
-        ("return bool(ridge >= GRAM_LIMIT * largest[0])", "return True", "core/test_solve.py::test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below"),
+        ("if ridge >= GRAM_LIMIT * self.trace:", "if True:", "core/test_solve.py::test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below"),
         ("ridge * problem.columns if per_snapshot else ridge", "ridge", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
         ("solving[:, group.newest] *= 0.5", "solving[:, group.newest] *= 1.0", "core/test_fast_paths.py::test_every_form_gives_the_papers_formula"),
         ("weights = values / (values**2 + ridge)", "weights = values / (values**2 + ridge**2)", "core/test_solve.py::test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen"),

@@ -6,9 +6,9 @@ is chosen by shape and conditioning:
 * primal, :math:`G = X' Y^T (Y Y^T + \lambda I)^{-1}` (the paper's formula), or dual,
   :math:`G = X' (Y^T Y + \lambda I)^{-1} Y^T`, the same matrix, whichever is less work;
 * singular values, where forming a Gram matrix would square away the accuracy: the effective λ is
-  below 1e-6 of the largest squared singular value, or λ = 0 (minimum norm), or a rank is given.
-  Where the newest rows alone are regressed, the primal form serves down to 1e-11: below 3e-8,
-  corrections by residuals of the data bring it back to their accuracy.
+  below 1e-6 of its trace, or λ = 0 (minimum norm), or a rank is given. Where the newest rows alone
+  are regressed, the primal form serves down to 1e-11: below 3e-8, corrections by residuals of the
+  data bring it back to their accuracy.
 
 All rows of the next extended state need rows of the inverse of :math:`M = C + \lambda I`. Let Z
 move the lags down by one, newest first, filling with zeros. The recursion of the Gram matrix says
@@ -61,7 +61,7 @@ from seakeep.errors import DataError, RequestError
 Method = Literal["primal", "dual", "svd"]
 
 GRAM_LIMIT = 1e-6
-"""Least effective λ, as a part of the largest squared singular value, for a Gram matrix.
+"""Least effective λ, as a part of the Gram matrix's trace, for which that is formed.
 
 Its condition number is then below 1e6, and ten digits are left of sixteen."""
 
@@ -264,20 +264,7 @@ class _Delayed:
         is_narrow = not self.all_rows and self.rows <= self.columns
         if is_narrow and ridge >= REFINED_LIMIT * self.trace:
             return "primal"
-        return self.form() if ridge > 0 and self.gram_suffices(ridge) else "svd"
-
-    def gram_suffices(self, ridge: float) -> bool:
-        """Whether λ ≥ 1e-6 σ²_max, from the upper triangle of the smaller Gram matrix."""
-        if self.rows <= self.columns:
-            upper = np.triu(primal_system(self.pieces, self.delays).gram)
-        else:
-            upper = np.triu(snapshot_gram(self.pieces, self.delays))
-        # A bound of the largest squared singular value from above, then the value itself.
-        if ridge >= GRAM_LIMIT * float(np.linalg.norm(upper + np.triu(upper, 1).T)):
-            return True
-        top = [len(upper) - 1] * 2
-        largest = linalg.eigvalsh(upper, lower=False, subset_by_index=top, check_finite=False)
-        return bool(ridge >= GRAM_LIMIT * largest[0])
+        return "svd"
 
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Hankel matrices of regressors and targets, built."""
