@@ -377,6 +377,12 @@ CHANGES = {
         ("1.0 - weights @ power[1:] / power[0]", "weights @ power[1:] / power[0]", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
         ("(high - low) / 3.29", "(high - low) / 1.645", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
     ],
+    "quality/probes.py": [
+        ("float(np.sign(alike) * size)", "float(size)", "quality/test_probes.py::test_another_unit_sign_or_gain"),
+        ("value = 1 / gain if is_first else gain", "value = gain", "quality/test_probes.py::test_of_three_probes_the_one_that_moves_otherwise_is_named"),
+        ("2 * len(rivals) > len(gains)", "rivals", "quality/test_probes.py::test_another_unit_sign_or_gain"),
+        ("(self.first * other.second)[strong]", "(self.second * other.first)[strong]", "quality/test_probes.py::test_another_unit_sign_or_gain"),
+    ],
     "report/acts.py": [
         ('("mean", "mean"), ("lower", "upper"), ("upper", "lower")', '("mean", "mean"), ("mean", "mean"), ("mean", "mean")', "report/test_claims.py::test_loads_diverge_more_by_the_ends_of_both_intervals"),
         ('[differences["ANRMSE"].above(1.0)', '[differences["ANRMSE"].below(1.0)', "report/test_claims.py::test_regular_waves_are_compared_with_irregular_ones"),

@@ -20,7 +20,7 @@ from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import cross_checks
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import expanded
-from seakeep.quality import as_json, warn_of
+from seakeep.quality import as_json, judge_probes, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
@@ -351,7 +351,9 @@ class Campaign:
         DataError
             As :meth:`read_run`.
         """
-        return dict(self.each_prepared(names, progress))
+        runs = dict(self.each_prepared(names, progress))
+        judge_probes(runs)
+        return runs
 
     def each_prepared(
         self,
