@@ -332,7 +332,8 @@ def _preparation(files: Files, guesses: Guesses, seas: Seas) -> Iterator[str]:
     shortest = min((sea.period for sea in seas.values()), default=0.0)
     every = int(max(rates, default=0.0) * shortest / STEPS)
     if rates and not several:
-        yield f"# the files have {rates[0]:.6g} samples per second"
+        hint = ". Are times in ms? Then state time_unit = 'ms' in [files], or correct the header"
+        yield f"# the files have {min(rates):.6g} samples per second{hint * (min(rates) < 1)}"
     if every > 1:
         yield (
             f"sampling_rate = {max(rates) / every:#.6g} # Hz; guessed: about {STEPS} samples per "
