@@ -25,7 +25,7 @@ from seakeep.signals import Clock, uniform_step
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
 
-FORMAT = 11
+FORMAT = 12
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 
 
