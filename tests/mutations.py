@@ -38,10 +38,14 @@ CHANGES = {
     "campaign/prepare.py": [
         ("dt = period / preparation.steps_per_period", "dt = period / (preparation.steps_per_period - 1)", "campaign/test_prepare.py::test_the_step_is_the_stated_one"),
     ],
+    "campaign/settings.py": [
+        ('if kind != "still")', 'if kind)', "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
+    ],
     "campaign/readers.py": [
         ("times = table.values[name] * factor", "times = table.values[name]", "formats/test_read_text.py::test_options"),
     ],
     "campaign/survey.py": [
+        ("if each[3] >= FEWEST} or spans", "} or spans", "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
         ("or steady > NOISY * counted", "", "campaign/test_plausibility.py::test_a_count_that_noise_leads_is_told"),
     ],
     "check/coherence.py": [

@@ -277,9 +277,10 @@ class Campaign:
         -------
         float
             The period stated in ``[campaign]``, s; without it, the mean over the irregular runs
-            (all used runs if none is marked irregular) of the zero-up-crossing period of
+            (all used runs with waves if none is) of the zero-up-crossing period of
             :meth:`period_channel`, each over the run's span, at the file's own rate. A run that
-            cannot be read, or holds fewer than two crossings, is left out with a warning.
+            cannot be read, or holds fewer than two crossings, is left out with a warning; those
+            of fewer than ten waves are left out where others hold more.
 
         Raises
         ------
@@ -318,7 +319,10 @@ class Campaign:
 
     def _mean_period(self, surveyed: Survey) -> float:
         if not surveyed.periods:
-            raise RequestError(f"{self.path} has no run in use. Give a run another role.")
+            raise RequestError(
+                f"{self.path} has no run with waves in use. Give a run another role, or state "
+                "encounter_period (s) in [campaign]."
+            )
         return float(np.mean(list(surveyed.periods.values())))
 
     def prepare(
