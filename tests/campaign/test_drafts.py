@@ -162,6 +162,12 @@ def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
         assert said in text
 
 
+def test_columns_without_a_known_name_are_marked(tmp_path):
+    text, _ = drafted(tmp_path, [write_csv(tmp_path / "a.csv", tank_columns(0, 60.0))])
+    assert 'column = "acc" # NOT RECOGNISED: rename the channel if it is a motion or load' in text
+    assert text.count("NOT RECOGNISED") == 1
+
+
 def test_runs_have_the_role_that_their_waves_give_them(tmp_path):
     """Regular and still runs are recognised; the last file is no test for being the last."""
     files = [write_csv(tmp_path / f"a{i}.csv", tank_columns(i, 60.0)) for i in range(3)]

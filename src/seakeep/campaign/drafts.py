@@ -170,8 +170,11 @@ def _channels(guesses: Guesses) -> Iterator[str]:
         if not guess.channel:
             continue
         canonical = canonical_channel(guess.channel)
-        said = f" # guessed: {canonical.long_name}; header '{guess.header}'" if canonical else ""
-        yield f"\n[channels.{guess.channel}]\ncolumn = {_value(guess.column)}{said}"
+        said = "NOT RECOGNISED: rename the channel if it is a motion or load"
+        if canonical:
+            said = f"guessed: {canonical.long_name}"
+        yield f"\n[channels.{guess.channel}]"
+        yield f"column = {_value(guess.column)} # {said}; header '{guess.header}'"
         if guess.logger:
             yield f"instrument = {_value(guess.logger)}"
         if guess.unit_from == "name":
@@ -266,7 +269,11 @@ def _roles(files: Files, guesses: Guesses, seas: Seas) -> dict[str, tuple[str, s
     dead = dead_motions(files, guesses) if len(runs) > 1 else {}
     roles, whole = {}, []
     for name in runs:
-        roles[name] = "unused", "guessed: no waves were found, as in still water or decay tests"
+        why = "guessed: no waves were found, as in still water or decay tests"
+        roles[name] = (
+            "unused",
+            f"{why}. With waves = 'still' and role = 'test' check judges a decay",
+        )
         lacking = loggers - {file.logger for file in files if file.run == name}
         if lacking:
             roles[name] = "unused", f"it has no file of {', '.join(sorted(lacking))}"
