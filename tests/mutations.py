@@ -31,16 +31,21 @@ CHANGES = {
     ],
     "campaign/pipeline.py": [
         ('attributes["accuracy"] = factor * settings.accuracy', 'attributes["accuracy"] = settings.accuracy', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
+        ("own > MOST_FINER * dt", "own < MOST_FINER * dt", "campaign/test_prepare.py::test_times_in_another_unit_are_refused_before_a_thousand_samples_are_made_of_one"),
         ("return origin + dt * np.arange(first, last + 1)", "return origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
         ("settings.sign * factor * (logger.columns.values[column] + settings.offset)", "settings.sign * factor * logger.columns.values[column] + settings.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],
     "campaign/prepare.py": [
         ("dt = period / preparation.steps_per_period", "dt = period / (preparation.steps_per_period - 1)", "campaign/test_prepare.py::test_the_step_is_the_stated_one"),
     ],
+    "campaign/settings.py": [
+        ('if kind != "still")', 'if kind)', "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
+    ],
     "campaign/readers.py": [
         ("times = table.values[name] * factor", "times = table.values[name]", "formats/test_read_text.py::test_options"),
     ],
     "campaign/survey.py": [
+        ("if each[3] >= FEWEST} or spans", "} or spans", "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
         ("or steady > NOISY * counted", "", "campaign/test_plausibility.py::test_a_count_that_noise_leads_is_told"),
     ],
     "check/coherence.py": [
@@ -54,6 +59,7 @@ CHANGES = {
         ("samples * (1 if apart == 0 else 2)", "samples", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
     ],
     "check/parts.py": [
+        ('if run.attrs.get("waves") != "still"}', '}', "check/test_worth.py::test_a_decay_in_still_water_is_no_test_in_irregular_waves"),
         ("max(history - 1, _waves_come(run, names))", "history - 1", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),
         ("replace(input_map, reference=0))", "input_map)", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
         ("model.at(parameter=varies.centre)", "model.at(parameter=varies.low)", "models/test_parametric.py::test_a_check_takes_the_middle_of_the_training"),
@@ -231,6 +237,7 @@ CHANGES = {
         ("rest, here = groups != group, groups == group", "rest, here = groups == group, groups == group", "statistics/test_calibration.py::test_a_learnt_scale_is_judged_by_runs_that_it_did_not_learn_from"),
     ],
     "models/conditions.py": [
+        ("gains.sum() + mean >= least", "gains.sum() >= least", "models/test_conditions.py::test_another_unit_of_a_load_moves_its_mean_too"),
         ("window=None, memory=0)", "window=None)", "models/test_conditions.py::test_an_offset_is_named_also_for_a_model_with_a_memory"),
     ],
     "models/draws.py": [
@@ -382,8 +389,18 @@ CHANGES = {
         ("tolerance=INSTANT_TOLERANCE * step", "tolerance=step", "test_pairing.py::test_the_instants_of_a_message_can_be_told_apart"),
     ],
     "quality/faults.py": [
+        ("corner > CORNER * distance[begin:end].max()", "True", "quality/test_faults.py::test_a_model_that_is_let_go_swings_back"),
         ("1.0 - weights @ power[1:] / power[0]", "weights @ power[1:] / power[0]", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
         ("(high - low) / 3.29", "(high - low) / 1.645", "quality/test_faults.py::test_a_fault_of_any_length_is_reported"),
+    ],
+    "quality/probes.py": [
+        ("float(np.sign(alike) * size)", "float(size)", "quality/test_probes.py::test_another_unit_sign_or_gain"),
+        ("value = 1 / gain if is_first else gain", "value = gain", "quality/test_probes.py::test_of_three_probes_the_one_that_moves_otherwise_is_named"),
+        ("2 * len(rivals) > len(gains)", "rivals", "quality/test_probes.py::test_another_unit_sign_or_gain"),
+        ("(self.first * other.second)[strong]", "(self.second * other.first)[strong]", "quality/test_probes.py::test_another_unit_sign_or_gain"),
+    ],
+    "report/check_page.py": [
+        ('float(own["correlation"]) < TURNED', 'float(own["correlation"]) > -TURNED', "check/test_coherence.py::test_a_channel_that_is_turned_over_is_told_so"),
     ],
     "report/acts.py": [
         ('("mean", "mean"), ("lower", "upper"), ("upper", "lower")', '("mean", "mean"), ("mean", "mean"), ("mean", "mean")', "report/test_claims.py::test_loads_diverge_more_by_the_ends_of_both_intervals"),
@@ -462,6 +479,7 @@ CHANGES = {
         ('pitch = side * seen["angle"]', 'pitch = seen["angle"]', "signals/test_tracking.py::test_a_camera_on_the_other_side"),
     ],
     "signals/waves.py": [
+        (" or record.size < SHORTEST * period", "", "signals/test_leakage.py::test_a_few_waves_are_alike_in_any_two_seas"),
         ("np.gradient(series) if is_motion else series, 1.0).start", "series, 1.0).stop", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),
         ("4.0 * float(np.std(as_series(series)))", "2.0 * float(np.std(as_series(series)))", "signals/test_waves.py::test_statistics_of_a_regular_wave"),
         ("before - x[before] / (x[before + 1] - x[before])", "before + x[before] / (x[before + 1] - x[before])", "signals/test_waves.py::test_crossings_lie_between_samples"),

@@ -71,6 +71,15 @@ def test_the_step_suits_the_shortest_waves_of_all_runs(tmp_path):
     assert "# Hz; guessed: about 32 samples per wave of 0.6 s, the shortest" in text
 
 
+def test_a_draft_asks_whether_slow_files_count_milliseconds(tmp_path):
+    for rate, asks in ((50, False), (0.05, True)):
+        t = np.arange(600) / rate
+        wave = {"t": t, "WP fwd [mm]": np.sin(2 * np.pi * np.arange(600) / 30)}
+        text, _ = drafted(tmp_path, [write_csv(tmp_path / "a.csv", wave)])
+        assert f"# the files have {rate} samples per second" in text
+        assert ("time_unit = 'ms'" in text) is asks
+
+
 def test_a_draft_without_waves_says_so(tmp_path):
     path = regular(tmp_path, "a", 1.6)
     path.write_text(path.read_text("utf-8").replace("WP fwd", "CH7"), "utf-8")
@@ -151,6 +160,12 @@ def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
     for name, key in (("heave", "states"), ("eta_2", "inputs")):
         said = f"# {name} left out: it has gaps, and a model takes none. To be among the {key}, "
         assert said in text
+
+
+def test_columns_without_a_known_name_are_marked(tmp_path):
+    text, _ = drafted(tmp_path, [write_csv(tmp_path / "a.csv", tank_columns(0, 60.0))])
+    assert 'column = "acc" # NOT RECOGNISED: rename the channel if it is a motion or load' in text
+    assert text.count("NOT RECOGNISED") == 1
 
 
 def test_runs_have_the_role_that_their_waves_give_them(tmp_path):

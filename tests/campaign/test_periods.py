@@ -65,6 +65,14 @@ def test_spans_of_regular_runs_count_in_the_period_that_irregular_ones_give(chan
     assert run.attrs["encounter_period"] == period
 
 
+@pytest.mark.parametrize(("waves", "seconds"), [("", 5.0), ("waves = 'still'", 20.0)])
+def test_runs_of_few_waves_or_none_have_no_part_in_the_period(tank, changed, waves, seconds):
+    """A test of three waves must change neither T̂ nor, with it, the delays of a model."""
+    alone = changed(('role = "test"', "role = 'unused'")).encounter_period()
+    write_csv(tank / "second.csv", tank_columns(5, seconds))
+    assert changed(("span = [2, 18]", waves)).encounter_period() == alone
+
+
 @pytest.mark.parametrize("measured", [False, True])
 def test_delays_window_and_stop_of_a_model(edited, measured):
     pairs = [] if measured else [STATED]

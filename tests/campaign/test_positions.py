@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+import xarray as xr
 from seas import sea
 from small_tank import write_csv
 
@@ -61,6 +62,21 @@ def test_a_wrong_position_is_warned_of_once_and_is_a_finding_of_every_run(campai
         assert [(each.channel, each.kind.word) for each in findings_of(run)] == [
             ("eta_fwd", "position")
         ]
+
+
+def test_a_probe_in_another_unit_is_kept_until_its_file_is_repaired(campaign, tmp_path):
+    sound, path = campaign(48.42), tmp_path / "two.csv"
+    text = path.read_text("utf-8")
+
+    def kept():
+        with xr.open_dataset(seakeep.campaign.write_prepared(sound)["two"]) as run:
+            return [each.channel for each in findings_of(run)]
+
+    path.write_text(text.replace("cog [m]", "cog [cm]"), "utf-8")
+    with pytest.warns(match=r"one: eta_cog moves 10\d times as much beside eta_fwd as in two\."):
+        assert kept() == ["eta_cog"]
+    path.write_text(text, "utf-8")
+    assert kept() == []
 
 
 def test_right_positions_and_regular_waves_give_no_finding(campaign):

@@ -144,6 +144,18 @@ def test_the_step_is_the_files_own(changed):
     np.testing.assert_array_equal(run["heave"], raw["heave"])
 
 
+def test_times_in_another_unit_are_refused_before_a_thousand_samples_are_made_of_one(changed, tank):
+    columns = tank_columns(1)
+    write_csv(tank / "second.csv", columns | {"Time [s]": 1000 * columns["Time [s]"]})
+    failed = {}
+    campaign = changed()
+    assert [name for name, _ in campaign.each_prepared(None, None, failed)] == ["first"]
+    assert "'second' has 0.05 samples per second by its times, and [preparation] asks for 10. " in (
+        str(failed["second"])
+    )
+    assert changed(("sampling_rate = 10", "sampling_rate = 400")).prepare(["first"])
+
+
 def test_steps_of_files_that_differ_are_refused(edited, tank):
     edited(("sampling_rate = 10", ""))
     columns = {name: each[::2] for name, each in tank_columns(1).items()}

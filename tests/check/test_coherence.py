@@ -42,6 +42,17 @@ def test_a_state_too_slow_for_the_segments_is_not_judged(run):
     assert text.startswith("surge: cannot be judged: its slow period of 6")
 
 
+def test_a_channel_that_is_turned_over_is_told_so(run):
+    model = fitted(run)
+    for turned, said in (
+        (run, False),
+        (run.assign(heave=(-run.heave).assign_attrs(units="m")), True),
+    ):
+        found = check.coherence(model, {"run": turned})
+        text = possible_section(found, Checked({}, {}, {})).points[0]
+        assert (abs(found.correlation[0]) > 0.8, "sign looks turned over" in text) == (True, said)
+
+
 def test_observables_lower_the_bound(run):
     """A wave that is Gaussian says nothing linear of its square: 0.5 of the SD is left."""
     square = (Expression("square", "eta**2"),)

@@ -9,6 +9,7 @@ from records import record
 from seakeep import BayesianHankelDMDc, Fixed, HankelDMDc, LogUniform, check
 from seakeep.check.parts import free_windows, samples_in
 from seakeep.core.extremes import free_decay
+from seakeep.errors import DataError
 
 DT, FREQUENCY, RATIO = 0.05, 2.0, 0.06  # s, rad/s, 1
 
@@ -65,6 +66,11 @@ def test_quadratic_damping_is_found_from_a_decay(model):
     # Equivalent linearisation: p = 2πζ, q = 8b/3, to second order in the damping.
     assert found.p[0] == pytest.approx(2 * np.pi * 0.02, rel=0.03)
     assert found.q[0] == pytest.approx(8 / 3 * 0.3, rel=0.03)
+
+
+def test_the_refusal_without_a_decay_names_role_and_waves(model):
+    with pytest.raises(DataError, match=r"waves = 'still' and role = 'test' .*unused"):
+        check.measured_decay(model, {"waves": measured_decay_run(0.02, 0.3).assign_attrs(waves="")})
 
 
 def test_free_runs_of_an_ensemble_are_the_mean_of_its_members():

@@ -8,7 +8,7 @@ from moored import moored_run
 
 from seakeep import HankelDMDc, metrics
 from seakeep.baselines import FIR, Mean
-from seakeep.check import Checked, check_model, worth
+from seakeep.check import Checked, check_model, validity, worth
 from seakeep.check.parts import free_runs
 from seakeep.report.check_page import check_sections
 
@@ -47,6 +47,12 @@ def baselines(runs):
 @pytest.fixture(scope="module")
 def checked(model, runs, baselines):
     return check_model(model, runs, None, baselines)
+
+
+def test_a_decay_in_still_water_is_no_test_in_irregular_waves(model, runs):
+    decay = part(5, waves="still", test_span=(0.0, 69.9))
+    assert [*worth(model, runs | {"decay": decay})["run"].values] == ["one", "two"]
+    assert [*validity(model, runs | {"decay": decay})["run"].values] == [*runs]
 
 
 def test_errors_are_those_of_the_tests_and_verdicts_follow_from_them(model, runs, checked):

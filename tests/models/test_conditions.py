@@ -62,6 +62,16 @@ def test_a_run_of_another_condition_is_named_with_what_sets_it_apart(last, reaso
     assert ("water_depth in [rig]" in each.describe()) == (reason == "dynamics")
 
 
+def test_another_unit_of_a_load_moves_its_mean_too():
+    """In kgf in one run, the load's mean and its motion make up the error together, not alone."""
+    mean = float(vessel(4)["heave"].std())
+    runs = {name: vessel(seed, offset=mean) for seed, name in enumerate(["a", "b", "c", "odd"], 1)}
+    runs["odd"] = runs["odd"].assign(heave=(runs["odd"]["heave"] / 9.81).assign_attrs(units="m"))
+    (each,) = disagreements(SPEC, runs, ["heave", "pitch"], ["eta"])
+    assert (each.run, each.reason, each.channel) == ("odd", "scale", "heave")
+    np.testing.assert_allclose(each.value, 1 / 9.81, rtol=0.1)
+
+
 def test_of_two_runs_either_may_be_wrong():
     runs = {"p1": vessel(1), "p2": vessel(4, offset=0.5)}
     (each,) = disagreements(SPEC, runs, ["heave", "pitch"], ["eta"])

@@ -42,6 +42,12 @@ def test_other_seas_do_not(seed):
     assert find_leakage([jittered[:HALF]], jittered[HALF:], DT) is None
 
 
+def test_a_few_waves_are_alike_in_any_two_seas():
+    short = sea(0)[1000 : 1000 + 32 * 4]
+    assert find_leakage([sea(10), sea(20), sea(30)], short, DT) is None
+    assert find_leakage([sea(1)], sea(1)[1000 : 1000 + 32 * 25], DT) is not None
+
+
 def test_regular_waves_repeat_by_their_nature():
     wave = 0.05 * np.sin(3.0 * TIME) * (1 + 0.04 * np.sin(0.3 * TIME))
     assert find_leakage([wave[:HALF]], wave[HALF:], DT) is None

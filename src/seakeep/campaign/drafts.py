@@ -153,7 +153,11 @@ def _roles(
     dead = dead_motions(files, guesses) if len(runs) > 1 else {}
     roles, whole = {}, []
     for name in runs:
-        roles[name] = "unused", "guessed: no waves were found, as in still water or decay tests"
+        why = "guessed: no waves were found, as in still water or decay tests"
+        roles[name] = (
+            "unused",
+            f"{why}. With waves = 'still' and role = 'test' check judges a decay",
+        )
         lacking = loggers - {file.logger for file in files if file.run == name}
         if lacking:
             roles[name] = "unused", f"it has no file of {', '.join(sorted(lacking))}"

@@ -84,6 +84,9 @@ from seakeep.toml import Length, number
 Reader = Callable[[Path, Options], Columns]
 COMMON = "the common step"
 """Place of derived channels whose sources come from several loggers."""
+MOST_FINER = 8.0
+"""Times finer than the fastest logger of a run that its step may be: waves of four samples get the
+32 of the paper's; with times in another unit it is 1000."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -526,6 +529,14 @@ def _axis(run: Run, dt: float) -> FloatArray:
         raise DataError(
             f"run '{run.name}': its instruments never recorded together ({spans}, on the "
             "reference's clock). Check the files of the run and the clocks."
+        )
+    own = min(map(usual_step, times.values()))
+    if own > MOST_FINER * dt:
+        raise DataError(
+            f"run '{run.name}' has {1 / own:.4g} samples per second by its times, and "
+            f"[preparation] asks for {1 / dt:.4g}. If its times are in ms, state time_unit = "
+            "'ms' in [files], or correct its header where that says s; else correct "
+            "sampling_rate, dt or steps_per_period."
         )
     origin = run.reference_time[0]
     first = np.ceil((begin - origin) / dt - 1e-6)

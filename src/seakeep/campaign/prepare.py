@@ -20,12 +20,12 @@ from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import cross_checks
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
 from seakeep.files import expanded
-from seakeep.quality import as_json, warn_of
+from seakeep.quality import as_json, judge_probes, warn_of
 from seakeep.signals import Clock, uniform_step
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
 
-FORMAT = 11
+FORMAT = 12
 """Goes into the digest: raise it when the same settings give other arrays or findings."""
 
 
@@ -272,9 +272,10 @@ class Campaign:
         -------
         float
             The period stated in ``[campaign]``, s; without it, the mean over the irregular runs
-            (all used runs if none is marked irregular) of the zero-up-crossing period of
+            (all used runs with waves if none is) of the zero-up-crossing period of
             :meth:`period_channel`, each over the run's span, at the file's own rate. A run that
-            cannot be read, or holds fewer than two crossings, is left out with a warning.
+            cannot be read, or holds fewer than two crossings, is left out with a warning; those
+            of fewer than ten waves are left out where others hold more.
 
         Raises
         ------
@@ -313,7 +314,10 @@ class Campaign:
 
     def _mean_period(self, surveyed: Survey) -> float:
         if not surveyed.periods:
-            raise RequestError(f"{self.path} has no run in use. Give a run another role.")
+            raise RequestError(
+                f"{self.path} has no run with waves in use. Give a run another role, or state "
+                "encounter_period (s) in [campaign]."
+            )
         return float(np.mean(list(surveyed.periods.values())))
 
     def prepare(
@@ -346,7 +350,9 @@ class Campaign:
         DataError
             As :meth:`read_run`.
         """
-        return dict(self.each_prepared(names, progress))
+        runs = dict(self.each_prepared(names, progress))
+        judge_probes(runs)
+        return runs
 
     def each_prepared(
         self,

@@ -495,9 +495,10 @@ class CampaignSettings(Table):
 
     @property
     def period_runs(self) -> tuple[str, ...]:
-        """Runs over which the period is measured: irregular ones, or all if none is marked."""
-        irregular = [name for name in self.used_runs if self.runs[name].waves == "irregular"]
-        return tuple(irregular or self.used_runs)
+        """Runs over which the period is measured: irregular ones, or all with waves if none is."""
+        waves = {name: self.runs[name].waves for name in self.used_runs}
+        irregular = [name for name, kind in waves.items() if kind == "irregular"]
+        return tuple(irregular or (name for name, kind in waves.items() if kind != "still"))
 
     @property
     def preset(self) -> str | None:

@@ -10,7 +10,7 @@ from seakeep.campaign.prepare import Campaign
 from seakeep.campaign.survey import Failures, as_one
 from seakeep.errors import SeakeepError, warn
 from seakeep.files import check_output, load_sealed, make_folder, version, write_sealed
-from seakeep.quality import warn_of_runs
+from seakeep.quality import judge_probes, warn_of_runs
 
 PREPARED = "prepared run"
 """Kind of these files, which sets them apart from measurements."""
@@ -74,6 +74,10 @@ def write_prepared(
     if len(set(steps.values())) > 1:  # that of fresh runs was another, which only all runs show
         for name, run in campaign.each_prepared(wanted, progress, failed):
             write_sealed(run, files[name], PREPARED)
+    every = _files(campaign, out_dir, None) | files
+    runs = dict(_fresh(campaign, every))
+    for name in judge_probes(runs):
+        write_sealed(runs[name], every[name], PREPARED)
     if failed and failures is None:
         raise as_one(failed)
     return {name: file for name, file in files.items() if name not in failed}

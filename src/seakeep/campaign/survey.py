@@ -34,6 +34,9 @@ It grows by 5 to 10 % in Pierson-Moskowitz and JONSWAP seas, and by 24 to 37 % w
 a twentieth of their SD, which takes 17 to 23 % off the count."""
 FEW = 40
 """Waves of which a few that are low may be a fifth."""
+FEWEST = 10.0
+"""Waves in a run that others, if they hold more, leave out of the encounter period: the mean of ten
+is certain to a tenth."""
 Failures = dict[str, SeakeepError]
 """Errors by run: a run that cannot be read must not stop the others."""
 
@@ -170,10 +173,11 @@ def survey(
                 spare(failures, name, error)
             bad[name] = error
     reader.keep = False
-    periods = {name: counted for name, (counted, *_) in spans.items()}
+    long = {name: each for name, each in spans.items() if each[3] >= FEWEST} or spans
+    periods = {name: counted for name, (counted, *_) in long.items()}
     doubts = {
         name: (counted, energy)
-        for name, (counted, energy, steady) in spans.items()
+        for name, (counted, energy, steady, _) in spans.items()
         if not 1 / LED <= energy / counted <= LED or steady > NOISY * counted
     }
     if bad and (not clocks or (period_runs and not periods)):
@@ -203,8 +207,8 @@ def _left_out(run: str, error: SeakeepError, period: bool, drift: bool) -> str:
     )
 
 
-def _period(run: Run, channel: str) -> tuple[float, float, float]:
-    """Counted and energy period of the waves of a run, and one that little noise leads, s."""
+def _period(run: Run, channel: str) -> tuple[float, float, float, float]:
+    """Counted and energy period of a run's waves, one that little noise leads (s), and waves."""
     run = derived(cleaned(mapped(run, [channel])), [channel])
     waves = next((group for group in run.groups.values() if channel in group), None)
     if waves is None:  # it needs several loggers
@@ -223,4 +227,5 @@ def _period(run: Run, channel: str) -> tuple[float, float, float]:
             steady = encounter_period(clipped, step, max(stated, 0.1))
     except DataError as error:
         raise DataError(f"run '{run.name}', channel '{channel}': {error}") from None
-    return counted, energy_period(series[waves_part(series, step)], step), steady
+    energy = energy_period(series[waves_part(series, step)], step)
+    return counted, energy, steady, series.size * step / counted

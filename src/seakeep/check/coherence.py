@@ -58,9 +58,9 @@ def coherence(
         ``multiple`` coherence with all inputs, corrected for what q inputs explain by chance (not
         below that with one input), and
         ``spectrum`` of the state; over state: ``linear_bound`` with ``linear_bound_lower`` and
-        ``linear_bound_upper`` (95 %), and ``nrmse`` of the model's free runs, pooled,
-        all NaN where the state stands ``still`` (below 1 % of its SD in training); bounds are NaN
-        where its dominant ``period`` (s) exceeds a third of a segment. With
+        ``linear_bound_upper`` (95 %), and ``nrmse`` and ``correlation`` of the model's free runs,
+        pooled, all NaN where the state stands ``still`` (below 1 % of its SD in training); bounds
+        are NaN where its dominant ``period`` (s) exceeds a third of a segment. With
         observables also ``multiple_observables`` and ``observables_bound`` with its interval, of
         inputs and observables together. ``attrs``: ``averages`` (independent segments),
         ``segment`` (s), ``observables`` (their names) and ``of`` ("tests" or "training").
@@ -127,6 +127,7 @@ def coherence(
         "ordinary": (("state", "input", "frequency"), spectra.ordinary()[..., :size].T),
         "spectrum": (over, spectra.outputs[:, :size].T),
         "nrmse": ("state", np.where(still, np.nan, pooled_nrmse(own))),
+        "correlation": ("state", np.where(still, np.nan, _correlation(own))),
         "still": ("state", still),
         "period": ("state", slow, {"units": "s"}),
     }
@@ -173,6 +174,14 @@ def _bound(
     power = spectra.outputs[:, :size]
     alike = 1 - np.divide(rest, power, out=np.ones_like(power), where=power > 0)
     return np.minimum(error[:, *best], 1.0), np.clip(alike, 0, 1).T
+
+
+def _correlation(runs: Mapping[str, FreeRun]) -> FloatArray:
+    """Correlation of forecast and measurement of each state, over all free runs."""
+    pairs = [[x - x.mean(axis=0) for x in (run.forecast, run.measured)] for run in runs.values()]
+    forecast, measured = map(np.concatenate, zip(*pairs, strict=True))
+    norms = np.sqrt((forecast**2).sum(axis=0) * (measured**2).sum(axis=0))
+    return ratio((forecast * measured).sum(axis=0), norms)
 
 
 def pooled_nrmse(runs: Mapping[str, FreeRun]) -> FloatArray:

@@ -163,8 +163,8 @@ def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
     motions = _motions(model)
     if not still:
         raise DataError(
-            "no run is a free decay in still water. State waves = 'still' of such runs, and the "
-            "model's decay stands beside theirs."
+            "no run in use is a free decay in still water. State waves = 'still' and role = 'test' "
+            "of such runs (unused ones are not read), and the model's decay stands beside theirs."
         )
     parts = []
     for name, run in still.items():

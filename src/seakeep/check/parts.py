@@ -70,6 +70,11 @@ def is_regular(run: xr.Dataset) -> bool:
     return bool(run.attrs.get("waves") == "regular")
 
 
+def in_waves(runs: Datasets) -> Groups:
+    """Runs that do not state still water, which `measured_decay` alone judges."""
+    return {name: run for name, run in runs.items() if run.attrs.get("waves") != "still"}
+
+
 def irregular(runs: Datasets, what: str) -> Groups:
     """Runs that are not regular; an error says what cannot be had without them."""
     skipped = {name: run for name, run in runs.items() if not is_regular(run)}
@@ -82,13 +87,13 @@ def irregular(runs: Datasets, what: str) -> Groups:
 
 
 def of_part(runs: Datasets, part: str) -> Groups:
-    """Runs with a span that trains ("train") or tests ("test"), and with this span alone.
+    """Runs in waves with a span that trains ("train") or tests ("test"), and with this span alone.
 
     A run that states neither span tests as a whole.
     """
     wanted, other = f"{part}_span", {"train": "test_span", "test": "train_span"}[part]
     parts = {}
-    for name, run in runs.items():
+    for name, run in in_waves(runs).items():
         if wanted in run.attrs or (part == "test" and other not in run.attrs):
             parts[name] = run.copy(deep=False)
             parts[name].attrs.pop(other, None)
@@ -102,9 +107,9 @@ def judged(runs: Datasets) -> tuple[Groups, str]:
 
 
 def used_parts(model: Model, runs: Datasets) -> dict[str, Part]:
-    """Parts of runs that train or test; a run that cannot be used warns."""
+    """Parts of runs in waves that train or test; a run that cannot be used warns."""
     parts = {}
-    for name, run in runs.items():
+    for name, run in in_waves(runs).items():
         check_step(run, name, model.dt)
         time = run["time"].values
         states = channel_matrix(run, model.states, name)

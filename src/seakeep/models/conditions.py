@@ -220,7 +220,9 @@ def _reason(
     factors = np.sum(p * m, axis=0) / np.sum(p * p, axis=0)
     gains = np.mean((m - p) ** 2, axis=0) - np.mean((m - factors * p) ** 2, axis=0)
     at = int(np.argmax(gains))
-    return ("scale", model.states[at], float(factors[at])) if gains.sum() >= least else None
+    mean = float(offsets[at] ** 2)  # another unit moves the mean of a load too
+    is_scale = gains.sum() + mean >= least and gains[at] >= (1 - EXPLAINS) * (gains[at] + mean)
+    return ("scale", model.states[at], float(factors[at])) if is_scale else None
 
 
 def _place(model: HankelDMDcModel, run: xr.Dataset) -> tuple[Reason, str, float, float] | None:

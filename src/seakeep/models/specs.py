@@ -221,9 +221,9 @@ class Choosing(HankelSettings, Generic[Fitted]):
                 return replace(model, selection=words + choice.describe())
         raise DataError(
             f"the model that was chosen grows: its spectral radius is {radius:.6f} at "
-            f"{settings.ridge_text(float(settings.ridge))}. Look for transients at the ends of the "
-            "training runs, use fewer state delays, clip eigenvalues (stable=True), or state the "
-            "ridge to have it as it is."
+            f"{settings.ridge_text(float(settings.ridge))}. Train on more, look for transients at "
+            "the ends of the training runs, use fewer state delays, clip eigenvalues (stable=True, "
+            "or stable = true in the table of the model), or state the ridge to have it as it is."
         )
 
 

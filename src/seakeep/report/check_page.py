@@ -33,6 +33,8 @@ from seakeep.report.tables import (
 
 OVERSHOOT = 1.1
 """Largest swing over the offset that a free decay may show; the rest is for the noise of a fit."""
+TURNED = -0.8
+"""Correlation of forecast and measurement below which one of them looks turned over."""
 
 USES = {
     0.1: "can stand in for a measurement (error below 0.1 SD)",
@@ -256,7 +258,8 @@ def possible_section(result: xr.Dataset, checked: Checked) -> Section:
             more = float(own.get("observables_bound", np.nan))
             beside = f"{state}: model {model:.2g}, linear bound {linear:.2g}"
             beside += f", with the observables {more:.2g}" * bool(np.isfinite(more))
-            advice[_advice(model, linear, more, ahead)].append(beside)
+            turned = float(own["correlation"]) < TURNED
+            advice[_advice(model, linear, more, ahead, turned)].append(beside)
     points = [f"{'; '.join(states)}. {words}" for words, states in advice.items()]
     points += [f"{', '.join(of)}: cannot be judged: {why}." for why, of in unjudged.items()]
     if worth and (state := worth.attrs["conditional_on"]):
@@ -276,10 +279,15 @@ def _bounds(own: xr.Dataset) -> tuple[str, ...]:
     return (*row(own, "state"), own.attrs["of"], number(own["nrmse"]), *cells)
 
 
-def _advice(model: float, linear: float, more: float, ahead: bool) -> str:
+def _advice(model: float, linear: float, more: float, ahead: bool, turned: bool) -> str:
     """What the distance of a model from its bounds says; `ahead`, whether it has a look-ahead."""
     if not np.isfinite(model):
         return "No free run holds over the test."
+    if turned:
+        return (
+            "The forecast goes up where the measurement goes down: its sign looks turned over in "
+            "these runs, or in those that trained. Check sign in [channels], and the files."
+        )
     least = np.nanmin([linear, more])
     first = "" if ahead else "a look-ahead (waves measured up-wave), "
     if model < 0.95 * least:
