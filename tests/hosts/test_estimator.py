@@ -96,7 +96,10 @@ def measured(run, model, lost_inputs=True):
     lost[:8], lost[150:200, 0], lost[230:310] = True, True, True
     y[lost] = np.nan
     if lost_inputs:
-        u[[30, 160, 161, 162], 1:], u[[*range(302, 310), *range(315, 320)]] = np.nan, np.nan
+        u[[30, 160, 161, 162], 1:], u[[*range(268, 280), *range(302, 310), *range(315, 320)]] = (
+            np.nan,
+            np.nan,
+        )
     return u, y
 
 

@@ -61,7 +61,7 @@ def test_short_gaps_are_closed_by_cubics_and_the_newest_by_what_there_is():
     left = np.isin(t, [0, *range(20, 29)])
     for series, places in ((cubic, t < 30), (square, t > 30)):
         record, gone = np.where(lost, 9.0, series), lost.copy()
-        close_gaps(record, gone)
+        close_gaps(record, gone, 8)
         np.testing.assert_array_equal(gone, left)
         np.testing.assert_array_equal(record[left], 9.0)
         closed = places & ~left

@@ -21,11 +21,11 @@ from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
 from seakeep.models.growth import DOUBTED
-from seakeep.models.live import Live
+from seakeep.models.live import AFTER, Live
 from seakeep.models.terms import SlowSquare, Term
 from seakeep.models.validity import CYCLES, TRAINED
 from seakeep.signals.expressions import Text
-from seakeep.signals.prediction import GAP, MEMORY, NOISE
+from seakeep.signals.prediction import MEMORY, NOISE
 from seakeep.waves import GRAVITY
 
 KIND = "C source"
@@ -159,7 +159,7 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
             "per_octave": PER_OCTAVE,
             "is_elevation": is_elevation,
             "noise_part": NOISE,
-            "gap": GAP,
+            "after": AFTER,
             "doubted": DOUBTED,
         }
         for end in ("h", "c"):

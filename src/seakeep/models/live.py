@@ -70,6 +70,8 @@ ALARM = 2.0
 """Consistency of a state above which errors of late are no longer those of training."""
 LATE = 16
 """Complete samples that are judged together: each alone would cost three times as much."""
+AFTER = 32
+"""Samples after a gap from which on what comes is predicted from them alone."""
 SMALL = 0.5
 """Part of the training SD below which an error stays over the lead time."""
 RIG = ("water_depth", "celerity", "probe_offset")
@@ -122,6 +124,8 @@ class _Counts:
         Complete ones in a row.
     lead : int
         Those since the start of a free run.
+    unseen : int
+        Those in a row without any state.
     """
 
     taken: int = 0
@@ -130,6 +134,7 @@ class _Counts:
     partly: bool = True
     complete: int = 0
     lead: int = 0
+    unseen: int = 0
 
 
 class Live:
@@ -197,6 +202,7 @@ class Live:
                 "there in service. Fit it with alignment mode = 'dispersion', surge = 'predicted', "
                 "which carries them in each step, or without alignment."
             )
+        self._gap = model.coverage.quarter(signature.dt)
         foresight = engine.foresight(signature, self._rig)
         self._places = foresight.keywords["positions"][self._waves]
         self._depth = foresight.keywords["depth"]
@@ -259,12 +265,15 @@ class Live:
 
     @property
     def state(self) -> FloatArray:
-        """Estimate of the states at :attr:`time`, shape (N,), physical units."""
-        return self._rows("x", self._count.taken - 1, self._count.taken)[0].copy()
+        """Estimate of the states at :attr:`time`, shape (N,), physical units; NaN before that."""
+        return self._recent["x"][max(self._count.taken - 1 - self._first, 0)].copy()
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of the errors of :attr:`state`, shape (N, N)."""
+        """Covariance of the errors of :attr:`state`, shape (N, N), but for those of lost waves.
+
+        While nothing is measured, the first step of a forecast holds these too.
+        """
         count = len(self.signature.states)
         return self._filter.covariance[-count:, -count:].copy()
 
@@ -321,14 +330,18 @@ class Live:
         """What lies outside the training: waves, mean surge, or errors of late; or lost waves.
 
         Errors do where :attr:`consistency_by_state` exceeds two for a state, one step ahead or in
-        free runs. Waves are lost while a forecast reads any that were not measured, and that no
-        gap of up to eight samples closed.
+        free runs. Waves are lost while estimate or forecast go back to any that were not measured,
+        beyond gaps of a quarter of their period, which are closed. While nothing at all is measured
+        they are not: the band holds what they do.
         """
         return self._validity(self.conditions)
 
     def _validity(self, conditions: Conditions | None) -> Validity:
         outside = Validity(0) if conditions is None else conditions.validity
-        if self._closed()[1][-self._begins :].any():
+        _, lost, dark = self._closed()
+        if dark <= self._count.unseen:  # the band holds what comes of it
+            lost = lost[: len(lost) - dark]
+        if lost[-self._begins - min(self._count.since, len(self.errors.rms)) :].any():
             outside |= Validity.LOST
         alarm = bool(np.any(self.consistency_by_state > ALARM))
         return outside | Validity.CONSISTENCY if alarm else outside
@@ -346,8 +359,8 @@ class Live:
         """What the filter computes with, for hosts: x' = offset + a x̂ + b û + d v, oldest first.
 
         Variances of process and measurement noise, mean and spread of the states, errors of free
-        runs by lead, and what inputs are predicted from: samples of their records, means, and
-        filters of a model that follows its own surge.
+        runs by lead, and what inputs are predicted from: samples of their records, means, gaps that
+        are closed, and filters of a model that follows its own surge.
         """
         scale = self.signature.state_scale
         return {
@@ -362,6 +375,7 @@ class Live:
             "spread": scale.spread,
             "record": self._record,
             "means": self.signature.input_scale.mean,
+            "gap": self._gap,
             "foresight": self._foresight,
             "waves": self._waves,
         }
@@ -478,12 +492,14 @@ class Live:
         """Inputs that waves are predicted from: the last ones, always as many once there are."""
         return self._rows(name, max(self._count.taken - self._record, 0), self._count.taken)
 
-    def _closed(self) -> tuple[FloatArray, BoolArray]:
-        """The same with short gaps closed, and which waves are not measured then."""
+    def _closed(self) -> tuple[FloatArray, BoolArray, int]:
+        """The same with short gaps closed; which waves are lost then, and for how long all are."""
         record, lost = self._known_inputs().copy(), self._known_inputs("lost") > 0
         for column in self._waves:
-            close_gaps(record[:, column], lost[:, column])
-        return record, lost[:, self._waves]
+            close_gaps(record[:, column], lost[:, column], self._gap)
+        lost = lost[:, self._waves]
+        dark = np.logical_and.accumulate(lost[::-1].all(axis=1) & bool(self._waves)).sum()
+        return record, lost, int(dark)
 
     def _filtered(self, at: int, seen: BoolArray) -> None:
         """Covariance and gain of a sample."""
@@ -497,6 +513,7 @@ class Live:
             update = _Update(self._filter.measure(seen), deviations)
         self._updates.append(update)
         count.complete = count.complete + 1 if is_exact else 0
+        count.unseen = 0 if seen.any() else count.unseen + 1
         if count.complete > self.signature.state_delays:
             if count.since:  # or it is zero already
                 self._filter.covariance.fill(0.0)
@@ -668,8 +685,9 @@ class Live:
             Inputs at the instants after :attr:`time`, as far as they are known: NaN, or left out
             of a mapping, where they are not. Where waves end before ``steps − 1 + lead_samples``
             rows, they are predicted from the record, and from what probes up-wave have seen where
-            positions and depth are known (`like`, or the model's alignment); futures drawn about
-            the prediction widen the band.
+            positions and depth are known (`like`, or the model's alignment); departures from
+            the prediction widen the band. Where the last samples hold no wave at all, they are
+            predicted from those before, whatever is given here.
         level : float, optional
             Probability of the band.
 
@@ -707,7 +725,8 @@ class Live:
             )
         futures, freedom, known, dark = self._futures(count, future)
         # In the dark the errors of what was filled grow as those of what is to come.
-        dark = 0 if self._count.partly else min(dark, self._count.since, len(self.errors.rms))
+        leads, unseen = len(self.errors.rms), min(dark, self._count.unseen)
+        dark = min(unseen, leads, self._count.taken - self._begins)
         taken = self._count.taken - dark
         history = self._rows("x", taken - signature.state_samples, taken)
         back = signature.input_map.history(signature.input_delays) + 1 + dark
@@ -734,6 +753,8 @@ class Live:
                 errors = np.minimum(own + self._filter.ahead(count), errors)
             given = np.arange(count) <= known - self._ahead
             table[0], spread, weight = weighed(complete, errors, scale, given)
+            if unseen > leads:
+                table[0], weight = scale.centre, np.zeros_like(weight)
             # The error passes over with the mean, to that of the mean of training.
             variance = weight * (spread + wider * errors)
             table[1] = np.sqrt(variance + (1.0 - weight) * wider * scale.spread**2)
@@ -781,9 +802,11 @@ class Live:
         rows were given, below zero where the last ones of the record were lost; and how many of
         these there are.
         """
-        names, waves, (record, lost) = self.signature.inputs, self._waves, self._closed()
-        tail = np.logical_and.accumulate(lost[::-1].all(axis=1)) if waves else np.empty(0)
-        dark = min(int(tail.sum()), len(record) // 2)
+        names, waves, (record, gone, tail) = self.signature.inputs, self._waves, self._closed()
+        dark, light = min(tail, len(self.errors.rms)), len(record) - tail
+        # What filled a gap that is not closed does not join the waves after it.
+        before = np.flatnonzero(gone[:light].all(axis=1)).max(initial=-1) + 1
+        before *= bool(waves) and light - before >= AFTER
         given = _plan(future, names, steps - 1 + self._ahead)
         for column in sorted(set(range(len(names))) - set(waves)):
             lost = np.isnan(given[:, column])
@@ -799,15 +822,15 @@ class Live:
         inputs, begin = np.concatenate([record, given]), len(record)
         inputs[begin - dark : begin, waves] = np.nan
         if not np.isnan(inputs).any():
-            return inputs[None], math.inf, len(given), dark
+            return inputs[None], math.inf, len(given), tail
         filled, first, freedom = fill_future(
             inputs[:, waves],
             begin - dark,
-            lambda of, steps: self._foreseen(of[-self._record :], steps),
+            lambda of, steps: self._foreseen(of[max(before, len(of) - self._record) :], steps),
         )
         futures = np.repeat(inputs[None], len(filled), axis=0)
         futures[:, :, waves] = filled
-        return futures, freedom, first - begin, dark
+        return futures, freedom, first - begin, tail
 
     def save(self, path: str | Path) -> Path:
         """Write all that the object needs to go on (NetCDF), to a temporary name first.
@@ -856,7 +879,8 @@ class Live:
         taps = 0 if self._follows is None else self._follows.place.taps.size
         longest = max(signature.state_delays, signature.input_delays, taps)
         tail = max(taken - (self._ahead + LATE + longest + 4), 0)
-        rows = [self._rows(each, tail, taken) for each in {*self._recent} - {"u", "lost"}]
+        rows = [self._rows(each, tail, taken) for each in ("y", "delayed", "direct")]
+        rows.append(self._rows("x", max(tail - len(self.errors.rms), self._first), taken))
         updates = [update for update in self._pending() if update is not self._as_it_is]
         state = [self._history, self._free, self._innovation, self._squares]
         state += [self._known_inputs(), self._known_inputs("lost")]

@@ -25,9 +25,6 @@ UNLIKE = math.sqrt(1.0 - LEAST_CORRELATION**2)
 NOISE = 1e-6
 """Part of a record's variance that counts as noise: a sum of tones, as of a simulated sea, would
 seem to be known for good without it."""
-GAP = 8
-"""Samples of a gap that is closed. With 32 to a wave period, a cubic across eight errs by 0.04 SD,
-and what the samples before it tell by 0.3."""
 SLOWLY, QUICKLY = 0.99, 0.05
 """Shares of a record's variance below the waves that arrive last, and below the first ones."""
 
@@ -178,8 +175,11 @@ def foresee(
     return Foreseen(expected, departures, size / max(orders, default=1.0))
 
 
-def close_gaps(record: FloatArray, lost: BoolArray) -> None:
-    """Close gaps of up to ``GAP`` samples, by a cubic through two measured samples on either side.
+def close_gaps(record: FloatArray, lost: BoolArray, longest: int) -> None:
+    """Close gaps by a cubic through two measured samples on either side.
+
+    Across a quarter of a wave's period it errs by 0.04 of the SD, and what samples before tell by
+    0.3 on the virtual tank.
 
     Parameters
     ----------
@@ -187,11 +187,13 @@ def close_gaps(record: FloatArray, lost: BoolArray) -> None:
         Uniformly sampled; changed in place.
     lost : ndarray of bool, shape (time,)
         Which samples were not measured; closed ones are taken out.
+    longest : int
+        Samples of a gap at most.
     """
     known, rows = np.flatnonzero(~lost), np.flatnonzero(lost)
     after = np.searchsorted(known, rows)
     rows, after = (each[(after > 0) & (after < known.size)] for each in (rows, after))
-    is_short = known[after] - known[after - 1] <= GAP + 1
+    is_short = known[after] - known[after - 1] <= longest + 1
     rows, places = rows[is_short, None], after[is_short, None] + np.arange(-2, 2)
     there = (places >= 0) & (places < known.size)  # one may lack at either end of the record
     near = known[np.clip(places, 0, known.size - 1)]

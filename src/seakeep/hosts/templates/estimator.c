@@ -23,6 +23,7 @@ enum {
     SETTLED = LEADS + OLD / N,  /* samples without a measurement after which errors stay as they are */
     FORE = {{ fore }},                  /* inputs that are predicted before each is from its own record */
     GAP = {{ gap }},
+    AFTER = {{ after }},
     PAST = {{ upper }}_U_ROWS - {{ lead_samples }},     /* rows of inputs that a forecast starts with, but the last */
     RUNS = 1 + 2 * {{ waves | length }}             /* of expected waves, and of departures from each */
 };
@@ -414,6 +415,7 @@ int {{ name }}_estimate({{ name }}_estimator *e, const double *u, const double *
         }
         measure(e, rows, count);
     }
+    e->unseen = count ? 0 : e->unseen + (e->unseen < RECORD);
     e->complete = exact ? (e->complete < M ? e->complete + 1 : M) : 0;
     if (e->complete * N > OLD) {
         e->since = e->partly = 0;
@@ -462,6 +464,16 @@ static int is_closed(const {{ name }}_estimator *e, int before, int after)
     return before >= RECORD - e->filled && after < RECORD && after - before <= GAP + 1;
 }
 
+/* Whether no wave is known in a row. */
+static int is_dark(const {{ name }}_estimator *e, int row)
+{
+    int dark = RUNS > 1;
+    for (int q = 0; q < Q; q++)
+        dark = dark && (!waves[q] || (e->lost[row * Q + q]
+                                      && !is_closed(e, measured(e, row, -1, q), measured(e, row, 1, q))));
+    return dark;
+}
+
 /* Copy the record into `planned` and close its short gaps, by a cubic through two measured rows on
  * either side. */
 static void close_gaps({{ name }}_estimator *e)
@@ -495,7 +507,11 @@ static void close_gaps({{ name }}_estimator *e)
 int {{ name }}_validity({{ name }}_estimator *e)
 {
     int size = e->filled, outside = 0;
-    for (int row = RECORD - (size < BEGINS ? size : BEGINS); row < RECORD; row++)
+    int back = BEGINS + (e->since < LEADS ? e->since : LEADS), tail = 0;
+    while (tail < size && is_dark(e, RECORD - 1 - tail))
+        tail++;
+    tail = tail <= e->unseen ? tail : 0; /* the band holds what comes of it */
+    for (int row = RECORD - (size < back ? size : back); row < RECORD - tail; row++)
         for (int q = 0; q < Q; q++)
             if (waves[q] && e->lost[row * Q + q]
                 && !is_closed(e, measured(e, row, -1, q), measured(e, row, 1, q)))
@@ -653,21 +669,10 @@ static void reach_on(double *reach)
     }
 }
 
-/* Samples at the end of the record without any wave. */
-static int in_the_dark(const {{ name }}_estimator *e)
-{
-    int dark = 0, lost = RUNS > 1;
-    while (lost && dark < e->filled / 2) {
-        for (int q = 0; q < Q; q++)
-            lost = lost && (!waves[q] || e->lost[(RECORD - 1 - dark) * Q + q]);
-        dark += lost;
-    }
-    return dark;
-}
-
-/* Run from so many samples `back`; `dark` samples before the newest, waves are not known. */
+/* Run from so many samples `back`; `dark` samples before the newest, waves are not known. After too
+ * long without a measurement all is as in the mean of training. */
 static int run_on({{ name }}_estimator *e, int n, const double *future, int known, int dark, int back,
-                  double *x, double *std)
+                  int too_long, double *x, double *std)
 {
     double u[Q + 1], apart[Q + 1] = { 0.0 }, row[Q + 1], moved[N] = { 0.0 }, spreads[N] = { 0.0 };
     double weight[N], *reach = e->cross;
@@ -699,7 +704,7 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
     }
     memcpy(reach, on_states, sizeof on_states);
     for (int i = 0; i < N; i++)
-        weight[i] = 1.0;
+        weight[i] = too_long ? 0.0 : 1.0;
     for (int step = -back; step < n; step++) {
         int at = step > 0 ? step : 0;
         const double *own = errors + (at < LEADS ? at : LEADS - 1) * N;
@@ -735,7 +740,7 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
             if (std)
                 std[step * N + i] = sqrt(variance);
         }
-        if (e->partly)
+        if (e->partly && step >= 0)
             reach_on(reach);
     }
     return 0;
@@ -744,12 +749,20 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x, double *std)
 {
     int most = n - 1 + {{ lead_samples }}, known = given_rows(future, most), filled = e->filled, status;
-    int dark = in_the_dark(e), back = e->partly ? 0 : dark;
-    back = back > e->since ? e->since : back;
-    back = back > LEADS ? LEADS : back;
+    int tail = 0, after, dark, back, unseen;
     if (e->taken < BEGINS)
         return 1;
     close_gaps(e);
+    while (tail < filled && is_dark(e, RECORD - 1 - tail))
+        tail++;
+    for (after = 0; after < filled - tail && !is_dark(e, RECORD - 1 - tail - after);)
+        after++;
+    dark = tail < LEADS ? tail : LEADS;
+    unseen = tail < e->unseen ? tail : e->unseen;
+    back = unseen < LEADS ? unseen : LEADS;
+    back = back < filled - BEGINS ? back : filled - BEGINS;
+    if (after >= AFTER) /* what filled a gap that is not closed does not join the waves after it */
+        e->filled = after + tail;
     memcpy(e->u_history, e->planned + (RECORD - 1 - PAST - back) * Q,
            (PAST + ({{ lead_samples }} > back ? back + 1 : {{ lead_samples }})) * Q * sizeof(double));
     if (dark > 0) { /* waves are predicted from the record before */
@@ -759,7 +772,7 @@ int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, do
     } else if (future && known > 0 && known < most) {
         plan(e, future, known);
     }
-    status = run_on(e, n, future, known, dark, back, x, std);
+    status = run_on(e, n, future, known, dark, back, unseen > LEADS, x, std);
     e->filled = filled;
     e->is_planned = 0;
     return status;

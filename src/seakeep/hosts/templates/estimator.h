@@ -28,8 +28,9 @@ enum {
     {{ upper }}_ESTIMATES = {{ late + (errors | length) + ([s + 1, x_rows, past + z + 1] | max) }}
 };
 
-/* What of the waves, or of the mean surge, lies outside the training; or whether waves that a
- * forecast reads were lost, beyond gaps of up to {{ gap }} samples that are closed. */
+/* What of the waves, or of the mean surge, lies outside the training; or whether waves were lost that
+ * estimates and forecasts go back to, beyond gaps of up to {{ gap }} samples, which are closed. While
+ * nothing at all is measured they are not: forecasts hold what they do. */
 enum { {{ upper }}_INSIDE = 0, {{ upper }}_PERIOD = 1, {{ upper }}_HEIGHT = 2, {{ upper }}_STEEPNESS = 4, {{ upper }}_SURGE = 8, {{ upper }}_LOST = 32 };
 
 /* All that an estimator remembers. To save and restore it, copy it as it is. */
@@ -45,7 +46,7 @@ typedef struct {
     /* Of the samples that waves to come move: */
     double y[{{ late + 1 }}][{{ upper }}_STATES], gains[{{ late + 1 }}][{{ upper }}_EXTENDED * {{ upper }}_STATES];
     int plain[{{ late + 1 }}], slot, pending, begun;
-    int filled, taken, since, partly, complete;
+    int filled, taken, since, partly, complete, unseen;
     /* What lies below is work space. */
     double ahead[{{ upper }}_EXTENDED], cross[{{ upper }}_EXTENDED * {{ upper }}_STATES];
     double forward[{{ record + fore }}], backward[{{ record + fore }}];
