@@ -7,8 +7,7 @@ is chosen by shape and conditioning:
   :math:`G = X' (Y^T Y + \lambda I)^{-1} Y^T`, the same matrix, whichever is less work;
 * singular values, where forming a Gram matrix would square away the accuracy: the effective λ is
   below 1e-6 of its trace, or λ = 0 (minimum norm), or a rank is given. Where the newest rows alone
-  are regressed, the primal form serves down to 1e-11: below 3e-8, corrections by residuals of the
-  data bring it back to their accuracy.
+  are regressed, the primal form serves down to 1e-10.
 
 All rows of the next extended state need rows of the inverse of :math:`M = C + \lambda I`. Let Z
 move the lags down by one, newest first, filling with zeros. The recursion of the Gram matrix says
@@ -32,7 +31,7 @@ a smooth series small, and τ = 1 one that turns its sign at every sample.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -65,20 +64,11 @@ GRAM_LIMIT = 1e-6
 
 Its condition number is then below 1e6, and ten digits are left of sixteen."""
 
-CORRECTED_LIMIT = 3e-8
-"""λ, as a part of the trace, from which the newest rows need no corrections.
+NARROW_LIMIT = 1e-10
+"""The same where the newest rows alone are regressed, as forecasts have them.
 
-Eight digits are left at least, ten on the virtual tank."""
-REFINED_LIMIT = 1e-11
-"""Least λ, as a part of the trace, where residuals correct the coefficients.
-
-Each correction gains four digits or more, up to those of singular values."""
-CORRECTIONS = 2
-ENOUGH = 1e-9
-"""A correction that changes less, as a part of the coefficients, is the last: the next is
-rounding."""
-PART = 512
-"""Snapshot pairs of a part."""
+Six digits are left at least, and eight to eleven at the λ that free runs choose on the virtual
+tank: λ itself is known to half a decade."""
 
 
 @dataclass(frozen=True)
@@ -262,7 +252,7 @@ class _Delayed:
         if ridge >= GRAM_LIMIT * self.trace:
             return self.form()
         is_narrow = not self.all_rows and self.rows <= self.columns
-        if is_narrow and ridge >= REFINED_LIMIT * self.trace:
+        if is_narrow and ridge >= NARROW_LIMIT * self.trace:
             return "primal"
         return "svd"
 
@@ -277,33 +267,13 @@ class _Delayed:
             targets.append(embed(piece.states, target_delays, piece.first + 1, piece.count))
         return np.concatenate(regressors, axis=1), np.concatenate(targets, axis=1)
 
-    def parts(self) -> Iterator[_Delayed]:
-        """The same in parts, whose matrices stay in the processor's cache."""
-        for piece in self.pieces:
-            for at in range(0, piece.count, PART):
-                count = min(PART, piece.count - at)
-                yield replace(self, pieces=[replace(piece, first=piece.first + at, count=count)])
-
     def primal(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`C = \hat Y \hat Y^T`."""
         system = primal_system(self.pieces, self.delays)
         factor = factorise(system.gram, ridge)
         if self.all_rows:
             return _all_rows(system, factor, ridge)
-        solution = solve_rows(factor, system.right)
-        if ridge >= CORRECTED_LIMIT * self.trace:
-            return solution
-        # λ is small: residuals of the data correct what the Gram matrix lost.
-        for _ in range(CORRECTIONS):
-            right = -ridge * solution
-            for part in self.parts():
-                regressors, targets = part.matrices()
-                right += (targets - solution @ regressors) @ regressors.T
-            change = solve_rows(factor, right)
-            solution += change
-            if np.linalg.norm(change) <= ENOUGH * np.linalg.norm(solution):
-                break
-        return solution
+        return solve_rows(factor, system.right)
 
     def dual(self, ridge: float) -> FloatArray:
         r"""Coefficients from :math:`K = \hat Y^T \hat Y`.
