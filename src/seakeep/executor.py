@@ -43,7 +43,7 @@ AHEAD = 16
 """Pieces handed out at a time: enough for as many workers, few enough that results stay few."""
 PATIENCE = 10.0
 """Seconds in which a Dask scheduler must answer, and after which silent workers are looked for."""
-ALIKE = ("seakeep", "numpy", "scipy")
+ALIKE = ("seakeep", "numpy", "scipy", "xarray")
 """Packages whose versions must be the same everywhere, so that arrays are."""
 
 

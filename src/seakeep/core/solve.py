@@ -40,7 +40,7 @@ import numpy as np
 from scipy import linalg
 from scipy.linalg import blas
 
-from seakeep.arrays import FloatArray, as_real
+from seakeep.arrays import FloatArray
 from seakeep.core.embedding import TrainingWindow, embed
 from seakeep.core.gram import (
     Group,
@@ -55,7 +55,6 @@ from seakeep.core.gram import (
     solve_rows,
 )
 from seakeep.core.response import clip_modes
-from seakeep.errors import DataError, RequestError
 
 Method = Literal["primal", "dual", "svd"]
 
@@ -146,25 +145,15 @@ def identify(
     -------
     Solution
         Coefficients of shape (N(s+1) or N, N(s+1) + Q(z+1) + D): states, inputs, direct inputs.
-
-    Raises
-    ------
-    RequestError
-        If shapes, windows or numbers do not fit.
-    DataError
-        If a sample that trains is not finite.
     """
-    if not 0 <= ridge < np.inf:
-        raise RequestError(f"ridge must be zero or positive, and finite; received {ridge!r}.")
-    targets = _checked(states, windows, state_delays or 0, "states")
-    groups = [] if state_delays is None else [(targets, state_delays)]
-    groups.append((_checked(inputs, windows, input_delays, "inputs"), input_delays))
+    groups = [] if state_delays is None else [(states, state_delays)]
+    groups.append((inputs, input_delays))
     if direct is not None:
-        groups.append((_checked(direct, windows, 0, "direct"), 0))
+        groups.append((direct, 0))
     groups = [(runs, delays) for runs, delays in groups if runs[0].shape[1]]
     pieces = [
         Piece(
-            targets[run],
+            states[run],
             tuple(runs[run] for runs, _ in groups),
             window.first_column,
             window.columns,
@@ -186,26 +175,6 @@ def identify(
     rows, clipped = clip_modes(solution.coefficients[:, :size], radius)
     coefficients = np.concatenate([rows, solution.coefficients[:, size:]], axis=1)
     return replace(solution, coefficients=coefficients, clipped=clipped)
-
-
-def _checked(
-    series: Sequence[FloatArray], windows: Sequence[TrainingWindow], delays: int, name: str
-) -> list[FloatArray]:
-    """Series of the runs as (time, channel), finite in the samples that train."""
-    arrays = [as_real(each, name) for each in series]
-    for array, window in zip(arrays, windows, strict=True):
-        begin, end = window.first_column - delays, window.last + 1
-        if not 0 <= begin < end <= len(array):
-            raise RequestError(
-                f"samples {begin} to {end - 1} of {name} train, and it has {len(array)}. Shorten "
-                "the delays, or give a longer run."
-            )
-        if not np.all(np.isfinite(array[begin:end])):
-            raise DataError(
-                f"{name} holds values that are NaN or infinite in the samples that train. Fill the "
-                "gaps, or train on a part without them."
-            )
-    return arrays
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,12 @@ import xarray as xr
 from seakeep.arrays import Progress
 from seakeep.campaign import read_campaign, write_prepared
 from seakeep.errors import needing
-from seakeep.executor import on_this_machine, submitting
+from seakeep.executor import on_this_machine, submitting, versions
 from seakeep.files import MARK, check_output, check_report, is_there, write_text
 from seakeep.study.plan import named
 from seakeep.study.run import run_study
 from seakeep.study.settings import Preset, read_study
-from seakeep.study.store import StudyResult, read_result, storing, versions
+from seakeep.study.store import StudyResult, read_result, storing
 from seakeep.toml import rendered
 
 NOTE = (

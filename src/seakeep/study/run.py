@@ -24,7 +24,7 @@ from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import embed, metrics
 from seakeep.errors import DataError, SeakeepError, warn
-from seakeep.executor import WorkerLostError, as_finished
+from seakeep.executor import WorkerLostError, as_finished, versions
 from seakeep.formats.netcdf import opened_netcdf
 from seakeep.models.calibration import envelope_of, held_out, learn_margin
 from seakeep.models.engine import Windows, member_series, read_groups
@@ -55,7 +55,7 @@ from seakeep.study.plan import (
     warn_of_slow_study,
 )
 from seakeep.study.settings import Study
-from seakeep.study.store import RESULT, StudyResult, UnitFolder, read_result, versions, write_result
+from seakeep.study.store import RESULT, StudyResult, UnitFolder, read_result, write_result
 
 
 def run_study(

@@ -9,7 +9,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from filelock import FileLock, Timeout
 
 from seakeep.arrays import Datasets, FloatArray, Groups
 from seakeep.errors import RequestError, SeakeepError, warn
+from seakeep.executor import versions
 from seakeep.files import (
     check_report,
     head_of,
@@ -39,11 +39,6 @@ STUDY, UNIT = "study", "unit of a study"
 
 class StorageError(SeakeepError):
     """Results could not be written: finished work is kept, and the same command continues."""
-
-
-def versions() -> dict[str, str]:
-    """Versions of what computes the results, by package."""
-    return {name: metadata.version(name) for name in ("seakeep", "numpy", "scipy", "xarray")}
 
 
 @contextmanager
