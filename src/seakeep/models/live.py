@@ -106,6 +106,17 @@ class _Update(NamedTuple):
     deviations: FloatArray
 
 
+class _Closed(NamedTuple):
+    """Inputs of the record with short gaps closed.
+
+    Which waves are lost then, shape (time, wave), and for how many of the last samples all are.
+    """
+
+    record: FloatArray
+    lost: BoolArray
+    dark: int
+
+
 @dataclass
 class _Counts:
     """Counts of samples, by which a service goes on.
@@ -334,11 +345,11 @@ class Live:
         beyond gaps of a quarter of their period, which are closed. While nothing at all is measured
         they are not: the band holds what they do.
         """
-        return self._validity(self.conditions)
+        return self._validity(self.conditions, self._closed())
 
-    def _validity(self, conditions: Conditions | None) -> Validity:
+    def _validity(self, conditions: Conditions | None, closed: _Closed) -> Validity:
         outside = Validity(0) if conditions is None else conditions.validity
-        _, lost, dark = self._closed()
+        _, lost, dark = closed
         if dark <= self._count.unseen:  # the band holds what comes of it
             lost = lost[: len(lost) - dark]
         if lost[-self._begins - min(self._count.since, len(self.errors.rms)) :].any():
@@ -492,14 +503,14 @@ class Live:
         """Inputs that waves are predicted from: the last ones, always as many once there are."""
         return self._rows(name, max(self._count.taken - self._record, 0), self._count.taken)
 
-    def _closed(self) -> tuple[FloatArray, BoolArray, int]:
-        """The same with short gaps closed; which waves are lost then, and for how long all are."""
+    def _closed(self) -> _Closed:
+        """The record with short gaps closed."""
         record, lost = self._known_inputs().copy(), self._known_inputs("lost") > 0
         for column in self._waves:
             close_gaps(record[:, column], lost[:, column], self._gap)
         lost = lost[:, self._waves]
         dark = np.logical_and.accumulate(lost[::-1].all(axis=1) & bool(self._waves)).sum()
-        return record, lost, int(dark)
+        return _Closed(record, lost, int(dark))
 
     def _filtered(self, at: int, seen: BoolArray) -> None:
         """Covariance and gain of a sample."""
@@ -723,9 +734,10 @@ class Live:
                 f"there are {self._count.taken} samples of history and the model needs "
                 f"{self._begins}. Call step {self._begins - self._count.taken} more times first."
             )
-        futures, freedom, known, dark = self._futures(count, future)
+        closed = self._closed()
+        futures, freedom, known = self._futures(count, future, closed)
         # In the dark the errors of what was filled grow as those of what is to come.
-        leads, unseen = len(self.errors.rms), min(dark, self._count.unseen)
+        leads, unseen = len(self.errors.rms), min(closed.dark, self._count.unseen)
         dark = min(unseen, leads, self._count.taken - self._begins)
         taken = self._count.taken - dark
         history = self._rows("x", taken - signature.state_samples, taken)
@@ -767,13 +779,12 @@ class Live:
             variables[label.name][2]["lead_time"] = int(samples) * signature.dt
         words = "the mean minus and plus a quantile times std"
         time = self._time + signature.dt * np.arange(1, count + 1)
-        attrs: dict[str, Any] = {"start": self._time, "level": level}
-        attrs |= {"known_input": max(known, 0)}
+        attrs: dict[str, Any] = {"start": self._time, "level": level, "known_input": max(known, 0)}
         attrs |= {"diverged": len(values) - len(complete)}
         attrs |= {"predictable": self._predictable()}
         if conditions is not None:
             attrs |= conditions.attrs()
-        attrs |= {"validity": self._validity(conditions).words, "consistency": worst}
+        attrs |= {"validity": self._validity(conditions, closed).words, "consistency": worst}
         return xr.Dataset(
             variables,
             coords={
@@ -794,15 +805,14 @@ class Live:
         apart = float(np.ptp(self._places[placed]))
         return predictable_time(record, self.signature.dt, apart, self._depth)
 
-    def _futures(self, steps: int, future: Any) -> tuple[FloatArray, float, int, int]:
+    def _futures(self, steps: int, future: Any, closed: _Closed) -> tuple[FloatArray, float, int]:
         """Inputs of the record and after it, shape (1 + 2 departures, time, Q).
 
         First those that are expected, then departures from them and their opposites, of each wave
-        by an innovation where it is first not known; the degrees of freedom of these; how many
-        rows were given, below zero where the last ones of the record were lost; and how many of
-        these there are.
+        by an innovation where it is first not known; the degrees of freedom of these; and how many
+        rows were given, below zero where the last ones of the record were lost.
         """
-        names, waves, (record, gone, tail) = self.signature.inputs, self._waves, self._closed()
+        names, waves, (record, gone, tail) = self.signature.inputs, self._waves, closed
         dark, light = min(tail, len(self.errors.rms)), len(record) - tail
         # What filled a gap that is not closed does not join the waves after it.
         before = np.flatnonzero(gone[:light].all(axis=1)).max(initial=-1) + 1
@@ -822,7 +832,7 @@ class Live:
         inputs, begin = np.concatenate([record, given]), len(record)
         inputs[begin - dark : begin, waves] = np.nan
         if not np.isnan(inputs).any():
-            return inputs[None], math.inf, len(given), tail
+            return inputs[None], math.inf, len(given)
         filled, first, freedom = fill_future(
             inputs[:, waves],
             begin - dark,
@@ -830,7 +840,7 @@ class Live:
         )
         futures = np.repeat(inputs[None], len(filled), axis=0)
         futures[:, :, waves] = filled
-        return futures, freedom, first - begin, tail
+        return futures, freedom, first - begin
 
     def save(self, path: str | Path) -> Path:
         """Write all that the object needs to go on (NetCDF), to a temporary name first.

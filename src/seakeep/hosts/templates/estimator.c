@@ -458,10 +458,15 @@ static int measured(const {{ name }}_estimator *e, int row, int by, int q)
     return row;
 }
 
-/* Whether a gap between measured rows is closed. */
-static int is_closed(const {{ name }}_estimator *e, int before, int after)
+/* Whether an input was not measured, in a gap that is not closed. */
+static int is_lost(const {{ name }}_estimator *e, int row, int q)
 {
-    return before >= RECORD - e->filled && after < RECORD && after - before <= GAP + 1;
+    int first = RECORD - e->filled, before = row, after = row;
+    while (after - before <= GAP + 1 && before >= first && e->lost[before * Q + q])
+        before--;
+    while (after - before <= GAP + 1 && after < RECORD && e->lost[after * Q + q])
+        after++;
+    return before < first || after == RECORD || after - before > GAP + 1;
 }
 
 /* Whether no wave is known in a row. */
@@ -469,9 +474,17 @@ static int is_dark(const {{ name }}_estimator *e, int row)
 {
     int dark = RUNS > 1;
     for (int q = 0; q < Q; q++)
-        dark = dark && (!waves[q] || (e->lost[row * Q + q]
-                                      && !is_closed(e, measured(e, row, -1, q), measured(e, row, 1, q))));
+        dark = dark && (!waves[q] || is_lost(e, row, q));
     return dark;
+}
+
+/* Rows at the end of the record in which no wave is known. */
+static int dark_rows(const {{ name }}_estimator *e)
+{
+    int rows = 0;
+    while (rows < e->filled && is_dark(e, RECORD - 1 - rows))
+        rows++;
+    return rows;
 }
 
 /* Copy the record into `planned` and close its short gaps, by a cubic through two measured rows on
@@ -481,17 +494,16 @@ static void close_gaps({{ name }}_estimator *e)
     memcpy(e->planned, e->inputs, RECORD * Q * sizeof(double));
     for (int row = RECORD - e->filled; row < RECORD; row++)
         for (int q = 0; q < Q; q++) {
-            int first = RECORD - e->filled, near[4], count = 0;
-            int before = measured(e, row, -1, q), after = measured(e, row, 1, q);
+            int near[4], count = 2;
             double value = 0.0;
-            if (!waves[q] || !e->lost[row * Q + q] || !is_closed(e, before, after))
+            if (!waves[q] || !e->lost[row * Q + q] || is_lost(e, row, q))
                 continue;
-            near[count++] = before;
-            near[count++] = after;
-            if ((before = measured(e, before - 1, -1, q)) >= first)
-                near[count++] = before;
-            if ((after = measured(e, after + 1, 1, q)) < RECORD)
-                near[count++] = after;
+            near[0] = measured(e, row, -1, q);
+            near[1] = measured(e, row, 1, q);
+            if ((near[count] = measured(e, near[0] - 1, -1, q)) >= RECORD - e->filled)
+                count++;
+            if ((near[count] = measured(e, near[1] + 1, 1, q)) < RECORD)
+                count++;
             for (int i = 0; i < count; i++) {
                 double part = e->inputs[near[i] * Q + q];
                 for (int k = 0; k < count; k++)
@@ -507,14 +519,11 @@ static void close_gaps({{ name }}_estimator *e)
 int {{ name }}_validity({{ name }}_estimator *e)
 {
     int size = e->filled, outside = 0;
-    int back = BEGINS + (e->since < LEADS ? e->since : LEADS), tail = 0;
-    while (tail < size && is_dark(e, RECORD - 1 - tail))
-        tail++;
+    int back = BEGINS + (e->since < LEADS ? e->since : LEADS), tail = dark_rows(e);
     tail = tail <= e->unseen ? tail : 0; /* the band holds what comes of it */
     for (int row = RECORD - (size < back ? size : back); row < RECORD - tail; row++)
         for (int q = 0; q < Q; q++)
-            if (waves[q] && e->lost[row * Q + q]
-                && !is_closed(e, measured(e, row, -1, q), measured(e, row, 1, q)))
+            if (waves[q] && is_lost(e, row, q))
                 outside |= {{ upper }}_LOST;
     for (int q = 0; size >= 4 && q < Q; q++) {
         double mean = 0.0, square = 0.0, fourth = 0.0, sum = 0.0, grown = 0.0;
@@ -749,12 +758,10 @@ static int run_on({{ name }}_estimator *e, int n, const double *future, int know
 int {{ name }}_forecast({{ name }}_estimator *e, int n, const double *future, double *x, double *std)
 {
     int most = n - 1 + {{ lead_samples }}, known = given_rows(future, most), filled = e->filled, status;
-    int tail = 0, after, dark, back, unseen;
+    int tail = dark_rows(e), after, dark, back, unseen;
     if (e->taken < BEGINS)
         return 1;
     close_gaps(e);
-    while (tail < filled && is_dark(e, RECORD - 1 - tail))
-        tail++;
     for (after = 0; after < filled - tail && !is_dark(e, RECORD - 1 - tail - after);)
         after++;
     dark = tail < LEADS ? tail : LEADS;
