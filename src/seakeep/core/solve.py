@@ -195,11 +195,6 @@ class _Delayed:
         """Regressors."""
         return self.groups[-1].stop
 
-    @cached_property
-    def trace(self) -> float:
-        """Trace of the Gram matrix."""
-        return gram_trace(self.pieces, self.delays)
-
     @property
     def columns(self) -> int:
         """Snapshot pairs."""
@@ -218,12 +213,9 @@ class _Delayed:
 
     def choose(self, ridge: float) -> Method:
         """The form, or singular values where λ is too small for a Gram matrix."""
-        if ridge >= GRAM_LIMIT * self.trace:
-            return self.form()
         is_narrow = not self.all_rows and self.rows <= self.columns
-        if is_narrow and ridge >= NARROW_LIMIT * self.trace:
-            return "primal"
-        return "svd"
+        least = NARROW_LIMIT if is_narrow else GRAM_LIMIT
+        return self.form() if ridge >= least * gram_trace(self.pieces, self.delays) else "svd"
 
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Hankel matrices of regressors and targets, built."""
