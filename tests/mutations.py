@@ -59,7 +59,6 @@ CHANGES = {
         ("samples * (1 if apart == 0 else 2)", "samples", "check/test_second_order.py::test_drift_of_a_square_is_its_own"),
     ],
     "check/parts.py": [
-        ('if run.attrs.get("waves") != "still"}', '}', "check/test_worth.py::test_a_decay_in_still_water_is_no_test_in_irregular_waves"),
         ("max(history - 1, _waves_come(run, names))", "history - 1", "check/test_free.py::test_a_forecast_starts_where_the_waves_have_come"),
         ("replace(input_map, reference=0))", "input_map)", "check/test_free.py::test_the_decay_of_an_oscillator_is_its_own"),
         ("model.at(parameter=varies.centre)", "model.at(parameter=varies.low)", "models/test_parametric.py::test_a_check_takes_the_middle_of_the_training"),
@@ -80,6 +79,7 @@ CHANGES = {
         ('1 / (1 + both[f"all_{other}"]) - 1', 'both[f"all_{other}"]', "check/test_worth.py::test_errors_are_those_of_the_tests_and_verdicts_follow_from_them"),
     ],
     "conventions.py": [
+        ('if run.attrs.get("waves") != "still"}', '}', "check/test_worth.py::test_a_decay_in_still_water_is_no_test_in_irregular_waves"),
         ("* density_ratio**mass", "", "signals/test_rigid_body.py::test_words_and_density"),
         ("length + 0.5 * time + 3.0 * mass", "length + 0.5 * time + 2.0 * mass", "signals/test_rigid_body.py::test_froude"),
     ],
@@ -176,9 +176,9 @@ CHANGES = {
         ("states[:number] = _forced(rows, propagator.state_input)", "states[:number] = 0.5 * _forced(rows, propagator.state_input)", "core/test_fast_paths.py::test_free_runs_are_the_loop_over_the_extended_state"),
     ],
     "core/solve.py": [
-        ("if is_narrow and ridge >=", "if is_narrow or ridge >=", "core/test_solve.py::test_the_newest_rows_alone_are_regressed_with_less"),
+        ("NARROW_LIMIT if is_narrow else GRAM_LIMIT", "GRAM_LIMIT", "core/test_solve.py::test_the_newest_rows_alone_are_regressed_with_less"),
         ("min(count, rank)", "min(count, rank + 1)", "core/test_fast_paths.py::test_a_rank_is_that_of_the_truncated_matrix"),
-        ("if ridge >= GRAM_LIMIT * self.trace:", "if True:", "core/test_solve.py::test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below"),
+        ("if ridge >= least * gram_trace(self.pieces, self.delays)", "if True", "core/test_solve.py::test_the_gram_matrix_is_used_from_the_limit_on_and_singular_values_below"),
         ("ridge * problem.columns if per_snapshot else ridge", "ridge", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
         ("solving[:, group.newest] *= 0.5", "solving[:, group.newest] *= 1.0", "core/test_fast_paths.py::test_every_form_gives_the_papers_formula"),
         ("weights = values / (values**2 + ridge)", "weights = values / (values**2 + ridge**2)", "core/test_solve.py::test_primal_dual_and_svd_agree_where_a_gram_matrix_is_chosen"),
@@ -326,8 +326,8 @@ CHANGES = {
         ("conditions.beyond**2)", "conditions.beyond)", "models/test_live.py::test_outside_the_training_the_band_widens_and_says_why"),
         ("whole[np.maximum.accumulate(at)][1:]", "whole[np.maximum.accumulate(at)][:-1]", "models/test_live.py::test_a_known_actuator_follows_its_plan_whatever_the_probe_does"),
         ("self._known_inputs(), self.signature, self._surge, waves=self._waves", "self._known_inputs(), self.signature, self._surge", "hosts/test_estimator.py::test_an_input_that_is_no_wave_is_not_judged"),
-        ("min(dark, self._count.unseen)", "0", "models/test_live.py::test_in_the_dark_the_waves_widen_the_band_though_a_sensor_was_dead"),
-        ("min(dark, self._count.unseen)", "dark", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
+        ("min(closed.dark, self._count.unseen)", "0", "models/test_live.py::test_in_the_dark_the_waves_widen_the_band_though_a_sensor_was_dead"),
+        ("min(closed.dark, self._count.unseen)", "closed.dark", "hosts/test_estimator.py::test_every_model_that_is_exported_is_followed"),
         ("if unseen > leads:", "if False:", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
         ("tail - len(self.errors.rms), self._first", "tail, self._first", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
         ("if dark <= self._count.unseen:", "if False:", "models/test_live.py::test_in_the_dark_a_forecast_is_that_of_the_last_sample"),
@@ -397,8 +397,8 @@ CHANGES = {
     ],
     "quality/probes.py": [
         ("float(np.sign(alike) * size)", "float(size)", "quality/test_probes.py::test_another_unit_sign_or_gain"),
-        ("value = 1 / gain if is_first else gain", "value = gain", "quality/test_probes.py::test_of_three_probes_the_one_that_moves_otherwise_is_named"),
-        ("2 * len(rivals) > len(gains)", "rivals", "quality/test_probes.py::test_another_unit_sign_or_gain"),
+        ("1 / gain if is_first else gain", "gain", "quality/test_probes.py::test_of_three_probes_the_one_that_moves_otherwise_is_named"),
+        ("2 * len(beyond) > len(gains)", "beyond", "quality/test_probes.py::test_another_unit_sign_or_gain"),
         ("(self.first * other.second)[strong]", "(self.second * other.first)[strong]", "quality/test_probes.py::test_another_unit_sign_or_gain"),
     ],
     "report/check_page.py": [

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from seakeep.arrays import positive
+from seakeep.arrays import Datasets, Groups, positive
 from seakeep.errors import RequestError, did_you_mean
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ __all__ = [
     "canonical_channel",
     "conversion",
     "displayed",
+    "in_waves",
     "is_elevation",
     "si_unit",
 ]
@@ -111,6 +112,11 @@ def canonical_channel(name: str) -> Channel | None:
         label = f"{place} {words}"
     symbol = accent.format(letter) + (rf"_\mathrm{{{place}}}" if place else "")
     return Channel(name, unit + per, f"{label} {suffix}".strip(), symbol)
+
+
+def in_waves(runs: Datasets) -> Groups:
+    """Runs that do not state still water."""
+    return {name: run for name, run in runs.items() if run.attrs.get("waves") != "still"}
 
 
 def is_elevation(name: str, rates: bool = False) -> bool:

@@ -74,10 +74,11 @@ def write_prepared(
     if len(set(steps.values())) > 1:  # that of fresh runs was another, which only all runs show
         for name, run in campaign.each_prepared(wanted, progress, failed):
             write_sealed(run, files[name], PREPARED)
-    every = _files(campaign, out_dir, None) | files
-    runs = dict(_fresh(campaign, every))
-    for name in judge_probes(runs):
-        write_sealed(runs[name], every[name], PREPARED)
+    if missing:  # a run that is new may be odd beside the others, or make one of them odd
+        every = _files(campaign, out_dir, None) | files
+        runs = dict(_fresh(campaign, every))
+        for name in judge_probes(runs):
+            write_sealed(runs[name], every[name], PREPARED)
     if failed and failures is None:
         raise as_one(failed)
     return {name: file for name, file in files.items() if name not in failed}

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups
-from seakeep.conventions import MOTIONS, is_elevation
+from seakeep.conventions import MOTIONS, in_waves, is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
 from seakeep.models.labelled import Span, channel_matrix, check_step
@@ -68,11 +68,6 @@ Known = dict[tuple[str, str], FreeRun]
 def is_regular(run: xr.Dataset) -> bool:
     """Whether a run states that its waves are regular."""
     return bool(run.attrs.get("waves") == "regular")
-
-
-def in_waves(runs: Datasets) -> Groups:
-    """Runs that do not state still water, which `measured_decay` alone judges."""
-    return {name: run for name, run in runs.items() if run.attrs.get("waves") != "still"}
 
 
 def irregular(runs: Datasets, what: str) -> Groups:

@@ -9,7 +9,7 @@ import scipy
 import xarray as xr
 
 from seakeep.arrays import ComplexArray, Datasets, FloatArray
-from seakeep.conventions import is_elevation
+from seakeep.conventions import in_waves, is_elevation
 from seakeep.quality.findings import (
     Finding,
     Findings,
@@ -38,8 +38,6 @@ SURELY = 3.0
 """Standard errors by which gains must differ."""
 STRONG = 1e-3
 """Part of the strongest frequency's weight below which a frequency is noise."""
-LISTED = 3
-"""Other runs that a sentence names at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,30 +77,27 @@ def odd_probes(runs: Datasets) -> Findings:
     of three tenths from a model that drifts by 1 m, narrow seas, runs of 80 s) none was doubted; of
     90 with a gain of 1.3 or another sign in one run, that run was named in all.
     """
-    moving = {name: run for name, run in runs.items() if run.attrs.get("waves") != "still"}
+    moving = in_waves(runs)
     first, *others = _probes(moving) or [""]
-    odd: dict[str, dict[str, tuple[float, float, list[str]]]] = {name: {} for name in moving}
+    odd: dict[str, dict[str, FloatArray]] = {name: {} for name in moving}
     for probe in others:
         seen = _seen(moving, first, probe)
         for name, own in seen.items():
-            gains = {n: own.gain(each) for n, each in seen.items() if n != name}
-            rivals = [n for n, (g, most) in gains.items() if g < 0 or max(g, 1 / g) > most]
-            if 2 * len(rivals) > len(gains):
-                value, limit = np.median([gains[n] for n in rivals], axis=0)
-                odd[name][probe] = float(value), float(limit), rivals
+            gains = [own.gain(each) for other, each in seen.items() if other != name]
+            beyond = [(g, most) for g, most in gains if g < 0 or max(g, 1 / g) > most]
+            if 2 * len(beyond) > len(gains):
+                odd[name][probe] = np.median(beyond, axis=0)
     for name, found in odd.items():
         is_first = len(found) == len(others) > 1  # all of them move otherwise beside it
-        for probe, (gain, limit, rivals) in list(found.items())[: 1 if is_first else None]:
-            value = 1 / gain if is_first else gain
+        for probe, (gain, limit) in list(found.items())[: 1 if is_first else None]:
+            value = float(1 / gain if is_first else gain)
             channel, other = (first, probe) if is_first else (probe, first)
-            more = f" and {len(rivals) - LISTED} more" if len(rivals) > LISTED else ""
             yield Finding(
-                SensorsKind.PROBE, name, channel, value, limit,
+                SensorsKind.PROBE, name, channel, value, float(limit),
                 details={
                     "other": other,
                     "size": abs(value),
                     "turned": ", and turned over," if value < 0 else "",
-                    "rivals": ", ".join(rivals[:LISTED]) + more,
                 },
             )  # fmt: skip
 

@@ -48,7 +48,7 @@ class SensorsKind(Kind):
         "Check [rig.positions] of the campaign, the water depth and the probes' clocks.",
     )
     PROBE = (
-        "moves {size:.3g} times as much{turned} beside {other} as in {rivals}",
+        "moves {size:.3g} times as much{turned} beside {other} as in most other runs",
         "Check units, signs and calibrations of both in the files of {run}.",
     )
 
