@@ -276,9 +276,12 @@ def compute_task(data: tuple[Plan, Groups], units: Sequence[Unit]) -> list[Group
             if selected is None and spec is not None:
                 selected = spec.central(plan.dt).settled(*plan.taught(training.spans))
             out.append(compute(plan, facts, unit, selected))
-        except SeakeepError as error:
+        except Exception as error:
             place = f"training set '{training.name}', model '{unit.model}'"
-            raise DataError(f"{place}: {error}") from error
+            if isinstance(error, SeakeepError):
+                raise DataError(f"{place}: {error}") from error
+            error.add_note(place)  # a model of somebody's own
+            raise
     return out
 
 
