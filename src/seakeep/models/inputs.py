@@ -10,7 +10,7 @@ beside them. The elevation is carried to a vessel whose position is measured as 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -164,10 +164,6 @@ class InputMap:
         still = self.alignment is None or self.follows is not None
         return self.lead_samples * dt + (0.0 if still else self.alignment.look_ahead(run))  # type: ignore[union-attr]
 
-    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
-        """What a forecast's attributes report of the map."""
-        return {} if self.alignment is None else self.alignment.notes(run)
-
     def describe(self, dt: float) -> list[str]:
         """Lines of a model's summary."""
         lines = []
@@ -207,8 +203,6 @@ class Drive:
         The run, with its rig; that of training without one.
     spans : sequence of Span
         Samples whose regressors are wanted, where the model follows its surge.
-    zero : Regressors, optional
-        What the regressors depart from.
     """
 
     input_map: InputMap
@@ -218,16 +212,6 @@ class Drive:
     banks: tuple[Bank, ...] = ()
     run: xr.Dataset | None = None
     spans: Sequence[Span] = ()
-    zero: Regressors | None = None
-
-    def about(self, span: Span) -> Drive:
-        """Drive of some samples, departing from the means over the reference period before them.
-
-        The squared place of a vessel that is followed stays as it is.
-        """
-        rows = self.rows(span.known + 1 - self.input_map.reference, span.known + 1)
-        zero = Regressors(*(each.mean(axis=0) for each in rows))
-        return replace(self, spans=[span], zero=zero)
 
     def rows(self, first: int, stop: int) -> Regressors:
         """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
@@ -243,7 +227,7 @@ class Drive:
             values = self.values[low : end + ahead - input_map.lead]
             if input_map.observed is not None:
                 values = input_map.observed.with_delayed(values)
-            return Regressors(self._departing(values[begin - low : end - low], 0), direct)
+            return Regressors(values[begin - low : end - low], direct)
         place, here = input_map.follows.place, self.places(first, stop)
         table = self.table(first, stop)
         delayed = read_table(place, table, np.arange(stop - first), here)
@@ -257,8 +241,7 @@ class Drive:
         _, before, after = self.input_map._around
         begin = max(first - before, self.first)
         values = self.values[begin - self.first : stop + after - self.first]
-        rows = self.input_map.observed.direct(values)[first - begin : stop - begin]
-        return self._departing(rows, 1)
+        return self.input_map.observed.direct(values)[first - begin : stop - begin]
 
     @cached_property
     def whole(self) -> tuple[int, FloatArray]:
@@ -279,10 +262,7 @@ class Drive:
         if input_map.observed is not None:
             flat = input_map.observed.with_delayed(out.reshape(-1, out.shape[2]))
             out = flat.reshape(stop - first, count, -1)
-        return self._departing(out, 0)
-
-    def _departing(self, values: FloatArray, group: int) -> FloatArray:
-        return values if self.zero is None else values - self.zero[group][: values.shape[-1]]
+        return out
 
     def waves(self, places: tuple[float, ...], first: int, stop: int) -> FloatArray:
         """Wave at places about the vessel at rest an instant after samples.

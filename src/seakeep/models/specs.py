@@ -900,5 +900,5 @@ def _step_of(dt: float | None, runs: Runs | None) -> float:
     runs = as_runs(runs)
     step = labelled.common_step(runs)
     if dt is not None:
-        labelled.check_step(*next((run, name) for name, run in runs.items()), dt)
+        labelled.run_step(*next((run, name) for name, run in runs.items()), dt)
     return step

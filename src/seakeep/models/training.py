@@ -457,12 +457,15 @@ def until(runs: Datasets, stop: Stop) -> Groups:
     DataError
         If the times of a run are not uniform.
     """
-    stops, out = _stop_instants(stop, list(runs)), {}
+    stops, out = _stops_by_run(stop, list(runs)), {}
     for name, run in runs.items():
-        labelled.run_step(run, name)
+        step = labelled.run_step(run, name)
         out[name] = run
         if (at := stops[name]) is not None:
-            last = _last_sample(np.asarray(run["time"].values, dtype=float), at, name)
+            time = np.asarray(run["time"].values, dtype=float)
+            last = labelled.nearest_sample(time, at, name, "stop")
+            # "up to and including": a sample later than the stop by more than rounding is not.
+            last -= last > 0 and time[last] > float(at) + 1e-3 * step
             out[name] = run.isel(time=slice(0, last + 1))
     return out
 
@@ -496,7 +499,7 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
         )
 
 
-def _stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
+def _stops_by_run(stop: Stop, names: list[str]) -> dict[str, Any]:
     """Last instant of each run's window as the user gave it; None for the run's end."""
     if stop is None:
         return dict.fromkeys(names)
@@ -507,28 +510,16 @@ def _stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
                 f"stop names the run '{unknown[0]}', which is not among the runs "
                 f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
             )
-        return {name: _one_stop(stop.get(name), f"stop of '{name}'") for name in names}
+        return {name: stop.get(name) for name in names}
     if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
-        values = [_one_stop(value, "each stop") for value in cast("list[Any]", stop)]
+        values = list(cast("list[Any]", stop))
         if len(values) != len(names):
             raise RequestError(
                 f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
                 "one per run."
             )
         return dict(zip(names, values, strict=True))
-    return dict.fromkeys(names, labelled.as_instant(stop, "stop"))
-
-
-def _one_stop(value: object, what: str) -> float | None:
-    return None if value is None else labelled.as_instant(value, what)
-
-
-def _last_sample(time: FloatArray, stop: float, name: str) -> int:
-    """Last sample up to and including `stop`."""
-    nearest = labelled.nearest_sample(time, stop, name, "stop")
-    step = (time[-1] - time[0]) / (time.size - 1)
-    # "up to and including": a sample later than the stop by more than rounding is not included.
-    return nearest if time[nearest] <= stop + 1e-3 * step else max(nearest - 1, 0)
+    return dict.fromkeys(names, stop)
 
 
 def _warn_of_dead(pieces: Sequence[Piece], group: int, scale: Scale, names: Sequence[str]) -> None:

@@ -288,7 +288,7 @@ def outside_training(
         return []
     name = labelled.run_name(run, "the run")
     time = np.asarray(run["time"].values, dtype=float)
-    at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
+    at = labelled.nearest_sample(time, start, name)
     first = max(at - model.signature.input_delays, 0)
     values = labelled.channel_matrix(run, model.inputs, name, slice(first, at + steps))
     if len(values) < 2 or not np.all(np.isfinite(values)):
