@@ -1,6 +1,6 @@
 """Free runs of many members over many windows: the one engine of models, ensembles and studies.
 
-:func:`read_windows` reads what forecasts from several starts in several runs need, the inputs of
+:func:`read_groups` reads what forecasts from several starts in several runs need, the inputs of
 each run once. A model's ``free_runs(windows, members)`` gives arrays; :func:`member_series` hands
 members to an executor and collects them, in a file where they are many.
 """
@@ -189,24 +189,16 @@ Place = tuple[str, float]
 """Name of a run, and the instant of the last measured state, s."""
 
 
-def read_windows(
-    signature: Signature,
-    runs: Datasets,
-    places: Sequence[Place],
-    steps: int | None,
-    ahead: str = "refuse",
-) -> Windows:
-    """Read what forecasts from several starts need; arguments and errors as ``forecast``."""
-    return read_groups(signature, runs, [(places, steps)], ahead)[0]
-
-
 def read_groups(
     signature: Signature,
     runs: Datasets,
     groups: Sequence[tuple[Sequence[Place], int | None]],
     ahead: str = "refuse",
 ) -> list[Windows]:
-    """Windows of several lengths; each probe is carried once per run for all of them."""
+    """Read what forecasts from several starts need, each group of starts with its steps.
+
+    Each probe is carried once per run for all of them; arguments and errors as ``forecast``.
+    """
     check_choice("ahead", ahead, ("refuse", "predict"))
     predicts = ahead == "predict" and bool(signature.inputs)
     labels, opened = signature.state_labels + signature.input_labels, dict[str, _Opened]()

@@ -118,7 +118,7 @@ class Model:
         ahead: str = "refuse",
     ) -> Windows:
         """What forecasts from several starts, in several runs, read: (run, start in s) each."""
-        return engine.read_windows(self.signature, runs, places, steps, ahead)
+        return engine.read_groups(self.signature, runs, [(places, steps)], ahead)[0]
 
     def free_runs(
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
@@ -253,17 +253,12 @@ class Model:
         DataError
             If the step or the units are not the model's, or needed samples are missing.
         """
-        windows = self.read_windows(*one_run(run, [start]), steps, ahead)
+        windows, signature = self.read_windows(*one_run(run, [start]), steps, ahead), self.signature
         values = self.free_runs([windows])[0][0]
-        signature = self.signature
         _warn_of_reach(signature, windows, values[0])
         variables = label_channels(signature, values[0], ("time",))
-        facts = {
-            **outcome(windows, 0, int(first_lost(values)[0])),
-            **outside(self, run, windows, values[0]),
-        }
-        attrs = {**forecast_notes(signature, windows), "start": windows.places[0][1], **facts}
-        attrs["status"] = status_text(facts, signature.dt)
+        lost = outcome(windows, 0, int(first_lost(values)[0]))
+        attrs = forecast_attrs(self, run, windows, values[0], **lost)
         # The instants stand among the variables: given as coords, xarray would merge twice.
         return xr.Dataset({"time": windows.time[0], **variables}, attrs=attrs)
 
@@ -305,11 +300,7 @@ class Model:
             values = np.array(series[0])
         signature = self.signature
         variables = label_channels(signature, values, ("window", "lead"))
-        status = [
-            status_text(outcome(windows, window, int(at)), signature.dt)
-            for window, at in enumerate(lost[0])
-        ]
-        variables["status"] = xr.Variable(("window",), status)
+        variables["status"] = xr.Variable(("window",), statuses(lost, windows, signature.dt)[0])
         return xr.Dataset(
             variables,
             coords=window_coords(windows, signature.dt),
@@ -369,11 +360,17 @@ class Spec(Protocol):
         """Rebuild the model that a file holds."""
 
 
-def outside(model: Any, run: xr.Dataset, windows: Windows, values: FloatArray) -> dict[str, str]:
-    """Attribute that says in what a forecast, shape (…, steps, N), lies outside the training."""
-    surge = values[..., model.states.index("surge")] if "surge" in model.states else None
-    reasons = outside_training(model, run, windows.places[0][1], windows.steps, surge)
-    return {"outside_training": "; ".join(reasons)} if reasons else {}
+def forecast_attrs(
+    model: Model, run: xr.Dataset, windows: Windows, values: FloatArray, **facts: Any
+) -> dict[str, Any]:
+    """Attributes of a forecast from one start, shape (…, steps, N), and facts of its runs."""
+    signature, (_, start) = model.signature, windows.places[0]
+    names = signature.states
+    surge = values[..., names.index("surge")] if "surge" in names else None
+    if reasons := outside_training(model, run, start, windows.steps, surge):
+        facts["outside_training"] = "; ".join(reasons)
+    attrs = {**forecast_notes(signature, windows), "start": start, **facts}
+    return {**attrs, "status": status_text(attrs, signature.dt)}
 
 
 def _warn_of_reach(signature: Signature, windows: Windows, values: FloatArray) -> None:
@@ -395,7 +392,7 @@ def _warn_of_reach(signature: Signature, windows: Windows, values: FloatArray) -
 
 
 def one_run(run: xr.Dataset, starts: Sequence[float]) -> tuple[Groups, list[tuple[str, float]]]:
-    """A run and the places in it, as :func:`engine.read_windows` takes them."""
+    """A run and the places in it, as :meth:`Model.read_windows` takes them."""
     if np.ndim(starts) == 0:
         raise RequestError(
             f"starts must be a list of instants; received {starts!r}. Write [{starts}]."
@@ -464,7 +461,7 @@ def status_text(facts: Mapping[str, Any], dt: float) -> str:
     Parameters
     ----------
     facts : mapping
-        What :func:`outcome` and :func:`outside` found, and of an ensemble how many of its
+        What :func:`outcome` found, and ``outside_training``; of an ensemble, how many of its
         ``members`` ``diverged``.
     dt : float
         Time step, s.
@@ -480,9 +477,12 @@ def status_text(facts: Mapping[str, Any], dt: float) -> str:
     return said + ", outside training" * ("outside_training" in facts)
 
 
-def statuses(lost: IntArray, windows: Windows, window: int, dt: float) -> npt.NDArray[np.str_]:
-    """Status of each member in a window from its first lost instant, or −1."""
-    texts = [status_text(outcome(windows, window, int(at)), dt) for at in lost]
+def statuses(lost: IntArray, windows: Windows, dt: float) -> npt.NDArray[np.str_]:
+    """Status from the first lost instants, or −1, shape (member, window)."""
+    texts = [
+        [status_text(outcome(windows, window, int(at)), dt) for window, at in enumerate(row)]
+        for row in lost
+    ]
     return np.array(texts, dtype=str)
 
 

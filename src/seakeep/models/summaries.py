@@ -34,20 +34,17 @@ def statistics_of(values: FloatArray, level: float) -> FloatArray:
         members.
     """
     out = np.full((4, *values.shape[1:]), np.nan)
-    if len(values):
-        out[0] = values.mean(axis=0)
-        out[1] = values.std(axis=0, ddof=1) if len(values) > 1 else 0.0
-        out[2:] = _quantiles(values, (0.5 - level / 2, 0.5 + level / 2))
-    return out
-
-
-def _quantiles(values: FloatArray, probabilities: tuple[float, float]) -> FloatArray:
-    """Quantiles over the first axis, as :func:`numpy.quantile` gives them to the last bit."""
+    if not len(values):
+        return out
+    out[0] = values.mean(axis=0)
+    out[1] = values.std(axis=0, ddof=1) if len(values) > 1 else 0.0
+    probabilities = 0.5 - level / 2, 0.5 + level / 2
     if len(values) > SORTED:
-        return np.asarray(np.quantile(values, probabilities, axis=0))
+        out[2:] = np.quantile(values, probabilities, axis=0)
+        return out
+    # As numpy.quantile gives them to the last bit.
     ordered = np.sort(values, axis=0)
-    out = np.empty((2, *values.shape[1:]))
-    for row, probability in zip(out, probabilities, strict=True):
+    for row, probability in zip(out[2:], probabilities, strict=True):
         place = probability * (len(ordered) - 1)
         below = int(place)
         low, high, part = ordered[below], ordered[min(below + 1, len(ordered) - 1)], place - below
