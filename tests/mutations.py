@@ -69,7 +69,7 @@ CHANGES = {
         ("rows = starts[:, None] + np.arange(1, count + 1)", "rows = starts[:, None] + np.arange(count)", "check/test_residuals.py::test_bands_and_ages_add_up"),
     ],
     "check/response.py": [
-        ("* dynamics.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_that_of_python_control"),
+        ("* own.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_that_of_python_control"),
         ("early = np.exp(2j * np.pi", "early = np.exp(-2j * np.pi", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ("np.hypot(radius, moved)[:, 0]", "radius[:, 0]", "check/test_response.py::test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectrum"),
         ("type_b = np.hypot(accuracy[1:], ratio * accuracy[0])", "type_b = np.hypot(accuracy[1:], 0 * ratio)", "check/test_response.py::test_accuracy_of_the_instruments_widens_the_interval"),
@@ -247,10 +247,10 @@ CHANGES = {
         ("points[number])", "points[0])", "models/test_ensemble.py::test_sobol_points_fill_the_prior_evenly"),
     ],
     "models/engine.py": [
-        ("on_inputs[k, :, : n * lags] = own", "on_inputs[k, :, -n * lags :] = own", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
-        ("histories[k] = each.state_scale", "histories[k] = members[0].state_scale", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
+        ("on_inputs[k, :, : n * lags] = on_delayed", "on_inputs[k, :, -n * lags :] = on_delayed", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
+        ("histories[k] = of.state_scale", "histories[k] = own[0].state_scale", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
         ("lost[part.start : part.start + len(members)] = first", "lost[: len(members)] = first", "models/test_ensemble.py::test_members_that_diverge_say_when"),
-        ("lost = ~(farthest <= _excess(scales, windows))", "lost = ~(farthest <= 1.0)", "hosts/test_c.py::test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python"),
+        ("lost = ~(farthest <= _excess(signature, windows))", "lost = ~(farthest <= 1.0)", "hosts/test_c.py::test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python"),
         ("available + 1 - lead if signature.inputs", "available - lead if signature.inputs", "models/test_forecast.py::test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it"),
         ("first = span.known + 1 - signature.state_samples", "first = span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
         ("run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1", "run.known - span.known + 1", "models/test_ahead.py::test_the_status_says_from_when_and_before_that_nothing_changes"),

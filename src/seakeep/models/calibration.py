@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, Protocol, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray, Progress, fraction, whole_number
+from seakeep.arrays import Datasets, FloatArray, Progress, check_choice, fraction, whole_number
 from seakeep.core.calibration import (
     ConformalMargin,
     band_scale,
@@ -24,11 +24,10 @@ from seakeep.core.calibration import (
 )
 from seakeep.errors import RequestError, warn
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice
 from seakeep.models.engine import Runs as FreeRuns
 from seakeep.models.engine import Windows, member_series, read_groups
-from seakeep.models.interface import Signature
-from seakeep.models.summaries import reduce_members
+from seakeep.models.forecasts import reduce_members
+from seakeep.models.inputs import Signature
 from seakeep.models.training import TrainingArrays
 
 Band = Literal["members", "calibrated"]

@@ -15,21 +15,27 @@ from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
+from operator import call
 from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress, whole_number
+from seakeep.arrays import (
+    BoolArray,
+    Datasets,
+    FloatArray,
+    IntArray,
+    Progress,
+    check_choice,
+    whole_number,
+)
 from seakeep.core.recursion import Recursion, read_table, recursion
 from seakeep.core.rollout import rollouts
 from seakeep.errors import RequestError
 from seakeep.executor import in_order
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice
-from seakeep.models.following import Following
-from seakeep.models.inputs import Drive
-from seakeep.models.interface import Scale, Signature
+from seakeep.models.inputs import Drive, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.readouts import FittedReadOut, read_out
 from seakeep.signals.prediction import Foreseen, fill_future, foresee
@@ -120,45 +126,23 @@ class Dynamics:
     ----------
     coefficients : ndarray, shape (N(s+1) or N, N(s+1) + n(z+1) + m)
         Regressed rows of [Â B̂], on standardised deviations.
-    state_delays, input_delays : int
-        s and z.
-    state_scale, input_scale, direct_scale : Scale
-        Moments of the states and of both kinds of regressors.
-    follows : Following or None
-        Carriers and place of the vessel where the model follows its own surge.
+    signature : Signature
+        Its own delays, moments and input map.
     """
 
     coefficients: FloatArray
-    state_delays: int
-    input_delays: int
-    state_scale: Scale
-    input_scale: Scale
-    direct_scale: Scale
-    follows: Following | None = None
-
-    @classmethod
-    def of(cls, coefficients: FloatArray, signature: Signature) -> Dynamics:
-        """Of coefficients, and what else a model knows."""
-        return cls(
-            coefficients,
-            signature.state_delays,
-            signature.input_delays,
-            signature.state_scale,
-            signature.input_scale,
-            signature.direct_scale,
-            signature.input_map.follows,
-        )
+    signature: Signature
 
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Regressed rows of Â and B̂."""
-        size = len(self.state_scale.mean) * (self.state_delays + 1)
+        size = len(self.signature.state_labels) * (self.signature.state_delays + 1)
         return self.coefficients[:, :size], self.coefficients[:, size:]
 
     @property
     def system(self) -> FloatArray:
         """Â, with the rows that shift the delayed states where these are exact."""
-        rows, count = self.matrices[0], len(self.state_scale.mean)
+        rows, count = self.matrices[0], len(self.signature.state_labels)
         size = rows.shape[1]
         return rows if len(rows) == size else np.concatenate([rows, np.eye(size - count, size)])
 
@@ -573,10 +557,11 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
     """Free runs step by step, where members follow their own surge; NaN from where one is lost."""
     assert windows.starts is not None
     assert windows.table is not None
-    follows = members[0].follows
+    own = [each.signature for each in members]
+    follows = own[0].input_map.follows
     assert follows is not None
     # Delays that a member does not have count nothing.
-    s, z = (max(getattr(each, f"{of}_delays") for each in members) for of in ("state", "input"))
+    s, z = max(each.state_delays for each in own), max(each.input_delays for each in own)
     N, n = windows.histories.shape[2], windows.table.shape[2]
     on_states = np.zeros((len(members), N, N * (s + 1)))
     on_inputs = np.zeros((len(members), N, n * (z + 1)))
@@ -584,17 +569,17 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
     histories = np.empty((len(members), *windows.histories.shape))
     forcing = np.empty((len(members), len(windows), windows.steps, N))
     for k, each in enumerate(members):
-        u, w, lags = each.input_scale, each.direct_scale, each.input_delays + 1
-        a, b = each.matrices
+        of, (a, b) = each.signature, each.matrices
+        u, w, lags = of.input_scale, of.direct_scale, of.input_delays + 1
         on_states[k, :, : a.shape[1]] = a
         # On regressors in physical units; their means are part of what is constant.
-        own, on_direct = b[:, : n * lags] / np.tile(u.std, lags), b[:, n * lags :] / w.std
-        on_inputs[k, :, : n * lags] = own
+        on_delayed, on_direct = b[:, : n * lags] / np.tile(u.std, lags), b[:, n * lags :] / w.std
+        on_inputs[k, :, : n * lags] = on_delayed
         on_square[k] = on_direct[:, -1]
         np.matmul(windows.direct, on_direct[:, :-1].T, out=forcing[k])
-        forcing[k] -= own @ np.tile(u.mean, lags) + on_direct @ w.mean
-        histories[k] = each.state_scale.deviations(windows.histories)
-    surges = [[each.state_scale.std, each.state_scale.mean] for each in members]
+        forcing[k] -= on_delayed @ np.tile(u.mean, lags) + on_direct @ w.mean
+        histories[k] = of.state_scale.deviations(windows.histories)
+    surges = [[of.state_scale.std, of.state_scale.mean] for of in own]
     gain, offset = np.array(surges)[..., follows.column].T
     models = Recursion(on_states, on_inputs, on_square, gain, offset, follows.column)
     known = windows.delayed.shape[1] - windows.steps
@@ -603,38 +588,37 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
         models, follows.place, histories, delayed, windows.table, windows.starts, forcing
     )
     with np.errstate(over="ignore", invalid="ignore"):  # a run that is lost is cut just below
-        for values, drove, each in zip(computed, used, members, strict=True):
+        for values, drove, of in zip(computed, used, own, strict=True):
             driving = np.concatenate([delayed, drove], axis=1)
-            each.state_scale.physical(values, out=values)
-            cut_lost(values, each, replace(windows, delayed=driving))
+            of.state_scale.physical(values, out=values)
+            cut_lost(values, of, replace(windows, delayed=driving))
     return computed
 
 
 def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
     """Free runs over all windows as products of matrices."""
-    batches = []
+    own, batches = member.signature, []
     for windows in groups:
         steps = windows.steps
-        driving = windows.delayed[:, windows.delayed.shape[1] - member.input_delays - steps :]
+        driving = windows.delayed[:, windows.delayed.shape[1] - own.input_delays - steps :]
         if not driving.shape[2]:
             driving = np.zeros((len(driving), steps, 0))
-        history = member.state_scale.deviations(windows.histories[:, -1 - member.state_delays :])
-        direct = member.direct_scale.deviations(windows.direct) if windows.direct.shape[2] else None
-        batches.append((history, member.input_scale.deviations(driving), direct))
-    a, b = member.matrices
-    computed = rollouts(a, b, batches, n_states=len(member.state_scale.mean))
+        history = own.state_scale.deviations(windows.histories[:, -1 - own.state_delays :])
+        direct = own.direct_scale.deviations(windows.direct) if windows.direct.shape[2] else None
+        batches.append((history, own.input_scale.deviations(driving), direct))
+    computed = rollouts(*member.matrices, batches, n_states=len(own.state_labels))
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
         for windows, values in zip(groups, computed, strict=True):
-            cut_lost(member.state_scale.physical(values, out=values), member, windows)
+            cut_lost(own.state_scale.physical(values, out=values), own, windows)
     return computed
 
 
-def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
+def _excess(signature: Signature, windows: Windows) -> FloatArray:
     """Largest deviation of the input over that in training, at least one, shape (window, steps).
 
     What lies before a step counts less, by ``fading`` of each step in between.
     """
-    z = scales.input_delays
+    z = signature.input_delays
     first = windows.delayed.shape[1] - z - windows.steps
     if first < 0:  # without inputs
         return np.ones((len(windows), windows.steps))
@@ -642,26 +626,26 @@ def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
         # The slow surge squared is no input.
         (np.abs(x - scale.centre[: x.shape[2]]) / scale.bound[: x.shape[2]]).max(axis=2, initial=1)
         for scale, x in (
-            (scales.input_scale, windows.delayed[:, first:]),
-            (scales.direct_scale, windows.direct),
+            (signature.input_scale, windows.delayed[:, first:]),
+            (signature.direct_scale, windows.direct),
         )
     )
     excess: FloatArray = np.maximum(delayed[:, z:], direct)
-    last, fade = delayed[:, :z].max(axis=1, initial=1.0), fading(scales)
+    last, fade = delayed[:, :z].max(axis=1, initial=1.0), fading(signature)
     for now in excess.T:
         last = now[:] = np.maximum(now, 1.0 + fade * (last - 1.0))
     return excess
 
 
-def fading(scales: Dynamics | Signature) -> float:
+def fading(signature: Signature) -> float:
     """Part that is left of an input's excess over the training after one step."""
-    longest = max(scales.state_delays, scales.input_delays) + 1
+    longest = max(signature.state_delays, signature.input_delays) + 1
     return 1.0 - 1.0 / (MEMORY * max(longest, LEAST))
 
 
-def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows) -> FloatArray:
+def cut_lost(values: FloatArray, signature: Signature, windows: Windows) -> FloatArray:
     """NaN from where free runs (window, steps, N) are lost, in physical units; they are changed."""
-    scale = scales.state_scale
+    scale = signature.state_scale
     start = np.abs(windows.histories - scale.centre).max(axis=1, initial=0.0)
     reach, farthest = GROWTH * np.maximum(scale.bound, start), np.zeros(values.shape[:2])
     with np.errstate(invalid="ignore", over="ignore"):
@@ -669,17 +653,12 @@ def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows)
             away = np.abs(values[..., column] - centre) / reach[:, [column]]
             np.maximum(farthest, away, out=farthest)
         if not (farthest <= 1.0).all():  # most runs end here
-            lost = ~(farthest <= _excess(scales, windows))
+            lost = ~(farthest <= _excess(signature, windows))
             values[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return values
 
 
 Series = tuple[FloatArray, IntArray]
-
-
-def _run_members(data: tuple[Runs, Sequence[Windows]], members: Sequence[int]) -> list[FloatArray]:
-    model, groups = data
-    return model.free_runs(groups, members)
 
 
 @contextmanager
@@ -738,7 +717,7 @@ def member_series(
             progress(number, count, f"member {number}")
 
         told = tell if progress else None
-        computed = in_order(_run_members, (model, groups), parts, executor, told)
+        computed = in_order(call, partial(model.free_runs, groups), parts, executor, told)
         for part, every in zip(parts, computed, strict=True):
             for (series, lost), values in zip(runs, every, strict=True):
                 members = values[: count - part.start]

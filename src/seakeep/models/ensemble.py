@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray, Progress, fraction
+from seakeep.arrays import FloatArray, IntArray, Json, Progress, check_choice, fraction
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.executor import in_order
@@ -28,7 +28,6 @@ from seakeep.models.calibration import (
     calibrated_for,
     widened,
 )
-from seakeep.models.checks import Json, check_choice
 from seakeep.models.draws import Draw, draws_dataset
 from seakeep.models.engine import Dynamics, Series, Windows, linear_runs, member_series
 from seakeep.models.forecasts import (
@@ -39,17 +38,18 @@ from seakeep.models.forecasts import (
     forecast_notes,
     label_channels,
     one_run,
+    reduce_members,
+    statistic_coordinate,
     statuses,
     window_coords,
     with_units,
 )
 from seakeep.models.growth import LeadErrors, Stretch, lead_errors, weigh_members
-from seakeep.models.interface import Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live
 from seakeep.models.settings import HankelSettings
-from seakeep.models.summaries import reduce_members, statistic_coordinate
 from seakeep.models.training import TrainingArrays, TrainingData
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
@@ -172,15 +172,16 @@ class HankelEnsemble(Model):
     @cached_property
     def training_spans(self) -> dict[str, tuple[float, float]]:
         """First and last instant of the training windows in each run that trains a member, s."""
-        spans: dict[str, tuple[float, float]] = {}
-        for run, name in enumerate(self.arrays.names):
-            ends = [
-                self.arrays.span(run, draw.settings, draw.last, self.dt)
-                for draw in self._taught
-                if draw.run in (None, run)
-            ]
+        spans, arrays = dict[str, tuple[float, float]](), self.arrays
+        for run, (name, begin) in enumerate(zip(arrays.names, arrays.begins, strict=True)):
+            firsts, ends = [], []
+            for draw in self._taught:
+                if draw.run in (None, run):
+                    whole, window = len(arrays.states[run]), draw.settings.window
+                    ends.append(whole - 1 if draw.last is None else draw.last - arrays.offsets[run])
+                    firsts.append(0 if window is None else ends[-1] - window + 1)
             if ends:
-                spans[name] = min(first for first, _ in ends), max(stop for _, stop in ends)
+                spans[name] = begin + min(firsts) * self.dt, begin + max(ends) * self.dt
         return spans
 
     @cached_property
@@ -214,7 +215,7 @@ class HankelEnsemble(Model):
         if self.identified:
             return self.identified[number]
         _, data, solution = self._identified(number)
-        return Dynamics.of(solution.coefficients, data.signature)
+        return Dynamics(solution.coefficients, data.signature)
 
     def member(self, number: int) -> HankelDMDcModel:
         """One member as a model of its own.
@@ -477,7 +478,7 @@ class HankelEnsemble(Model):
     ) -> xr.Dataset:
         """Dataset of one window: values of shape (members or statistics, steps, N)."""
         variables = label_channels(self.signature, values, (dimension, "time"))
-        variables["status"] = ("member", statuses(lost, windows, self.dt)[:, 0])
+        variables["status"] = ("member", statuses(lost, windows, self.signature.dt)[:, 0])
         time, gone = windows.time[0], lost[:, 0]
         words = {"units": "s", "long_name": "first instant at which the member is lost"}
         middle = values if dimension == "member" else values[:1]

@@ -1,4 +1,4 @@
-"""Input maps: how measured inputs become what drives a model.
+"""Input maps: how measured inputs become what drives a model, and the signature of a model.
 
 A map is fitted with a model and opened once per run: its :class:`Drive` then serves all members,
 windows and steps. It aligns the elevations to the vessel, reads them ahead, and puts observables
@@ -10,20 +10,21 @@ beside them. The elevation is carried to a vessel whose position is measured as 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.core.recursion import read_table
+from seakeep.core.recursion import carried, read_table
+from seakeep.errors import RequestError
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.following import SQUARED, Bank, Following
 from seakeep.models.labelled import ChannelLabel, Span
 from seakeep.models.observables import Observed
-from seakeep.signals.carriers import carried
+from seakeep.models.readouts import FittedReadOut
 
 
 class Regressors(NamedTuple):
@@ -283,3 +284,128 @@ class Drive:
         if self.surge is None:
             return np.full(stop - first, place.centre)
         return place.of(self.surge[first - self.first - place.taps.size + 1 : stop - self.first])
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """Moments of channels over the training windows.
+
+    Parameters
+    ----------
+    mean, std : ndarray, shape (channel,)
+        What is subtracted, and what is divided by (0 and 1 without standardisation).
+    spread : ndarray, shape (channel,)
+        Standard deviation over the training windows, with standardisation or without.
+    centre, reach : ndarray, shape (channel,)
+        Mean over the training windows, and the largest deviation from it.
+    """
+
+    mean: FloatArray
+    std: FloatArray
+    spread: FloatArray
+    centre: FloatArray
+    reach: FloatArray
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            getattr(self, each.name).flags.writeable = False
+
+    @property
+    def bound(self) -> FloatArray:
+        """Largest deviation in training, infinite for a channel that was constant there."""
+        return np.where(self.reach > 0, self.reach, np.inf)
+
+    def part(self, channels: Any) -> Scale:
+        """Moments of some channels: an index of arrays."""
+        return Scale(*(getattr(self, each.name)[channels] for each in fields(self)))
+
+    def deviations(self, values: FloatArray) -> FloatArray:
+        """Standardised deviations of physical values, shape (…, channel)."""
+        return (values - self.mean) / self.std
+
+    def physical(self, deviations: FloatArray, out: FloatArray | None = None) -> FloatArray:
+        """Physical values of standardised deviations, shape (…, channel); `out` may be these."""
+        values = np.multiply(deviations, self.std, out=out)
+        values += self.mean
+        return values
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """What a forecast needs to know about a model or an ensemble.
+
+    Parameters
+    ----------
+    dt : float
+        Time step, s.
+    state_labels, input_labels : tuple of ChannelLabel
+        Names, units and long names of the states and of the measured inputs.
+    state_delays, input_delays : int
+        s and z; for an ensemble the longest of a member.
+    input_map : InputMap
+        How measured inputs become regressors, as fitted.
+    state_scale, input_scale, direct_scale : Scale
+        Moments of the states, of the delayed and of the direct regressors over the training
+        windows; for an ensemble over all that its members learn from.
+    readouts : tuple of FittedReadOut
+        Channels that are read off the free runs.
+    parameter : str
+        Attribute of runs that the model varies with, if it does.
+    """
+
+    dt: float
+    state_labels: tuple[ChannelLabel, ...]
+    input_labels: tuple[ChannelLabel, ...]
+    state_delays: int
+    input_delays: int
+    input_map: InputMap = field(repr=False)
+    state_scale: Scale = field(repr=False)
+    input_scale: Scale = field(repr=False)
+    direct_scale: Scale = field(repr=False)
+    readouts: tuple[FittedReadOut, ...] = field(default=(), repr=False)
+    parameter: str = ""
+
+    @property
+    def states(self) -> list[str]:
+        """Names of the states, in the order of the model."""
+        return [label.name for label in self.state_labels]
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the measured inputs, in the order of the model."""
+        return [label.name for label in self.input_labels]
+
+    @property
+    def regressors(self) -> list[str]:
+        """Names of what the inputs become: the delayed regressors, then the direct ones."""
+        return [
+            label.name for group in self.input_map.regressors(self.input_labels) for label in group
+        ]
+
+    @property
+    def history_samples(self) -> int:
+        """Samples a forecast needs up to its start, that one included."""
+        return max(self.state_delays, self.input_map.history(self.input_delays)) + 1
+
+    @property
+    def state_samples(self) -> int:
+        """Samples of the states among these: where the vessel was counts for delayed waves too."""
+        follows, reference = self.input_map.follows, self.input_map.reference
+        where = 0
+        if follows is not None:
+            where = max(self.input_delays, reference) + follows.place.taps.size
+        return max(self.state_delays + 1, reference, where)
+
+    @property
+    def lead_samples(self) -> int:
+        """Samples of input after the one a step starts from that drive the step."""
+        return self.input_map.lead_samples
+
+    def check_fixed(self) -> None:
+        """Refuse a model whose means are those before each start."""
+        if self.input_map.reference:
+            raise RequestError(
+                "the model forecasts departures from the means before each start (centre = 'run'), "
+                "which forecast, compare and forecast_arrays take from what they are given. For "
+                "anything else, fit it with centre = 'pooled'."
+            )

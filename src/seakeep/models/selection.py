@@ -41,7 +41,7 @@ from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.following import LEAD
-from seakeep.models.interface import Scale, Signature
+from seakeep.models.inputs import Scale, Signature
 from seakeep.models.loads import PERIODS, Held, fit_readouts
 from seakeep.models.observables import Powers, SlowSquares, named
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
@@ -285,9 +285,15 @@ class Problem:
             path = np.pad(path, ((0, 0), (0, 0), (count, 0)))
         parts = zip(scales, (slice(None), delayed, direct), strict=True)
         x, u, w = (scale.part(part) for scale, part in parts)
-        reach = candidate.state_reach, candidate.input_delays
-        follows = data.signature.input_map.follows
-        return [Dynamics(each, *reach, x, u, w, follows) for each in path]
+        signature = replace(
+            data.signature,
+            state_delays=candidate.state_reach,
+            input_delays=candidate.input_delays,
+            state_scale=x,
+            input_scale=u,
+            direct_scale=w,
+        )
+        return [Dynamics(each, signature) for each in path]
 
     def _system(
         self, candidate: HankelSettings, runs: Sequence[int]
@@ -407,7 +413,7 @@ class Problem:
                 measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
                 if zeros:
                     measured += np.stack([zeros[at] for at in starts])[:, None]
-                every[steps] = FreeRuns(predicted, measured, models[0].state_scale.std)
+                every[steps] = FreeRuns(predicted, measured, models[0].signature.state_scale.std)
         yield from (every[steps] for steps in horizons if steps in every)
 
     def judge(self, candidate: HankelSettings, fold: int, levels: Sequence[float]) -> Scores:

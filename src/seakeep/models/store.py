@@ -13,10 +13,9 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import FloatArray, plain
 from seakeep.errors import MissingFileError, RequestError
 from seakeep.files import load_sealed
-from seakeep.models.checks import plain
 from seakeep.models.observables import from_json
 from seakeep.models.terms import Observable
 

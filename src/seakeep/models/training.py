@@ -22,8 +22,7 @@ from seakeep.core.embedding import (
 from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import labelled
-from seakeep.models.inputs import InputMap, Regressors
-from seakeep.models.interface import Scale, Signature
+from seakeep.models.inputs import InputMap, Regressors, Scale, Signature
 from seakeep.models.labelled import ChannelLabel, Span, Stop
 from seakeep.models.settings import HankelSettings
 
@@ -151,6 +150,8 @@ def with_means(
     settings: HankelSettings, states: Sequence[FloatArray], direct: Sequence[FloatArray]
 ) -> list[FloatArray]:
     """Direct regressors of each run, and the means over blocks of its delayed states."""
+    if not settings.blocks:
+        return [*direct]
     return [
         np.concatenate([own, block_means(x, settings.blocks)], axis=1)
         for own, x in zip(direct, states, strict=True)
@@ -274,8 +275,12 @@ def _standardised(
     zeros: tuple[FloatArray, ...] = ()
     if settings.centre:
         series, zeros = departures(series, windows, input_map)
+    # A look-ahead leaves the last row, which is no column, without regressors.
     groups = [
-        [_lengthened(values, len(own[0])) for values, own in zip(group, series, strict=True)]
+        [
+            values if len(values) == len(own[0]) else np.concatenate([values, values[-1:]])
+            for values, own in zip(group, series, strict=True)
+        ]
         for group in zip(*series, strict=True)
     ]
     channels = [
@@ -373,19 +378,6 @@ class TrainingArrays:
         ]
         return type(self)(*zip(*read, strict=True))
 
-    def span(
-        self, run: int, settings: HankelSettings, last: int | None, dt: float
-    ) -> tuple[float, float]:
-        """First and last instant of a training window that ends at a sample of the run, s."""
-        end = self._end(run, last)
-        stop = self.begins[run] + end * dt
-        samples = end + 1 if settings.window is None else settings.window
-        return stop - (samples - 1) * dt, stop
-
-    def _end(self, run: int, last: int | None) -> int:
-        """Last sample of a window in the arrays of a run."""
-        return len(self.states[run]) - 1 if last is None else last - self.offsets[run]
-
     def data(
         self, settings: HankelSettings, run: int | None, last: int | None, signature: Signature
     ) -> TrainingData:
@@ -395,9 +387,11 @@ class TrainingArrays:
         """
         input_map, pieces = replace(signature.input_map, reference=0), []
         for each in range(len(self.names)) if run is None else (run,):
-            _, shifted, cut = _place(self._end(each, last), settings, input_map)
+            end = len(self.states[each]) - 1 if last is None else last - self.offsets[each]
+            place, shifted, cut = _place(end, settings, input_map)
             series = self.states[each][cut], self.delayed[each][cut], self.direct[each][cut]
-            instants = self.span(each, settings, last, signature.dt)
+            begin, dt = self.begins[each], signature.dt
+            instants = begin + place.first * dt, begin + end * dt
             pieces.append(Piece(self.names[each], series, shifted, instants))
         labels = signature.state_labels, signature.input_labels
         return _standardised(pieces, signature.dt, labels, input_map, settings)
@@ -427,12 +421,6 @@ def run_regressors(
     if not missing:
         return rows
     return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in rows))
-
-
-def _lengthened(values: FloatArray, length: int) -> FloatArray:
-    """Rows with the last one repeated where a look-ahead leaves one without: it is no column."""
-    missing = length - len(values)
-    return np.concatenate([values, values[-1:]]) if missing > 0 else values
 
 
 def until(runs: Datasets, stop: Stop) -> Groups:

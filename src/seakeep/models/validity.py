@@ -20,7 +20,7 @@ from seakeep.conventions import is_elevation
 from seakeep.core.spectra import split_bands
 from seakeep.errors import warn
 from seakeep.models import labelled
-from seakeep.models.interface import Signature
+from seakeep.models.inputs import Signature
 from seakeep.waves import GRAVITY
 
 PER_OCTAVE = 6
