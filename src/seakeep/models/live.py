@@ -31,6 +31,7 @@ from seakeep.arrays import (
     as_table,
     check_choice,
     fraction,
+    plain,
     positive,
     whole_number,
 )
@@ -899,7 +900,7 @@ class Live:
     @cached_property
     def _identity(self) -> str:
         """Identity of the model."""
-        digest = hashlib.sha256(store.as_json(asdict(self.signature)).encode())
+        digest = hashlib.sha256(json.dumps(plain(asdict(self.signature))).encode())
         for each in (self._a, self._b, self._d, self._offset):
             digest.update(np.ascontiguousarray(each).tobytes())
         return digest.hexdigest()
