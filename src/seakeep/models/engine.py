@@ -294,8 +294,7 @@ def _series(
         delayed = np.stack([each.delayed for each in read])
         direct = np.stack([each.direct[z:] for each in read])
         if reference:
-            delayed -= zeros[0]
-            direct -= zeros[1]
+            delayed, direct = delayed - zeros[0], direct - zeros[1]
         return out | {"delayed": delayed, "direct": direct}
     direct = np.stack([drive.direct(span.known, span.stop) for drive, span in pairs])
     if reference:
