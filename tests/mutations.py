@@ -69,7 +69,7 @@ CHANGES = {
         ("rows = starts[:, None] + np.arange(1, count + 1)", "rows = starts[:, None] + np.arange(count)", "check/test_residuals.py::test_bands_and_ages_add_up"),
     ],
     "check/response.py": [
-        ("* dynamics.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_that_of_python_control"),
+        ("* own.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_that_of_python_control"),
         ("early = np.exp(2j * np.pi", "early = np.exp(-2j * np.pi", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
         ("np.hypot(radius, moved)[:, 0]", "radius[:, 0]", "check/test_response.py::test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectrum"),
         ("type_b = np.hypot(accuracy[1:], ratio * accuracy[0])", "type_b = np.hypot(accuracy[1:], 0 * ratio)", "check/test_response.py::test_accuracy_of_the_instruments_widens_the_interval"),
@@ -251,15 +251,18 @@ CHANGES = {
         ("points[number])", "points[0])", "models/test_ensemble.py::test_sobol_points_fill_the_prior_evenly"),
     ],
     "models/engine.py": [
-        ("on_inputs[k, :, : n * lags] = own", "on_inputs[k, :, -n * lags :] = own", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
-        ("histories[k] = each.state_scale", "histories[k] = members[0].state_scale", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
+        ("on_inputs[k, :, : n * lags] = on_delayed", "on_inputs[k, :, -n * lags :] = on_delayed", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
+        ("histories[k] = of.state_scale", "histories[k] = own[0].state_scale", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
         ("lost[part.start : part.start + len(members)] = first", "lost[: len(members)] = first", "models/test_ensemble.py::test_members_that_diverge_say_when"),
-        ("<= reach[:, [column]] * excess", "<= reach[:, [column]]", "hosts/test_c.py::test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python"),
+        ("lost = ~(farthest <= _excess(signature, windows))", "lost = ~(farthest <= 1.0)", "hosts/test_c.py::test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python"),
         ("available + 1 - lead if signature.inputs", "available - lead if signature.inputs", "models/test_forecast.py::test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it"),
         ("first = span.known + 1 - signature.state_samples", "first = span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
-        ("self.known - math.ceil(ahead - 1e-6) - span.known + 1", "self.known - span.known + 1", "models/test_ahead.py::test_the_status_says_from_when_and_before_that_nothing_changes"),
-        ("zero = each[-reference:].mean(axis=0)", "zero = each[-1:].mean(axis=0)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
-        ("zero[follows.column] = 0.0", "pass", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
+        ("run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1", "run.known - span.known + 1", "models/test_ahead.py::test_the_status_says_from_when_and_before_that_nothing_changes"),
+        ("[:, -reference:].mean(axis=1)", "[:, -1:].mean(axis=1)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
+        ("zero[:, follows.column] = 0.0", "pass", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
+        ("drive.rows(at.known + 1 - reference, at.known + 1)", "drive.rows(at.known + 2 - reference, at.known + 1)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
+        ("direct - zeros[1]", "direct", "models/test_centre.py::test_regressors_depart_from_their_means_over_the_reference_period"),
+        ("drive.table(span.first, span.stop) - zeros[0][number]", "drive.table(span.first, span.stop)", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
         ("values += windows.zero[:, None]", "pass", "models/test_centre.py::test_a_zero_moves_the_forecast_and_changes_nothing_else"),
         ("filled(signature, values, start + 1, self.run)", "filled(signature, values, start + 1)", "models/test_live.py::test_what_follows_is_predicted_as_the_forecast_predicts_it"),
     ],
@@ -300,9 +303,6 @@ CHANGES = {
     ],
     "models/inputs.py": [
         ("squared = (here - place.centre) ** 2", "squared = here**2", "models/test_following.py::test_training_is_the_recursion_on_the_measured_surge"),
-        ("self.rows(span.known + 1 - self.input_map.reference, span.known + 1)", "self.rows(span.known + 2 - self.input_map.reference, span.known + 1)", "models/test_centre.py::test_the_system_is_recovered_from_runs_whose_zeros_differ"),
-        ("return self._departing(rows, 1)", "return rows", "models/test_centre.py::test_regressors_depart_from_their_means_over_the_reference_period"),
-        ("return self._departing(out, 0)", "return out", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
     ],
     "models/labelled.py": [
         ("*filter(is_elevation, inputs), *lengths", "*inputs", "models/test_selection.py::test_periods_are_counted_in_the_first_elevation"),
@@ -385,7 +385,7 @@ CHANGES = {
     "models/training.py": [
         ("/ (pooled.shape[1] - 1))", "/ pooled.shape[1])", "models/test_training_window.py::test_moments_are_those_of_the_windows_pooled_with_ddof_one"),
         ("final = last - max(input_map.lead_samples - 1, 0)", "final = last", "models/test_training_window.py::test_a_stop_between_two_samples_takes_the_one_before"),
-        ("nearest if time[nearest] <= stop + 1e-3 * step else max(nearest - 1, 0)", "nearest", "models/test_training_window.py::test_a_stop_between_two_samples_takes_the_one_before"),
+        ("last -= last > 0 and time[last] > float(at) + 1e-3 * step", "pass", "models/test_training_window.py::test_a_stop_between_two_samples_takes_the_one_before"),
         ("means[0][input_map.follows.column] = means[2][-1] = 0.0", "pass", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
     ],
     "models/validity.py": [

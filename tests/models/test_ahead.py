@@ -11,7 +11,7 @@ import seakeep
 from seakeep import HankelDMDc, RequestError
 from seakeep.models.engine import Windows
 from seakeep.models.growth import LeadErrors, weigh_members, weighed
-from seakeep.models.interface import Scale
+from seakeep.models.inputs import Scale
 from seakeep.signals.prediction import foresee
 
 PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")

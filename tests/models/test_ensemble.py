@@ -18,7 +18,7 @@ from seakeep import (
     SeakeepWarning,
     Uniform,
 )
-from seakeep.models import engine, summaries
+from seakeep.models import engine, forecasts
 from seakeep.models.draws import child
 from seakeep.toml import Length
 
@@ -150,7 +150,7 @@ def test_the_summary_is_that_of_the_members(run, monkeypatch):
     np.testing.assert_allclose(std, values.std(axis=0, ddof=1), rtol=1e-12)
     for held, chunk in ((2**25, 2**23), (0, 1500)):
         monkeypatch.setattr(engine, "HELD", held)
-        monkeypatch.setattr(summaries, "CHUNK", chunk)
+        monkeypatch.setattr(forecasts, "CHUNK", chunk)
         found = ensemble.forecast_summary(run, start=65.0, steps=77, level=0.9)
         np.testing.assert_array_equal(table(found, STATES), table(expected, STATES))
     assert (found.members, found.diverged, found.level) == (6, 0, 0.9)

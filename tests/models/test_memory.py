@@ -6,7 +6,7 @@ import numpy as np
 from ensembles import few
 from records import record
 
-from seakeep.models import engine, summaries
+from seakeep.models import engine, forecasts
 
 STATES = [f"x{k}" for k in range(6)]
 STEPS = 500
@@ -14,7 +14,7 @@ STEPS = 500
 
 def test_a_summary_does_not_hold_its_members(monkeypatch):
     monkeypatch.setattr(engine, "HELD", 0)
-    monkeypatch.setattr(summaries, "CHUNK", 50_000)
+    monkeypatch.setattr(forecasts, "CHUNK", 50_000)
     rng = np.random.default_rng(0)
     eta = rng.standard_normal(2000)
     states = {name: np.convolve(eta, rng.standard_normal(4), "same") for name in STATES}

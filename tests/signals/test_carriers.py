@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from seas import sea
 
-from seakeep.signals.carriers import carried, carriers, mean_spectrum, position_taps, slow_position
+from seakeep.core.recursion import carried
+from seakeep.signals.carriers import carriers, mean_spectrum, position_taps, slow_position
 
 DT, PERIOD, DEPTH = 0.05, 1.6, 3.6  # s, s, m
 TIME = DT * np.arange(4000)

@@ -13,7 +13,7 @@ from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups
 from seakeep.conventions import MOTIONS, in_waves, is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
-from seakeep.models.labelled import Span, channel_matrix, check_step
+from seakeep.models.labelled import Span, channel_matrix, run_step
 from seakeep.models.observables import at_once
 from seakeep.models.registry import is_linear
 from seakeep.signals.time_axis import inside, stretches
@@ -105,7 +105,7 @@ def used_parts(model: Model, runs: Datasets) -> dict[str, Part]:
     """Parts of runs in waves that train or test; a run that cannot be used warns."""
     parts = {}
     for name, run in in_waves(runs).items():
-        check_step(run, name, model.dt)
+        run_step(run, name, model.dt)
         time = run["time"].values
         states = channel_matrix(run, model.states, name)
         try:

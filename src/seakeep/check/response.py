@@ -146,21 +146,20 @@ def response(
 
 def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> ComplexArray:
     """Transfer functions of a member from all regressors, physical units, (frequency, N, n + m)."""
-    rows, driven = dynamics.matrices
+    own = dynamics.signature
     gain = frequency_response(
-        rows,
-        driven,
+        *dynamics.matrices,
         2 * np.pi * frequency * model.dt,
-        len(dynamics.state_scale.mean),
-        len(dynamics.input_scale.mean),
-        dynamics.input_delays,
+        len(own.state_labels),
+        len(own.input_scale.mean),
+        own.input_delays,
     )
-    scale = np.concatenate([dynamics.input_scale.std, dynamics.direct_scale.std])
+    scale = np.concatenate([own.input_scale.std, own.direct_scale.std])
     input_map = model.signature.input_map
     lead = (input_map.follows or input_map).lead  # of delayed columns, in samples
     early = np.exp(2j * np.pi * frequency * model.dt * lead)
     early = np.where(np.arange(scale.size) < len(model.inputs), early[:, None], 1.0)
-    return gain * dynamics.state_scale.std[:, None] / scale * early[:, None]
+    return gain * own.state_scale.std[:, None] / scale * early[:, None]
 
 
 def _matrices(model: Model) -> tuple[Coverage, list[Dynamics]]:

@@ -130,7 +130,8 @@ def worth(
     order = [r for names in of_kind.values() for r in names]
     input_map = model.signature.input_map
     ahead = [input_map.look_ahead(runs[r], model.dt) - model.dt for r in order]
-    reads = [input_map.notes(runs[r]).get("conditional_on", "") for r in order]
+    aligned = input_map.alignment
+    reads = aligned.settings.surge_channel if aligned and input_map.reads_surge else ""
     return out.assign_coords(
         run=order,
         channel=list(model.states),
@@ -139,7 +140,7 @@ def worth(
         look_ahead=("run", np.maximum(ahead, 0.0), {"units": "s"}),
     ).assign_attrs(
         of=of,
-        conditional_on=str(next(filter(None, reads), "")),
+        conditional_on=reads,
         lost="; ".join(_lost(every, baselines or {})),
     )
 

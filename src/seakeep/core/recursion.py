@@ -59,6 +59,29 @@ class Place:
         return np.minimum(np.maximum(position, self.lowest), highest)
 
 
+def carried(taps: FloatArray, record: FloatArray) -> FloatArray:
+    """Elevations at the places of carriers.
+
+    Parameters
+    ----------
+    taps : ndarray, shape (place, probe, taps)
+        Weights of samples about an instant, oldest first (:mod:`seakeep.signals.carriers`).
+    record : ndarray, shape (time, probe)
+        Elevations at the probes.
+
+    Returns
+    -------
+    ndarray, shape (time − taps + 1, place)
+        The first row belongs to the instant of sample `back`.
+    """
+    places, _, length = taps.shape
+    if len(record) < length:
+        return np.zeros((0, places))
+    windows = np.lib.stride_tricks.sliding_window_view(record, length, axis=0)
+    carried_to: FloatArray = windows.reshape(len(windows), -1) @ taps.reshape(places, -1).T
+    return carried_to
+
+
 def read_table(
     place: Place, table: FloatArray, samples: IntArray, places: FloatArray
 ) -> FloatArray:

@@ -15,7 +15,6 @@ import numpy.typing as npt
 from seakeep.arrays import FloatArray
 from seakeep.conventions import is_elevation
 from seakeep.core.readouts import SOFT
-from seakeep.core.spectra import PER_OCTAVE
 from seakeep.files import MARK, check_output, make_folder, templates, write_text
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
@@ -23,7 +22,7 @@ from seakeep.models.engine import GROWTH, fading
 from seakeep.models.growth import DOUBTED
 from seakeep.models.live import AFTER, Live
 from seakeep.models.terms import SlowSquare, Term
-from seakeep.models.validity import CYCLES, TRAINED
+from seakeep.models.validity import CYCLES, PER_OCTAVE, TRAINED
 from seakeep.signals.expressions import Text
 from seakeep.signals.prediction import MEMORY, NOISE
 from seakeep.waves import GRAVITY

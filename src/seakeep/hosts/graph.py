@@ -16,7 +16,7 @@ from seakeep.files import MARK, check_output, replacing
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.following import Following
-from seakeep.models.interface import Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.observables import Observed
 from seakeep.models.terms import SlowSquare, Term
 

@@ -6,7 +6,6 @@ observables and carriers have a finite reach is causal in its newest input. Inpu
 
 from __future__ import annotations
 
-import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
@@ -128,12 +127,9 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
     """
     signature = exportable(model).signature
     history = signature.input_map.history(signature.input_delays)
-    name = labelled.run_name(run, "the run")
-    labelled.check_run(run, name)
-    labelled.check_step(run, name, signature.dt)
-    labelled.check_units(run, signature.state_labels + signature.input_labels, name)
-    time = np.asarray(run["time"].values, dtype=float)
-    at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
+    labels = signature.state_labels + signature.input_labels
+    name, time = labelled.opened(run, "the run", signature.dt, labels)
+    at = labelled.nearest_sample(time, start, name)
     rows = []
     for names, first, stop in (
         (signature.states, at + 1 - signature.state_samples, at + 1),

@@ -4,9 +4,8 @@ from seakeep.executor import processes
 from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.conditions import ProbeOffset, estimate_probe_offset
 from seakeep.models.ensemble import BandForecast, HankelEnsemble
-from seakeep.models.forecasts import Model, Spec
-from seakeep.models.inputs import InputMap
-from seakeep.models.interface import Needs, Signature
+from seakeep.models.forecasts import Model, Spec, summarize
+from seakeep.models.inputs import InputMap, Signature
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live, load_live
@@ -14,9 +13,8 @@ from seakeep.models.observables import OBSERVABLES, Expression, Powers, SlowSqua
 from seakeep.models.priors import Fixed, LogUniform, Uniform
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.registry import KINDS, is_ensemble, load_model
-from seakeep.models.settings import Select
+from seakeep.models.settings import Needs, Select
 from seakeep.models.specs import BayesianHankelDMDc, HankelDMDc
-from seakeep.models.summaries import summarize
 from seakeep.models.terms import Bound
 from seakeep.models.validity import outside_training
 

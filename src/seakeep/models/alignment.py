@@ -19,16 +19,19 @@ from typing import Literal, NamedTuple, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import TINY, Datasets, FloatArray, number
-from seakeep.conventions import is_elevation
-from seakeep.errors import DataError, RequestError
-from seakeep.models import labelled
-from seakeep.models.checks import (
+from seakeep.arrays import (
+    TINY,
+    Datasets,
+    FloatArray,
     check_choice,
     check_flag,
     names_of,
+    number,
     settings_of,
 )
+from seakeep.conventions import is_elevation
+from seakeep.errors import DataError, RequestError
+from seakeep.models import labelled
 from seakeep.models.labelled import Span
 from seakeep.signals.propagation import (
     CarriedElevation,

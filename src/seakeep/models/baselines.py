@@ -13,19 +13,25 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, whole_number
+from seakeep.arrays import FloatArray, Json, check_keys, whole_number
 from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
-from seakeep.models.checks import Json, check_keys
 from seakeep.models.engine import Windows, cut_lost
 from seakeep.models.forecasts import Model, counted
-from seakeep.models.interface import Needs, Role, Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs, Stop, as_runs, common_step, mean_period
 from seakeep.models.linear import HankelDMDcModel, LinearKind, packed, unpacked
 from seakeep.models.readouts import ReadOuts
 from seakeep.models.selection import RIDGES, select
-from seakeep.models.settings import DelayRows, HankelSettings, RidgeScale, periods_to_samples
+from seakeep.models.settings import (
+    DelayRows,
+    HankelSettings,
+    Needs,
+    RidgeScale,
+    Role,
+    periods_to_samples,
+)
 from seakeep.models.store import unpack
 from seakeep.models.training import Training, TrainingData, gather, until
 from seakeep.models.validity import Coverage

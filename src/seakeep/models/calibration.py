@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, Protocol, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, FloatArray, Progress, fraction, whole_number
+from seakeep.arrays import Datasets, FloatArray, Progress, check_choice, fraction, whole_number
 from seakeep.core.calibration import (
     ConformalMargin,
     band_scale,
@@ -24,11 +24,10 @@ from seakeep.core.calibration import (
 )
 from seakeep.errors import RequestError, warn
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice
 from seakeep.models.engine import Runs as FreeRuns
-from seakeep.models.engine import Windows, member_series, read_windows
-from seakeep.models.interface import Signature
-from seakeep.models.summaries import reduce_members
+from seakeep.models.engine import Windows, member_series, read_groups
+from seakeep.models.forecasts import reduce_members
+from seakeep.models.inputs import Signature
 from seakeep.models.training import TrainingArrays
 
 Band = Literal["members", "calibrated"]
@@ -257,7 +256,8 @@ def held_out(
         done += ensemble.n_members
         time = np.asarray(run["time"].values, dtype=float)
         starts = tuple(float(time[at]) for at in places)
-        windows = read_windows(signature, {name: run}, [(name, start) for start in starts], steps)
+        places_of = [(name, start) for start in starts]
+        (windows,) = read_groups(signature, {name: run}, [(places_of, steps)])
         with member_series(ensemble, [windows], executor, tell) as ((series, lost),):
             values = reduce_members(series, lost, level)
         states = labelled.channel_matrix(run, signature.states, name)
@@ -347,26 +347,14 @@ def _holds(
     return bool(np.array_equal(values, states[skipped : skipped + count]))
 
 
-def check_band(calibration: Calibration | None, level: float, band: Band) -> None:
-    """Refuse a band that the ensemble does not have.
-
-    Parameters
-    ----------
-    calibration : Calibration or None
-        Of the ensemble.
-    level : float
-        Probability that is asked of the band.
-    band : {"members", "calibrated"}
-        Which band.
+def calibrated_for(calibration: Calibration | None, level: float) -> Calibration:
+    """Calibration of an ensemble, for a band of a level.
 
     Raises
     ------
     RequestError
-        If the ensemble was not calibrated, or for another level, or there is no such band.
+        If the ensemble was not calibrated, or for another level.
     """
-    check_choice("band", band, get_args(Band))
-    if band == "members":
-        return
     if calibration is None:
         raise RequestError(
             "the ensemble is not calibrated. Call ensemble.calibrate(runs, steps), or seakeep "
@@ -378,21 +366,16 @@ def check_band(calibration: Calibration | None, level: float, band: Band) -> Non
             f"the band was calibrated for level = {known:g}, and {level:g} was asked for. "
             "Calibrate for that level."
         )
+    return calibration
 
 
 def widened(
-    calibration: Calibration | None,
-    values: FloatArray,
-    band: Band,
-    signature: Signature,
-    windows: Windows,
+    calibration: Calibration, values: FloatArray, signature: Signature, windows: Windows
 ) -> FloatArray:
-    """Statistics of shape (window, 4, steps, N) with the bounds of a band that was checked.
+    """Statistics of shape (window, 4, steps, N) with the bounds of a calibrated band.
 
-    Warns where a forecast is longer than those that its calibrated band was made from.
+    Warns where a forecast is longer than those that the band was made from.
     """
-    if band == "members" or calibration is None:
-        return values
     if windows.steps > calibration.steps:
         warn(
             f"the forecast of {windows.places[0][0]} is longer than the {calibration.steps} "

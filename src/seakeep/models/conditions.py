@@ -15,7 +15,7 @@ from seakeep.arrays import Datasets, FloatArray
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
 from seakeep.models import labelled
 from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.interface import Scale
+from seakeep.models.inputs import Scale
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import regular_periods
 from seakeep.models.specs import HankelDMDc

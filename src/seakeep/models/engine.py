@@ -1,6 +1,6 @@
 """Free runs of many members over many windows: the one engine of models, ensembles and studies.
 
-:func:`read_windows` reads what forecasts from several starts in several runs need, the inputs of
+:func:`read_groups` reads what forecasts from several starts in several runs need, the inputs of
 each run once. A model's ``free_runs(windows, members)`` gives arrays; :func:`member_series` hands
 members to an executor and collects them, in a file where they are many.
 """
@@ -10,26 +10,32 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
+from operator import call
 from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress, whole_number
+from seakeep.arrays import (
+    BoolArray,
+    Datasets,
+    FloatArray,
+    IntArray,
+    Progress,
+    check_choice,
+    whole_number,
+)
 from seakeep.core.recursion import Recursion, read_table, recursion
 from seakeep.core.rollout import rollouts
 from seakeep.errors import RequestError
 from seakeep.executor import in_order
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice
-from seakeep.models.following import Following
-from seakeep.models.inputs import Drive
-from seakeep.models.interface import Scale, Signature
+from seakeep.models.inputs import Drive, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.readouts import FittedReadOut, read_out
 from seakeep.signals.prediction import Foreseen, fill_future, foresee
@@ -120,45 +126,23 @@ class Dynamics:
     ----------
     coefficients : ndarray, shape (N(s+1) or N, N(s+1) + n(z+1) + m)
         Regressed rows of [Â B̂], on standardised deviations.
-    state_delays, input_delays : int
-        s and z.
-    state_scale, input_scale, direct_scale : Scale
-        Moments of the states and of both kinds of regressors.
-    follows : Following or None
-        Carriers and place of the vessel where the model follows its own surge.
+    signature : Signature
+        Its own delays, moments and input map.
     """
 
     coefficients: FloatArray
-    state_delays: int
-    input_delays: int
-    state_scale: Scale
-    input_scale: Scale
-    direct_scale: Scale
-    follows: Following | None = None
-
-    @classmethod
-    def of(cls, coefficients: FloatArray, signature: Signature) -> Dynamics:
-        """Of coefficients, and what else a model knows."""
-        return cls(
-            coefficients,
-            signature.state_delays,
-            signature.input_delays,
-            signature.state_scale,
-            signature.input_scale,
-            signature.direct_scale,
-            signature.input_map.follows,
-        )
+    signature: Signature
 
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray]:
         """Regressed rows of Â and B̂."""
-        size = len(self.state_scale.mean) * (self.state_delays + 1)
+        size = len(self.signature.state_labels) * (self.signature.state_delays + 1)
         return self.coefficients[:, :size], self.coefficients[:, size:]
 
     @property
     def system(self) -> FloatArray:
         """Â, with the rows that shift the delayed states where these are exact."""
-        rows, count = self.matrices[0], len(self.state_scale.mean)
+        rows, count = self.matrices[0], len(self.signature.state_labels)
         size = rows.shape[1]
         return rows if len(rows) == size else np.concatenate([rows, np.eye(size - count, size)])
 
@@ -189,27 +173,19 @@ Place = tuple[str, float]
 """Name of a run, and the instant of the last measured state, s."""
 
 
-def read_windows(
-    signature: Signature,
-    runs: Datasets,
-    places: Sequence[Place],
-    steps: int | None,
-    ahead: str = "refuse",
-) -> Windows:
-    """Read what forecasts from several starts need; arguments and errors as ``forecast``."""
-    return read_groups(signature, runs, [(places, steps)], ahead)[0]
-
-
 def read_groups(
     signature: Signature,
     runs: Datasets,
     groups: Sequence[tuple[Sequence[Place], int | None]],
     ahead: str = "refuse",
 ) -> list[Windows]:
-    """Windows of several lengths; each probe is carried once per run for all of them."""
+    """Read what forecasts from several starts need, each group of starts with its steps.
+
+    Each probe is carried once per run for all of them; arguments and errors as ``forecast``.
+    """
     check_choice("ahead", ahead, ("refuse", "predict"))
     predicts = ahead == "predict" and bool(signature.inputs)
-    opened: dict[str, _Opened] = {}
+    labels, opened = signature.state_labels + signature.input_labels, dict[str, _Opened]()
     wanted: dict[str, list[Span]] = {}
     spans: list[list[Span]] = []
     for places, steps in groups:
@@ -223,7 +199,8 @@ def read_groups(
         spans.append([])
         for name, start in places:
             if name not in opened:
-                opened[name], wanted[name] = _Opened.of(signature, runs[name], name), []
+                own = labelled.opened(runs[name], name, signature.dt, labels)
+                opened[name], wanted[name] = _Opened(runs[name], *own), []
             span = opened[name].span(signature, start, steps, predicts)
             spans[-1].append(span)
             wanted[name].append(span)
@@ -257,79 +234,91 @@ def _driven(
     signature: Signature, drives: Sequence[Drive], spans: Sequence[Span], runs: Sequence[_Opened]
 ) -> Windows:
     """Windows of one length, each with its run's drive."""
-    pairs = list(zip(runs, spans, strict=True))
-    maps, dt = signature.input_map, signature.dt
+    maps, dt, steps = signature.input_map, signature.dt, spans[0].stop - spans[0].known
+    places, time, histories, look_ahead, predicted = [], [], [], [], []
+    for run, span in zip(runs, spans, strict=True):
+        places.append((run.name, float(run.time[span.known])))
+        inside = run.time[span.known + 1 : span.stop + 1]
+        beyond = run.time[-1] + dt * np.arange(1, steps - inside.size + 1)
+        attrs = dict(run.run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
+        time.append(xr.Variable(("time",), np.concatenate([inside, beyond]), attrs))
+        first = span.known + 1 - signature.state_samples
+        rows = slice(first, span.known + 1)
+        states = labelled.channel_matrix(run.run, signature.states, run.name, rows)
+        labelled.check_finite(states, signature.states, run.run, run.name, first)
+        histories.append(states)
+        look_ahead.append(maps.look_ahead(run.run, dt))
+        step = steps
+        if run.known is not None:
+            step = max(run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1, 0)
+        predicted.append(step if step < steps else -1)
+    parameter = signature.parameter
     return Windows(
-        places=tuple((run.name, float(run.time[span.known])) for run, span in pairs),
-        steps=spans[0].stop - spans[0].known,
-        time=tuple(run.instants(dt, span) for run, span in pairs),
-        look_ahead=tuple(maps.look_ahead(run.run, dt) for run in runs),
-        notes=maps.notes(runs[0].run),
-        predicted=tuple(run.first_predicted(signature, span) for run, span in pairs),
-        parameters=tuple(
-            parameter_of(run.run, signature.parameter, run.name)
-            for run in runs
-            if signature.parameter
-        ),
-        **_series(signature, (run.history(signature, span) for run, span in pairs), drives, spans),
+        places=tuple(places),
+        steps=steps,
+        time=tuple(time),
+        look_ahead=tuple(look_ahead),
+        notes={} if maps.alignment is None else maps.alignment.notes(runs[0].run),
+        predicted=tuple(predicted),
+        parameters=tuple(parameter_of(run.run, parameter, run.name) for run in runs if parameter),
+        **_series(signature, histories, drives, spans),
     )
 
 
 def _series(
     signature: Signature,
-    histories: Iterable[FloatArray],
+    histories: Sequence[FloatArray] | FloatArray,
     drives: Sequence[Drive],
     spans: Sequence[Span],
 ) -> dict[str, Any]:
     """What windows of one length start from, and what drives each, from its run's drive."""
     reference, follows = signature.input_map.reference, signature.input_map.follows
-    if not reference:
-        return {"histories": np.stack([*histories]), **_regressors(signature, drives, spans)}
-    rows = max(signature.state_delays + 1, signature.history_samples - reference)
-    states, zeros = [], []
-    for each in histories:
-        zero = each[-reference:].mean(axis=0)
-        if follows is not None:
-            zero[follows.column] = 0.0  # it is a place
-        zeros.append(zero)
-        states.append(each[-rows:] - zero)
-    drives = [drive.about(span) for drive, span in zip(drives, spans, strict=True)]
-    out = {"histories": np.stack(states), "zero": np.stack(zeros)}
-    return out | _regressors(signature, drives, spans)
-
-
-def _regressors(
-    signature: Signature, drives: Sequence[Drive], spans: Sequence[Span]
-) -> dict[str, Any]:
-    """What drives windows of one length, each from its run's drive."""
     z, pairs = signature.input_delays, list(zip(drives, spans, strict=True))
-    if signature.input_map.follows is None:
-        rows = [
+    out: dict[str, Any] = {"histories": np.stack([*histories])}
+    if reference:  # all but the place of a vessel that is followed departs from means
+        zero = out["histories"][:, -reference:].mean(axis=1)
+        if follows is not None:
+            zero[:, follows.column] = 0.0
+        rows = max(signature.state_delays + 1, signature.history_samples - reference)
+        out = {"histories": out["histories"][:, -rows:] - zero[:, None], "zero": zero}
+        before = [drive.rows(at.known + 1 - reference, at.known + 1) for drive, at in pairs]
+        zeros = [
+            np.stack([each.mean(axis=0) for each in group])[:, None]
+            for group in zip(*before, strict=True)
+        ]
+    if follows is None:
+        read = [
             drive.rows(span.first, span.stop if signature.inputs else span.known + 1)
             for drive, span in pairs
         ]
-        delayed = np.stack([each.delayed for each in rows])
-        return {"delayed": delayed, "direct": np.stack([each.direct[z:] for each in rows])}
-    place = signature.input_map.follows.place
-    tables, starts, first = [], {}, 0
-    for drive in dict.fromkeys(drives):
-        begin, table = drive.whole
-        starts[drive] = first - begin
-        tables.append(table)
-        first += len(table)
+        delayed = np.stack([each.delayed for each in read])
+        direct = np.stack([each.direct[z:] for each in read])
+        if reference:
+            delayed, direct = delayed - zeros[0], direct - zeros[1]
+        return out | {"delayed": delayed, "direct": direct}
+    direct = np.stack([drive.direct(span.known, span.stop) for drive, span in pairs])
+    if reference:
+        direct -= zeros[1][..., :-1]
+    tables, starts, offsets, length = [], [], dict[Drive, int](), 0
+    for number, (drive, span) in enumerate(pairs):
+        if reference or drive not in offsets:
+            first, table = drive.whole
+            if reference:
+                first, table = span.first, drive.table(span.first, span.stop) - zeros[0][number]
+            tables.append(table)
+            offsets[drive] = length - first
+            length += len(table)
+        starts.append(offsets[drive] + span.known)
     table = tables[0] if len(tables) == 1 else np.concatenate(tables)
-    steps = spans[0].stop - spans[0].known
-    at = np.array([starts[drive] + span.known for drive, span in pairs])
+    steps, at = spans[0].stop - spans[0].known, np.array(starts)
     here = np.stack([drive.places(span.first, span.known + 1) for drive, span in pairs])
     here = np.concatenate([here, here[:, -1:].repeat(steps - 1, axis=1)], axis=1)
-    delayed = read_table(place, table, at[:, None] + np.arange(-z, steps), here)
-    direct = np.stack([drive.direct(span.known, span.stop) for drive, span in pairs])
-    out = {"delayed": delayed, "direct": direct}
+    delayed = read_table(follows.place, table, at[:, None] + np.arange(-z, steps), here)
     lines = tuple(each.load.place for each in signature.readouts if each.load is not None)
     if lines:
         waves = [drive.waves(lines, span.known, span.stop) for drive, span in pairs]
         out["waves"] = np.stack(waves)
-    return out | {"table": table, "starts": at}
+    return out | {"delayed": delayed, "direct": direct, "table": table, "starts": at}
 
 
 def parameter_of(run: xr.Dataset, parameter: str, name: str) -> float:
@@ -371,20 +360,12 @@ class _Opened:
     time: FloatArray
     known: int | None = None
 
-    @classmethod
-    def of(cls, signature: Signature, run: xr.Dataset, key: str) -> _Opened:
-        name = labelled.run_name(run, key)
-        labelled.check_run(run, name)
-        labelled.check_step(run, name, signature.dt)
-        labelled.check_units(run, signature.state_labels + signature.input_labels, name)
-        return cls(run, name, np.asarray(run.variables["time"].values, dtype=float))
-
     def span(
         self, signature: Signature, start: float, steps: int | None, predicts: bool = False
     ) -> Span:
         """Samples of input that a forecast reads, before the map."""
         time, dt, name = self.time, signature.dt, self.name
-        at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
+        at = labelled.nearest_sample(time, start, name)
         needed, lead = signature.history_samples, 0 if predicts else signature.lead_samples
 
         def shown(instant: float) -> str:
@@ -422,7 +403,7 @@ class _Opened:
         """
         stop = max(signature.input_map.reads(span).stop for span in spans)
         start = max(span.known for span in spans)
-        values = self.read(signature.inputs, 0, stop)
+        values = labelled.channel_matrix(self.run, signature.inputs, self.name, slice(stop))
         values = np.pad(values, ((0, stop - len(values)), (0, 0)), constant_values=np.nan)
         gaps = np.flatnonzero(~np.isfinite(values).all(axis=1))
         # Only the future is predicted: missing samples that are read before a start are refused.
@@ -449,46 +430,23 @@ class _Opened:
             out.append(replace(self, run=own, known=first - 1))
         return out
 
-    def first_predicted(self, signature: Signature, span: Span) -> int:
-        """First step that reads predicted input, or −1."""
-        if self.known is None:
-            return -1
-        ahead = signature.input_map.look_ahead(self.run, signature.dt) / signature.dt
-        first = max(self.known - math.ceil(ahead - 1e-6) - span.known + 1, 0)
-        return first if first < span.stop - span.known else -1
-
     def drive(self, signature: Signature, spans: Sequence[Span]) -> Drive:
         """Regressors of the run, made once for all windows."""
         read = [signature.input_map.reads(span) for span in spans]
         first = min(each.first for each in read)
         stop = max(each.stop for each in read) if signature.inputs else first
-        values = self.read(signature.inputs, first, stop)
+        rows = slice(first, stop)
+        values = labelled.channel_matrix(self.run, signature.inputs, self.name, rows)
         for each in read:
             wanted = values[each.first - first : max(each.stop - first, 0)]
             labelled.check_finite(wanted, signature.inputs, self.run, self.name, each.first)
         surge = None
         if (follows := signature.input_map.follows) is not None:
             last = max(span.known for span in spans) + 1  # no later state is read
-            surge = self.read([signature.states[follows.column]], first, last)[:, 0]
+            channel = [signature.states[follows.column]]
+            rows = slice(first, last)
+            surge = labelled.channel_matrix(self.run, channel, self.name, rows)[:, 0]
         return signature.input_map.drive(values, spans, run=self.run, first=first, surge=surge)
-
-    def history(self, signature: Signature, span: Span) -> FloatArray:
-        """States up to the start."""
-        first = span.known + 1 - signature.state_samples
-        states = self.read(signature.states, first, span.known + 1)
-        labelled.check_finite(states, signature.states, self.run, self.name, first)
-        return states
-
-    def read(self, names: Sequence[str], first: int, stop: int) -> FloatArray:
-        """Channels at some samples."""
-        return labelled.channel_matrix(self.run, names, self.name, slice(first, stop))
-
-    def instants(self, dt: float, span: Span) -> xr.Variable:
-        """Instants that are forecast; the last ones may lie beyond the record."""
-        inside = self.time[span.known + 1 : span.stop + 1]
-        beyond = self.time[-1] + dt * np.arange(1, span.stop - span.known - inside.size + 1)
-        attrs = dict(self.run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
-        return xr.Variable(("time",), np.concatenate([inside, beyond]), attrs)
 
 
 def filled(
@@ -587,7 +545,8 @@ def linear_runs(
         # One member needs no copy.
         runs = [np.stack(each) if len(each) > 1 else each[0][None] for each in every]
     for values, windows in zip(runs, groups, strict=True):
-        read_out(readouts, values, windows.waves)
+        if readouts:
+            read_out(readouts, values, windows.waves)
         if windows.zero is not None:
             values += windows.zero[:, None]
     return runs
@@ -597,10 +556,11 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
     """Free runs step by step, where members follow their own surge; NaN from where one is lost."""
     assert windows.starts is not None
     assert windows.table is not None
-    follows = members[0].follows
+    own = [each.signature for each in members]
+    follows = own[0].input_map.follows
     assert follows is not None
     # Delays that a member does not have count nothing.
-    s, z = (max(getattr(each, f"{of}_delays") for each in members) for of in ("state", "input"))
+    s, z = max(each.state_delays for each in own), max(each.input_delays for each in own)
     N, n = windows.histories.shape[2], windows.table.shape[2]
     on_states = np.zeros((len(members), N, N * (s + 1)))
     on_inputs = np.zeros((len(members), N, n * (z + 1)))
@@ -608,17 +568,17 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
     histories = np.empty((len(members), *windows.histories.shape))
     forcing = np.empty((len(members), len(windows), windows.steps, N))
     for k, each in enumerate(members):
-        u, w, lags = each.input_scale, each.direct_scale, each.input_delays + 1
-        a, b = each.matrices
+        of, (a, b) = each.signature, each.matrices
+        u, w, lags = of.input_scale, of.direct_scale, of.input_delays + 1
         on_states[k, :, : a.shape[1]] = a
         # On regressors in physical units; their means are part of what is constant.
-        own, on_direct = b[:, : n * lags] / np.tile(u.std, lags), b[:, n * lags :] / w.std
-        on_inputs[k, :, : n * lags] = own
+        on_delayed, on_direct = b[:, : n * lags] / np.tile(u.std, lags), b[:, n * lags :] / w.std
+        on_inputs[k, :, : n * lags] = on_delayed
         on_square[k] = on_direct[:, -1]
         np.matmul(windows.direct, on_direct[:, :-1].T, out=forcing[k])
-        forcing[k] -= own @ np.tile(u.mean, lags) + on_direct @ w.mean
-        histories[k] = each.state_scale.deviations(windows.histories)
-    surges = [[each.state_scale.std, each.state_scale.mean] for each in members]
+        forcing[k] -= on_delayed @ np.tile(u.mean, lags) + on_direct @ w.mean
+        histories[k] = of.state_scale.deviations(windows.histories)
+    surges = [[of.state_scale.std, of.state_scale.mean] for of in own]
     gain, offset = np.array(surges)[..., follows.column].T
     models = Recursion(on_states, on_inputs, on_square, gain, offset, follows.column)
     known = windows.delayed.shape[1] - windows.steps
@@ -627,38 +587,37 @@ def _followed_runs(members: Sequence[Dynamics], windows: Windows) -> FloatArray:
         models, follows.place, histories, delayed, windows.table, windows.starts, forcing
     )
     with np.errstate(over="ignore", invalid="ignore"):  # a run that is lost is cut just below
-        for values, drove, each in zip(computed, used, members, strict=True):
+        for values, drove, of in zip(computed, used, own, strict=True):
             driving = np.concatenate([delayed, drove], axis=1)
-            each.state_scale.physical(values, out=values)
-            cut_lost(values, each, replace(windows, delayed=driving))
+            of.state_scale.physical(values, out=values)
+            cut_lost(values, of, replace(windows, delayed=driving))
     return computed
 
 
 def _open_runs(member: Dynamics, groups: Sequence[Windows]) -> list[FloatArray]:
     """Free runs over all windows as products of matrices."""
-    batches = []
+    own, batches = member.signature, []
     for windows in groups:
         steps = windows.steps
-        driving = windows.delayed[:, windows.delayed.shape[1] - member.input_delays - steps :]
+        driving = windows.delayed[:, windows.delayed.shape[1] - own.input_delays - steps :]
         if not driving.shape[2]:
             driving = np.zeros((len(driving), steps, 0))
-        history = member.state_scale.deviations(windows.histories[:, -1 - member.state_delays :])
-        direct = member.direct_scale.deviations(windows.direct) if windows.direct.shape[2] else None
-        batches.append((history, member.input_scale.deviations(driving), direct))
-    a, b = member.matrices
-    computed = rollouts(a, b, batches, n_states=len(member.state_scale.mean))
+        history = own.state_scale.deviations(windows.histories[:, -1 - own.state_delays :])
+        direct = own.direct_scale.deviations(windows.direct) if windows.direct.shape[2] else None
+        batches.append((history, own.input_scale.deviations(driving), direct))
+    computed = rollouts(*member.matrices, batches, n_states=len(own.state_labels))
     with np.errstate(over="ignore"):  # a run that is lost is cut just below
         for windows, values in zip(groups, computed, strict=True):
-            cut_lost(member.state_scale.physical(values, out=values), member, windows)
+            cut_lost(own.state_scale.physical(values, out=values), own, windows)
     return computed
 
 
-def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
+def _excess(signature: Signature, windows: Windows) -> FloatArray:
     """Largest deviation of the input over that in training, at least one, shape (window, steps).
 
     What lies before a step counts less, by ``fading`` of each step in between.
     """
-    z = scales.input_delays
+    z = signature.input_delays
     first = windows.delayed.shape[1] - z - windows.steps
     if first < 0:  # without inputs
         return np.ones((len(windows), windows.steps))
@@ -666,48 +625,39 @@ def _excess(scales: Dynamics | Signature, windows: Windows) -> FloatArray:
         # The slow surge squared is no input.
         (np.abs(x - scale.centre[: x.shape[2]]) / scale.bound[: x.shape[2]]).max(axis=2, initial=1)
         for scale, x in (
-            (scales.input_scale, windows.delayed[:, first:]),
-            (scales.direct_scale, windows.direct),
+            (signature.input_scale, windows.delayed[:, first:]),
+            (signature.direct_scale, windows.direct),
         )
     )
     excess: FloatArray = np.maximum(delayed[:, z:], direct)
-    last, fade = delayed[:, :z].max(axis=1, initial=1.0), fading(scales)
+    last, fade = delayed[:, :z].max(axis=1, initial=1.0), fading(signature)
     for now in excess.T:
         last = now[:] = np.maximum(now, 1.0 + fade * (last - 1.0))
     return excess
 
 
-def fading(scales: Dynamics | Signature) -> float:
+def fading(signature: Signature) -> float:
     """Part that is left of an input's excess over the training after one step."""
-    longest = max(scales.state_delays, scales.input_delays) + 1
+    longest = max(signature.state_delays, signature.input_delays) + 1
     return 1.0 - 1.0 / (MEMORY * max(longest, LEAST))
 
 
-def cut_lost(values: FloatArray, scales: Dynamics | Signature, windows: Windows) -> FloatArray:
+def cut_lost(values: FloatArray, signature: Signature, windows: Windows) -> FloatArray:
     """NaN from where free runs (window, steps, N) are lost, in physical units; they are changed."""
-    scale = scales.state_scale
+    scale = signature.state_scale
     start = np.abs(windows.histories - scale.centre).max(axis=1, initial=0.0)
-    reach = GROWTH * np.maximum(scale.bound, start)
-
-    def beyond(excess: FloatArray | float) -> BoolArray:
-        lost = np.zeros(values.shape[:2], dtype=bool)
-        for column, centre in enumerate(scale.centre):  # one after the other takes little room
-            lost |= ~(np.abs(values[..., column] - centre) <= reach[:, [column]] * excess)
-        return lost
-
+    reach, farthest = GROWTH * np.maximum(scale.bound, start), np.zeros(values.shape[:2])
     with np.errstate(invalid="ignore", over="ignore"):
-        if beyond(1.0).any():
-            lost = beyond(_excess(scales, windows))
+        for column, centre in enumerate(scale.centre):  # one after the other takes little room
+            away = np.abs(values[..., column] - centre) / reach[:, [column]]
+            np.maximum(farthest, away, out=farthest)
+        if not (farthest <= 1.0).all():  # most runs end here
+            lost = ~(farthest <= _excess(signature, windows))
             values[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return values
 
 
 Series = tuple[FloatArray, IntArray]
-
-
-def _run_members(data: tuple[Runs, Sequence[Windows]], members: Sequence[int]) -> list[FloatArray]:
-    model, groups = data
-    return model.free_runs(groups, members)
 
 
 @contextmanager
@@ -761,11 +711,12 @@ def member_series(
         parts = [range(total)[at : at + together] for at in range(0, total, together)]
 
         def tell(done: int, of: int, what: str) -> None:
-            if progress is not None:
-                number = min(parts[done - 1].stop, count)
-                progress(number, count, f"member {number}")
+            assert progress is not None
+            number = min(parts[done - 1].stop, count)
+            progress(number, count, f"member {number}")
 
-        computed = in_order(_run_members, (model, groups), parts, executor, tell)
+        told = tell if progress else None
+        computed = in_order(call, partial(model.free_runs, groups), parts, executor, told)
         for part, every in zip(parts, computed, strict=True):
             for (series, lost), values in zip(runs, every, strict=True):
                 members = values[: count - part.start]

@@ -8,13 +8,13 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, IntArray, Progress, fraction
+from seakeep.arrays import FloatArray, IntArray, Json, Progress, check_choice, fraction
 from seakeep.core.solve import Solution
 from seakeep.errors import RequestError, warn
 from seakeep.executor import in_order
@@ -25,33 +25,31 @@ from seakeep.models.calibration import (
     BandScale,
     Calibration,
     calibrate,
-    check_band,
+    calibrated_for,
     widened,
 )
-from seakeep.models.checks import Json
 from seakeep.models.draws import Draw, draws_dataset
 from seakeep.models.engine import Dynamics, Series, Windows, linear_runs, member_series
 from seakeep.models.forecasts import (
     Model,
     check_arrays,
     counted,
+    forecast_attrs,
     forecast_notes,
     label_channels,
     one_run,
-    outcome,
-    outside,
-    status_text,
+    reduce_members,
+    statistic_coordinate,
     statuses,
     window_coords,
     with_units,
 )
 from seakeep.models.growth import LeadErrors, Stretch, lead_errors, weigh_members
-from seakeep.models.interface import Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.live import Live
 from seakeep.models.settings import HankelSettings
-from seakeep.models.summaries import reduce_members, statistic_coordinate
 from seakeep.models.training import TrainingArrays, TrainingData
 from seakeep.models.validity import Coverage
 from seakeep.signals.time_axis import span_text
@@ -174,15 +172,16 @@ class HankelEnsemble(Model):
     @cached_property
     def training_spans(self) -> dict[str, tuple[float, float]]:
         """First and last instant of the training windows in each run that trains a member, s."""
-        spans: dict[str, tuple[float, float]] = {}
-        for run, name in enumerate(self.arrays.names):
-            ends = [
-                self.arrays.span(run, draw.settings, draw.last, self.dt)
-                for draw in self._taught
-                if draw.run in (None, run)
-            ]
+        spans, arrays = dict[str, tuple[float, float]](), self.arrays
+        for run, (name, begin) in enumerate(zip(arrays.names, arrays.begins, strict=True)):
+            firsts, ends = [], []
+            for draw in self._taught:
+                if draw.run in (None, run):
+                    whole, window = len(arrays.states[run]), draw.settings.window
+                    ends.append(whole - 1 if draw.last is None else draw.last - arrays.offsets[run])
+                    firsts.append(0 if window is None else ends[-1] - window + 1)
             if ends:
-                spans[name] = min(first for first, _ in ends), max(stop for _, stop in ends)
+                spans[name] = begin + min(firsts) * self.dt, begin + max(ends) * self.dt
         return spans
 
     @cached_property
@@ -216,7 +215,7 @@ class HankelEnsemble(Model):
         if self.identified:
             return self.identified[number]
         _, data, solution = self._identified(number)
-        return Dynamics.of(solution.coefficients, data.signature)
+        return Dynamics(solution.coefficients, data.signature)
 
     def member(self, number: int) -> HankelDMDcModel:
         """One member as a model of its own.
@@ -465,10 +464,9 @@ class HankelEnsemble(Model):
             As :meth:`forecast`.
         """
         windows = self.read_windows(*one_run(run, [start]), steps, ahead)
-        values, lost = self._banded(windows, level, band, executor, progress)
+        values, lost, statistic, counts = self._banded(windows, level, band, executor, progress)
         forecast = self._single(run, windows, values[0], lost, "statistic")
-        forecast = forecast.assign_coords(statistic=self._statistics(level, band))
-        return forecast.assign_attrs(self._counts(level, band))
+        return forecast.assign_coords(statistic=statistic).assign_attrs(counts)
 
     def _single(
         self,
@@ -480,15 +478,15 @@ class HankelEnsemble(Model):
     ) -> xr.Dataset:
         """Dataset of one window: values of shape (members or statistics, steps, N)."""
         variables = label_channels(self.signature, values, (dimension, "time"))
-        variables["status"] = ("member", statuses(lost[:, 0], windows, 0, self.dt))
+        variables["status"] = ("member", statuses(lost, windows, self.signature.dt)[:, 0])
         time, gone = windows.time[0], lost[:, 0]
         words = {"units": "s", "long_name": "first instant at which the member is lost"}
+        middle = values if dimension == "member" else values[:1]
         facts = {
+            "ensemble": json.dumps(self.origin),
             "diverged": int(np.count_nonzero(gone >= 0)),
             "members": self.n_members,
-            **outside(self, run, windows, values if dimension == "member" else values[:1]),
         }
-        status = status_text(facts | outcome(windows, 0), self.dt)
         return xr.Dataset(
             variables,
             coords={
@@ -496,7 +494,7 @@ class HankelEnsemble(Model):
                 "diverged_at": ("member", np.where(gone >= 0, time.values[gone], np.nan), words),
                 "time": time,
             },
-            attrs=self._notes(windows) | {"status": status, **facts, "start": windows.places[0][1]},
+            attrs=forecast_attrs(self, run, windows, middle, **facts),
         )
 
     def forecast_windows(
@@ -534,10 +532,11 @@ class HankelEnsemble(Model):
         with self._series(windows, executor, progress) as (series, lost):
             values = np.array(series).swapaxes(0, 1)
         variables = label_channels(self.signature, values, ("window", "member", "lead"))
-        status = [statuses(row, windows, window, self.dt) for window, row in enumerate(lost.T)]
-        variables["status"] = xr.Variable(("window", "member"), np.stack(status))
+        status = statuses(lost, windows, self.dt).T
+        variables["status"] = xr.Variable(("window", "member"), status)
         coords = window_coords(windows, self.dt) | {"member": np.arange(self.n_members)}
-        return xr.Dataset(variables, coords=coords, attrs=self._notes(windows))
+        attrs = {"ensemble": json.dumps(self.origin), **forecast_notes(self.signature, windows)}
+        return xr.Dataset(variables, coords=coords, attrs=attrs)
 
     def summarize_windows(
         self,
@@ -573,13 +572,14 @@ class HankelEnsemble(Model):
             As :meth:`forecast`.
         """
         windows = self.read_windows(*one_run(run, starts), steps, ahead)
-        values, lost = self._banded(windows, level, band, executor, progress)
+        values, lost, statistic, counts = self._banded(windows, level, band, executor, progress)
         variables = label_channels(self.signature, values, ("window", "statistic", "lead"))
         variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
-        coords = window_coords(windows, self.dt)
-        coords["statistic"] = self._statistics(level, band)
+        attrs = {"ensemble": json.dumps(self.origin), **forecast_notes(self.signature, windows)}
         return xr.Dataset(
-            variables, coords=coords, attrs=self._notes(windows) | self._counts(level, band)
+            variables,
+            coords=window_coords(windows, self.dt) | {"statistic": statistic},
+            attrs=attrs | counts,
         )
 
     def _banded(
@@ -589,26 +589,23 @@ class HankelEnsemble(Model):
         band: Band,
         executor: Executor | None = None,
         progress: Progress | None = None,
-    ) -> tuple[FloatArray, IntArray]:
-        """Statistics (window, 4, steps, N) of all members, and where these were lost."""
+    ) -> tuple[FloatArray, IntArray, xr.Variable, dict[str, Any]]:
+        """Statistics (window, 4, steps, N) of all members, and where these were lost.
+
+        Then the coordinate of the statistics, and attributes of the band.
+        """
         level = fraction(level, "level")
-        check_band(self.calibration, level, band)
+        check_choice("band", band, get_args(Band))
+        attrs: dict[str, Any] = {"level": level, "members": self.n_members}
+        bounds, calibrated = "", None
+        if band == "calibrated":
+            calibrated = calibrated_for(self.calibration, level)
+            bounds, attrs["band"] = calibrated.bounds, band
         with self._series(windows, executor, progress) as (series, lost):
             values = reduce_members(series, lost, level)
-        return widened(self.calibration, values, band, self.signature, windows), lost
-
-    def _statistics(self, level: float, band: Band) -> xr.Variable:
-        """Coordinate of the statistics, with what the bounds of a calibrated band are."""
-        calibrated = self.calibration if band == "calibrated" else None
-        return statistic_coordinate(level, calibrated.bounds if calibrated else "")
-
-    def _counts(self, level: float, band: Band) -> dict[str, Any]:
-        kind = {"band": band} if band == "calibrated" else {}
-        return {"level": level, "members": self.n_members, **kind}
-
-    def _notes(self, windows: Windows) -> dict[str, Any]:
-        notes = forecast_notes(self.signature, windows)
-        return {"run": notes.pop("run"), "ensemble": json.dumps(self.origin), **notes}
+        if calibrated is not None:
+            values = widened(calibrated, values, self.signature, windows)
+        return values, lost, statistic_coordinate(level, bounds), attrs
 
     def hold(self, *, executor: Executor | None = None, progress: Progress | None = None) -> Self:
         """Identify all members once and keep them, for forecasts in a loop or on board.
@@ -671,7 +668,7 @@ class HankelEnsemble(Model):
             If a shape or name does not fit, or there is no such band.
         """
         windows = check_arrays(self.signature, x_history, u_history, u_future, steps, ahead)
-        values, lost = self._banded(windows, level, band)
+        values, lost, *_ = self._banded(windows, level, band)
         mean, std, lower, upper = values[0]
         return BandForecast(mean, std, lower, upper, int(np.count_nonzero(lost >= 0)))
 

@@ -12,7 +12,7 @@ from scipy import sparse
 from seakeep.arrays import FloatArray
 from seakeep.errors import RequestError, needing
 from seakeep.files import MARK, check_output, replacing
-from seakeep.models.interface import Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.terms import SlowSquare
 from seakeep.signals.expressions import Text
 

@@ -159,17 +159,7 @@ class Following:
         RequestError
             If the probes of the run stand beyond the reach of the carriers.
         """
-        rig = self.alignment.rig(run)
-        computed = _banks(self, rig)
-        for bank in computed:
-            if bank.errors[self._known].min() > REACH:
-                raise RequestError(
-                    f"the probe of '{self.alignment.inputs[bank.column]}' stands "
-                    f"{rig.offsets[bank.column]:+.3g} m from where it stood in training, too far "
-                    f"for carriers of {(self.back + self.ahead) * self.dt:.3g} s. Correct its "
-                    "position, or fit with alignment surge = 'measured' or 'none'."
-                )
-        return computed
+        return _banks(self, self.alignment.rig(run))
 
     def foresight(self, run: xr.Dataset | None, count: int) -> tuple[FloatArray, tuple[int, ...]]:
         """Filters that predict placed elevations from themselves and those up-wave, in a rig.
@@ -241,20 +231,15 @@ class Following:
         return slice(int(margin), self.place.count - int(margin))
 
     @cached_property
-    def errors(self) -> FloatArray:
-        """Largest error of a carrier at each place in the rig of training, per SD of the waves."""
-        banks = _banks(self, self.alignment.rig())
-        return np.max([bank.errors for bank in banks], axis=0)
-
-    @property
     def reach(self) -> tuple[float, float]:
-        """Places between which every carrier errs less than ``REACH``, m."""
-        sound = self.place.grid[self.errors <= REACH]
+        """Places between which every carrier errs less than ``REACH`` in the rig of training, m."""
+        sound = self.place.grid[np.max([bank.errors for bank in self.banks(None)], axis=0) <= REACH]
         return (float(sound[0]), float(sound[-1])) if sound.size else (0.0, 0.0)
 
     def describe(self, dt: float) -> list[str]:
         """Lines of a summary."""
-        (low, high), known = self.reach, self.errors[self._known]
+        (low, high), banks = self.reach, self.banks(None)
+        known = np.max([bank.errors[self._known] for bank in banks], axis=0)
         return [
             f"  alignment     mode {self.alignment.settings.mode}; surge predicted, in each step",
             f"    carriers    {self.back * dt:.3g} s back and {self.ahead * dt:.3g} s ahead of all "
@@ -274,6 +259,13 @@ def _banks(following: Following, rig: Rig) -> tuple[Bank, ...]:
         targets = following.place.grid + rig.offsets[column] + (own or 0.0)
         leads = np.full(len(targets), following.lead)
         taps, errors = following._carriers(rig, columns, targets, following.ahead, leads)
+        if errors[following._known].min() > REACH:
+            raise RequestError(
+                f"the probe of '{aligned.inputs[column]}' stands {rig.offsets[column]:+.3g} m from "
+                "where it stood in training, too far for carriers of "
+                f"{(following.back + following.ahead) * following.dt:.3g} s. Correct its "
+                "position, or fit with alignment surge = 'measured' or 'none'."
+            )
         out.append(Bank(column, tuple(columns), taps, errors))
     return tuple(out)
 

@@ -1,4 +1,4 @@
-"""Forecasts as Datasets: names, units, status; and the door for plain arrays."""
+"""Forecasts as Datasets: names, units, status, statistics of members; the door for arrays."""
 
 from __future__ import annotations
 
@@ -18,21 +18,30 @@ from seakeep.arrays import (
     FloatArray,
     Groups,
     IntArray,
+    Json,
     Progress,
     as_real,
+    check_choice,
+    fraction,
     whole_number,
 )
 from seakeep.errors import RequestError, warn
 from seakeep.files import write_sealed
 from seakeep.models import engine, store
 from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.checks import Json, check_choice
 from seakeep.models.engine import Windows, first_lost
-from seakeep.models.interface import Needs, Role, Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix, run_name
+from seakeep.models.settings import Needs, Role
 from seakeep.models.training import Training
 from seakeep.models.validity import outside_training
 from seakeep.signals.time_axis import instant_text, span_text
+
+STATISTICS = ("mean", "std", "lower", "upper")
+CHUNK = 8 * 2**20
+"""Bytes of all members that are reduced at a time."""
+SORTED = 512
+"""Members up to which sorting them all is faster than selecting the few that are asked for."""
 
 
 class Model:
@@ -118,7 +127,7 @@ class Model:
         ahead: str = "refuse",
     ) -> Windows:
         """What forecasts from several starts, in several runs, read: (run, start in s) each."""
-        return engine.read_windows(self.signature, runs, places, steps, ahead)
+        return engine.read_groups(self.signature, runs, [(places, steps)], ahead)[0]
 
     def free_runs(
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
@@ -253,17 +262,12 @@ class Model:
         DataError
             If the step or the units are not the model's, or needed samples are missing.
         """
-        windows = self.read_windows(*one_run(run, [start]), steps, ahead)
+        windows, signature = self.read_windows(*one_run(run, [start]), steps, ahead), self.signature
         values = self.free_runs([windows])[0][0]
-        signature = self.signature
         _warn_of_reach(signature, windows, values[0])
         variables = label_channels(signature, values[0], ("time",))
-        facts = {
-            **outcome(windows, 0, int(first_lost(values)[0])),
-            **outside(self, run, windows, values[0]),
-        }
-        attrs = {**forecast_notes(signature, windows), "start": windows.places[0][1], **facts}
-        attrs["status"] = status_text(facts, signature.dt)
+        lost = outcome(windows, 0, int(first_lost(values)[0]))
+        attrs = forecast_attrs(self, run, windows, values[0], **lost)
         # The instants stand among the variables: given as coords, xarray would merge twice.
         return xr.Dataset({"time": windows.time[0], **variables}, attrs=attrs)
 
@@ -305,11 +309,7 @@ class Model:
             values = np.array(series[0])
         signature = self.signature
         variables = label_channels(signature, values, ("window", "lead"))
-        status = [
-            status_text(outcome(windows, window, int(at)), signature.dt)
-            for window, at in enumerate(lost[0])
-        ]
-        variables["status"] = xr.Variable(("window",), status)
+        variables["status"] = xr.Variable(("window",), statuses(lost, windows, signature.dt)[0])
         return xr.Dataset(
             variables,
             coords=window_coords(windows, signature.dt),
@@ -369,11 +369,17 @@ class Spec(Protocol):
         """Rebuild the model that a file holds."""
 
 
-def outside(model: Any, run: xr.Dataset, windows: Windows, values: FloatArray) -> dict[str, str]:
-    """Attribute that says in what a forecast, shape (…, steps, N), lies outside the training."""
-    surge = values[..., model.states.index("surge")] if "surge" in model.states else None
-    reasons = outside_training(model, run, windows.places[0][1], windows.steps, surge)
-    return {"outside_training": "; ".join(reasons)} if reasons else {}
+def forecast_attrs(
+    model: Model, run: xr.Dataset, windows: Windows, values: FloatArray, **facts: Any
+) -> dict[str, Any]:
+    """Attributes of a forecast from one start, shape (…, steps, N), and facts of its runs."""
+    signature, (_, start) = model.signature, windows.places[0]
+    names = signature.states
+    surge = values[..., names.index("surge")] if "surge" in names else None
+    if reasons := outside_training(model, run, start, windows.steps, surge):
+        facts["outside_training"] = "; ".join(reasons)
+    attrs = {**forecast_notes(signature, windows), "start": start, **facts}
+    return {**attrs, "status": status_text(attrs, signature.dt)}
 
 
 def _warn_of_reach(signature: Signature, windows: Windows, values: FloatArray) -> None:
@@ -395,7 +401,7 @@ def _warn_of_reach(signature: Signature, windows: Windows, values: FloatArray) -
 
 
 def one_run(run: xr.Dataset, starts: Sequence[float]) -> tuple[Groups, list[tuple[str, float]]]:
-    """A run and the places in it, as :func:`engine.read_windows` takes them."""
+    """A run and the places in it, as :meth:`Model.read_windows` takes them."""
     if np.ndim(starts) == 0:
         raise RequestError(
             f"starts must be a list of instants; received {starts!r}. Write [{starts}]."
@@ -464,7 +470,7 @@ def status_text(facts: Mapping[str, Any], dt: float) -> str:
     Parameters
     ----------
     facts : mapping
-        What :func:`outcome` and :func:`outside` found, and of an ensemble how many of its
+        What :func:`outcome` found, and ``outside_training``; of an ensemble, how many of its
         ``members`` ``diverged``.
     dt : float
         Time step, s.
@@ -480,9 +486,12 @@ def status_text(facts: Mapping[str, Any], dt: float) -> str:
     return said + ", outside training" * ("outside_training" in facts)
 
 
-def statuses(lost: IntArray, windows: Windows, window: int, dt: float) -> npt.NDArray[np.str_]:
-    """Status of each member in a window from its first lost instant, or −1."""
-    texts = [status_text(outcome(windows, window, int(at)), dt) for at in lost]
+def statuses(lost: IntArray, windows: Windows, dt: float) -> npt.NDArray[np.str_]:
+    """Status from the first lost instants, or −1, shape (member, window)."""
+    texts = [
+        [status_text(outcome(windows, window, int(at)), dt) for window, at in enumerate(row)]
+        for row in lost
+    ]
     return np.array(texts, dtype=str)
 
 
@@ -579,3 +588,150 @@ def _finite(name: str, needed: FloatArray) -> FloatArray:
             f"{len(needed)} rows needed. Fill the gap first."
         )
     return as_real(needed, name)
+
+
+def statistics_of(values: FloatArray, level: float) -> FloatArray:
+    """Statistics over the first axis.
+
+    Parameters
+    ----------
+    values : ndarray, shape (member, …)
+        Members.
+    level : float
+        Probability between the two quantiles.
+
+    Returns
+    -------
+    ndarray, shape (4, …)
+        Mean, standard deviation (ddof = 1; zero for one member) and the quantiles
+        (1 ∓ `level`)/2, exact with linear interpolation between order statistics. NaN without
+        members.
+    """
+    out = np.full((4, *values.shape[1:]), np.nan)
+    if not len(values):
+        return out
+    out[0] = values.mean(axis=0)
+    out[1] = values.std(axis=0, ddof=1) if len(values) > 1 else 0.0
+    probabilities = 0.5 - level / 2, 0.5 + level / 2
+    if len(values) > SORTED:
+        out[2:] = np.quantile(values, probabilities, axis=0)
+        return out
+    # As numpy.quantile gives them to the last bit.
+    ordered = np.sort(values, axis=0)
+    for row, probability in zip(out[2:], probabilities, strict=True):
+        place = probability * (len(ordered) - 1)
+        below = int(place)
+        low, high, part = ordered[below], ordered[min(below + 1, len(ordered) - 1)], place - below
+        np.subtract(high, low, out=row)
+        if part < 0.5:  # from the nearer of the two, as NumPy does
+            row *= part
+            row += low
+        else:
+            row *= part - 1.0
+            row += high
+    return out
+
+
+def statistic_coordinate(level: float, bounds: str = "") -> xr.Variable:
+    """Coordinate of the statistics, which says what the bounds of the band are."""
+    quantiles = f"the quantiles {0.5 - level / 2:g} and {0.5 + level / 2:g} of the members"
+    bounds = bounds or quantiles
+    attrs = {
+        "long_name": "statistic over the members",
+        "comment": f"lower and upper are {bounds}; members that diverged are left out of all four",
+    }
+    return xr.Variable(("statistic",), list(STATISTICS), attrs)
+
+
+def reduce_members(series: FloatArray, lost: IntArray, level: float) -> FloatArray:
+    """Reduce members to statistics, piece by piece in time.
+
+    A member that is lost (NaN) anywhere in a window is left out of that window's statistics from
+    its first instant on: what is left of it would weigh in one part of the band and not in the
+    other.
+
+    Parameters
+    ----------
+    series : ndarray, shape (member, window, steps, N)
+        Series of the members, from :func:`seakeep.models.engine.member_series`.
+    lost : ndarray of int, shape (member, window)
+        First instant lost, or −1.
+    level : float
+        Probability between the two quantiles.
+
+    Returns
+    -------
+    ndarray, shape (window, 4, steps, N)
+        As :func:`statistics_of`.
+    """
+    members, windows, steps, channels = series.shape
+    out = np.empty((windows, 4, steps, channels))
+    length = max(1, CHUNK // (8 * members * channels))
+    for window in range(windows):
+        complete = np.flatnonzero(lost[:, window] < 0)
+        for first in range(0, steps, length):
+            piece = slice(first, first + length)
+            out[window, :, piece] = statistics_of(
+                np.asarray(series[complete, window, piece]), level
+            )
+    return out
+
+
+def summarize(forecast: xr.Dataset, level: float = 0.95) -> xr.Dataset:
+    """Mean, standard deviation and band of an ensemble forecast.
+
+    Parameters
+    ----------
+    forecast : Dataset
+        With the dimension ``member``, from ``forecast`` of an ensemble.
+    level : float, optional
+        Probability between ``lower`` and ``upper``.
+
+    Returns
+    -------
+    Dataset
+        The variables of `forecast` with ``statistic`` (mean, std, lower, upper) instead of
+        ``member``. Members that diverged are left out of all instants; ``attrs["members"]`` and
+        ``attrs["diverged"]`` count them.
+
+    Raises
+    ------
+    RequestError
+        If `level` is not between 0 and 1.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> two = xr.Dataset({"heave": (("member", "time"), [[1.0, 2.0], [3.0, 4.0]])})
+    >>> summarize(two).heave.sel(statistic="mean").values
+    array([2., 3.])
+    """
+    level = fraction(level, "level")
+    outer = ["member", *(["window"] if "window" in forecast.dims else [])]
+    channels = {
+        name: variable.transpose(*outer, ...)
+        for name, variable in forecast.data_vars.items()
+        if "member" in variable.dims and variable.dtype.kind in "iuf"
+    }
+    members, windows = forecast.sizes["member"], forecast.sizes.get("window", 1)
+    lost, variables = np.zeros((members, windows), dtype=bool), {}
+    for each in channels.values():
+        lost |= np.isnan(each.values.reshape(members, windows, -1)).any(axis=2)
+    for name, each in channels.items():
+        shape = each.shape[len(outer) :]
+        series = each.values.reshape(members, windows, -1, 1)
+        values = reduce_members(series, np.where(lost, 0, -1), level)
+        values = values.reshape(*each.shape[1 : len(outer)], len(STATISTICS), *shape)
+        dims = (*outer[1:], "statistic", *each.dims[len(outer) :])
+        variables[name] = xr.Variable(dims, values, each.attrs)
+    dropped = int(lost.sum())
+    coords: Mapping[str, object] = {
+        str(name): coordinate
+        for name, coordinate in forecast.coords.items()
+        if "member" not in coordinate.dims
+    }
+    return xr.Dataset(
+        variables,
+        coords={**coords, "statistic": statistic_coordinate(level)},
+        attrs={**forecast.attrs, "level": level, "members": members, "diverged": dropped},
+    )

@@ -12,8 +12,8 @@ import xarray as xr
 from scipy.optimize import isotonic_regression
 
 from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray
-from seakeep.models.engine import Dynamics, Windows, linear_runs, read_windows
-from seakeep.models.interface import Scale, Signature
+from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
+from seakeep.models.inputs import Scale, Signature
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.training import TrainingData
 
@@ -106,7 +106,7 @@ class Stretch:
         if self.source is not None and steps > 1:
             signature, name, run, begin = self.source
             places = [(name, begin + at * signature.dt) for at in starts]
-            return read_windows(signature, {name: run}, places, steps)
+            return read_groups(signature, {name: run}, [(places, steps)])[0]
         return Windows(
             places=(("training", 0.0),) * len(starts),
             steps=steps,
@@ -127,8 +127,8 @@ def lead_errors(
     Residuals are those of the states as they are regressed; free runs are read off as forecasts
     are.
     """
-    s = max(each.state_delays for each in members)
-    z = max(each.input_delays for each in members)
+    s = max(each.signature.state_delays for each in members)
+    z = max(each.signature.input_delays for each in members)
     longest = max(each.last - each.first for each in stretches)
     steps = max(1, min(max(REACH * (max(s, z) + 1), LEAST), longest // 2))
     residuals = np.concatenate(

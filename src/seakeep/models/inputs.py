@@ -1,4 +1,4 @@
-"""Input maps: how measured inputs become what drives a model.
+"""Input maps: how measured inputs become what drives a model, and the signature of a model.
 
 A map is fitted with a model and opened once per run: its :class:`Drive` then serves all members,
 windows and steps. It aligns the elevations to the vessel, reads them ahead, and puts observables
@@ -10,20 +10,21 @@ beside them. The elevation is carried to a vessel whose position is measured as 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.core.recursion import read_table
+from seakeep.core.recursion import carried, read_table
+from seakeep.errors import RequestError
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.following import SQUARED, Bank, Following
 from seakeep.models.labelled import ChannelLabel, Span
 from seakeep.models.observables import Observed
-from seakeep.signals.carriers import carried
+from seakeep.models.readouts import FittedReadOut
 
 
 class Regressors(NamedTuple):
@@ -164,10 +165,6 @@ class InputMap:
         still = self.alignment is None or self.follows is not None
         return self.lead_samples * dt + (0.0 if still else self.alignment.look_ahead(run))  # type: ignore[union-attr]
 
-    def notes(self, run: xr.Dataset) -> dict[str, str | float]:
-        """What a forecast's attributes report of the map."""
-        return {} if self.alignment is None else self.alignment.notes(run)
-
     def describe(self, dt: float) -> list[str]:
         """Lines of a model's summary."""
         lines = []
@@ -207,8 +204,6 @@ class Drive:
         The run, with its rig; that of training without one.
     spans : sequence of Span
         Samples whose regressors are wanted, where the model follows its surge.
-    zero : Regressors, optional
-        What the regressors depart from.
     """
 
     input_map: InputMap
@@ -218,16 +213,6 @@ class Drive:
     banks: tuple[Bank, ...] = ()
     run: xr.Dataset | None = None
     spans: Sequence[Span] = ()
-    zero: Regressors | None = None
-
-    def about(self, span: Span) -> Drive:
-        """Drive of some samples, departing from the means over the reference period before them.
-
-        The squared place of a vessel that is followed stays as it is.
-        """
-        rows = self.rows(span.known + 1 - self.input_map.reference, span.known + 1)
-        zero = Regressors(*(each.mean(axis=0) for each in rows))
-        return replace(self, spans=[span], zero=zero)
 
     def rows(self, first: int, stop: int) -> Regressors:
         """Regressors of the samples from `first` to before `stop`, shape (sample, channel).
@@ -243,7 +228,7 @@ class Drive:
             values = self.values[low : end + ahead - input_map.lead]
             if input_map.observed is not None:
                 values = input_map.observed.with_delayed(values)
-            return Regressors(self._departing(values[begin - low : end - low], 0), direct)
+            return Regressors(values[begin - low : end - low], direct)
         place, here = input_map.follows.place, self.places(first, stop)
         table = self.table(first, stop)
         delayed = read_table(place, table, np.arange(stop - first), here)
@@ -257,8 +242,7 @@ class Drive:
         _, before, after = self.input_map._around
         begin = max(first - before, self.first)
         values = self.values[begin - self.first : stop + after - self.first]
-        rows = self.input_map.observed.direct(values)[first - begin : stop - begin]
-        return self._departing(rows, 1)
+        return self.input_map.observed.direct(values)[first - begin : stop - begin]
 
     @cached_property
     def whole(self) -> tuple[int, FloatArray]:
@@ -279,10 +263,7 @@ class Drive:
         if input_map.observed is not None:
             flat = input_map.observed.with_delayed(out.reshape(-1, out.shape[2]))
             out = flat.reshape(stop - first, count, -1)
-        return self._departing(out, 0)
-
-    def _departing(self, values: FloatArray, group: int) -> FloatArray:
-        return values if self.zero is None else values - self.zero[group][: values.shape[-1]]
+        return out
 
     def waves(self, places: tuple[float, ...], first: int, stop: int) -> FloatArray:
         """Wave at places about the vessel at rest an instant after samples.
@@ -303,3 +284,128 @@ class Drive:
         if self.surge is None:
             return np.full(stop - first, place.centre)
         return place.of(self.surge[first - self.first - place.taps.size + 1 : stop - self.first])
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """Moments of channels over the training windows.
+
+    Parameters
+    ----------
+    mean, std : ndarray, shape (channel,)
+        What is subtracted, and what is divided by (0 and 1 without standardisation).
+    spread : ndarray, shape (channel,)
+        Standard deviation over the training windows, with standardisation or without.
+    centre, reach : ndarray, shape (channel,)
+        Mean over the training windows, and the largest deviation from it.
+    """
+
+    mean: FloatArray
+    std: FloatArray
+    spread: FloatArray
+    centre: FloatArray
+    reach: FloatArray
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            getattr(self, each.name).flags.writeable = False
+
+    @property
+    def bound(self) -> FloatArray:
+        """Largest deviation in training, infinite for a channel that was constant there."""
+        return np.where(self.reach > 0, self.reach, np.inf)
+
+    def part(self, channels: Any) -> Scale:
+        """Moments of some channels: an index of arrays."""
+        return Scale(*(getattr(self, each.name)[channels] for each in fields(self)))
+
+    def deviations(self, values: FloatArray) -> FloatArray:
+        """Standardised deviations of physical values, shape (…, channel)."""
+        return (values - self.mean) / self.std
+
+    def physical(self, deviations: FloatArray, out: FloatArray | None = None) -> FloatArray:
+        """Physical values of standardised deviations, shape (…, channel); `out` may be these."""
+        values = np.multiply(deviations, self.std, out=out)
+        values += self.mean
+        return values
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """What a forecast needs to know about a model or an ensemble.
+
+    Parameters
+    ----------
+    dt : float
+        Time step, s.
+    state_labels, input_labels : tuple of ChannelLabel
+        Names, units and long names of the states and of the measured inputs.
+    state_delays, input_delays : int
+        s and z; for an ensemble the longest of a member.
+    input_map : InputMap
+        How measured inputs become regressors, as fitted.
+    state_scale, input_scale, direct_scale : Scale
+        Moments of the states, of the delayed and of the direct regressors over the training
+        windows; for an ensemble over all that its members learn from.
+    readouts : tuple of FittedReadOut
+        Channels that are read off the free runs.
+    parameter : str
+        Attribute of runs that the model varies with, if it does.
+    """
+
+    dt: float
+    state_labels: tuple[ChannelLabel, ...]
+    input_labels: tuple[ChannelLabel, ...]
+    state_delays: int
+    input_delays: int
+    input_map: InputMap = field(repr=False)
+    state_scale: Scale = field(repr=False)
+    input_scale: Scale = field(repr=False)
+    direct_scale: Scale = field(repr=False)
+    readouts: tuple[FittedReadOut, ...] = field(default=(), repr=False)
+    parameter: str = ""
+
+    @property
+    def states(self) -> list[str]:
+        """Names of the states, in the order of the model."""
+        return [label.name for label in self.state_labels]
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the measured inputs, in the order of the model."""
+        return [label.name for label in self.input_labels]
+
+    @property
+    def regressors(self) -> list[str]:
+        """Names of what the inputs become: the delayed regressors, then the direct ones."""
+        return [
+            label.name for group in self.input_map.regressors(self.input_labels) for label in group
+        ]
+
+    @property
+    def history_samples(self) -> int:
+        """Samples a forecast needs up to its start, that one included."""
+        return max(self.state_delays, self.input_map.history(self.input_delays)) + 1
+
+    @property
+    def state_samples(self) -> int:
+        """Samples of the states among these: where the vessel was counts for delayed waves too."""
+        follows, reference = self.input_map.follows, self.input_map.reference
+        where = 0
+        if follows is not None:
+            where = max(self.input_delays, reference) + follows.place.taps.size
+        return max(self.state_delays + 1, reference, where)
+
+    @property
+    def lead_samples(self) -> int:
+        """Samples of input after the one a step starts from that drive the step."""
+        return self.input_map.lead_samples
+
+    def check_fixed(self) -> None:
+        """Refuse a model whose means are those before each start."""
+        if self.input_map.reference:
+            raise RequestError(
+                "the model forecasts departures from the means before each start (centre = 'run'), "
+                "which forecast, compare and forecast_arrays take from what they are given. For "
+                "anything else, fit it with centre = 'pooled'."
+            )

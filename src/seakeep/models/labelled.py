@@ -108,29 +108,56 @@ def check_run(run: object, name: str) -> None:
         )
 
 
-def run_step(run: xr.Dataset, name: str) -> float:
-    """Time step of a run, s; its times must be uniform.
+def run_step(run: xr.Dataset, name: str, expected: float | None = None) -> float:
+    """Time step of a run, s; its times must be uniform, and the step that which is `expected`.
+
+    A step read from rounded times is known to about the rounding divided by the number of
+    samples; one part in ten thousand is beyond that and far below a wrong sampling rate.
 
     Raises
     ------
     DataError
-        If the times are not numbers, unsorted, repeated or not uniform.
+        If the times are not numbers, unsorted, repeated or not uniform, or the step is another.
     """
-    return uniform_step(run.variables["time"].values, name)
-
-
-def check_step(run: xr.Dataset, name: str, expected: float) -> None:
-    """Refuse a run whose step is not `expected` (s).
-
-    A step read from rounded times is known to about the rounding divided by the number of
-    samples; one part in ten thousand is beyond that and far below a wrong sampling rate.
-    """
-    step = run_step(run, name)
-    if abs(step - expected) > 1e-4 * expected:
+    step = uniform_step(run.variables["time"].values, name)
+    if expected is not None and abs(step - expected) > 1e-4 * expected:
         raise DataError(
             f"{name} has a time step of {step:.6g} s and the model one of {expected:.6g} s. "
             "Resample the run (seakeep.signals.resample, or the campaign's [preparation])."
         )
+    return step
+
+
+def opened(
+    run: xr.Dataset, fallback: str, dt: float, labels: Sequence[ChannelLabel]
+) -> tuple[str, FloatArray]:
+    """Name and instants of a run that a model reads: one of its time step and its units.
+
+    Warns of channels that state no unit; `fallback` is the name of a run without one.
+    """
+    name = run_name(run, fallback)
+    check_run(run, name)
+    run_step(run, name, dt)
+    silent, variables = [], run.variables
+    for label in labels:
+        if label.name not in variables or not label.units:
+            continue
+        units = variables[label.name].attrs.get("units")
+        if not units:
+            silent.append(label)
+        elif str(units) != label.units:
+            raise DataError(
+                f"channel '{label.name}' of {name} is in '{units}' and the model expects "
+                f"'{label.units}'. Convert the channel and its units attribute."
+            )
+    if silent:
+        listed = ", ".join(f"'{label.name}'" for label in silent)
+        units = ", ".join(dict.fromkeys(f"'{label.units}'" for label in silent))
+        warn(
+            f"channel {listed} of {name} states no unit; it is taken to be in the model's {units}. "
+            "Set its units attribute."
+        )
+    return name, np.asarray(variables["time"].values, dtype=float)
 
 
 def channel_matrix(
@@ -210,7 +237,7 @@ def check_finite(
         return
     row, column = (int(index) for index in np.argwhere(bad)[0])
     time = run["time"].values.astype(float)
-    instant = instant_text(time[first + row], _spacing(time))
+    instant = instant_text(time[first + row], float(time[-1] - time[0]) / (time.size - 1))
     raise DataError(
         f"channel '{names[column]}' of {name} has {int(bad[:, column].sum())} missing or infinite "
         f"value(s) in the samples needed, the first at t = {instant} s. "
@@ -218,11 +245,6 @@ def check_finite(
         "gaps = 'bridge' (of arrays by seakeep.signals.bridge); cut the run so that a longer one "
         "lies outside (record, span, train or test in [runs.NAME])."
     )
-
-
-def _spacing(time: FloatArray) -> float:
-    """Step of uniform instants, s, as near as they state it."""
-    return float(time[-1] - time[0]) / (time.size - 1)
 
 
 def channel_labels(run: xr.Dataset, names: Sequence[str]) -> tuple[ChannelLabel, ...]:
@@ -245,7 +267,7 @@ def common_step(runs: Datasets) -> float:
     dt = run_step(first_run, first_name)
     for name, run in runs.items():
         if run is not first_run:
-            check_step(run, name, dt)
+            run_step(run, name, dt)
     return dt
 
 
@@ -287,46 +309,15 @@ def common_labels(runs: Datasets, names: Sequence[str]) -> tuple[ChannelLabel, .
     return tuple(out)
 
 
-def check_units(run: xr.Dataset, labels: Sequence[ChannelLabel], name: str) -> None:
-    """Refuse a run in another unit than the model's, and warn of one that states none."""
-    silent, variables = [], run.variables
-    for label in labels:
-        if label.name not in variables or not label.units:
-            continue
-        units = variables[label.name].attrs.get("units")
-        if not units:
-            silent.append(label)
-        elif str(units) != label.units:
-            raise DataError(
-                f"channel '{label.name}' of {name} is in '{units}' and the model expects "
-                f"'{label.units}'. Convert the channel and its units attribute."
-            )
-    if silent:
-        listed = ", ".join(f"'{label.name}'" for label in silent)
-        units = ", ".join(dict.fromkeys(f"'{label.units}'" for label in silent))
-        warn(
-            f"channel {listed} of {name} states no unit; it is taken to be in the model's {units}. "
-            "Set its units attribute."
-        )
-
-
-def as_instant(value: object, what: str) -> float:
-    """Return an instant in seconds as a float; a number or an array that holds one number."""
-    array = np.asarray(value)
-    if array.ndim or array.dtype.kind not in "iuf":
-        raise RequestError(f"{what} must be an instant in seconds; received {value!r}.")
-    return float(array)
-
-
-def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "start") -> int:
+def nearest_sample(time: FloatArray, value: object, name: str, what: str = "start") -> int:
     """Sample nearest to an instant.
 
     Parameters
     ----------
     time : ndarray, shape (time,)
         Uniform instants, s.
-    instant : float
-        Instant wanted, s.
+    value : object
+        Instant wanted, s: a number, or an array that holds one number.
     name, what : str
         What the message calls the run and the instant.
 
@@ -340,7 +331,10 @@ def nearest_sample(time: FloatArray, instant: float, name: str, what: str = "sta
     RequestError
         If the instant is outside the run by more than rounding, or not a number.
     """
-    step = _spacing(time)
+    array = np.asarray(value)
+    if array.ndim or array.dtype.kind not in "iuf":
+        raise RequestError(f"{what} must be an instant in seconds; received {value!r} for {name}.")
+    instant, step = float(array), float(time[-1] - time[0]) / (time.size - 1)
     rounding = 1e-3 * step
     if not time[0] - rounding <= instant <= time[-1] + rounding:
         raise RequestError(

@@ -20,7 +20,7 @@ from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
 from seakeep.models.forecasts import Model, check_arrays, counted, one_run, rows_by_name
 from seakeep.models.growth import LeadErrors, training_errors, weigh_members
-from seakeep.models.interface import Scale, Signature
+from seakeep.models.inputs import Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.live import Live
 from seakeep.models.parametric import Variation, data_by_value
@@ -276,7 +276,7 @@ class HankelDMDcModel(Model):
                 f"the model varies with {self.signature.parameter}, whose value is not known here. "
                 "Take the model at a value: model.at(parameter=…)."
             )
-        return Dynamics.of(self.coefficients, self.signature)
+        return Dynamics(self.coefficients, self.signature)
 
     def aligned_inputs(self, run: xr.Dataset) -> xr.Dataset:
         """Inputs of a run as the model wants them: carried to the measured position.

@@ -29,7 +29,9 @@ from seakeep.arrays import (
     IntArray,
     as_real,
     as_table,
+    check_choice,
     fraction,
+    plain,
     positive,
     whole_number,
 )
@@ -39,14 +41,11 @@ from seakeep.errors import RequestError, did_you_mean
 from seakeep.executor import one_blas_thread
 from seakeep.files import load_sealed, write_sealed
 from seakeep.models import engine, store
-from seakeep.models.checks import check_choice
 from seakeep.models.engine import Dynamics, Runs
-from seakeep.models.forecasts import label_channels, rows_by_name
+from seakeep.models.forecasts import label_channels, rows_by_name, statistic_coordinate
 from seakeep.models.growth import WINDOWS, LeadErrors, weighed
-from seakeep.models.inputs import Drive
-from seakeep.models.interface import Signature
+from seakeep.models.inputs import Drive, Signature
 from seakeep.models.labelled import Span
-from seakeep.models.summaries import statistic_coordinate
 from seakeep.models.validity import Conditions, Coverage, Validity
 from seakeep.signals.prediction import (
     close_gaps,
@@ -901,7 +900,7 @@ class Live:
     @cached_property
     def _identity(self) -> str:
         """Identity of the model."""
-        digest = hashlib.sha256(store.as_json(asdict(self.signature)).encode())
+        digest = hashlib.sha256(json.dumps(plain(asdict(self.signature))).encode())
         for each in (self._a, self._b, self._d, self._offset):
             digest.update(np.ascontiguousarray(each).tobytes())
         return digest.hexdigest()
@@ -996,14 +995,15 @@ def _mean_predictor(
     ]
     offset = np.zeros(count)
     for member in members:
-        own, first = (member.state_scale, member.input_scale, member.direct_scale), 0
-        offset += own[0].mean
+        own, first = member.signature, 0
+        moments = own.state_scale, own.input_scale, own.direct_scale
+        offset += own.state_scale.mean
         for whole, of, delays in zip(
-            out, own, (member.state_delays, member.input_delays, 0), strict=True
+            out, moments, (own.state_delays, own.input_delays, 0), strict=True
         ):
             shape = delays + 1, of.mean.size
             columns = member.coefficients[:count, first : first + math.prod(shape)]
-            physical = columns.reshape(count, *shape) * own[0].std[:, None, None] / of.std
+            physical = columns.reshape(count, *shape) * own.state_scale.std[:, None, None] / of.std
             offset -= np.einsum("nlc,c->n", physical, of.mean)
             whole[:, whole.shape[1] - shape[0] :] += physical[:, ::-1]
             first += math.prod(shape)

@@ -14,11 +14,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from seakeep.arrays import TINY, Datasets, FloatArray, number
+from seakeep.arrays import TINY, Datasets, FloatArray, check_choice, check_keys, names_of, number
 from seakeep.core.observables import slow_kernel
 from seakeep.errors import SHOWN, RequestError, did_you_mean
 from seakeep.models import labelled
-from seakeep.models.checks import check_choice, check_keys, names_of
 from seakeep.models.labelled import ChannelLabel
 from seakeep.models.terms import Bound, Formula, Observable, Power, SlowSquare
 from seakeep.signals import expressions

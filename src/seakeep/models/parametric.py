@@ -20,7 +20,7 @@ from seakeep.core.gram import ridge_path
 from seakeep.core.solve import Solution
 from seakeep.errors import DataError, warn
 from seakeep.models.engine import parameter_of
-from seakeep.models.interface import Scale, Signature
+from seakeep.models.inputs import Scale, Signature
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import TrainingData, system_of
 

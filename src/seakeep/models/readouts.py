@@ -8,11 +8,10 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from seakeep.arrays import FloatArray, as_table
+from seakeep.arrays import FloatArray, as_table, check_choice
 from seakeep.conventions import MOTIONS
 from seakeep.core.readouts import LoadMap
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.models.checks import check_choice
 from seakeep.models.labelled import ChannelLabel
 
 ReadOutKind = Literal["none", "wave"]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeGuard, TypeVar, overload
 
-from seakeep.errors import DataError, RequestError
+from seakeep.errors import DataError, MissingFileError, RequestError
+from seakeep.files import load_sealed
 from seakeep.models import store
 from seakeep.models.baselines import ARX, FIR, HoldLast, Mean, Subspace
 from seakeep.models.ensemble import HankelEnsemble
@@ -59,7 +60,19 @@ def load_model(path: str | Path, kind: type[Kind] | None = None) -> Model | Kind
     DataError
         If it is damaged, not a model, or of another layout.
     """
-    dataset = store.read(path)
+    source = Path(path)
+    if source.suffix.lower() == ".toml":
+        raise RequestError(
+            f"{source} is a campaign file, and a model file is expected here: the model comes "
+            "first, and then the campaign."
+        )
+    try:
+        dataset = load_sealed(source, store.MODEL)
+    except MissingFileError as error:
+        raise MissingFileError(
+            f"{error} A model file is expected here: make one with `seakeep fit` or "
+            "model.save(...)."
+        ) from None
     word = dataset.attrs["seakeep_kind"]
     if word not in KINDS:
         raise DataError(

@@ -41,7 +41,7 @@ from seakeep.models.alignment import FittedAlignment, ProbeAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.following import LEAD
-from seakeep.models.interface import Scale, Signature
+from seakeep.models.inputs import Scale, Signature
 from seakeep.models.loads import PERIODS, Held, fit_readouts
 from seakeep.models.observables import Powers, SlowSquares, named
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
@@ -294,11 +294,17 @@ class Problem:
         on_states = path[..., : path.shape[2] - np.count_nonzero(there)]
         if candidate.is_filter:
             on_states = np.zeros((*path.shape[:2], count))
-        reach = candidate.state_reach, z
-        follows = data.signature.input_map.follows
-        both = np.concatenate([on_states, on_inputs], axis=2)
         x, u, w = scales
-        return [Dynamics(each, *reach, x, u, w, follows) for each in both]
+        signature = replace(
+            data.signature,
+            state_delays=candidate.state_reach,
+            input_delays=z,
+            state_scale=x,
+            input_scale=u,
+            direct_scale=w,
+        )
+        both = np.concatenate([on_states, on_inputs], axis=2)
+        return [Dynamics(each, signature) for each in both]
 
     def _system(
         self, candidate: HankelSettings, runs: Sequence[int]
@@ -416,7 +422,7 @@ class Problem:
                 measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
                 if zeros:
                     measured += np.stack([zeros[at] for at in starts])[:, None]
-                every[steps] = FreeRuns(predicted, measured, models[0].state_scale.std)
+                every[steps] = FreeRuns(predicted, measured, models[0].signature.state_scale.std)
         yield from (every[steps] for steps in horizons if steps in every)
 
     def judge(self, tried: Tried, fold: int) -> list[Scores]:

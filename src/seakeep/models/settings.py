@@ -9,22 +9,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar, Literal, Self, get_args
 
-from seakeep.arrays import TINY, Datasets, number, whole_number
-from seakeep.core.embedding import History
-from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
-from seakeep.models import labelled
-from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.checks import (
+from seakeep.arrays import (
+    TINY,
+    Datasets,
     Json,
     check_choice,
     check_flag,
     check_keys,
+    number,
     plain,
     settings_of,
+    whole_number,
 )
+from seakeep.core.embedding import History
+from seakeep.errors import SHOWN, RequestError, SeakeepWarning, warn
+from seakeep.models import labelled
+from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.following import BACK, Following
 from seakeep.models.inputs import InputMap
-from seakeep.models.interface import Needs, Role
 from seakeep.models.observables import Observed, observables_of
 from seakeep.models.observables import to_json as observable_json
 from seakeep.models.priors import Prior, prior_json
@@ -34,6 +36,29 @@ from seakeep.toml import Length, parse_length
 
 DelayRows = Literal["ridge", "exact"]
 RidgeScale = Literal["absolute", "per_snapshot"]
+Role = Literal["model", "reference"]
+
+
+@dataclass(frozen=True)
+class Needs:
+    """Samples that a spec asks of its runs.
+
+    Parameters
+    ----------
+    snapshots : int
+        Of the longest training window; 1 where all of a run trains.
+    history : int
+        Before the start of a forecast, that one not counted.
+    inside : bool
+        Whether the delay history of training lies inside the window.
+    lead : int
+        Input after the last instant but one that a forecast reads.
+    """
+
+    snapshots: int
+    history: int
+    inside: bool = False
+    lead: int = 0
 
 
 def periods_to_samples(periods: float, encounter_period: float, dt: float) -> int:

@@ -12,18 +12,17 @@ from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, get_args
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import Datasets, Progress, whole_number
+from seakeep.arrays import Datasets, Json, Progress, check_choice, check_flag, whole_number
 from seakeep.core.embedding import TrainingWindow
 from seakeep.errors import SHOWN, DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.baselines import FIR
-from seakeep.models.checks import Json, check_choice, check_flag
 from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members, draws_of
 from seakeep.models.engine import parameter_of
 from seakeep.models.ensemble import PARTS, HankelEnsemble, spectral_radius
 from seakeep.models.forecasts import Spec
-from seakeep.models.interface import Needs, Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel, LinearKind
 from seakeep.models.parametric import regress_varying
@@ -41,6 +40,7 @@ from seakeep.models.selection import (
 from seakeep.models.settings import (
     OPENED,
     HankelSettings,
+    Needs,
     Select,
     in_samples,
     periods_to_samples,
@@ -899,5 +899,5 @@ def _step_of(dt: float | None, runs: Runs | None) -> float:
     runs = as_runs(runs)
     step = labelled.common_step(runs)
     if dt is not None:
-        labelled.check_step(*next((run, name) for name, run in runs.items()), dt)
+        labelled.run_step(*next((run, name) for name, run in runs.items()), dt)
     return step

@@ -6,17 +6,13 @@ import functools
 import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from pathlib import Path
 from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray
-from seakeep.errors import MissingFileError, RequestError
-from seakeep.files import load_sealed
-from seakeep.models.checks import plain
+from seakeep.arrays import FloatArray, plain
 from seakeep.models.observables import from_json
 from seakeep.models.terms import Observable
 
@@ -58,7 +54,9 @@ def _rebuilt(kind: Any, value: Any, dataset: xr.Dataset) -> Any:
         ways = (_rebuilt(each, value, dataset) for each in inside)
         return next((each for each in ways if each is not value), value)
     if kind == FloatArray:
-        return numbers(dataset, value)
+        numbers = np.ascontiguousarray(dataset[value].values, dtype=np.float64)
+        numbers.flags.writeable = False
+        return numbers
     if kind is Observable:
         return from_json(value)
     if origin is tuple:
@@ -78,32 +76,3 @@ _hints = functools.cache(get_type_hints)
 def content(dataset: xr.Dataset, name: str) -> Any:
     """JSON value that a file keeps in an attribute."""
     return json.loads(dataset.attrs[name])
-
-
-def numbers(dataset: xr.Dataset, name: str) -> FloatArray:
-    """Array that a file keeps, read-only."""
-    values = np.ascontiguousarray(dataset[name].values, dtype=np.float64)
-    values.flags.writeable = False
-    return values
-
-
-def as_json(value: object) -> str:
-    """Write JSON values as text; numbers of numpy become plain ones."""
-    return json.dumps(plain(value))
-
-
-def read(path: str | Path) -> xr.Dataset:
-    """Read a model file into memory, with ``attrs["seakeep_kind"]``; raises as load_sealed."""
-    source = Path(path)
-    if source.suffix.lower() == ".toml":
-        raise RequestError(
-            f"{source} is a campaign file, and a model file is expected here: the model comes "
-            "first, and then the campaign."
-        )
-    try:
-        return load_sealed(source, MODEL)
-    except MissingFileError as error:
-        raise MissingFileError(
-            f"{error} A model file is expected here: make one with `seakeep fit` or "
-            "model.save(...)."
-        ) from None

@@ -22,8 +22,7 @@ from seakeep.core.embedding import (
 from seakeep.core.solve import Method, Solution, identify
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 from seakeep.models import labelled
-from seakeep.models.inputs import InputMap, Regressors
-from seakeep.models.interface import Scale, Signature
+from seakeep.models.inputs import InputMap, Regressors, Scale, Signature
 from seakeep.models.labelled import ChannelLabel, Span, Stop
 from seakeep.models.settings import HankelSettings
 
@@ -151,6 +150,8 @@ def with_means(
     settings: HankelSettings, states: Sequence[FloatArray], direct: Sequence[FloatArray]
 ) -> list[FloatArray]:
     """Direct regressors of each run, and the means over blocks of its delayed states."""
+    if not settings.blocks:
+        return [*direct]
     return [
         np.concatenate([own, block_means(x, settings.blocks)], axis=1)
         for own, x in zip(direct, states, strict=True)
@@ -274,8 +275,12 @@ def _standardised(
     zeros: tuple[FloatArray, ...] = ()
     if settings.centre:
         series, zeros = departures(series, windows, input_map)
+    # A look-ahead leaves the last row, which is no column, without regressors.
     groups = [
-        [_lengthened(values, len(own[0])) for values, own in zip(group, series, strict=True)]
+        [
+            values if len(values) == len(own[0]) else np.concatenate([values, values[-1:]])
+            for values, own in zip(group, series, strict=True)
+        ]
         for group in zip(*series, strict=True)
     ]
     channels = [
@@ -373,19 +378,6 @@ class TrainingArrays:
         ]
         return type(self)(*zip(*read, strict=True))
 
-    def span(
-        self, run: int, settings: HankelSettings, last: int | None, dt: float
-    ) -> tuple[float, float]:
-        """First and last instant of a training window that ends at a sample of the run, s."""
-        end = self._end(run, last)
-        stop = self.begins[run] + end * dt
-        samples = end + 1 if settings.window is None else settings.window
-        return stop - (samples - 1) * dt, stop
-
-    def _end(self, run: int, last: int | None) -> int:
-        """Last sample of a window in the arrays of a run."""
-        return len(self.states[run]) - 1 if last is None else last - self.offsets[run]
-
     def data(
         self, settings: HankelSettings, run: int | None, last: int | None, signature: Signature
     ) -> TrainingData:
@@ -395,9 +387,11 @@ class TrainingArrays:
         """
         input_map, pieces = replace(signature.input_map, reference=0), []
         for each in range(len(self.names)) if run is None else (run,):
-            _, shifted, cut = _place(self._end(each, last), settings, input_map)
+            end = len(self.states[each]) - 1 if last is None else last - self.offsets[each]
+            place, shifted, cut = _place(end, settings, input_map)
             series = self.states[each][cut], self.delayed[each][cut], self.direct[each][cut]
-            instants = self.span(each, settings, last, signature.dt)
+            begin, dt = self.begins[each], signature.dt
+            instants = begin + place.first * dt, begin + end * dt
             pieces.append(Piece(self.names[each], series, shifted, instants))
         labels = signature.state_labels, signature.input_labels
         return _standardised(pieces, signature.dt, labels, input_map, settings)
@@ -429,12 +423,6 @@ def run_regressors(
     return Regressors(*(np.concatenate([each[:1].repeat(missing, 0), each]) for each in rows))
 
 
-def _lengthened(values: FloatArray, length: int) -> FloatArray:
-    """Rows with the last one repeated where a look-ahead leaves one without: it is no column."""
-    missing = length - len(values)
-    return np.concatenate([values, values[-1:]]) if missing > 0 else values
-
-
 def until(runs: Datasets, stop: Stop) -> Groups:
     """Cut runs at the last instants of their training windows.
 
@@ -457,12 +445,15 @@ def until(runs: Datasets, stop: Stop) -> Groups:
     DataError
         If the times of a run are not uniform.
     """
-    stops, out = _stop_instants(stop, list(runs)), {}
+    stops, out = _stops_by_run(stop, list(runs)), {}
     for name, run in runs.items():
-        labelled.run_step(run, name)
+        step = labelled.run_step(run, name)
         out[name] = run
         if (at := stops[name]) is not None:
-            last = _last_sample(np.asarray(run["time"].values, dtype=float), at, name)
+            time = np.asarray(run["time"].values, dtype=float)
+            last = labelled.nearest_sample(time, at, name, "stop")
+            # "up to and including": a sample later than the stop by more than rounding is not.
+            last -= last > 0 and time[last] > float(at) + 1e-3 * step
             out[name] = run.isel(time=slice(0, last + 1))
     return out
 
@@ -496,7 +487,7 @@ def check_names(states: Sequence[str], inputs: Sequence[str]) -> None:
         )
 
 
-def _stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
+def _stops_by_run(stop: Stop, names: list[str]) -> dict[str, Any]:
     """Last instant of each run's window as the user gave it; None for the run's end."""
     if stop is None:
         return dict.fromkeys(names)
@@ -507,28 +498,16 @@ def _stop_instants(stop: Stop, names: list[str]) -> dict[str, float | None]:
                 f"stop names the run '{unknown[0]}', which is not among the runs "
                 f"({', '.join(names)}).{did_you_mean(unknown[0], names)}"
             )
-        return {name: _one_stop(stop.get(name), f"stop of '{name}'") for name in names}
+        return {name: stop.get(name) for name in names}
     if np.ndim(stop) > 0:  # a scalar array, such as an instant of a run, is one for all
-        values = [_one_stop(value, "each stop") for value in cast("list[Any]", stop)]
+        values = list(cast("list[Any]", stop))
         if len(values) != len(names):
             raise RequestError(
                 f"stop has {len(values)} instants for {len(names)} runs; give one for all, or "
                 "one per run."
             )
         return dict(zip(names, values, strict=True))
-    return dict.fromkeys(names, labelled.as_instant(stop, "stop"))
-
-
-def _one_stop(value: object, what: str) -> float | None:
-    return None if value is None else labelled.as_instant(value, what)
-
-
-def _last_sample(time: FloatArray, stop: float, name: str) -> int:
-    """Last sample up to and including `stop`."""
-    nearest = labelled.nearest_sample(time, stop, name, "stop")
-    step = (time[-1] - time[0]) / (time.size - 1)
-    # "up to and including": a sample later than the stop by more than rounding is not included.
-    return nearest if time[nearest] <= stop + 1e-3 * step else max(nearest - 1, 0)
+    return dict.fromkeys(names, stop)
 
 
 def _warn_of_dead(pieces: Sequence[Piece], group: int, scale: Scale, names: Sequence[str]) -> None:

@@ -6,8 +6,9 @@ Slow motions of which a training window holds too few cycles to estimate mean an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntFlag
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,14 @@ from scipy import fft
 
 from seakeep.arrays import TINY, BoolArray, Datasets, FloatArray, IntArray
 from seakeep.conventions import is_elevation
-from seakeep.core.spectra import PER_OCTAVE, band_edges, band_energy, split_bands
+from seakeep.core.spectra import split_bands
 from seakeep.errors import warn
 from seakeep.models import labelled
-from seakeep.models.interface import Signature
+from seakeep.models.inputs import Signature
 from seakeep.waves import GRAVITY
 
+PER_OCTAVE = 6
+"""Bands per octave: each is 12 % wide, as wide as the peak of a record of eight waves."""
 TRAINED = 0.01
 """Part of the training energy from which a band, or a neighbour of it, counts as trained: the
 leakage of a taper stays below it, and the tail of a sea above twice its peak frequency too."""
@@ -57,8 +60,6 @@ class Conditions:
     ----------
     trained : Coverage
         The training.
-    periods : ndarray, shape (band,)
-        Middle of each band, s.
     peak : ndarray of int, shape (channel,)
         Band with the most energy.
     unseen : ndarray, shape (channel,)
@@ -76,7 +77,6 @@ class Conditions:
     """
 
     trained: Coverage
-    periods: FloatArray
     peak: IntArray
     unseen: FloatArray
     heights: FloatArray
@@ -110,7 +110,7 @@ class Conditions:
             "trained_height": self.trained.heights,
             "steepness": self.steepnesses,
             "trained_steepness": self.trained.steepnesses,
-            "period": self.periods[self.peak],
+            "period": self.trained.periods[self.peak],
             "unseen_energy": self.unseen,
         }
         if self.surge is not None:
@@ -121,17 +121,17 @@ class Conditions:
         """A sentence for each reason: periods, heights, steepnesses, mean surge."""
         texts: list[list[str]] = [[], [], []]
         for at, (channel, unit) in enumerate(zip(self.trained.channels, self.units, strict=True)):
-            peak, taught = self.peak[at], self.trained.shares[at] >= TRAINED
-            known, trained = self.trained.known[at], np.flatnonzero(taught)
+            peak, periods = self.peak[at], self.trained.periods
+            known, trained = self.trained.known[at], np.flatnonzero(self.trained.taught[at])
             if self.reasons[0, at]:
                 low, high, where, word, nothing = trained[0], trained[-1], "outside", "to", ""
                 if low < peak < high and not known[peak]:
                     low, high = trained[trained < peak][-1], trained[trained > peak][0]
                     where, word, nothing = "between", "and", ", with none between"
                 texts[0].append(
-                    f"{channel}: the dominant period of {self.periods[peak]:.3g} s lies {where} "
-                    f"the periods that trained the model ({self.periods[high]:.3g} {word} "
-                    f"{self.periods[low]:.3g} s{nothing}); {100 * self.unseen[at]:.0f} % of the "
+                    f"{channel}: the dominant period of {periods[peak]:.3g} s lies {where} "
+                    f"the periods that trained the model ({periods[high]:.3g} {word} "
+                    f"{periods[low]:.3g} s{nothing}); {100 * self.unseen[at]:.0f} % of the "
                     "energy is at periods it has not seen"
                 )
             for group, what, values, most, of in (
@@ -169,6 +169,18 @@ class Coverage:
     heights, steepnesses : ndarray, shape (channel,)
         Largest ones of a window: four SDs, of regular waves 2√2, and that over the length in deep
         water of a wave of the mean period.
+
+    Attributes
+    ----------
+    edges : ndarray, shape (band + 1,)
+        Edges of the bands, Hz.
+    periods : ndarray, shape (band,)
+        Middle of each band, s.
+    taught, known : ndarray of bool, shape (channel, band)
+        Bands that were trained, and those with the bands beside them: the leakage of a taper
+        reaches there.
+    elevations : ndarray of bool, shape (channel,)
+        Inputs that are wave elevations.
     """
 
     channels: tuple[str, ...]
@@ -176,6 +188,23 @@ class Coverage:
     shares: FloatArray
     heights: FloatArray
     steepnesses: FloatArray
+    edges: FloatArray = field(init=False, repr=False)
+    periods: FloatArray = field(init=False, repr=False)
+    taught: BoolArray = field(init=False, repr=False)
+    known: BoolArray = field(init=False, repr=False)
+    elevations: BoolArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        edges = 2.0 ** ((self.first + np.arange(self.shares.shape[1] + 1)) / PER_OCTAVE)
+        taught = self.shares >= TRAINED
+        known = taught.copy()
+        known[:, 1:] |= taught[:, :-1]
+        known[:, :-1] |= taught[:, 1:]
+        elevations = np.array([is_elevation(each) for each in self.channels], dtype=bool)
+        periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])
+        made = {"edges": edges, "periods": periods, "taught": taught, "known": known}
+        for name, value in (made | {"elevations": elevations}).items():
+            object.__setattr__(self, name, value)
 
     @classmethod
     def of(cls, channels: Sequence[str], series: Sequence[FloatArray], dt: float) -> Coverage:
@@ -185,16 +214,8 @@ class Coverage:
         count = int(np.floor(PER_OCTAVE * np.log2(0.5 / dt))) + 1 - first
         energy = np.sum([band_energy(each, dt, first, count) for each in series], axis=0)
         most = np.max([_heights(each, dt) for each in series], axis=0)
-        return cls(tuple(channels), first, _shares(energy), *most)
-
-    @property
-    def known(self) -> BoolArray:
-        """Bands that were trained, and those beside them: the leakage of a taper reaches there."""
-        taught = self.shares >= TRAINED
-        known = taught.copy()
-        known[:, 1:] |= taught[:, :-1]
-        known[:, :-1] |= taught[:, 1:]
-        return known
+        shares = energy / np.maximum(energy.sum(axis=1, keepdims=True), TINY)
+        return cls(tuple(channels), first, shares, *most)
 
     def quarter(self, dt: float) -> int:
         """Samples in a quarter of the period with most energy; of several inputs, the shortest."""
@@ -208,9 +229,8 @@ class Coverage:
         -------
         ndarray of bool, shape (channel, frequency)
         """
-        edges = band_edges(self.first, self.shares.shape[1])
         known = np.pad(self.known, ((0, 0), (1, 1)))  # nothing below and above the bands
-        return known[:, np.searchsorted(edges, frequency, side="right")]
+        return known[:, np.searchsorted(self.edges, frequency, side="right")]
 
     def conditions(
         self,
@@ -228,24 +248,21 @@ class Coverage:
         tenth, are no reason. What moves for five periods or less is not judged.
         """
         dt = signature.dt
-        own = _shares(band_energy(inputs, dt, self.first, self.shares.shape[1]))
-        edges = band_edges(self.first, self.shares.shape[1])
-        taught, peak = self.shares >= TRAINED, own.argmax(axis=1)
-        periods = 1.0 / np.sqrt(edges[:-1] * edges[1:])
-        lasts = len(inputs) * dt if duration is None else duration
-        repeats = lasts / periods[peak]
+        energy = band_energy(inputs, dt, self.first, self.shares.shape[1])
+        own = energy / np.maximum(energy.sum(axis=1, keepdims=True), TINY)
+        lasts, peak = len(inputs) * dt if duration is None else duration, own.argmax(axis=1)
+        repeats = lasts / self.periods[peak]
         heights, steepnesses = _heights(inputs, dt)
-        elevations = np.array([is_elevation(each) for each in self.channels], dtype=bool)
         margin = 1.1 + 1.7 / repeats**0.5
         unseen = np.where(self.known, 0.0, own).sum(axis=1)
         reasons = np.array(
             [
                 unseen > 0.5,
                 heights > margin * self.heights,
-                elevations & (steepnesses > margin * self.steepnesses),
+                self.elevations & (steepnesses > margin * self.steepnesses),
             ]
         )
-        reasons &= taught.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
+        reasons &= self.taught.any(axis=1) & own.any(axis=1) & (repeats > CYCLES)
         if waves is not None:
             reasons &= np.isin(np.arange(len(self.channels)), waves)
         mean, reach, scale = None, np.array([-np.inf, np.inf]), signature.state_scale
@@ -255,9 +272,7 @@ class Coverage:
             at, mean = signature.states.index("surge"), float(np.nanmean(surge))
             reach = scale.centre[at] + scale.reach[at] * np.array([-1.0, 1.0])
         units = tuple(label.units for label in signature.input_labels)
-        return Conditions(
-            self, periods, peak, unseen, heights, steepnesses, reasons, mean, reach, units
-        )
+        return Conditions(self, peak, unseen, heights, steepnesses, reasons, mean, reach, units)
 
 
 def outside_training(
@@ -284,24 +299,49 @@ def outside_training(
         A sentence for each reason; none where the forecast is shorter than five periods.
     """
     coverage: Coverage | None = getattr(model, "coverage", None)
-    if coverage is None or not model.inputs:
+    if coverage is None or not coverage.channels:
         return []
+    signature: Signature = model.signature
     name = labelled.run_name(run, "the run")
     time = np.asarray(run["time"].values, dtype=float)
-    at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
-    first = max(at - model.signature.input_delays, 0)
-    values = labelled.channel_matrix(run, model.inputs, name, slice(first, at + steps))
+    at = labelled.nearest_sample(time, start, name)
+    first = max(at - signature.input_delays, 0)
+    values = labelled.channel_matrix(run, coverage.channels, name, slice(first, at + steps))
     if len(values) < 2 or not np.all(np.isfinite(values)):
         return []
-    duration = steps * model.dt
+    duration = steps * signature.dt
     if surge is None and "surge" in run:
         surge = run["surge"].values[(time > start) & (time <= start + duration + 1e-6)]
-    return coverage.conditions(values, model.signature, surge, duration).sentences()
+    return coverage.conditions(values, signature, surge, duration).sentences()
 
 
-def _shares(energy: FloatArray) -> FloatArray:
-    total = energy.sum(axis=1, keepdims=True)
-    return np.divide(energy, total, out=np.zeros_like(energy), where=total > 0)
+def band_energy(series: FloatArray, dt: float, first: int, count: int) -> FloatArray:
+    """Energy of series (time, channel) in `count` bands from the number `first` on.
+
+    Returns
+    -------
+    ndarray, shape (channel, band)
+        Sums of a Hann-tapered periodogram; they add up to about the variance times the length.
+    """
+    taper, bands, begins, stop = _taper_and_bands(len(series), dt, first, count)
+    tapered = np.ascontiguousarray(series.T)
+    tapered = taper * (tapered - tapered.mean(axis=1, keepdims=True))
+    power = np.abs(fft.rfft(tapered)) ** 2
+    out = np.zeros((len(power), count))
+    out[:, bands] = np.add.reduceat(power[:, :stop], begins, axis=1) / len(series)
+    return out
+
+
+@lru_cache(maxsize=8)
+def _taper_and_bands(
+    length: int, dt: float, first: int, count: int
+) -> tuple[FloatArray, IntArray, IntArray, int]:
+    """Hann taper, bands that hold frequencies, the first of each, and the one after the last."""
+    frequency = fft.rfftfreq(length, dt)[1:]
+    band = np.floor(PER_OCTAVE * np.log2(frequency)).astype(np.intp) - first
+    inside = 1 + np.flatnonzero((band >= 0) & (band < count))
+    bands, begins = np.unique(band[inside - 1], return_index=True)
+    return np.hanning(length + 2)[1:-1], bands, inside[begins], int(inside[-1]) + 1
 
 
 def _heights(inputs: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:

@@ -129,29 +129,6 @@ def carriers(
     return taps.reshape(len(targets), len(probes), lags.size), errors
 
 
-def carried(taps: FloatArray, record: FloatArray) -> FloatArray:
-    """Elevations at the places of carriers.
-
-    Parameters
-    ----------
-    taps : ndarray, shape (place, probe, taps)
-        From :func:`carriers`.
-    record : ndarray, shape (time, probe)
-        Elevations at the probes.
-
-    Returns
-    -------
-    ndarray, shape (time − taps + 1, place)
-        The first row belongs to the instant of sample `back`.
-    """
-    places, _, length = taps.shape
-    if len(record) < length:
-        return np.zeros((0, places))
-    windows = np.lib.stride_tricks.sliding_window_view(record, length, axis=0)
-    carried_to: FloatArray = windows.reshape(len(windows), -1) @ taps.reshape(places, -1).T
-    return carried_to
-
-
 def slow_position(surge: FloatArray, period: float) -> FloatArray:
     """Surge below ``CUTOFF`` without delay; `period` in samples."""
     sections = signal.butter(4, 2 * CUTOFF / period, output="sos")

@@ -13,9 +13,9 @@ import numpy.typing as npt
 import scipy
 from scipy import special
 
-from seakeep.arrays import FloatArray, as_series, number, positive, time_step
+from seakeep.arrays import FloatArray, as_real, as_series, number, positive, time_step
 from seakeep.errors import DataError, RequestError
-from seakeep.signals.time_axis import as_seconds, span_text, uniform_step
+from seakeep.signals.time_axis import span_text, uniform_step
 
 
 def lowpass_taps(
@@ -193,7 +193,10 @@ def resample(
     True
     """
     array = as_series(series, channels=True)
-    t, wanted = as_seconds(time, "the series"), as_seconds(new_time, "the new time axis")
+    t, wanted = (
+        as_real(instants, f"the times of {what}", DataError)
+        for instants, what in ((time, "the series"), (new_time, "the new time axis"))
+    )
     dt, new_dt = uniform_step(t, "the series"), uniform_step(wanted, "the new time axis")
     slack = 1e-6 * dt
     if wanted[0] < t[0] - slack or wanted[-1] > t[-1] + slack:

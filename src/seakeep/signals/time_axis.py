@@ -16,11 +16,6 @@ STEP_TOLERANCE = 0.01
 """A time axis is uniform if no instant is further than this part of a step from its grid."""
 
 
-def as_seconds(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
-    """Return times as floats; refuse dates, text and what else is not a number of seconds."""
-    return as_real(time, f"the times of {name}", DataError)
-
-
 def instant_text(instant: float, dt: float) -> str:
     """Write an instant to a thousandth of a time step, for any origin of time.
 
@@ -42,7 +37,7 @@ def span_text(begin: float, end: float, dt: float) -> str:
 
 def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
     """Return the times as floats; refuse values that are not finite, repeated or unsorted."""
-    t = as_seconds(time, name)
+    t = as_real(time, f"the times of {name}", DataError)
     if t.ndim != 1 or t.size < 2:
         raise DataError(
             f"{name} has {t.size} instant(s); a time axis needs at least two. "
@@ -121,7 +116,7 @@ def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
     >>> uniform_step([0.0, 0.1, 0.2, 0.3])
     0.1
     """
-    t = as_seconds(time, name)
+    t = as_real(time, f"the times of {name}", DataError)
     if t.ndim != 1 or t.size < 2:
         check_order(t, name)
     step = float((t[-1] - t[0]) / (t.size - 1))

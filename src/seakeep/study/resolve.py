@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, Literal
 
+from seakeep.arrays import check_keys
 from seakeep.campaign import ModelSettings
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.errors import RequestError, SeakeepWarning, did_you_mean
 from seakeep.models import KINDS, ProbeAlignment, Select, Spec
-from seakeep.models.checks import check_keys
 from seakeep.models.observables import SlowSquares, counted_in, observables_of
 from seakeep.models.settings import Folds
 from seakeep.models.specs import left_open

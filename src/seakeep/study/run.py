@@ -29,10 +29,10 @@ from seakeep.formats.columns import decoding
 from seakeep.models.calibration import envelope_of, held_out, learn_margin
 from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.ensemble import spectral_radius
+from seakeep.models.forecasts import STATISTICS, reduce_members
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
-from seakeep.models.summaries import STATISTICS, reduce_members
 from seakeep.models.training import gather
 from seakeep.signals import envelope_squared
 from seakeep.study.describe import describe_study, words_of_repeats
