@@ -401,29 +401,23 @@ class Problem:
         states = data.signature.state_scale.physical(data.states[run])
         zeros: dict[int, FloatArray] = {}
         known: dict[int, FloatArray] = {}  # by start: a longer run begins with the shorter one
-        every: dict[int, FreeRuns] = {}
         read = self.windows(run, horizons)
-        for steps in sorted(horizons, reverse=True):
-            starts = self.starts(run, steps).tolist()
-            if steps in read:
-                new, windows = read[steps]
-                last = windows.delayed.shape[1] - self.ahead(candidate)
-                if windows.zero is not None:
-                    zeros |= zip(new, data.zeros[run] - windows.zero, strict=True)
-                windows = replace(
-                    windows,
-                    zero=None,  # read-outs are learnt from departures
-                    delayed=windows.delayed[:, :last],
-                )
-                (computed,) = linear_runs(models, [windows])
-                known |= zip(new, computed.swapaxes(0, 1), strict=True)
-            if starts:
+        groups = []
+        for new, windows in read.values():
+            last = windows.delayed.shape[1] - self.ahead(candidate)
+            if windows.zero is not None:
+                zeros |= zip(new, data.zeros[run] - windows.zero, strict=True)
+            # Read-outs are learnt from departures.
+            groups.append(replace(windows, zero=None, delayed=windows.delayed[:, :last]))
+        for (new, _), computed in zip(read.values(), linear_runs(models, groups), strict=True):
+            known |= zip(new, computed.swapaxes(0, 1), strict=True)
+        for steps in horizons:
+            if starts := self.starts(run, steps).tolist():
                 predicted = np.stack([known[at][:, :steps] for at in starts], axis=1)
                 measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
                 if zeros:
                     measured += np.stack([zeros[at] for at in starts])[:, None]
-                every[steps] = FreeRuns(predicted, measured, models[0].signature.state_scale.std)
-        yield from (every[steps] for steps in horizons if steps in every)
+                yield FreeRuns(predicted, measured, models[0].signature.state_scale.std)
 
     def judge(self, tried: Tried, fold: int) -> list[Scores]:
         """Judge free runs on a run that is held out, over all horizons that fit."""
