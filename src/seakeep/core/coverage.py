@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction
+from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction, undefined
 from seakeep.errors import DataError, RequestError
 
 WAVE_PARTS = ("lowest waves", "middle waves", "highest waves")
@@ -210,8 +210,8 @@ def coverage_table(
     Parameters
     ----------
     lower, upper, measured : array_like, shape (…, time, channel), or Dataset
-        Bounds and measurement in windows of the same length. Windows in which the band is lost
-        (NaN) in any channel are left out.
+        Bounds and measurement in windows of the same length. Windows in which the band of a
+        channel is lost (NaN) are left out of that channel.
     level : float, optional
         Probability that the band is to have.
     waves : array_like, shape (…, time), or DataArray, optional
@@ -244,23 +244,29 @@ def coverage_table(
         finite(np.atleast_1d(heights), "waves")
         heights = np.broadcast_to(heights, y.shape[:-1]).reshape(-1, y.shape[-2])
     low, high, y = (each.reshape(-1, *y.shape[-2:]) for each in (low, high, y))
-    whole = ~(np.isnan(low) | np.isnan(high)).any(axis=(1, 2))
-    if not whole.any():
-        raise DataError(
-            f"the band is lost in all of {whole.size} window(s); nothing can be judged."
-        )
-    low, high, y = low[whole], high[whole], y[whole]
-    places = _parts(y.shape[:2], None if heights is None else heights[whole])
+    lost = np.any(np.isnan(low) | np.isnan(high), axis=1, keepdims=True)
+    held = np.broadcast_to(~lost, y.shape)
+    some = np.any(held, axis=(1, 2))
+    if not some.any():
+        raise DataError(f"the band is lost in all of {some.size} window(s); nothing can be judged.")
+    low, high, y, held = low[some], high[some], y[some], held[some]
+    places = _parts(y.shape[:2], None if heights is None else heights[some])
     scores = {
         "inside": ((y >= low) & (y <= high)).astype(float),
         "width": high - low,
         "winkler": winkler_score(low, high, y, level),
         "crps": band_crps(low, high, y, level),
     }
-    variables = {
-        key: np.stack([each[place].mean(axis=0) for place in places.values()])
-        for key, each in scores.items()
-    }
+    with undefined():
+        variables = {
+            key: np.stack(
+                [
+                    each[place].sum(axis=0, where=held[place]) / held[place].sum(axis=0)
+                    for place in places.values()
+                ]
+            )
+            for key, each in scores.items()
+        }
     pooled = y.reshape(-1, y.shape[-1])
     spread = np.where(np.ptp(pooled, axis=0) > 0, pooled.std(axis=0, ddof=1), np.nan)
     return CoverageTable(

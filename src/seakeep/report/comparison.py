@@ -25,7 +25,6 @@ from seakeep.report.tables import (
     Table,
     band_verdict,
     band_words,
-    change,
     entries,
     interval,
     number,
@@ -35,7 +34,6 @@ from seakeep.report.tables import (
     row,
     short,
 )
-from seakeep.study.judge import verdict
 
 UNTIL = "waves read until [s]"
 """Column of a forecast's CSV file where the model looks ahead."""
@@ -145,12 +143,7 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
         yield Table("by_run", f"{of} by wave period: ANRMSE", heads, rows, averages=[len(runs)])
     changes: list[tuple[str, ...]] = []
     for at in entries(table, "model"):
-        value, low, high = ratio_of(at, "all_")
-        cells = ("", "", "")
-        if changes:
-            known = bool(np.isfinite([low, high]).all())
-            bounds = (change(low, high), verdict(low - 1, high - 1)) if known else ("", "")
-            cells = (change(value), *bounds)
+        cells = ratio_of(at, "all_").cells() if changes else ("", "", "")
         changes.append((*row(at, "model", all_anrmse=3), *cells))
     note = "Paired intervals over redrawn blocks of the forecast; they hold for these runs."
     heads = ("model", "ANRMSE", "change", "95 %", "verdict")
@@ -168,9 +161,9 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
     name, first = (each["model"].item() for each in (best, table.isel(model=0)))
     said = f"Least error: {name}, ANRMSE {number(best['all_anrmse'])}"
     if name != first:
-        value, low, high = ratio_of(best, "all_")
-        said += f", {change(value)} [{change(low, high)}] from {first}"
-        if verdict(low - 1, high - 1) != "better":
+        value, bounds, word = ratio_of(best, "all_").cells()
+        said += f", {value} [{bounds}] from {first}"
+        if word != "better":
             return f"{said}: no model is surely better. Keep {first}."
     if kind := baselines.get(name):
         said += (
