@@ -218,7 +218,8 @@ def findings(result: StudyResult) -> list[str]:
             if singles and ensembles:
                 pair = {"model": ensembles[0], "other": singles[0], "measure": measure}
                 value, bounds, word = ratio_of(differences.sel(pair)).cells()
-                words += f" (the ensemble's mean: {word}, {value} [{bounds}])"
+                within = "too few cells" if bounds == MISSING else f"[{bounds}]"
+                words += f" (the ensemble's mean: {word}, {value} {within})"
             parts.append(words)
         label = result.label_of(test)
         said.append(f"{label[:1].upper()}{label[1:]}: {'; '.join(parts)}.")
