@@ -132,6 +132,10 @@ def test_a_calibrated_band_that_is_infinite_counts_neither_as_inside_nor_as_wide
     bands = tables["bands"].sel(model="m", band="calibrated", part="all")
     np.testing.assert_allclose(bands["inside"], 0.5)
     np.testing.assert_allclose(bands["width"], 34.5)
+    endless = calibration.assign(margin=calibration["margin"].max("training"))
+    tables = band_tables(four(), endless.expand_dims(training=2), 0.95)
+    bands = tables["bands"].sel(model="m", band="calibrated", part="all")
+    np.testing.assert_array_equal(bands["inside"].isnull(), [True, False])
 
 
 def test_boxes_are_those_of_the_judged_cells():

@@ -317,7 +317,7 @@ def band_tables(test: xr.Dataset, calibration: xr.Dataset | None, level: float) 
     for model, band in product(ensembles, bands):
         lower, upper = (bound[judged] for bound in band_of(test, model, bands[band]))
         shares += [_coverage_row(lower, upper, each) for each in against.values()]
-        if not np.isnan(lower).any(axis=(1, 2)).all():  # lost, or nothing to calibrate on
+        if not np.isnan(lower).any(axis=1).all():  # lost, or nothing to calibrate on
             parts[model, band] = statistics.coverage_table(
                 lower, upper, against["measured"], level, waves
             )

@@ -4,6 +4,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -160,17 +161,10 @@ def difference_table(result: StudyResult, test: str) -> Table:
     """Change of both measures from the first model to each other one, and whether it is better."""
     first, *others = result.models
     at = result.groups["statistics/differences"].sel(test=test, other=first, channel="average")
-    rows = [
-        (
-            model_words(model),
-            *(
-                cell
-                for key in HEADING
-                for cell in ratio_of(at.sel(model=model, measure=key)).cells()
-            ),
-        )
-        for model in others
-    ]
+    rows = []
+    for model in others:
+        pairs = [ratio_of(at.sel(model=model, measure=key)).cells() for key in HEADING]
+        rows.append((model_words(model), *chain(*pairs)))
     heads = [f"{key}: {part}" for key in HEADING.values() for part in ("change", "95 %", "verdict")]
     return table(
         "differences",
@@ -190,16 +184,12 @@ def conditional(result: StudyResult, models: Sequence[str]) -> str:
     return f" Conditional on measured {words}: {listed(read)}." if read else ""
 
 
-def left_out(result: StudyResult) -> str:
-    """Sentence on references, which tables and figures by channel leave out."""
-    gone = [model for model in result.models if model not in judged_models(result)]
-    where = WORDS["sections"]["scales"]["title"]
-    return f" References are left out: {listed(gone)}; see “{where}”." if gone else ""
-
-
 def of_judged(result: StudyResult) -> str:
-    """What is left out of the models that are no references, and what they read."""
-    return left_out(result) + conditional(result, judged_models(result))
+    """Sentences on references, which tables and figures by channel leave out, and on the others."""
+    judged, where = judged_models(result), WORDS["sections"]["scales"]["title"]
+    gone = [model for model in result.models if model not in judged]
+    words = f" References are left out: {listed(gone)}; see “{where}”." * bool(gone)
+    return words + conditional(result, judged)
 
 
 def findings(result: StudyResult) -> list[str]:
@@ -364,6 +354,7 @@ def errors(result: StudyResult) -> Section:
             group,
             tests=", ".join(map(result.label_of, group)),
             fewest=FEWEST,
+            more=conditional(result, result.models),
             name=f"errors_{group[0] if len(group) == 1 else 'others'}",
         )
         for group in filter(None, groups)
@@ -376,7 +367,7 @@ def errors(result: StudyResult) -> Section:
             test,
             tests=result.label_of(test),
             fewest=FEWEST,
-            left_out=left_out(result),
+            more=of_judged(result),
             name=f"errors_{test}_by_channel",
         )
         for test in tests
