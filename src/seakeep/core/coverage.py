@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction, undefined
+from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, finite, fraction
 from seakeep.errors import DataError, RequestError
 
 WAVE_PARTS = ("lowest waves", "middle waves", "highest waves")
@@ -245,11 +245,11 @@ def coverage_table(
         heights = np.broadcast_to(heights, y.shape[:-1]).reshape(-1, y.shape[-2])
     low, high, y = (each.reshape(-1, *y.shape[-2:]) for each in (low, high, y))
     lost = np.any(np.isnan(low) | np.isnan(high), axis=1, keepdims=True)
-    held = np.broadcast_to(~lost, y.shape)
-    some = np.any(held, axis=(1, 2))
+    lost = np.broadcast_to(lost, y.shape)
+    some = ~np.all(lost, axis=(1, 2))
     if not some.any():
         raise DataError(f"the band is lost in all of {some.size} window(s); nothing can be judged.")
-    low, high, y, held = low[some], high[some], y[some], held[some]
+    low, high, y, lost = low[some], high[some], y[some], lost[some]
     places = _parts(y.shape[:2], None if heights is None else heights[some])
     scores = {
         "inside": ((y >= low) & (y <= high)).astype(float),
@@ -257,16 +257,12 @@ def coverage_table(
         "winkler": winkler_score(low, high, y, level),
         "crps": band_crps(low, high, y, level),
     }
-    with undefined():
-        variables = {
-            key: np.stack(
-                [
-                    each[place].sum(axis=0, where=held[place]) / held[place].sum(axis=0)
-                    for place in places.values()
-                ]
-            )
-            for key, each in scores.items()
-        }
+    variables = {
+        key: np.ma.stack(
+            [np.ma.array(each, mask=lost)[place].mean(axis=0) for place in places.values()]
+        ).filled(np.nan)
+        for key, each in scores.items()
+    }
     pooled = y.reshape(-1, y.shape[-1])
     spread = np.where(np.ptp(pooled, axis=0) > 0, pooled.std(axis=0, ddof=1), np.nan)
     return CoverageTable(

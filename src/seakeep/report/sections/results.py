@@ -277,7 +277,7 @@ def _fewer_windows(result: StudyResult) -> list[str]:
     return [
         f"{used} {what} were used of the {asked} asked for: no more fit without overlap."
         for what, asked, used in places
-        if asked is not None and used < asked
+        if used < (asked or 0)
     ]
 
 
