@@ -198,16 +198,16 @@ def findings(result: StudyResult) -> list[str]:
     ensembles = result.ensembles
     singles = [model for model in result.models if model not in ensembles]
     for test in result.tests:
-        differences = result.groups["statistics/differences"].sel(test=test, channel="average")
-        median = result.groups["statistics/boxes"]["median"].sel(test=test, channel="average")
         parts = []
         for measure, heading in HEADING.items():
-            errors = median.sel(measure=measure)
-            listed = [f"{model_words(m)} {number(errors.sel(model=m))}" for m in result.models]
-            words = f"median {heading} {', '.join(listed)}"
+            at = {"test": test, "measure": measure, "channel": "average"}
+            errors = result.groups["statistics/boxes"]["median"].sel(at)
+            each = (f"{model_words(m)} {number(errors.sel(model=m))}" for m in result.models)
+            words = f"median {heading} {', '.join(each)}"
             if singles and ensembles:
-                pair = {"model": ensembles[0], "other": singles[0], "measure": measure}
-                value, bounds, word = ratio_of(differences.sel(pair)).cells()
+                at |= {"model": ensembles[0], "other": singles[0]}
+                changes = ratio_of(result.groups["statistics/differences"].sel(at))
+                value, bounds, word = changes.cells()
                 within = "too few cells" if bounds == MISSING else f"[{bounds}]"
                 words += f" (the ensemble's mean: {word}, {value} {within})"
             parts.append(words)
