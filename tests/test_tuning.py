@@ -229,12 +229,12 @@ def test_a_search_that_was_interrupted_goes_on(tmp_path):
     more = {"vary": ["ridge"], "horizon": (15,), "resume": kept}
     with pytest.raises(KeyboardInterrupt):
         seakeep.tune(SPEC, runs(), STATES, INPUTS, progress=stop, **more)
-    assert len(json.loads(kept.read_text())["scores"]) == 1  # the second was not handed on
+    assert len(json.loads(kept.read_text())["scores"]) == 2
     counted = []
     again = seakeep.tune(
         SPEC, runs(), STATES, INPUTS, progress=lambda *each: counted.append(each), **more
     )
-    assert len(counted) == 2 + 3  # of three folds, and the rest of λ in all
+    assert len(counted) == 1 + 3  # of three folds, and the rest of λ in all
     whole = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,))
     assert again.table.identical(whole.table)
     with pytest.raises(RequestError, match="keeps scores of other runs or settings"):

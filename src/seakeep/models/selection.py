@@ -76,8 +76,10 @@ Known = MutableMapping[str, list[list[Any]]]
 """Scores and weights by candidate, fold and λ, as JSON values."""
 COARSE = 4
 """Every so-many-th λ is tried first."""
-NEAR = 1.5
-"""Error, in parts of the best, above which the other λ of a candidate are left."""
+NEAR = 1.2
+"""Error, in parts of the best, above which the other λ of a candidate are left.
+
+On the virtual tank they lower that of a candidate by 7 % at most."""
 LAST = 3
 """Runs whose windows each problem keeps in memory: the next round begins with them."""
 ALIKE = 0.03
@@ -729,7 +731,7 @@ def select(
     """Choose settings by free runs on training runs that are held out in turn.
 
     One setting after the other is chosen, each candidate with every fourth λ, and those about its
-    best unless it errs half as much again as the best of all: first what the settings leave open,
+    best unless it errs a fifth more than the best of all: first what the settings leave open,
     of which the simplest is taken that is as good as the best but for the noise; then what is
     varied from there, which is left for what is better by more than the noise.
     Of the λ the largest is taken that is as good as the best. Where that model grows, it is the

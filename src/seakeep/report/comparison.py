@@ -157,14 +157,20 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
     """
     if not np.isfinite(table["all_anrmse"]).any():
         return "No model could be judged."
-    best = table.isel(model=table["all_anrmse"].fillna(np.inf).argmin("model"))
-    name, first = (each["model"].item() for each in (best, table.isel(model=0)))
-    said = f"Least error: {name}, ANRMSE {number(best['all_anrmse'])}"
+    first, ratios = table["model"].values[0], {}
+    for at in entries(table.sortby("all_anrmse"), "model"):  # what cannot be judged comes last
+        ratios[at["model"].item()] = ratio_of(at, "all_").cells()
+    name = next(iter(ratios))
+    said = f"Least error: {name}, ANRMSE {number(table['all_anrmse'].min())}"
     if name != first:
-        value, bounds, word = ratio_of(best, "all_").cells()
-        said += f", {value} [{bounds}] from {first}"
-        if word != "better":
+        better = next((key for key, (*_, word) in ratios.items() if word == "better"), None)
+        for key in dict.fromkeys((name, better or name)):
+            value, bounds, _ = ratios[key]
+            said += f"; surely better: {key}" if key != name else ""
+            said += f", {value} [{bounds}] from {first}"
+        if better is None:
             return f"{said}: no model is surely better. Keep {first}."
+        name = better
     if kind := baselines.get(name):
         said += (
             f". To use it, give the campaign file a table [models.{kind}] with kind = '{kind}' and "
