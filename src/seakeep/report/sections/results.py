@@ -208,8 +208,8 @@ def findings(result: StudyResult) -> list[str]:
                 at |= {"model": ensembles[0], "other": singles[0]}
                 changes = ratio_of(result.groups["statistics/differences"].sel(at))
                 value, bounds, word = changes.cells()
-                within = "too few cells" if bounds == MISSING else f"[{bounds}]"
-                words += f" (the ensemble's mean: {word}, {value} {within})"
+                within = ", too few cells" if bounds == MISSING else f" [{bounds}]"
+                words += f" (the ensemble's mean: {word}, {value}{within})"
             parts.append(words)
         label = result.label_of(test)
         said.append(f"{label[:1].upper()}{label[1:]}: {'; '.join(parts)}.")
