@@ -136,6 +136,14 @@ def test_the_table_of_the_acts_is_made_of_their_cells(results):
     assert row[table.columns.index("λ/L 2: slow")] == f"{float(slow):.2f}"
 
 
+def test_findings_name_the_models_that_know_more(results):
+    from seakeep.report.sections.results import findings
+
+    said = findings(results["raw"])
+    begins = ("Conditional on measured surge: deterministic, ", "Models read the waves ahead of ")
+    assert [sum(each.startswith(words) for each in said) for words in begins] == [1, 1]
+
+
 def test_every_claim_has_a_figure_and_a_verdict(results):
     from seakeep.report.acts import claims_table
 
