@@ -12,7 +12,13 @@ import xarray as xr
 from tutorial_study import STUDY, put_tutorial
 
 from seakeep.files import check_report
-from seakeep.report.sections.results import coverage_table, divergence_table, summary
+from seakeep.report.sections.results import (
+    bands,
+    coverage_table,
+    divergence_table,
+    findings,
+    summary,
+)
 from seakeep.report.tables import WORDS
 from seakeep.study import read_result, read_study, run_study
 
@@ -108,6 +114,13 @@ def test_the_calibrated_band_has_a_table_and_says_what_it_rests_on(page, result)
     groups = {"statistics/coverage": table, "tests/long": result.groups["tests/unseen"]}
     note = coverage_table(changed(result, groups, tests=tests), "bayesian", calibrated=True).note
     assert "Those are 6 T̂ long; the margin is not made for long (12 T̂)" in note
+    margins = result.groups["calibration"]
+    endless = {"calibration": margins.assign(margin=np.inf * margins["margin"])}
+    found = changed(result, endless)
+    words = "The calibrated band is infinite in 6 of 6 cases"
+    assert words in coverage_table(found, "bayesian", calibrated=True).note
+    assert words in " ".join(findings(found))
+    assert [words in each.note for each in bands(found).tables] == [False, False, True, True]
 
 
 def test_a_history_shows_the_calibrated_band_around_that_of_the_members(result):

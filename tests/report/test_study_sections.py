@@ -8,8 +8,16 @@ import pytest
 import xarray as xr
 from cells import cells
 
-from seakeep.report.sections.data import chosen
-from seakeep.report.sections.results import bands, regular, scales
+from seakeep.report.sections.data import chosen, not_chosen, unequal_look_ahead
+from seakeep.report.sections.results import (
+    bands,
+    conditional,
+    difference_table,
+    infinite_bands,
+    of_judged,
+    regular,
+    scales,
+)
 from seakeep.study import StudyResult
 from seakeep.study.judge import band_tables, box_table
 
@@ -40,12 +48,107 @@ def result():
         "statistics/boxes": box_table(test).expand_dims(test=["t"]),
         "statistics/bands": band_tables(test, None, 0.95)["bands"].expand_dims(test=["t"]),
     }  # fmt: skip
-    attrs = {"settings": json.dumps(settings), "models": json.dumps({"m": {"ensemble": True}})}
+    attrs = {"settings": json.dumps(settings), "models": models_of(m={})}
     return StudyResult(None, attrs, groups)
+
+
+def models_of(**models):
+    """Models as a result holds them: ensembles without stated settings, unless said."""
+    return json.dumps(
+        {name: {"ensemble": True, "settings": {}, **each} for name, each in models.items()}
+    )
+
+
+def with_models(result, **models):
+    return replace(result, attrs={**result.attrs, "models": models_of(**models)})
 
 
 def with_group(result, name, group):
     return replace(result, groups={**result.groups, name: group})
+
+
+def with_choices(result, words, look_ahead):
+    """Models "m" and "fir" of training sets "a" and "b"."""
+    over = ("model", "training")
+    group = xr.Dataset(
+        {"words": (over, words), "look_ahead": (over, look_ahead)},
+        coords={"model": ["m", "fir"], "training": ["a", "b"]},
+    )
+    return with_group(with_models(result, m={}, fir={"role": "reference"}), "chosen", group)
+
+
+@pytest.mark.parametrize(
+    ("ahead", "words"),
+    [
+        ([[1.17, 0.59], [0.0, 0.0]], "different times: m 0.59 to 1.17 s; FIR 0.00 s. Part"),
+        ([[1.17, 1.17], [1.17, 1.17]], ""),
+    ],
+)
+def test_models_that_know_more_of_the_waves_are_named(result, ahead, words):
+    said = unequal_look_ahead(with_choices(result, [["", ""]] * 2, ahead))
+    assert words in said
+    assert bool(said) == bool(words)
+
+
+def test_settings_that_nothing_was_held_out_to_choose_are_named(result):
+    fallen = "ridge 0.001: no window of 480 samples can be held out of runs of at most 400"
+    found = with_choices(result, [[fallen, "chosen"], [fallen, fallen]], np.zeros((2, 2)))
+    assert "to be held out: m in a; FIR in a, b; see “How settings were" in not_chosen(found)
+    assert not_chosen(with_choices(result, [["", "chosen"]] * 2, np.zeros((2, 2)))) == ""
+
+
+def test_models_that_read_the_measured_surge_are_named_where_they_are_shown(result):
+    reading = {
+        "alignment.surge": {"value": "measured"},
+        "alignment.surge_channel": {"value": "x_0"},
+    }
+    causal = {**reading, "alignment.surge": {"value": "predicted"}}
+    found = with_models(
+        result,
+        paper={"settings": reading},
+        m={"settings": causal},
+        own={},
+        hold_last={"role": "reference"},
+    )
+    assert found.conditional_on == {"paper": "x_0"}
+    assert conditional(found, found.models) == " Conditional on measured x 0: paper."
+    assert conditional(found, ["m", "own"]) == ""
+    assert of_judged(found) == (
+        " References are left out: hold last; see “Errors in SD of the training”. "
+        "Conditional on measured x 0: paper."
+    )
+    assert of_judged(result) == ""
+
+
+def test_the_difference_from_the_first_model_has_a_table(result):
+    over = ("test", "model", "other", "measure", "channel")
+    shape = (1, 2, 2, 2, 1)
+    change, lower, upper = (np.zeros(shape) for _ in range(3))
+    change[0, 1, 0, :, 0] = -0.2, 1.5
+    lower[0, 1, 0, :, 0], upper[0, 1, 0, :, 0] = (-0.3, np.nan), (-0.1, np.nan)
+    change[0, 0, 1] = 9.0  # the other way round
+    table = xr.Dataset(
+        {"change": (over, change), "lower": (over, lower), "upper": (over, upper)},
+        coords={"test": ["t"], "model": ["m", "fir"], "other": ["m", "fir"],
+                "measure": ["nrmse", "nammae"], "channel": ["average"]},
+    )  # fmt: skip
+    found = with_group(with_models(result, m={}, fir={}), "statistics/differences", table)
+    shown = difference_table(found, "t")
+    assert shown.name == "differences_t"
+    assert shown.rows == [
+        ("FIR", "−20 %", "−30 to −10 %", "better", "2.5 times", "–", "cannot tell")
+    ]
+    assert "from m to each other model" in shown.note
+
+
+def test_bands_that_are_infinite_are_counted(result):
+    margin = xr.DataArray([[[1.0, np.inf], [2.0, 3.0]]], dims=("ensemble", "training", "channel"))
+    group = xr.Dataset({"margin": margin}, {"ensemble": ["m"], "training": ["a", "b"]})
+    assert "infinite in 1 of 4 cases (training set × channel; a)" in infinite_bands(
+        with_group(result, "calibration", group), "m"
+    )
+    bounded = group.isel(training=[1])
+    assert infinite_bands(with_group(result, "calibration", bounded), "m") == ""
 
 
 def test_errors_stand_in_both_standard_deviations(result):
@@ -68,8 +171,7 @@ def test_bands_stand_by_horizon_and_channel(result):
     assert heave[3] == f"{width / 2:.2f}"
     # 2/0.05 times the distance to the bound at -9, of crests and troughs in turn, in a third.
     assert float(heave[4]) == pytest.approx(width + 40 * 9 / 3, rel=4e-3)  # three digits
-    single = {**result.attrs, "models": json.dumps({"m": {"ensemble": False}})}
-    assert bands(replace(result, attrs=single)).is_empty
+    assert bands(with_models(result, m={"ensemble": False})).is_empty
 
 
 @pytest.mark.parametrize(("size", "share"), [(1.0, "62 %"), (0.0, "–")])

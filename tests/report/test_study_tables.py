@@ -11,7 +11,7 @@ from rich.console import Console
 
 from seakeep.report.quality_sheet import clock_rows
 from seakeep.report.sections.data import setting_text
-from seakeep.report.tables import Table, number, rich_tables, write_csv
+from seakeep.report.tables import Number, Table, number, rich_tables, write_csv, write_latex
 from seakeep.signals.synchronisation import Clock
 
 
@@ -48,6 +48,20 @@ def test_no_cell_of_a_csv_file_is_a_formula(tmp_path):
     with write_csv(table, tmp_path / "t.csv").open(encoding="utf-8", newline="") as file:
         rows = [row[0] for row in csv.reader(file)]
     assert rows == ["'=head", *(f"'{name}" for name in names), *numbers]
+
+
+def test_a_latex_table_breaks_short_headings_where_it_is_too_wide(tmp_path):
+    def widths(models):
+        heads = ("channel", *(f"NRMSE {name}: median [IQR]" for name in models))
+        row = ("a bow load", *(Number("1.005 [1.122]") for _ in models))
+        path = write_latex(Table("t", "T", heads, [row]), tmp_path / "t.tex")
+        form = re.search(r"begin\{tabular\}\{(.*)\}", path.read_text("utf-8"))[1]
+        return [form, *(float(each) for each in re.findall(r"p\{([\d.]+)\\linewidth\}", form))]
+
+    assert widths(["own"]) == ["lr"]  # it fits as it is
+    _, *parts = widths(["own", "ens", "fir", "arx", "old", "new"])
+    assert len(parts) == 7  # of at most 23 letters each
+    assert 0.6 < sum(parts) <= 1.0
 
 
 @pytest.mark.parametrize("width", [140, 80, 60])

@@ -85,7 +85,7 @@ def test_a_table_by_wave_height_and_horizon_by_hand():
     y = rng.standard_normal((4, 30, 2)) * [1.0, 10.0]
     waves = rng.uniform(size=(4, 30))
     lower, upper = np.full_like(y, -1.0), np.full_like(y, 2.0)
-    lower[3, 5, 1] = np.nan  # the last window is lost
+    lower[3, 5] = np.nan  # the last window is lost
     table = coverage_table(lower, upper, y, 0.9, waves)
     assert table.parts[0] == "all"
     assert table.instants.tolist() == [90] + 6 * [30]
@@ -106,6 +106,12 @@ def test_a_table_by_wave_height_and_horizon_by_hand():
         scores = inside, winkler_score(-1, 2, each, 0.9), band_crps(-1, 2, each, 0.9)
         expected = *(score.mean(axis=0) for score in scores), 3 / spread
         np.testing.assert_allclose(found, expected, rtol=1e-12)
+    lower[0, 2, 1] = np.nan  # of one channel alone
+    parted = coverage_table(lower[:3], upper[:3], y, 0.9)
+    for k, kept in ((0, slice(0, 3)), (1, slice(1, 3))):
+        alone = coverage_table(*(each[kept, :, k:][..., :1] for each in (lower, upper, y)), 0.9)
+        for key in ("inside", "width", "winkler", "crps"):
+            np.testing.assert_allclose(getattr(parted, key)[:, k], getattr(alone, key)[:, 0])
     without = coverage_table(lower, upper, np.where(np.isnan(lower), 0, lower), 0.9)
     assert without.parts == ("all", "first third", "middle third", "last third")
 

@@ -101,8 +101,9 @@ def test_all_acts_have_the_same_windows_and_the_recommended_model_learns_from_ot
     stops = [result.groups["training"]["stop"].values for result in results.values()]
     np.testing.assert_array_equal(*stops)
     # The waves are carried to where the vessel is, drift included.
-    assert results["paper"].attrs["conditional_on"] == "surge_with_drift"
-    assert results["raw"].attrs["conditional_on"] == "surge"
+    aligned = ("deterministic", "bayesian", "fir", "fir_ahead")
+    assert results["paper"].conditional_on == dict.fromkeys(aligned, "surge_with_drift")
+    assert results["raw"].conditional_on == dict.fromkeys(aligned, "surge")
 
 
 def test_the_first_act_alone_has_lost_the_drift_and_keeps_the_waves(results):
@@ -127,11 +128,20 @@ def test_the_table_of_the_acts_is_made_of_their_cells(results):
     assert tuple(table.columns[2:6]) == (
         "irregular: waves", "irregular: slow", "λ/L 1.5: waves", "λ/L 1.5: slow"
     )  # fmt: skip
+    assert "(b): Conditional on measured surge: deterministic, Bayesian, FIR" in table.note
     data = results["raw"].tests["regular_2"]
     slow = data["error"].sel(model="fir", measure="nrmse", channel=list(SLOW))
     slow = slow.mean("channel").median()
     (row,) = (row for row in table.rows if row[:2] == ("(b)", "FIR"))
     assert row[table.columns.index("λ/L 2: slow")] == f"{float(slow):.2f}"
+
+
+def test_findings_name_the_models_that_know_more(results):
+    from seakeep.report.sections.results import findings
+
+    said = findings(results["raw"])
+    begins = ("Conditional on measured surge: deterministic, ", "Models read the waves ahead of ")
+    assert [sum(each.startswith(words) for each in said) for words in begins] == [1, 1]
 
 
 def test_every_claim_has_a_figure_and_a_verdict(results):

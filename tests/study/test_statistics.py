@@ -15,6 +15,7 @@ from seakeep.core.density import density_grid
 from seakeep.errors import SeakeepWarning
 from seakeep.metrics import nrmse
 from seakeep.models.training import gather
+from seakeep.report.tables import ratio_of
 from seakeep.study import read_study, run_study
 from seakeep.study.judge import (
     MEASURES,
@@ -24,7 +25,6 @@ from seakeep.study.judge import (
     joined,
     median_of,
     trend_table,
-    verdict,
 )
 from seakeep.study.plan import make_plan, random_stream
 
@@ -101,6 +101,7 @@ def four():
     return cells(
         ["heave", "pitch"], time, measured=measured, judged=[[True, True], [True, False]],
         lower=lower[None], upper=upper[None], error=[[errors, 2 * errors, 3 * errors]],
+        mean=np.zeros((1, *lower.shape)),
     )  # fmt: skip
 
 
@@ -115,6 +116,26 @@ def test_coverage_by_hand():
     np.testing.assert_allclose(
         row["relative_width"].sel(channel=["heave", "pitch"]), [heave, heave / 10], rtol=1e-12
     )
+
+
+def test_a_calibrated_band_that_is_infinite_counts_neither_as_inside_nor_as_wide():
+    margin = [[[1.0, 1.0], [np.inf, 1.0]]]
+    calibration = xr.Dataset(
+        {"margin": (("ensemble", "training", "channel"), margin)}, {"ensemble": ["m"]}
+    )
+    tables = band_tables(four(), calibration, 0.95)
+    row = tables["coverage"].sel(model="m", band="calibrated", against="measured")
+    np.testing.assert_allclose(row["inside"], 0.5)
+    # Widths of 62 and 7 in turns; of heave in the first training set alone.
+    heave = 34.5 / np.sqrt(8 / 7) * np.mean([1, 0.5])
+    assert row["relative_width"].sel(channel="heave") == pytest.approx(heave, rel=1e-12)
+    bands = tables["bands"].sel(model="m", band="calibrated", part="all")
+    np.testing.assert_allclose(bands["inside"], 0.5)
+    np.testing.assert_allclose(bands["width"], 34.5)
+    endless = calibration.assign(margin=calibration["margin"].max("training"))
+    tables = band_tables(four(), endless.expand_dims(training=2), 0.95)
+    bands = tables["bands"].sel(model="m", band="calibrated", part="all")
+    np.testing.assert_array_equal(bands["inside"].isnull(), [True, False])
 
 
 def test_boxes_are_those_of_the_judged_cells():
@@ -186,8 +207,10 @@ def test_differences_between_models_have_intervals_and_verdicts():
     }
     for (model, other), words in pairs.items():
         at = found.sel(model=model, other=other, channel="average")
-        assert verdict(at["lower"], at["upper"]) == words
-    assert verdict(np.nan, np.nan) == "cannot tell"
+        assert ratio_of(at).cells()[2] == words
+    told = [found[key].attrs["long_name"] for key in ("change", "lower", "upper")]
+    words = "median error of model over that of other, minus one"
+    assert told == [words, f"{words}, lower bound", f"{words}, upper bound"]
 
 
 def test_growth_is_pooled_over_cells_and_its_interval_holds_it():

@@ -104,7 +104,7 @@ def folder(tmp_path):
 def test_cells_by_predicted_surge_are_what_the_models_say(folder):
     study = read_study(folder / "study.toml")
     found = run_study(study, folder / "out")
-    assert found.attrs["conditional_on"] == ""
+    assert found.conditional_on == {}
     plan = make_plan(study)
     assert {test: len(each) for test, each in plan.tests.items()} == {"later": 2, "regular": 3}
     # The record is read up to the end of the last window of its run, and continued by prediction

@@ -210,8 +210,8 @@ def coverage_table(
     Parameters
     ----------
     lower, upper, measured : array_like, shape (…, time, channel), or Dataset
-        Bounds and measurement in windows of the same length. Windows in which the band is lost
-        (NaN) in any channel are left out.
+        Bounds and measurement in windows of the same length. Windows in which the band of a
+        channel is lost (NaN) are left out of that channel.
     level : float, optional
         Probability that the band is to have.
     waves : array_like, shape (…, time), or DataArray, optional
@@ -244,13 +244,13 @@ def coverage_table(
         finite(np.atleast_1d(heights), "waves")
         heights = np.broadcast_to(heights, y.shape[:-1]).reshape(-1, y.shape[-2])
     low, high, y = (each.reshape(-1, *y.shape[-2:]) for each in (low, high, y))
-    whole = ~(np.isnan(low) | np.isnan(high)).any(axis=(1, 2))
-    if not whole.any():
-        raise DataError(
-            f"the band is lost in all of {whole.size} window(s); nothing can be judged."
-        )
-    low, high, y = low[whole], high[whole], y[whole]
-    places = _parts(y.shape[:2], None if heights is None else heights[whole])
+    lost = np.any(np.isnan(low) | np.isnan(high), axis=1, keepdims=True)
+    lost = np.broadcast_to(lost, y.shape)
+    some = ~np.all(lost, axis=(1, 2))
+    if not some.any():
+        raise DataError(f"the band is lost in all of {some.size} window(s); nothing can be judged.")
+    low, high, y, lost = low[some], high[some], y[some], lost[some]
+    places = _parts(y.shape[:2], None if heights is None else heights[some])
     scores = {
         "inside": ((y >= low) & (y <= high)).astype(float),
         "width": high - low,
@@ -258,7 +258,9 @@ def coverage_table(
         "crps": band_crps(low, high, y, level),
     }
     variables = {
-        key: np.stack([each[place].mean(axis=0) for place in places.values()])
+        key: np.ma.stack(
+            [np.ma.array(each, mask=lost)[place].mean(axis=0) for place in places.values()]
+        ).filled(np.nan)
         for key, each in scores.items()
     }
     pooled = y.reshape(-1, y.shape[-1])

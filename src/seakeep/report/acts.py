@@ -16,7 +16,7 @@ from seakeep.core.spectra import split_bands
 from seakeep.report.figures.histories import acts_figure
 from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.sections.data import finished, wave_tables
-from seakeep.report.sections.results import divergence_table
+from seakeep.report.sections.results import conditional, divergence_table
 from seakeep.report.style import HEADING, model_words
 from seakeep.report.tables import WORDS, Interval, Number, Table, number, numbers, ratio_of, table
 from seakeep.statistics import two_way_interval
@@ -554,9 +554,9 @@ def acts_table(results: Results) -> Table:
         for model in results[act.name].models
     ]
     seas = [*map(first.sea_of, first.tests)]
-    reading = [a.letter for a in _played(results) if results[a.name].attrs["conditional_on"]]
-    conditions = (
-        f"{' and '.join(reading)}: conditional on measured surge, which the alignment reads."
-    ) * bool(reading)
+    conditions = [
+        f"{act.letter}:{conditional(results[act.name], results[act.name].models)}"
+        for act in _played(results)
+    ]
     columns = ("act", "model", *(f"{sea}: {part}" for sea in seas for part in ("waves", "slow")))
-    return table("acts", rows, more=conditions, columns=columns)
+    return table("acts", rows, more=" ".join(conditions), columns=columns)

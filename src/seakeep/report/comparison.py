@@ -25,7 +25,6 @@ from seakeep.report.tables import (
     Table,
     band_verdict,
     band_words,
-    change,
     entries,
     interval,
     number,
@@ -35,7 +34,6 @@ from seakeep.report.tables import (
     row,
     short,
 )
-from seakeep.study.judge import verdict
 
 UNTIL = "waves read until [s]"
 """Column of a forecast's CSV file where the model looks ahead."""
@@ -145,12 +143,7 @@ def difference_blocks(table: xr.Dataset) -> Iterator[Table]:
         yield Table("by_run", f"{of} by wave period: ANRMSE", heads, rows, averages=[len(runs)])
     changes: list[tuple[str, ...]] = []
     for at in entries(table, "model"):
-        value, low, high = ratio_of(at, "all_")
-        cells = ("", "", "")
-        if changes:
-            known = bool(np.isfinite([low, high]).all())
-            bounds = (change(low, high), verdict(low - 1, high - 1)) if known else ("", "")
-            cells = (change(value), *bounds)
+        cells = ratio_of(at, "all_").cells() if changes else ("", "", "")
         changes.append((*row(at, "model", all_anrmse=3), *cells))
     note = "Paired intervals over redrawn blocks of the forecast; they hold for these runs."
     heads = ("model", "ANRMSE", "change", "95 %", "verdict")
@@ -166,18 +159,15 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
         return "No model could be judged."
     first, ratios = table["model"].values[0], {}
     for at in entries(table.sortby("all_anrmse"), "model"):  # what cannot be judged comes last
-        ratios[at["model"].item()] = ratio_of(at, "all_")
+        ratios[at["model"].item()] = ratio_of(at, "all_").cells()
     name = next(iter(ratios))
     said = f"Least error: {name}, ANRMSE {number(table['all_anrmse'].min())}"
     if name != first:
-        sure = (
-            key for key, (_, low, high) in ratios.items() if verdict(low - 1, high - 1) == "better"
-        )
-        better = next(sure, None)
+        better = next((key for key, (*_, word) in ratios.items() if word == "better"), None)
         for key in dict.fromkeys((name, better or name)):
-            value, *bounds = ratios[key]
+            value, bounds, _ = ratios[key]
             said += f"; surely better: {key}" if key != name else ""
-            said += f", {change(value)} [{change(*bounds)}] from {first}"
+            said += f", {value} [{bounds}] from {first}"
         if better is None:
             return f"{said}: no model is surely better. Keep {first}."
         name = better

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -171,6 +171,11 @@ def model_words(model: str) -> str:
     """
     known = {"bayesian": "Bayesian", "fir": "FIR", "fir_ahead": "FIR, 2 T̂ ahead", "arx": "ARX"}
     return known.get(model, model.replace("_", " "))
+
+
+def listed(models: Iterable[str]) -> str:
+    """Names of models, one after the other."""
+    return ", ".join(map(model_words, models))
 
 
 def shown(channel: xr.DataArray) -> tuple[float, str]:

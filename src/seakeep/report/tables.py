@@ -157,6 +157,17 @@ def numbers(values: npt.ArrayLike, digits: int = 3) -> list[Number]:
     return [number(each, digits) for each in np.ravel(values)]
 
 
+def reach(values: npt.ArrayLike, digits: int = 0) -> str:
+    """Text of the smallest and the largest of some numbers, of both alike once.
+
+    Examples
+    --------
+    >>> reach([13, 12.7, 278.4]), reach([1.2, 1.2], 1)
+    ('13 to 278', '1.2')
+    """
+    return " to ".join(dict.fromkeys(numbers([np.min(values), np.max(values)], digits)))
+
+
 def short(value: SupportsFloat, digits: int = 4) -> Number:
     """Text of a number of four significant digits; a dash for one that is not finite.
 
@@ -298,6 +309,19 @@ class Interval(NamedTuple):
         value, low, high = (each(factor * x) for x in self)
         return Number(f"{value}{unit}" + f" [{low}, {high}]" * bool(np.isfinite(self.lower)))
 
+    def cells(self) -> tuple[str, str, str]:
+        """Cells of an error over another: its change, the bounds, and what they say.
+
+        Examples
+        --------
+        >>> Interval(0.8, 0.7, 0.9).cells(), Interval(1.1, 0.9, 1.3).cells()[2]
+        (('−20 %', '−30 to −10 %', 'better'), 'cannot tell')
+        """
+        words = {True: "better", False: "worse", None: "cannot tell"}[self.below(1.0)]
+        if max(abs(self.lower - 1.0), abs(self.upper - 1.0)) < 0.005:
+            words = "as good"
+        return change(self.value), change(self.lower, self.upper), words
+
     def change(self) -> Number:
         """Text of a ratio as a relative change."""
         return Interval(*(x - 1 for x in self)).text(signed, " %", 100.0)
@@ -438,9 +462,7 @@ def _least_width(table: Table, k: int) -> int:
 
 NAME = 20
 """Characters of a word, such as the name of a channel, that a terminal does not break."""
-WIDE = 24
-"""Characters of a cell from which on its column may break lines in LaTeX."""
-LINE = 90
+LINE = 75
 """Characters, about, that fit beside each other on a page of an article in small type."""
 PAGE = 35
 """Rows from which on a LaTeX table breaks pages."""
@@ -481,7 +503,7 @@ def write_latex(table: Table, path: Path) -> Path:
 
 
 _SHORT = r"""\begin{{table}}
-\centering\small
+\centering\small\tabcolsep=4pt
 \caption{{{caption}}}
 \label{{tab:{name}}}
 \begin{{tabular}}{{{form}}}
@@ -491,7 +513,7 @@ _SHORT = r"""\begin{{table}}
 \end{{tabular}}
 \end{{table}}
 """
-_LONG = r"""\begingroup\small
+_LONG = r"""\begingroup\small\tabcolsep=4pt
 \begin{{longtable}}{{{form}}}
 \caption{{{caption}}}\label{{tab:{name}}}\\
 {head}
@@ -510,16 +532,17 @@ def _latex_line(cells: Iterable[str]) -> str:
 
 
 def _latex_columns(table: Table) -> str:
-    """Columns of numbers to the right, of text to the left, of long text in lines that break."""
+    """Columns of numbers to the right, of text to the left, of what does not fit in lines."""
     columns = list(zip(table.columns, *table.rows, strict=True))
-    longest = [max(map(len, column)) for column in columns]
-    wide = [length for length in longest if length > WIDE]
-    room = 1.0 - sum(length + 2 for length in longest if length <= WIDE) / LINE
-    part = max(room, 0.12 * len(wide)) / max(sum(wide), 1)
-    breaks = sum(longest) > LINE
+    whole = [max(map(len, column)) for column in columns]
+    words = [max(map(len, " ".join(column).split()), default=0) for column in columns]
+
+    def widths(level: int) -> list[int]:
+        """Each column as wide as its longest word, and as a level that it may need less than."""
+        return [min(a, max(b, level)) for a, b in zip(whole, words, strict=True)]
+
+    fitting = (k for k in range(LINE, 8, -1) if sum(widths(k)) + 2 * len(columns) <= LINE)
     return "".join(
-        rf"p{{{part * length:.2f}\linewidth}}"
-        if breaks and length > WIDE
-        else "lr"[k in table.numbers]
-        for k, length in enumerate(longest)
+        rf"p{{{width / LINE:.2f}\linewidth}}" if width < whole[k] else "lr"[k in table.numbers]
+        for k, width in enumerate(widths(next(fitting, 8)))
     )

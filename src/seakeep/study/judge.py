@@ -11,7 +11,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from itertools import product
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -188,7 +188,7 @@ def difference_table(
     the other model, minus one: −0.2 is better by 20 %. ``lower`` and ``upper`` come from a two-way
     block bootstrap over training sets and test windows
     (:func:`seakeep.statistics.two_way_interval`); ``blocks`` of each that overlap are drawn
-    together. Where the interval holds zero the study cannot tell (:func:`verdict`).
+    together. Where the interval holds zero the study cannot tell.
     """
     order, _ = training_order(training)
     blocks = blocks_of([test], training)
@@ -208,7 +208,10 @@ def difference_table(
         "channel": _names(test),
     }
     values = np.stack([ratio(cells[None])[0], *bounds]) - 1.0
-    return numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
+    out = numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
+    for key, words in {"change": "", "lower": ", lower bound", "upper": ", upper bound"}.items():
+        out[key].attrs["long_name"] = f"median error of model over that of other, minus one{words}"
+    return out
 
 
 def _names(test: xr.Dataset) -> list[str]:
@@ -256,19 +259,6 @@ def median_of(cells: FloatArray) -> FloatArray:
     low, high = np.maximum(count - 1, 0) // 2, count // 2
     pair = np.take_along_axis(ordered, np.concatenate([low, high], axis=1), axis=1)
     return pair.mean(axis=1)
-
-
-def verdict(lower: float, upper: float) -> Literal["better", "worse", "cannot tell"]:
-    """What an interval of a change of error says: a smaller error is better.
-
-    Examples
-    --------
-    >>> verdict(-0.2, -0.1), verdict(-0.1, 0.2)
-    ('better', 'cannot tell')
-    """
-    if upper < 0:
-        return "better"
-    return "worse" if lower > 0 else "cannot tell"
 
 
 BOX = (
@@ -327,7 +317,7 @@ def band_tables(test: xr.Dataset, calibration: xr.Dataset | None, level: float) 
     for model, band in product(ensembles, bands):
         lower, upper = (bound[judged] for bound in band_of(test, model, bands[band]))
         shares += [_coverage_row(lower, upper, each) for each in against.values()]
-        if not np.isnan(lower).any(axis=(1, 2)).all():  # lost, or nothing to calibrate on
+        if not np.isnan(lower).any(axis=1).all():  # lost, or nothing to calibrate on
             parts[model, band] = statistics.coverage_table(
                 lower, upper, against["measured"], level, waves
             )
@@ -361,7 +351,10 @@ def _coverage_row(lower: FloatArray, upper: FloatArray, against: FloatArray) -> 
 def band_of(
     test: xr.Dataset, model: str, calibration: xr.Dataset | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Bounds of a band in a test set, (training, window, time, channel): calibrated, or not."""
+    """Bounds of a band in a test set, (training, window, time, channel): calibrated, or not.
+
+    NaN where the margin of a calibrated band is infinite: it would hold everything.
+    """
     own = test.sel(ensemble=model)
     lower, upper = own["lower"].values, own["upper"].values
     if calibration is None:
@@ -374,7 +367,8 @@ def band_of(
         each = zip(*(data[key].values for data, key in keys), strict=True)
         scale = np.stack([band_scale(*of_training) for of_training in each])
     mean = test["mean"].sel(model=model).values
-    return calibrated_bounds(mean, lower, upper, margins["margin"].values[:, None, None], scale)
+    margin = margins["margin"].where(np.isfinite(margins["margin"])).values
+    return calibrated_bounds(mean, lower, upper, margin[:, None, None], scale)
 
 
 TREND_LINES = ("error_mean", "lower_quartile", "upper_quartile")

@@ -171,9 +171,6 @@ def _labels(study: Study) -> dict[str, str]:
 
 def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
     general = study.settings.study
-    alignments = [each.spec.alignment for each in plan.models.values()]
-    # Measured output that a forecast reads after its start.
-    read = [each.surge_channel for each in alignments if each and each.surge == "measured"]
     return {
         "campaign": study.campaign.name,
         "preset": general.preset,
@@ -185,7 +182,6 @@ def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
         "longest_training": training_samples(plan.needs) * plan.dt,
         "preparation": study.campaign.settings.preparation.model_dump_json(),
         "models": json.dumps({name: each.to_json() for name, each in plan.models.items()}),
-        "conditional_on": ", ".join(dict.fromkeys(read)),
         "versions": json.dumps(versions()),
     }
 

@@ -246,6 +246,19 @@ class StudyResult:
         return json.loads(self.attrs["models"])
 
     @property
+    def conditional_on(self) -> dict[str, str]:
+        """Measured output that forecasts read after their start, of each model that does so."""
+        return {
+            model: self.setting(model, "alignment.surge_channel")
+            for model in self.models
+            if self.setting(model, "alignment.surge") == "measured"
+        }
+
+    def setting(self, model: str, key: str) -> Any:
+        """Value of a setting of a model; None where it has none of that name."""
+        return self.model_settings[model]["settings"].get(key, {}).get("value")
+
+    @property
     def models(self) -> list[str]:
         """Names of the models, in the order of the study file."""
         return list(self.model_settings)

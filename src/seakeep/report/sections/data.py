@@ -1,7 +1,8 @@
 """What a study used: waves, channels, runs and their quality, settings, windows, versions."""
 
 import json
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from datetime import datetime
 from typing import Any
 
@@ -11,8 +12,8 @@ import xarray as xr
 from seakeep.report.figures.histories import spectrum_figure
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.quality_sheet import clock_rows, other_findings, run_row
-from seakeep.report.style import model_words, shown_unit
-from seakeep.report.tables import WORDS, Table, entries, number, percent, row, table
+from seakeep.report.style import listed, model_words, shown_unit
+from seakeep.report.tables import WORDS, Table, entries, number, percent, reach, row, table
 from seakeep.study import StudyResult
 from seakeep.study.judge import window_spans
 from seakeep.study.plan import windows_overlap
@@ -196,7 +197,7 @@ def _stated_settings(result: StudyResult) -> Iterator[tuple[str, str]]:
 def _windows_table(result: StudyResult) -> Table:
     """Training sets and test windows."""
     training = result.groups["training"]
-    every = ", ".join(map(model_words, whole_readers(result)))
+    every = listed(whole_readers(result))
     rows = []
     for each, spans in zip(entries(training, "training"), training_spans(result), strict=True):
         words = ", ".join(f"{run}, {begin:.2f} to {end:.2f} s" for run, begin, end in spans)
@@ -226,11 +227,10 @@ def training_spans(result: StudyResult) -> list[Spans]:
 
 def _trained_on(result: StudyResult) -> dict[str, Any]:
     """Stated training length of each model that has one; None where it or its centre reads all."""
-    every = {model: stated["settings"] for model, stated in result.model_settings.items()}
     return {
-        model: None if known.get("centred", {}).get("value") else known["window"]["value"]
-        for model, known in every.items()
-        if "window" in known
+        model: None if result.setting(model, "centred") else result.setting(model, "window")
+        for model, stated in result.model_settings.items()
+        if "window" in stated["settings"]
     }
 
 
@@ -241,23 +241,52 @@ def whole_readers(result: StudyResult) -> list[str]:
 
 def unequal_training(result: StudyResult) -> str:
     """Sentence on models that learn from different lengths of data; empty where none do."""
-    lengths, whole = _trained_on(result), ", ".join(map(model_words, whole_readers(result)))
-    period, parts = result.encounter_period, []
-    for model, length in lengths.items():
-        if isinstance(length, dict):
-            parts.append(f"{model_words(model)} from a part ({_prior_text(length, ' samples')})")
-        elif length is not None:
-            periods = length * result.dt / period
-            parts.append(f"{model_words(model)} from a part ({periods:.3g} T̂)")
-    if not (whole and parts):
-        return ""
+    period, words = result.encounter_period, {}
     sets = [sum(end - begin for _, begin, end in spans) for spans in training_spans(result)]
-    ends = dict.fromkeys(f"{each / period:.0f}" for each in (min(sets), max(sets)))
+    for model, length in _trained_on(result).items():
+        words[model] = f"from all of a training set ({reach(np.divide(sets, period))} T̂)"
+        if isinstance(length, dict):
+            words[model] = f"from a part ({_prior_text(length, ' samples')})"
+        elif length is not None:
+            words[model] = f"from a part ({length * result.dt / period:.3g} T̂)"
+    groups = grouped(words)
     return (
-        f"Models learn from different amounts of data: {whole} from all of a training set "
-        f"({' to '.join(ends)} T̂), {', '.join(parts)}. Part of the difference between them is one "
-        "of training data."
-    )
+        f"Models learn from different amounts of data: {'; '.join(groups)}. Part of the difference "
+        "between them is one of training data."
+    ) * (len(groups) > 1)
+
+
+def unequal_look_ahead(result: StudyResult) -> str:
+    """Sentence on models that read the waves ahead by different times; empty where none do."""
+    ahead = result.groups["chosen"]["look_ahead"]
+    groups = grouped({m: f"{reach(ahead.sel(model=m), 2)} s" for m in result.models})
+    return (
+        "Models read the waves ahead of the instant that they forecast by different times: "
+        f"{'; '.join(groups)}. Part of the difference between them is one of waves that are known."
+    ) * (len(groups) > 1)
+
+
+def not_chosen(result: StudyResult) -> str:
+    """Sentence on models whose settings nothing was held out to choose; empty without any."""
+    fallen = defaultdict[str, list[str]](list)
+    for at in entries(result.groups["chosen"], "model", "training"):
+        model, training, said = row(at, "model", "training", "words")
+        if "can be held out" in said:
+            fallen[model].append(training)
+    groups = grouped({model: f"in {', '.join(sets)}" for model, sets in fallen.items()})
+    where = WORDS["sections"]["chosen"]["title"]
+    return (
+        "Settings were filled in, and not chosen, where no part of the training data is long "
+        f"enough to be held out: {'; '.join(groups)}; see “{where}”."
+    ) * bool(groups)
+
+
+def grouped(words: Mapping[str, str]) -> list[str]:
+    """What is said of models, once for those of which the same is said."""
+    models = defaultdict[str, list[str]](list)
+    for model, said in words.items():
+        models[said].append(model)
+    return [f"{listed(of)} {said}" for said, of in models.items()]
 
 
 def training_overlap(result: StudyResult) -> tuple[bool, str]:
@@ -279,7 +308,7 @@ def training_overlap(result: StudyResult) -> tuple[bool, str]:
     nested, whole = windows_overlap(spans) if readers else 0.0, ""
     if nested >= APART:
         whole = (
-            f" From the start of their spans, as {', '.join(map(model_words, readers))} reads "
+            f" From the start of their spans, as {listed(readers)} reads "
             f"them, they share {percent(nested)} %."
         )
     if share < APART:

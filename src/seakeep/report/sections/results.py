@@ -2,8 +2,9 @@
 
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,14 @@ from seakeep.report.figures.errors import (
 )
 from seakeep.report.figures.histories import history_figure, shown_cells
 from seakeep.report.page import Section, drawing, section
-from seakeep.report.sections.data import test_overlap, training_overlap, unequal_training
-from seakeep.report.style import HEADING, judged_models, model_words
+from seakeep.report.sections.data import (
+    not_chosen,
+    test_overlap,
+    training_overlap,
+    unequal_look_ahead,
+    unequal_training,
+)
+from seakeep.report.style import HEADING, judged_models, listed, model_words
 from seakeep.report.tables import (
     MISSING,
     WORDS,
@@ -36,6 +43,7 @@ from seakeep.report.tables import (
     numbers,
     percent,
     ratio_of,
+    reach,
     row,
     short,
     signed,
@@ -44,7 +52,7 @@ from seakeep.report.tables import (
 )
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
-from seakeep.study.judge import VARIANTS, verdict, words_of_lost
+from seakeep.study.judge import VARIANTS, words_of_lost
 
 
 def summary(result: StudyResult) -> Section:
@@ -55,7 +63,6 @@ def summary(result: StudyResult) -> Section:
         result.attrs.get("preparation_note"),
         words_of_lost(lost) if lost else "",
         words_of_repeats(repeats) if repeats else "",
-        _few_cells(result),
         words if shares else "",
         test_overlap(result),
     ]
@@ -91,18 +98,12 @@ def _tested(result: StudyResult) -> str:
         f"{data['time'].values[-1] / period:.3g} T̂)"
         for test, data in result.tests.items()
     ]
-    words = (
-        f"Tested: {', '.join(map(model_words, result.models))}, each learnt from {sets} training "
+    return (
+        f"Tested: {listed(result.models)}, each learnt from {sets} training "
         f"set{'s' * (sets > 1)} and run freely through {', '.join(seas)}; {len(result.channels)} "
         "channels. Errors are in measured SDs of the window: 0 is perfect, 1 is no better than its "
         "mean."
     )
-    if condition := result.attrs["conditional_on"].replace("_", " "):
-        words += (
-            f" Every number is conditional on measured {condition}: the alignment of the waves "
-            "reads it after the start of a forecast. It is no forecast in the strict sense."
-        )
-    return words
 
 
 def by_channel(
@@ -110,7 +111,7 @@ def by_channel(
     key: str,
     cells: Callable[[str], Iterable[str]],
     columns: Iterable[str],
-    more: str = "",
+    more: str,
     test: str = "",
     **given: Any,
 ) -> Table:
@@ -124,7 +125,7 @@ def by_channel(
         of_test = {"name": f"{key}_{test}", "folded": test != next(iter(result.tests))}
         given = {"test": result.label_of(test), **of_test, **given}
     heads, last = ("channel", *columns), [len(rows) - 1]
-    return table(key, rows, more + conditional(result), columns=heads, averages=last, **given)
+    return table(key, rows, more, columns=heads, averages=last, **given)
 
 
 def _heat(result: StudyResult) -> Table:
@@ -139,7 +140,7 @@ def _heat(result: StudyResult) -> Table:
     def cells(channel: str) -> Iterator[str]:
         return (number(median.sel({**at, "channel": channel}), 2) for at in places.values())
 
-    return by_channel(result, "heat", cells, places)
+    return by_channel(result, "heat", cells, places, of_judged(result))
 
 
 def overview_table(result: StudyResult) -> Table:
@@ -153,13 +154,42 @@ def overview_table(result: StudyResult) -> Table:
         cells += row(at.sel(measure="training_nrmse"), median=3)
         cells += row(at.sel(measure="nrmse"), count=0)
         rows.append((result.label_of(test), model_words(model), *cells))
-    return table("overview", rows, conditional(result))
+    return table("overview", rows, conditional(result, result.models))
 
 
-def conditional(result: StudyResult) -> str:
-    """Sentence for tables whose forecasts read a measured output after the start."""
-    words = result.attrs.get("conditional_on", "").replace("_", " ")
-    return f" Conditional on measured {words}." if words else ""
+def difference_table(result: StudyResult, test: str) -> Table:
+    """Change of both measures from the first model to each other one, and whether it is better."""
+    first, *others = result.models
+    at = result.groups["statistics/differences"].sel(test=test, other=first, channel="average")
+    rows = []
+    for model in others:
+        pairs = [ratio_of(at.sel(model=model, measure=key)).cells() for key in HEADING]
+        rows.append((model_words(model), *chain(*pairs)))
+    heads = [f"{key}: {part}" for key in HEADING.values() for part in ("change", "95 %", "verdict")]
+    return table(
+        "differences",
+        rows,
+        conditional(result, result.models),
+        columns=("model", *heads),
+        name=f"differences_{test}",
+        test=result.label_of(test),
+        first=model_words(first),
+    )
+
+
+def conditional(result: StudyResult, models: Sequence[str]) -> str:
+    """Sentence on those of some models that read a measured output after the start."""
+    read = {m: result.conditional_on[m] for m in models if m in result.conditional_on}
+    words = ", ".join(dict.fromkeys(read.values())).replace("_", " ")
+    return f" Conditional on measured {words}: {listed(read)}." if read else ""
+
+
+def of_judged(result: StudyResult) -> str:
+    """Sentences on references, which tables and figures by channel leave out, and on the others."""
+    judged, where = judged_models(result), WORDS["sections"]["scales"]["title"]
+    gone = [model for model in result.models if model not in judged]
+    words = f" References are left out: {listed(gone)}; see “{where}”." * bool(gone)
+    return words + conditional(result, judged)
 
 
 def findings(result: StudyResult) -> list[str]:
@@ -168,38 +198,31 @@ def findings(result: StudyResult) -> list[str]:
     ensembles = result.ensembles
     singles = [model for model in result.models if model not in ensembles]
     for test in result.tests:
-        median = result.groups["statistics/boxes"]["median"].sel(test=test, channel="average")
         parts = []
         for measure, heading in HEADING.items():
-            errors = median.sel(measure=measure)
-            listed = [f"{model_words(m)} {number(errors.sel(model=m))}" for m in result.models]
-            words = f"median {heading} {', '.join(listed)}"
+            at = {"test": test, "measure": measure, "channel": "average"}
+            errors = result.groups["statistics/boxes"]["median"].sel(at)
+            each = (f"{model_words(m)} {number(errors.sel(model=m))}" for m in result.models)
+            words = f"median {heading} {', '.join(each)}"
             if singles and ensembles:
-                words += _verdict(result, test, ensembles[0], singles[0], measure)
+                at |= {"model": ensembles[0], "other": singles[0]}
+                changes = ratio_of(result.groups["statistics/differences"].sel(at))
+                value, bounds, word = changes.cells()
+                within = ", too few cells" if bounds == MISSING else f" [{bounds}]"
+                words += f" (the ensemble's mean: {word}, {value}{within})"
             parts.append(words)
         label = result.label_of(test)
         said.append(f"{label[:1].upper()}{label[1:]}: {'; '.join(parts)}.")
-    said += filter(None, [unequal_training(result)])
+    said += [unequal_training(result), unequal_look_ahead(result)]
+    if words := conditional(result, result.models).strip():
+        said.append(
+            f"{words} The alignment of the waves reads it after the start of a forecast, which is "
+            "none in the strict sense."
+        )
     for model in ensembles:
         said += _coverage_findings(result, model)
-    return said + _fewer_windows(result)
-
-
-def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure: str) -> str:
-    """Whether the ensemble's mean is better than the single model, if the study can decide."""
-    at = result.groups["statistics/differences"].sel(
-        test=test, model=ensemble, other=single, measure=measure, channel="average"
-    )
-    change, *bounds = (100 * (each - 1) for each in ratio_of(at))
-    if not np.isfinite(change):
-        return ""
-    outcome = "as good" if np.abs(bounds).max() < 0.5 else verdict(*bounds)
-    words = f"the ensemble's mean is {outcome}"
-    if outcome == "cannot tell":
-        words = "cannot tell whether the ensemble's mean is better"
-    interval = f"[{', '.join(map(signed, bounds))}]"
-    interval = interval if np.isfinite(bounds[0]) else "with too few cells"
-    return f" ({words}: {signed(change)} % {interval})".replace("-", "−")
+    said += [*_fewer_windows(result), not_chosen(result), _few_cells(result)]
+    return list(filter(None, said))
 
 
 def _coverage_findings(result: StudyResult, model: str) -> list[str]:
@@ -210,12 +233,14 @@ def _coverage_findings(result: StudyResult, model: str) -> list[str]:
     inside = row["inside"].sel(band="members").item()
     words = band_verdict(inside, level)
     calibrated = ""
-    if "calibrated" in row["band"] and np.isfinite(held := row["inside"].sel(band="calibrated")):
-        width, wider = row["relative_width"]
-        calibrated = (
-            f" Calibrated on training data it holds {percent(held)} %, "
-            f"{short(wider, 2)} measured SD wide instead of {short(width, 2)}."
-        )
+    if "calibrated" in row["band"]:
+        if np.isfinite(held := row["inside"].sel(band="calibrated")):
+            width, wider = row["relative_width"]
+            calibrated = (
+                f" Calibrated on training data it holds {percent(held)} %, "
+                f"{short(wider, 2)} measured SD wide instead of {short(width, 2)}."
+            )
+        calibrated += infinite_bands(result, model)
     each = [test["lost"].sel(ensemble=model) for test in result.tests.values()]
     lost, total = (int(sum((test >= least).sum() for test in each)) for least in (0, -1))
     return [
@@ -224,6 +249,20 @@ def _coverage_findings(result: StudyResult, model: str) -> list[str]:
         f"it carries the spread of the hyperparameters, and no noise or model error.{calibrated}",
         f"{lost} of {total} member forecasts diverged and were left out of mean and band.",
     ]
+
+
+def infinite_bands(result: StudyResult, model: str) -> str:
+    """Sentence on calibrated bands that are infinite; empty where none is."""
+    margins = result.groups["calibration"]["margin"].sel(ensemble=model)
+    endless = margins.where(np.isinf(margins), drop=True)
+    if not endless.size:
+        return ""
+    return (
+        f" The calibrated band is infinite in {endless.count():d} of {margins.size} cases "
+        f"(training set × channel; {', '.join(endless['training'].values)}), where too many "
+        "forecasts of the windows that calibrate it diverged. It would hold everything there, and "
+        "is left out."
+    )
 
 
 def _fewer_windows(result: StudyResult) -> list[str]:
@@ -238,7 +277,7 @@ def _fewer_windows(result: StudyResult) -> list[str]:
     return [
         f"{used} {what} were used of the {asked} asked for: no more fit without overlap."
         for what, asked, used in places
-        if asked is not None and used < asked
+        if used < (asked or 0)
     ]
 
 
@@ -315,6 +354,7 @@ def errors(result: StudyResult) -> Section:
             group,
             tests=", ".join(map(result.label_of, group)),
             fewest=FEWEST,
+            more=conditional(result, result.models),
             name=f"errors_{group[0] if len(group) == 1 else 'others'}",
         )
         for group in filter(None, groups)
@@ -327,11 +367,12 @@ def errors(result: StudyResult) -> Section:
             test,
             tests=result.label_of(test),
             fewest=FEWEST,
+            more=of_judged(result),
             name=f"errors_{test}_by_channel",
         )
         for test in tests
     ]
-    tables = (error_table(result, test) for test in tests)
+    tables = (make(result, test) for make in (difference_table, error_table) for test in tests)
     return section("errors", *figures, overview_table(result), *tables)
 
 
@@ -346,10 +387,10 @@ def error_table(result: StudyResult, test: str) -> Table:
             at = {"channel": name, "measure": measure, "model": model}
             yield beside(boxes["median"].sel(at), spread.sel(at))
 
-    more = ""
-    if left_out := int(boxes["left_out"].sel(model=models, measure="nrmse").sum()):
-        more = (
-            f" {left_out} values were left out: a channel whose measured SD is below 1 % of its "
+    more = of_judged(result)
+    if lost := int(boxes["left_out"].sel(model=models, measure="nrmse").sum()):
+        more += (
+            f" {lost} values were left out: a channel whose measured SD is below 1 % of its "
             "training SD (a slack line), or more than half of whose variance is noise, is not "
             "judged, nor is a forecast that diverged."
         )
@@ -376,7 +417,7 @@ def _scales_table(result: StudyResult, test: str) -> Table:
             yield "{} ({})".format(*numbers(at.sel(measure=["nrmse", "training_nrmse"])))
 
     heads = ("SD of the window [training SD]", *map(model_words, result.models))
-    return by_channel(result, "scales", cells, heads, test=test)
+    return by_channel(result, "scales", cells, heads, conditional(result, result.models), test=test)
 
 
 def regular(result: StudyResult) -> Section:
@@ -403,7 +444,7 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
             share = Number(f"{percent(offset**2 / total)} %") if total > 0 else MISSING
             cells += [*row(at, amplitude_ratio=2, phase_lead=signed, error_offset=2), share]
         rows.append(tuple(cells))
-    return table("response", rows, columns=columns, more=conditional(result))
+    return table("response", rows, columns=columns, more=of_judged(result))
 
 
 def _slack_words(result: StudyResult, tests: list[str]) -> str:
@@ -434,12 +475,13 @@ def bands(result: StudyResult) -> Section:
             band = at["band"].item()
             kind = "calibrated " * (band == "calibrated")
             title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
-            name = f"bands_{band}_{model}"
-            tables += [_by_part(result, at, name, title), _of_all(result, at, name, title)]
+            more = (infinite_bands(result, model) if kind else "") + conditional(result, [model])
+            given = {"more": more, "band": title, "name": f"bands_{band}_{model}"}
+            tables += [_by_part(result, at, given), _of_all(result, at, given)]
     return section("bands", *tables)
 
 
-def _by_part(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table:
+def _by_part(result: StudyResult, at: xr.Dataset, given: Mapping[str, str]) -> Table:
     """Averages over the channels, a row per test set and part."""
     scale = at["relative_width"] / at["width"]  # one over the measured SD
     at, rows = at.assign(at[["winkler", "crps"]] * scale), []
@@ -449,14 +491,13 @@ def _by_part(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Tabl
             continue
         least = inside[np.nanargmin(inside.values)]
         named = result.words_of(least["channel"].item())
-        moving = one[["relative_width", "winkler", "crps"]].map(lambda x: x.where(np.isfinite(x)))
-        means = row(moving.mean("channel"), relative_width=2, winkler=2, crps=2)
+        means = row(one.mean("channel"), relative_width=2, winkler=2, crps=2)
         covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
         rows.append((result.label_of(one["test"].item()), *row(one, "part"), *covered, *means))
-    return table("bands", rows, conditional(result), name=name, band=title)
+    return table("bands", rows, **given)
 
 
-def _of_all(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table:
+def _of_all(result: StudyResult, at: xr.Dataset, given: Mapping[str, str]) -> Table:
     """All instants, a row per test set and channel."""
     units, three = result.groups["channels"]["units"], partial(short, digits=3)
     rows = [
@@ -468,8 +509,7 @@ def _of_all(result: StudyResult, at: xr.Dataset, name: str, title: str) -> Table
         for one in entries(at.sel(part="all"), "test", "channel")
         for channel in row(one, "channel")
     ]
-    name = f"{name}_channels"
-    return table("bands_by_channel", rows, conditional(result), name=name, band=title)
+    return table("bands_by_channel", rows, **{**given, "name": f"{given['name']}_channels"})
 
 
 def age(result: StudyResult) -> Section:
@@ -490,7 +530,7 @@ def age(result: StudyResult) -> Section:
     return section(
         "time",
         drawing("error_over_time", error_over_time_figure, result, split=split),
-        table("trend", rows, conditional(result), split=split, seconds=seconds),
+        table("trend", rows, of_judged(result), split=split, seconds=seconds),
     )
 
 
@@ -522,6 +562,7 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
             " In brackets, of the true instants. The truth is the virtual tank's, without noise or "
             "slap; rates are not filtered."
         )
+    more += conditional(result, [model])
     heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
     return by_channel(
         result,
@@ -561,17 +602,14 @@ def _calibrated_words(result: StudyResult, model: str, level: float) -> str:
     if not group["windows"].all():
         said += "Some training sets hold no such window. "
     else:
-        windows, blocks = (
-            " to ".join(dict.fromkeys(f"{each:.0f}" for each in (values.min(), values.max())))
-            for values in (group["windows"].values, group["blocks"].values)
-        )
         said += (
-            f"A training set had {windows} of them; allowing for their dependence, their "
-            f"scores are worth {blocks} independent ones. "
+            f"A training set had {reach(group['windows'])} of them; allowing for their dependence, "
+            f"their scores are worth {reach(group['blocks'])} independent ones. "
         )
         if (warranted := float(group["warranted"].min())) < level:
             said += f"Of some channels that is too few: {warranted:.2f} is guaranteed there. "
-    return said + "The margin guarantees nothing in another kind of sea."
+    said += "The margin guarantees nothing in another kind of sea."
+    return said + infinite_bands(result, model)
 
 
 def densities(result: StudyResult) -> Section:
@@ -618,7 +656,8 @@ def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
         "jsd",
         cells,
         [*heads, *published],
-        " The paper's columns are of another vessel in another tank." * comparable,
+        " The paper's columns are of another vessel in another tank." * comparable
+        + conditional(result, [model]),
         test=data.attrs["test"],
         name=f"jsd_{model}_{variant}",
         elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
