@@ -255,7 +255,7 @@ CHANGES = {
         ("on_inputs[k, :, : n * lags] = on_delayed", "on_inputs[k, :, -n * lags :] = on_delayed", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
         ("histories[k] = of.state_scale", "histories[k] = own[0].state_scale", "models/test_ways.py::test_members_are_the_models_of_their_settings"),
         ("lost[part.start : part.start + len(members)] = first", "lost[: len(members)] = first", "models/test_ensemble.py::test_members_that_diverge_say_when"),
-        ("lost = ~(farthest <= _excess(signature, windows))", "lost = ~(farthest <= 1.0)", "hosts/test_c.py::test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python"),
+        ("<= reach[:, [column]] * excess", "<= reach[:, [column]]", "hosts/test_c.py::test_a_spike_of_a_probe_is_forgotten_by_the_limit_in_c_and_python"),
         ("available + 1 - lead if signature.inputs", "available - lead if signature.inputs", "models/test_forecast.py::test_a_forecast_goes_to_the_end_of_the_run_and_one_step_past_it"),
         ("first = span.known + 1 - signature.state_samples", "first = span.known - signature.state_samples", "models/test_forecast.py::test_nothing_before_the_delays_of_each_group_is_read"),
         ("run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1", "run.known - span.known + 1", "models/test_ahead.py::test_the_status_says_from_when_and_before_that_nothing_changes"),

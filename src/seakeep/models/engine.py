@@ -646,13 +646,17 @@ def cut_lost(values: FloatArray, signature: Signature, windows: Windows) -> Floa
     """NaN from where free runs (window, steps, N) are lost, in physical units; they are changed."""
     scale = signature.state_scale
     start = np.abs(windows.histories - scale.centre).max(axis=1, initial=0.0)
-    reach, farthest = GROWTH * np.maximum(scale.bound, start), np.zeros(values.shape[:2])
-    with np.errstate(invalid="ignore", over="ignore"):
+    reach = GROWTH * np.maximum(scale.bound, start)
+
+    def beyond(excess: FloatArray | float) -> BoolArray:
+        lost = np.zeros(values.shape[:2], dtype=bool)
         for column, centre in enumerate(scale.centre):  # one after the other takes little room
-            away = np.abs(values[..., column] - centre) / reach[:, [column]]
-            np.maximum(farthest, away, out=farthest)
-        if not (farthest <= 1.0).all():  # most runs end here
-            lost = ~(farthest <= _excess(signature, windows))
+            lost |= ~(np.abs(values[..., column] - centre) <= reach[:, [column]] * excess)
+        return lost
+
+    with np.errstate(invalid="ignore", over="ignore"):
+        if beyond(1.0).any():
+            lost = beyond(_excess(signature, windows))
             values[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return values
 
