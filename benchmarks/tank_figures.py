@@ -106,7 +106,7 @@ def realise(played: Played, name: str) -> Realised:
     true = truth(played, name)
     true = true.isel(time=true["time"].values >= run.startup)
     true["surge_fast"] = (true["surge"] - true["surge_slow"]).assign_attrs(units="m")
-    loads = [f"mooring_{line}" for line in played.rig.line_names]
+    loads = [f"mooring_{line}" for line in played.settings.moorings]
     motions = true[[*played.rig.names, "surge_fast", *loads]].to_dataframe()
     heights = wave_heights(eta, dt)
     return Realised(

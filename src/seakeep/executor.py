@@ -4,8 +4,6 @@ An executor is a pool of processes (:func:`processes`), Dask's ``client.get_exec
 object with ``submit``. Results do not depend on it: BLAS has one thread wherever work is done.
 """
 
-from __future__ import annotations
-
 import functools
 import multiprocessing
 import os
@@ -16,7 +14,7 @@ import signal
 import threading
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from concurrent.futures import ProcessPoolExecutor as Pool
 from concurrent.futures.process import BrokenProcessPool
@@ -62,7 +60,7 @@ def in_order(
     """Yield ``function(data, item)`` for each item, in the order of the items."""
     results = _in_order(function, data, items, executor)
     for done, result in enumerate(results, start=1):
-        if progress is not None:
+        if progress:
             progress(done, len(items), f"{what} {done}")
         yield result
 
@@ -73,7 +71,7 @@ def _in_order(
     items: Sequence[Item],
     executor: Executor | None,
 ) -> Iterator[Result]:
-    if executor is None:
+    if not executor:
         for item in items:
             with one_blas_thread():
                 result = function(data, item)
@@ -101,7 +99,7 @@ def as_finished(
     Items are taken from the left of `items`. Whoever iterates may append more: those that need a
     result which has just been yielded.
     """
-    if executor is None:
+    if not executor:
         while items:
             item = items.popleft()
             (result,) = _in_order(function, data, [item], None)
@@ -191,7 +189,7 @@ def processes(workers: int) -> Iterator[Executor]:
 def _start_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
     parent = multiprocessing.parent_process()
-    if parent is not None:  # a parent that was killed leaves no worker behind
+    if parent:  # a parent that was killed leaves no worker behind
         sentinel = parent.sentinel
         threading.Thread(target=lambda: (wait_for([sentinel]), os._exit(1)), daemon=True).start()
 
@@ -328,23 +326,17 @@ def _work(
     """Results of some items in a worker, which reads the data once."""
     global _received
     if (received := _received)[0] != token:
-        data, expected = pickle.loads(payload)
-        _check_versions(expected)
+        (data, expected), installed = pickle.loads(payload), versions()
+        other = [
+            f"{name} {installed[name]} (here {version})"
+            for name, version in expected.items()
+            if installed.get(name) != version
+        ]
+        if other:  # the arrays would not be those of the caller
+            raise RequestError(
+                f"the worker {platform.node()} would not compute the same arrays: it has "
+                f"{', '.join(other)}. Install the same versions everywhere."
+            )
         received = _received = token, data
     with one_blas_thread():
         return [function(received[1], item) for item in items]
-
-
-def _check_versions(expected: Mapping[str, str]) -> None:
-    """Refuse to work with other versions: the arrays would not be those of the caller."""
-    installed = versions()
-    other = [
-        f"{name} {installed[name]} (here {version})"
-        for name, version in expected.items()
-        if installed.get(name) != version
-    ]
-    if other:
-        raise RequestError(
-            f"the worker {platform.node()} would not compute the same arrays: it has "
-            f"{', '.join(other)}. Install the same versions everywhere."
-        )

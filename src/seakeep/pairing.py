@@ -1,7 +1,5 @@
 """Pairs of channels: those of one Dataset, each with that of the same name in others."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,8 +77,7 @@ def pair(**sides: xr.Dataset) -> Paired:
         values = _stacked(matched, names, (*(dim for dim in lead if dim in further), "time"), side)
         if further:
             missing = [axis for axis, dim in enumerate(lead) if dim not in further]
-            shape = arrays[first].shape
-            values = np.broadcast_to(np.expand_dims(values, missing), shape)
+            values = np.broadcast_to(np.expand_dims(values, missing), arrays[first].shape)
         arrays[side] = values
     return Paired(names, lead, arrays)
 

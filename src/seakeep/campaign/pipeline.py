@@ -46,8 +46,7 @@ from seakeep.campaign.settings import (
 )
 from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
 from seakeep.conventions import MOTIONS, conversion
-from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
-from seakeep.files import version
+from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean, naming
 from seakeep.formats import Columns, Options
 from seakeep.formats.columns import is_unit, meant_column, same_unit
 from seakeep.quality import Finding, Rate, Record, Redundant, check
@@ -189,17 +188,14 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
 
 def sync(run: Run, clocks: Mapping[str, Clock] | None = None) -> Run:
     """Step 2: find each logger's clock against the reference's, or take those that are known."""
-    if clocks is not None:
+    if clocks:
         return replace(run, clocks=clocks)
     reference, *others = run.loggers.values()
     by_reference = {reference.name: Clock()}
     instruments = run.settings.instruments
     for each in others:
-        try:
+        with naming(f"run '{run.name}', clock of '{each.name}' ({each.path})"):
             by_reference[each.name] = _clock(each, reference, instruments[each.name], instruments)
-        except SeakeepError as error:
-            place = f"run '{run.name}', clock of '{each.name}' ({each.path})"
-            raise type(error)(f"{place}: {error}") from None
     return replace(run, clocks=by_reference)
 
 
@@ -218,7 +214,7 @@ def _clock(
             own.offset or 0.0,
         )  # fmt: skip
     pair = own.shared or own.correlated
-    if pair is None:
+    if not pair:
         stated = own.offset is not None or own.drift is not None
         method = "as stated" if stated else ASSUMED
         return Clock(own.offset or 0.0, 1e-6 * (own.drift or 0.0), method=method)
@@ -359,8 +355,7 @@ def cleaned(run: Run) -> Run:
         data = _regular(data, preparation, f"run '{run.name}' ({logger.path})")
         groups[key] = data = flag_samples(data, preparation)
         if logger.options.sampling_rate and logger.options.time is None:
-            aside = time_column(logger.columns)
-            step = None if aside is None else time_step_of(logger.columns, aside)
+            step = time_step_of(logger.columns, time_column(logger.columns))
             if step:  # the step of the file's times, where a stated rate is used
                 data.attrs["time_column_step"] = step
         elif counts_samples(logger.columns, logger.options):
@@ -424,48 +419,35 @@ def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Datas
     step = usual_step(data["time"].values)
     longest = preparation.longest_gap if preparation.gaps == "bridge" else 0.0
     for name in list(data.data_vars):
-        try:
-            values, flags, known = _flagged(
-                data[name].values, step, longest, preparation.outliers == "replace"
-            )
-        except DataError as error:
-            raise DataError(f"channel '{name}': {error}") from None
-        data[name] = data[name].copy(data=values).assign_attrs(known)
-        if flags.any():
-            data.coords[f"{name}_flags"] = ("time", flags, flag_attributes(str(name)))
-    return data
-
-
-def _flagged(
-    x: FloatArray, step: float, longest: float, replaced: bool
-) -> tuple[FloatArray, Any, dict[str, Any]]:
-    """Series without gaps, its flags, and the attributes that say what was done to it."""
-    flags, known, repaired = np.zeros(x.size, dtype=np.int16), dict[str, Any](), list[str]()
-    if not np.isfinite(x).all():
-        filled = bridge(x, step, longest)
-        x = filled.values
-        flags += (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
+        x, repaired = data[name].values, list[str]()
+        with naming(f"channel '{name}'"):
+            filled = bridge(x, step, longest)
+        x, known = filled.values, data[name].attrs
+        flags = (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
         if count := filled.short.sum():
             seconds = f"{count * step:.3g} s of {x.size * step:.4g} s"
             repaired.append(f"{count} samples ({seconds}) bridged by monotone cubics")
-    if x.size >= 16 and np.ptp(x):
-        if np.isfinite(reading := reading_step(x)):
-            known["reading_step"] = reading
-        there = flags == 0
-        stuck = find_held(x, step) & there
-        for start, end in stretches(stuck):  # what stands before a gap that was filled
-            stuck[start:end] = end - start > 2
-        outlier, edge = find_outliers(x) & there & ~stuck, saturated(x, stuck)
-        flags[outlier] |= OUTLIER
-        flags[edge] |= SATURATED
-        flags[stuck & ~edge] |= STUCK
-        if replaced and outlier.any():
-            x = bridge(np.where(outlier, np.nan, x), step, np.inf).values
-            flags[outlier] |= REPLACED
-            repaired.append(f"{outlier.sum()} outliers replaced by monotone cubics")
-    if repaired:
-        known["repaired"] = "; ".join(repaired)
-    return x, flags, known
+        if x.size >= 16 and np.ptp(x):
+            if np.isfinite(reading := reading_step(x)):
+                known["reading_step"] = reading
+            there = flags == 0
+            stuck = find_held(x, step) & there
+            for start, end in stretches(stuck):  # what stands before a gap that was filled
+                stuck[start:end] = end - start > 2
+            outlier, edge = find_outliers(x) & there & ~stuck, saturated(x, stuck)
+            flags[outlier] |= OUTLIER
+            flags[edge] |= SATURATED
+            flags[stuck & ~edge] |= STUCK
+            if preparation.outliers == "replace" and outlier.any():
+                x = bridge(np.where(outlier, np.nan, x), step, np.inf).values
+                flags[outlier] |= REPLACED
+                repaired.append(f"{outlier.sum()} outliers replaced by monotone cubics")
+        if repaired:
+            known["repaired"] = "; ".join(repaired)
+        data[name] = data[name].copy(data=x)
+        if flags.any():
+            data.coords[f"{name}_flags"] = ("time", flags, flag_attributes(str(name)))
+    return data
 
 
 def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
@@ -578,21 +560,17 @@ def _on_axis(
         str(name): xr.Variable("time", series[:, i].copy(), {**channel.attrs, **filtered})
         for i, (name, channel) in enumerate(channels.items())
     }
-    for name, flags in group.variables.items():
-        if str(name).endswith("_flags"):
-            new = _flags_at(flags.values, time, wanted, dt)
-            out[str(name)] = xr.Variable("time", new, flags.attrs)
-    return out
-
-
-def _flags_at(flags: Any, time: FloatArray, wanted: FloatArray, dt: float) -> Any:
-    """Flags at new instants: what any sample within half a new step of them carries."""
+    # Flags at new instants: what any sample within half a new step of them carries.
     half = 0.5 * max(dt, time[1] - time[0]) * (1 + 1e-9)
     begin = np.searchsorted(time, wanted - half)
     end = np.searchsorted(time, wanted + half, side="right")
     edges = np.column_stack([begin, end]).ravel()
-    seen = np.bitwise_or.reduceat(np.append(flags, 0), edges)[::2]
-    return np.where(begin < end, seen, 0).astype(np.int16)
+    for name, flags in group.variables.items():
+        if str(name).endswith("_flags"):
+            seen = np.bitwise_or.reduceat(np.append(flags.values, 0), edges)[::2]
+            new = np.where(begin < end, seen, 0).astype(np.int16)
+            out[str(name)] = xr.Variable("time", new, flags.attrs)
+    return out
 
 
 def strays(own: float, samples: int, dt: float) -> bool:
@@ -600,7 +578,7 @@ def strays(own: float, samples: int, dt: float) -> bool:
 
     Times written with few decimals give a step that is off by a part of a sample over the record.
     """
-    return bool(abs(own - dt) * samples > 0.05 * dt)
+    return abs(own - dt) * samples > 0.05 * dt
 
 
 def redundant_pairs(settings: CampaignSettings, period: float) -> Redundant:
@@ -660,9 +638,8 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
 def used_span(settings: RunSettings) -> tuple[float, float]:
     """First and last instant of a run that is used at all, s."""
     stated = (settings.span,) if settings.span else (settings.train, settings.test)
-    spans = [(number(each[0]), number(each[1])) for each in stated if each]
-    starts, ends = zip(*spans, strict=True) if spans else ((-np.inf,), (np.inf,))
-    return min(starts), max(ends)
+    edges = [number(edge) for span in stated if span for edge in span]
+    return min(edges, default=-np.inf), max(edges, default=np.inf)
 
 
 def cropped(run: Run) -> Run:
@@ -721,61 +698,17 @@ def _part(
     raise RequestError(f"{stated}. Lengthen the span, or move it into the run's {common}.")
 
 
-def attributes_of(
-    name: str, run: xr.Dataset, dt: float, clocks: Mapping[str, Clock], campaign: CampaignSettings
-) -> dict[str, Any]:
-    """Attributes that settings (lengths in seconds) and clocks give to a run that was cut."""
-    settings, rig, general = campaign.runs[name], campaign.rig, campaign.campaign
-    time = run["time"].values
-    attributes: dict[str, Any] = {
-        "run": name,
-        "seakeep_version": version(),
-        "file": settings.file or ", ".join(settings.files.values()),
-        "preparation_preset": campaign.preparation.preset,
-        "dt": dt,
-        "scale_factor": general.scale_factor,
-        "sea_state": settings.sea_state,
-        "role": settings.serves,
-        "waves": settings.waves,
-        "water_depth": rig.water_depth,
-        "wave_direction": rig.wave_direction,
-        "frame": rig.frame,
-        "encounter_period": general.encounter_period,
-        "probe_offset": settings.probe_offset,
-        "celerity": celerity_of(run.isel(time=inside(time, used_span(settings), dt)), dt, campaign),
-    }
-    whole = (time[0], time[-1])
-    for use in ("train", "test"):
-        span = getattr(settings, use)
-        if span is None and settings.serves == use:
-            span = whole
-        if span:
-            used = time[inside(time, span, dt)]
-            if used.size:
-                attributes[f"{use}_span"] = (float(used[0]), float(used[-1]))
-    for logger, clock in list(clocks.items())[1:]:
-        attributes |= {
-            f"clock_{logger}": clock.describe(),
-            f"clock_{logger}_method": clock.method,
-            f"clock_{logger}_count": clock.count,
-            f"clock_{logger}_offset": clock.offset,
-            f"clock_{logger}_offset_error": clock.offset_error,
-            f"clock_{logger}_drift_ppm": 1e6 * clock.drift,
-            f"clock_{logger}_drift_error_ppm": 1e6 * clock.drift_error,
-        }
-    attributes |= settings.parameters
-    return {key: value for key, value in attributes.items() if value is not None}
-
-
-def celerity_of(run: xr.Dataset, dt: float, campaign: CampaignSettings) -> float | None:
+def celerity_of(
+    run: xr.Dataset, dt: float, campaign: CampaignSettings, settings: RunSettings
+) -> float | None:
     """Effective celerity of the waves in the part of a run that is used, m/s; None if unknown."""
     channels, depth = campaign.celerity_channels, campaign.rig.water_depth
     if channels is None or depth is None or any(name not in run for name in channels):
         return None
     apart = campaign.rig.positions[channels[1]] - campaign.rig.positions[channels[0]]
     try:
-        first, last = (run[name].values for name in channels)
-        celerity = effective_celerity(first, last, dt, apart, depth)
+        used = inside(run["time"].values, used_span(settings), dt)
+        first, last = (run[name].values[used] for name in channels)
+        return effective_celerity(first, last, dt, apart, depth).celerity
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
         return None
-    return celerity.celerity

@@ -59,10 +59,10 @@ def expand(file: str, folder: Path) -> Path:
 
 def checksum(path: Path) -> str:
     """SHA-256 of a file, or of the names and contents of the files in a bag's folder."""
-    if folder_reader(path) is None:
+    if not folder_reader(path):
         return sha256_of(path)
     digest = hashlib.sha256()
-    for part in sorted(each for each in path.iterdir() if each.is_file()):
+    for part in sorted(filter(Path.is_file, path.iterdir())):
         digest.update(part.name.encode() + b"\0" + bytes.fromhex(sha256_of(part)))
     return digest.hexdigest()
 
@@ -161,14 +161,14 @@ def _said_unit(table: Columns, name: str) -> str:
     return table.units.get(name, "").split(" since ")[0].strip()
 
 
-def time_step_of(table: Columns, name: str) -> float | None:
-    """Step of a time column in s, gaps left out; None where it has too few values."""
-    times, unit = table.values.get(name), time_unit_of(table, name)
-    if times is None or times.size < 3:
+def time_step_of(table: Columns, name: str | None) -> float | None:
+    """Step of a time column in s, gaps left out; None without one, or of too few values."""
+    if name not in table.values or (times := table.values[name]).size < 3:
         return None
-    step = float(times[-1] - times[0]) / (times.size - 1)
+    step = (times[-1] - times[0]) / (times.size - 1)
     usual = usual_step(times)
     step = step if abs(step - usual) < 0.01 * abs(usual) else usual
+    unit = time_unit_of(table, name)
     step *= conversion(unit, "s", f"the time column '{name}'") if is_unit(unit) else 1.0
     return step if step > 0 else None
 
@@ -191,7 +191,7 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
             f"{path} has no time column '{options.time}'.{did_you_mean(options.time, table.names)} "
             f"Its columns: {', '.join(table.names)}. State one of them as time in [files]."
         )
-    if name is None and rate is None:
+    if name is None and not rate:
         raise RequestError(
             f"{path} has no column with a usual name of times. State time = 'NAME' or "
             f"sampling_rate (Hz) in [files]. Its columns: {', '.join(table.names)}."

@@ -18,7 +18,7 @@ from seakeep.campaign.pipeline import (
     used_span,
 )
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.errors import DataError, MissingFileError, SeakeepError, warn
+from seakeep.errors import DataError, MissingFileError, SeakeepError, naming, warn
 from seakeep.formats import Columns, Options, read_columns
 from seakeep.quality import Finding, warn_of
 from seakeep.quality.clocks import ClocksKind
@@ -151,22 +151,22 @@ def survey(
     where the campaign does not say otherwise, and one that is not certain is left out.
     """
     reader, pools = ReadOnce(), settings.instruments.pool_drift
-    own = [name for name in asked if settings.runs[name].files]
-    others = settings.used_runs if own and pools else ()  # whose drifts are pooled with theirs
-    clock_runs = dict.fromkeys([*own, *filter(lambda name: settings.runs[name].files, others)])
+    # Those whose drifts are pooled with theirs, too.
+    pooled = settings.used_runs if pools and any(settings.runs[n].files for n in asked) else ()
+    clock_runs = [n for n in dict.fromkeys([*asked, *pooled]) if settings.runs[n].files]
     period_runs = () if channel is None else settings.period_runs
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks = {}
     spans = {}
     bad = {}
     for count, name in enumerate(runs, 1):
-        if progress is not None:
+        if progress:
             progress(0, len(runs), f"clocks and waves of {name} ({count} of {len(runs)})")
         reader.keep = name in asked
         try:
             run = sync(read(name, settings, files_of(name), reader))
             clocks[name] = dict(run.clocks)
-            if channel is not None and name in period_runs:
+            if channel and name in period_runs:
                 spans[name] = _period(run, channel)
         except SeakeepError as error:
             if name in asked:
@@ -217,7 +217,7 @@ def _period(run: Run, channel: str) -> tuple[float, float, float, float]:
     step = uniform_step(time, f"run '{run.name}'")
     used = inside(time, used_span(run.own), step)
     series = series[used] if used.sum() > 2 else series
-    try:
+    with naming(f"run '{run.name}', channel '{channel}'"):
         stated = run.settings.campaign.period_hysteresis
         counted = encounter_period(series, step, stated)
         steady = counted
@@ -225,7 +225,5 @@ def _period(run: Run, channel: str) -> tuple[float, float, float, float]:
             # A spike would make the SD so large that no wave is left.
             clipped = np.clip(series, *np.quantile(series, [0.001, 0.999]))
             steady = encounter_period(clipped, step, max(stated, 0.1))
-    except DataError as error:
-        raise DataError(f"run '{run.name}', channel '{channel}': {error}") from None
     energy = energy_period(series[waves_part(series, step)], step)
     return counted, energy, steady, series.size * step / counted

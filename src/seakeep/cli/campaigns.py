@@ -51,7 +51,7 @@ def tank(
     from seakeep.tank.play import play
     from seakeep.tank.settings import default_settings, read_tank, with_waves
 
-    chosen = default_settings() if settings is None else read_tank(settings)
+    chosen = read_tank(settings) if settings else default_settings()
     chosen = with_waves(chosen, seed, spacing)
     with progress_bar("Playing") as progress:
         files = play(
@@ -185,7 +185,7 @@ def track(
         bridge=bridge,
         passband=passband if passband != 0 else None,
     )
-    reference = None if mru is None else read_table(mru, columns=("heave", "pitch"))
+    reference = read_table(mru, columns=("heave", "pitch")) if mru else None
     with progress_bar("Tracking") as progress:
         track = track_video(video, settings, progress)
     if sheet:
@@ -231,7 +231,7 @@ def init(
         if is_there(out) and not force:
             raise RequestError(f"{out} exists already. Give another name, or --force.")
         check_output(out, "draft", files)
-    folder = Path() if out is None else out.parent
+    folder = out.parent if out else Path()
     marks = {"tab": "\t", "blank": " "}
     mark = None if delimiter is None else marks.get(delimiter, delimiter)
     options = {"skip_rows": skip_rows, "delimiter": mark, "decimal": decimal, "group": group}
@@ -352,7 +352,7 @@ datasets = typer.Typer(
 
 @datasets.callback()
 def _list(context: typer.Context) -> None:
-    if context.invoked_subcommand is not None:
+    if context.invoked_subcommand:
         return
     from rich import box
     from rich.table import Table
@@ -389,7 +389,7 @@ def _fetch(
 
     dataset = find_dataset(name)
     folder = to or data_folder()
-    if folder is None:
+    if not folder:
         raise RequestError(
             "no data folder is known. Give --to DIR, or set the environment variable "
             "SEAKEEP_DATA_DIR."

@@ -332,7 +332,7 @@ def _named(files: list[Path]) -> dict[str, Path]:
 
 def _figures(names: list[str], out: Path, suffix: str) -> dict[str, Path]:
     """Files of figures by name, where figures can be drawn."""
-    if find_spec("matplotlib") is None:
+    if not find_spec("matplotlib"):
         say(
             "Note: no figures, because matplotlib is not installed. "
             "Install it with: pip install 'seakeep[figures]'"
@@ -414,8 +414,8 @@ def _band(
     if members:
         del given["--members"]
         refuse(given, NO_BAND)
-    calibrations = [each.calibration for each in ensembles if each.calibration is not None]
-    if calibrations and band is None and not members:
+    calibrations = [each.calibration for each in ensembles if each.calibration]
+    if calibrations and not (band or members):
         say(
             "Note: the ensemble is calibrated, and the band shown is that of its members. "
             "--band calibrated shows the calibrated one."

@@ -1,20 +1,15 @@
 """Tables in NetCDF and HDF5 files."""
 
-from __future__ import annotations
-
 import io
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
 from seakeep.errors import DataError, did_you_mean
 from seakeep.formats.columns import Columns, Options, decoding
-
-if TYPE_CHECKING:
-    import h5py
 
 WIDEST = 64
 """Columns of a two-dimensional set beyond which it is a picture or a field, not channels."""
@@ -92,7 +87,7 @@ def _group(path: Path, wanted: str | None) -> str | None:
 
     holding: dict[str, int] = {}
 
-    def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
+    def look(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.ndim and item.dtype.kind in "fiub":
             parent = name.rpartition("/")[0]
             holding[parent] = holding.get(parent, 0) + 1

@@ -84,10 +84,10 @@ def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
     types = {}
     for connection in connections:
         first = next(iter(reader.messages([connection])), None)
-        if first is None:
+        if not first:
             continue
         message = reader.deserialize(first[2], connection.msgtype)
-        if next(iter(_flat(message, "")), None) is not None:
+        if any(True for _ in _flat(message, "")):
             types[connection.topic] = f"{connection.msgtype}, {connection.msgcount}"
     if not types:
         topics = ", ".join(sorted({connection.topic for connection in connections})) or "none"
@@ -104,7 +104,7 @@ def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
 def _stamp(message: Any) -> int | None:
     """Stamp of the message's header, ns; None where it has none or was not stamped."""
     stamp = getattr(getattr(message, "header", None), "stamp", None)
-    if stamp is None:
+    if not stamp:
         return None
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec) or None
 
@@ -167,7 +167,7 @@ def _columns(
 
 def _seconds(instants: list[int], begin: int) -> FloatArray:
     # Subtracted as integers: a count of nanoseconds since 1970 has more digits than a float.
-    return 1e-9 * np.array([instant - begin for instant in instants], dtype=float)
+    return 1e-9 * np.array([instant - begin for instant in instants], float)
 
 
 def _unit(kind: str, name: str) -> str | None:

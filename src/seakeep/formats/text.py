@@ -161,7 +161,7 @@ def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
         if line.strip(" \t,;") and not line.lstrip().startswith(marks)
     ]
     text = next((line for _, line in rows[:HEAD] if not _RULE.match(line)), None)
-    if text is None:
+    if not text:
         raise DataError(
             f"{path} holds no rows, only comments and blank lines. Export the run again."
         )

@@ -1,7 +1,5 @@
 """C99 sources of a model and of its estimator, without any dependency."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping
@@ -113,10 +111,10 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
     """Text of the C files of a model by their names, and of its estimator where it is live."""
     signature, input_map = model.signature, model.signature.input_map
     follows, observed = input_map.follows, input_map.observed
-    back = 0 if follows is None else follows.back
+    back = follows.back if follows else 0
     kernels: list[FloatArray] = []
     every = [Text(f"u[{place}]", _number) for place in range(len(signature.inputs))]
-    u = np.array([every], dtype=object)
+    u = np.array([every], object)
     delayed, direct = list(map(str, every)), list[str]()
     if observed:
         for each in observed.bound:

@@ -1,7 +1,5 @@
 """Functional mock-up units: the C sources of a model behind FMI 2.0 for co-simulation."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import platform
@@ -115,7 +113,7 @@ def compiler() -> list[str] | None:
     if named := shlex.split(os.environ.get("CC", "")):
         return named
     path = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-    return None if path is None else [path]
+    return [path] if path else None
 
 
 def _compiled(compiler: list[str], folder: Path, name: str, suffix: str) -> Path:

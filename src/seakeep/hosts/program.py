@@ -4,8 +4,6 @@ A step from instant k takes the inputs of instant k + ``lead_samples``, so that 
 observables and carriers have a finite reach is causal in its newest input. Inputs are as measured.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 
@@ -69,7 +67,7 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             "recursion runs on every host, fed with the probes as they are measured; or without "
             "alignment."
         )
-    for bound in () if observed is None else observed.bound:
+    for bound in observed.bound if observed else ():
         if not bound.terms:
             raise RequestError(
                 f"the observable '{bound.labels[0].name}' states no terms, by which other "
@@ -132,7 +130,7 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
     labelled.check_run(run, name)
     labelled.check_step(run, name, signature.dt)
     labelled.check_units(run, signature.state_labels + signature.input_labels, name)
-    time = np.asarray(run["time"].values, dtype=float)
+    time = np.asarray(run["time"].values, float)
     at = labelled.nearest_sample(time, labelled.as_instant(start, "start"), name)
     rows = []
     for names, first, stop in (

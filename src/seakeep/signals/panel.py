@@ -5,8 +5,6 @@ filling, the largest component, its centroid and orientation. Places are in pixe
 downwards from the centre of the upper left pixel. Needs OpenCV, the extra ``video``.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from typing import Any, Literal

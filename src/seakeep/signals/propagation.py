@@ -7,20 +7,18 @@ them. The wavenumber follows linear dispersion, or one celerity c for all freque
 :math:`\eta(t) = \eta_{kn}(t - d(t)/c)`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 from numpy.polynomial import chebyshev
 from scipy import fft
 
 from seakeep.arrays import (
+    ArrayLike,
     ComplexArray,
     FloatArray,
     as_pair,
@@ -88,7 +86,7 @@ class EffectiveCelerity:
 
 
 def phase_celerity(
-    upstream: npt.ArrayLike, downstream: npt.ArrayLike, dt: float, separation: float, depth: float
+    upstream: ArrayLike, downstream: ArrayLike, dt: float, separation: float, depth: float
 ) -> PhaseCelerity:
     r"""Phase speed between two probes from the phase of their cross-spectrum.
 
@@ -141,8 +139,8 @@ def phase_celerity(
 
 
 def effective_celerity(
-    upstream: npt.ArrayLike,
-    downstream: npt.ArrayLike,
+    upstream: ArrayLike,
+    downstream: ArrayLike,
     dt: float,
     separation: float,
     depth: float,
@@ -287,7 +285,7 @@ class Misplaced:
 
 
 def misplaced_probes(
-    elevations: Mapping[str, npt.ArrayLike],
+    elevations: Mapping[str, ArrayLike],
     positions: Mapping[str, float],
     dt: float,
     depth: float,
@@ -362,14 +360,12 @@ def misplaced_probes(
 
 def _telling(series: FloatArray) -> bool:
     """Whether a record holds irregular waves, and enough of them."""
-    if series.size < 64 or np.ptp(series) == 0:
-        return False
     rises = np.diff(np.sign(series - series.mean())) > 0
-    return bool(rises.sum() >= LEAST_WAVES) and not is_regular(series)
+    return series.size >= 64 and rises.sum() >= LEAST_WAVES and not is_regular(series)
 
 
 def probe_separation(
-    first: npt.ArrayLike, second: npt.ArrayLike, dt: float, depth: float, stated: float
+    first: ArrayLike, second: ArrayLike, dt: float, depth: float, stated: float
 ) -> ProbeSeparation:
     r"""Separation of two wave probes from the phases of their cross-spectrum.
 
@@ -518,16 +514,16 @@ class CarriedElevation:
     highest: float
     terms: FloatArray = field(repr=False)
 
-    def at(self, distance: npt.ArrayLike, sample: int | slice = slice(None)) -> FloatArray:
+    def at(self, distance: ArrayLike, sample: int | slice = slice(None)) -> FloatArray:
         """Elevation at a distance from where it was measured."""
         half = 0.5 * (self.highest - self.lowest)
-        place = np.asarray(distance, dtype=float) - 0.5 * (self.highest + self.lowest)
+        place = np.asarray(distance, float) - 0.5 * (self.highest + self.lowest)
         scaled = np.clip(place / half, -1.0, 1.0) if half > 0 else np.zeros_like(place)
         x = scaled[:, None] if scaled.ndim else scaled
         return np.asarray(chebyshev.chebval(x, self.terms[:, sample], tensor=False))
 
 
-def band_limit(series: npt.ArrayLike, dt: float, share: float = WAVE_SHARE) -> float:
+def band_limit(series: ArrayLike, dt: float, share: float = WAVE_SHARE) -> float:
     """Frequency below which a given part of a record's variance lies."""
     array = as_series(series, channels=True)
     flat = array.reshape(array.shape[0], -1)
@@ -544,7 +540,7 @@ def band_limit(series: npt.ArrayLike, dt: float, share: float = WAVE_SHARE) -> f
 
 
 def carry_by_dispersion(
-    series: npt.ArrayLike,
+    series: ArrayLike,
     dt: float,
     distances: tuple[float, float],
     depth: float,
@@ -567,7 +563,7 @@ def carry_by_dispersion(
 
 
 def carry_by_celerity(
-    series: npt.ArrayLike, dt: float, distances: tuple[float, float], celerity: float
+    series: ArrayLike, dt: float, distances: tuple[float, float], celerity: float
 ) -> CarriedElevation:
     """Prepare a record to be carried over a range of distances (m) at one celerity (m/s)."""
     speed = positive(celerity, "the celerity", "m/s")

@@ -10,8 +10,6 @@ the right of the picture the camera looks along +y and sees the vessel's port si
 downstream to the left it stands on the other side of the tank.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -114,7 +112,7 @@ class _Video:
 
         first, previous, count = 0.0, -1, 0
         while (read := self.capture.read())[0]:
-            stamp = 1e-3 * float(self.capture.get(cv2.CAP_PROP_POS_MSEC))
+            stamp = 1e-3 * self.capture.get(cv2.CAP_PROP_POS_MSEC)
             first = stamp if count == 0 else first
             number = round((stamp - first) * self.rate)
             if not np.isfinite(stamp) or (count and stamp <= first):
@@ -151,7 +149,7 @@ def _open_video(path: Path | str) -> Iterator[_Video]:
                 "has its table of frames at the end), or is a file of another kind. Copy or export "
                 "it again."
             )
-        rate = float(capture.get(cv2.CAP_PROP_FPS))
+        rate = capture.get(cv2.CAP_PROP_FPS)
         if not SLOWEST <= rate <= FASTEST:
             raise DataError(
                 f"{path} states {rate:g} frames per second, which is impossible. Encode it again "
@@ -276,7 +274,7 @@ def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) ->
     """What was seen of the panel and of the lamp in each frame; NaN of one that was dropped."""
     numbers: list[int] = []
     rows: list[list[float]] = []
-    at_rest = how.origin is None
+    at_rest = not how.origin
     if how.lamp:
         x, y, radius = how.lamp
         below, right = np.ogrid[: video.size[1], : video.size[0]]
@@ -297,9 +295,9 @@ def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) ->
             row["lamp"] = float(np.mean(frame[disc])) / 255.0
         numbers.append(number)
         rows.append([row.get(field, np.nan) for field in FIELDS])
-        if progress is not None and len(rows) % REPORT_EVERY == 0:
+        if progress and len(rows) % REPORT_EVERY == 0:
             progress(len(rows), max(video.announced, len(rows)), "frames")
-    if progress is not None:
+    if progress:
         progress(len(rows), len(rows), "frames")
     return seen()
 
@@ -321,7 +319,7 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
     lowest = np.min([seen[corner][like] - usual[corner] for corner in CORNERS], axis=0)
     usual["corner_noise"] = 1.4826 * np.median(abs(lowest - np.median(lowest)))
     square = panel[0] * panel[1] / (usual["length"] * usual["height"])
-    usual["scale"] = known or float(np.sqrt(square))
+    usual["scale"] = known or np.sqrt(square)
     return usual
 
 
@@ -409,7 +407,7 @@ def _motions(
             )
         table[:, :2] -= table[rest, :2].mean(axis=0)
     table[~good] = np.nan
-    filled = np.zeros(good.size, dtype=bool)
+    filled = np.zeros(good.size, bool)
     for begin, end in stretches(~good):
         inner = begin > 0 and end < good.size
         filled[begin:end] = inner and end - begin <= how.bridge * rate + 1e-9
