@@ -30,10 +30,10 @@ CHANGES = {
         ("rotation_matrix(angles)[:, 2, axis]", "rotation_matrix(angles)[:, axis, 2]", "campaign/test_steps.py::test_gravity_is_removed_from_one_accelerometer"),
     ],
     "campaign/pipeline.py": [
-        ('attributes["accuracy"] = factor * settings.accuracy', 'attributes["accuracy"] = settings.accuracy', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
+        ('{"accuracy": factor * each.accuracy}', '{"accuracy": each.accuracy}', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
         ("own > MOST_FINER * dt", "own < MOST_FINER * dt", "campaign/test_prepare.py::test_times_in_another_unit_are_refused_before_a_thousand_samples_are_made_of_one"),
         ("return origin + dt * np.arange(first, last + 1)", "return origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
-        ("settings.sign * factor * (logger.columns.values[column] + settings.offset)", "settings.sign * factor * logger.columns.values[column] + settings.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
+        ("each.sign * factor * (logger.columns.values[column] + each.offset)", "each.sign * factor * logger.columns.values[column] + each.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],
     "campaign/prepare.py": [
         ("dt = period / preparation.steps_per_period", "dt = period / (preparation.steps_per_period - 1)", "campaign/test_prepare.py::test_the_step_is_the_stated_one"),

@@ -75,7 +75,18 @@ def draft_campaign(
     read = arranged(paths, [read_columns(path, settings) for path in paths])
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
-        _refuse(read)
+        first = read[0]
+        for other in read[1:]:
+            if not set(first.table.names) & set(other.table.names) - {first.time}:
+                raise RequestError(
+                    f"{first.path} and {other.path} have no column in common. Name files of one "
+                    "logger, one per run; or those of several loggers as RUN/LOGGER.csv or "
+                    "RUN_LOGGER.csv."
+                )
+        raise RequestError(
+            f"{first.path}: no column has numbers that a channel could be made of (columns: "
+            f"{', '.join(first.table.names)}). Check delimiter and decimal mark of the file."
+        )
     wave = next(iter(_inputs(guesses)), None)
     seas = seas_of(read, guesses, wave) if wave else {}
     runs = list(dict.fromkeys(file.run for file in read))
@@ -113,21 +124,6 @@ def draft_campaign(
         every=int(max(rates, default=0.0) * shortest / STEPS),
         **_loggers(read, guesses),
         **_channels(guesses),
-    )
-
-
-def _refuse(files: Files) -> None:
-    first = files[0]
-    for other in files[1:]:
-        if not set(first.table.names) & set(other.table.names) - {first.time}:
-            raise RequestError(
-                f"{first.path} and {other.path} have no column in common. Name files of one "
-                "logger, one per run; or those of several loggers as RUN/LOGGER.csv or "
-                "RUN_LOGGER.csv."
-            )
-    raise RequestError(
-        f"{first.path}: no column has numbers that a channel could be made of (columns: "
-        f"{', '.join(first.table.names)}). Check delimiter and decimal mark of the file."
     )
 
 

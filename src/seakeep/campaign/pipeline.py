@@ -18,7 +18,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -248,11 +247,11 @@ def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
     every = channels_of(run.settings, run.own)
     chosen = {name: each for name, each in every.items() if name in needed}
     homes = _homes(run, chosen)
-    groups = {}
-    for key, logger in run.loggers.items():
-        own = {name: each for name, each in chosen.items() if homes[name] == key}
-        if own:
-            groups[key] = _channels(run, logger, own)
+    groups = {
+        key: _channels(run, logger, own)
+        for key, logger in run.loggers.items()
+        if (own := {name: each for name, each in chosen.items() if homes[name] == key})
+    }
     return replace(run, groups=groups)
 
 
@@ -300,48 +299,36 @@ def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings])
         records = _part(f"runs.{run.name}.record", (start, end), time, step, whole, slack)
     variables = {}
     for name, each in channels.items():
-        values, attributes = _converted(name, each, run, logger)
-        variables[name] = ("time", values[records], attributes)
+        wanted, path = each.column or name, logger.path
+        column = find_column(path, logger.columns, wanted)
+        said, unit = logger.columns.units.get(column), each.unit
+        changed = run.own.channels.get(name)
+        if (
+            unit is not None
+            and not (changed and "unit" in changed.model_fields_set)
+            and said not in (None, "", "-", "1")
+            and is_unit(said)
+            and not same_unit(said, unit)
+        ):
+            raise RequestError(
+                f"channels.{name}: the unit '{unit}' is stated, and run '{run.name}' ({path}) says "
+                f"'{said}' for the column '{wanted}'. Leave unit out where the files say it; or, "
+                f"if this file is wrong, state the unit in [runs.{run.name}.channels.{name}]."
+            )
+        unit = said if unit is None else unit
+        if unit is None:
+            raise RequestError(
+                f"channels.{name}: the column '{wanted}' of {path} states no unit. Add unit = '…' "
+                f"to [channels.{name}] ('-' for none)."
+            )
+        target = units_of(name, unit)
+        factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")
+        values = each.sign * factor * (logger.columns.values[column] + each.offset)
+        attributes = {"units": target, "long_name": long_name_of(name, each.long_name)}
+        accuracy = {} if each.accuracy is None else {"accuracy": factor * each.accuracy}
+        variables[name] = ("time", values[records], attributes | accuracy)
     coordinate = ("time", time[records], {"units": "s", "long_name": "time"})
     return xr.Dataset(variables, {"time": coordinate})
-
-
-def _converted(
-    name: str, settings: ChannelSettings, run: Run, logger: Logger
-) -> tuple[FloatArray, dict[str, Any]]:
-    """Values and attributes of a channel."""
-    wanted, path = settings.column or name, logger.path
-    column = find_column(path, logger.columns, wanted)
-    said, stated = logger.columns.units.get(column), settings.unit
-    changed = run.own.channels.get(name)
-    if (
-        stated is not None
-        and not (changed and "unit" in changed.model_fields_set)
-        and said not in (None, "", "-", "1")
-        and is_unit(said)
-        and not same_unit(said, stated)
-    ):
-        raise RequestError(
-            f"channels.{name}: the unit '{stated}' is stated, and run '{run.name}' ({path}) says "
-            f"'{said}' for the column '{wanted}'. Leave unit out where the files say it; or, if "
-            f"this file is wrong, state the unit in [runs.{run.name}.channels.{name}]."
-        )
-    unit = said if stated is None else stated
-    if unit is None:
-        raise RequestError(
-            f"channels.{name}: the column '{wanted}' of {path} states no unit. Add unit = '…' to "
-            f"[channels.{name}] ('-' for none)."
-        )
-    target = units_of(name, unit)
-    factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")
-    values = settings.sign * factor * (logger.columns.values[column] + settings.offset)
-    attributes: dict[str, Any] = {
-        "units": target,
-        "long_name": long_name_of(name, settings.long_name),
-    }
-    if settings.accuracy is not None:
-        attributes["accuracy"] = factor * settings.accuracy
-    return values, attributes
 
 
 def cleaned(run: Run) -> Run:

@@ -3,7 +3,7 @@
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -212,28 +212,19 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
             "[files]."
         )
     times = table.values[name] * factor
-    _refuse_stuck_clock(path, times, [x for each, x in table.values.items() if each != name])
+    # Rows that are there twice are left to `check_order`.
+    if (again := np.flatnonzero(np.diff(times) == 0)).size:
+        pairs = [(x[again], x[again + 1]) for each, x in table.values.items() if each != name]
+        same = [(a == b) | ~(np.isfinite(a) | np.isfinite(b)) for a, b in pairs]
+        if pairs and np.all(same, axis=0).mean() <= 0.5:
+            first = again[0]
+            raise DataError(
+                f"the times of {path} repeat: {instant_text(times[first], 0)} s stands at samples "
+                f"{first} and {first + 1} ({again.size} repetitions in all), and the readings "
+                "beside them differ, so no row is double: the clock stood still, or is written "
+                "with too few decimals. If the readings went on evenly, leave time out of [files] "
+                "and state sampling_rate (Hz) there; of one logger of several, export the file "
+                "without its times and state sampling_rate in [instruments.NAME]. Else export it "
+                "with more decimals."
+            )
     return name, check_order(times, str(path))
-
-
-def _refuse_stuck_clock(path: Path, times: FloatArray, others: Sequence[FloatArray]) -> None:
-    """Refuse times that repeat while readings go on: no row is double, the clock is wrong.
-
-    Rows that are there twice are left to :func:`check_order`.
-    """
-    again = np.flatnonzero(np.diff(times) == 0)
-    if not again.size or not others:
-        return
-    pairs = [(x[again], x[again + 1]) for x in others]
-    same = [(a == b) | ~(np.isfinite(a) | np.isfinite(b)) for a, b in pairs]
-    if np.all(same, axis=0).mean() > 0.5:
-        return
-    first = again[0]
-    raise DataError(
-        f"the times of {path} repeat: {instant_text(times[first], 0)} s stands at samples {first} "
-        f"and {first + 1} ({again.size} repetitions in all), and the readings beside them differ, "
-        "so no row is double: the clock stood still, or is written with too few decimals. If the "
-        "readings went on evenly, leave time out of [files] and state sampling_rate (Hz) there; "
-        "of one logger of several, export the file without its times and state sampling_rate in "
-        "[instruments.NAME]. Else export it with more decimals."
-    )

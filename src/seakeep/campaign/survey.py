@@ -158,7 +158,7 @@ def survey(
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks = {}
     spans = {}
-    bad = {}
+    bad, left_out = {}, {}
     for count, name in enumerate(runs, 1):
         if progress:
             progress(0, len(runs), f"clocks and waves of {name} ({count} of {len(runs)})")
@@ -172,6 +172,12 @@ def survey(
             if name in asked:
                 spare(failures, name, error)
             bad[name] = error
+            lacks = ["the encounter period"] * (name in period_runs)
+            lacks += ["the pooled clock drifts"] * (name in clock_runs and name not in clocks)
+            left_out[name] = (
+                f"run '{name}' is left out of {' and of '.join(lacks) or 'the clocks'}: {error} "
+                f"Once it is repaired, prepare again; or state role = 'unused' in [runs.{name}]."
+            )
     reader.keep = False
     long = {name: each for name, each in spans.items() if each[3] >= FEWEST} or spans
     periods = {name: counted for name, (counted, *_) in long.items()}
@@ -182,10 +188,6 @@ def survey(
     }
     if bad and (not clocks or (period_runs and not periods)):
         raise as_one(bad)
-    left_out = {
-        name: _left_out(name, error, name in period_runs, name in clock_runs and name not in clocks)
-        for name, error in bad.items()
-    }
     for words in (words for name, words in left_out.items() if name not in asked):
         warn(words)
     kind = ClocksKind.PERIOD
@@ -197,14 +199,6 @@ def survey(
             each[logger] = without_doubtful_drift(clock)
     alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}
     return Survey(settings, files_of, reader, alone | clocks, periods, left_out, doubts)
-
-
-def _left_out(run: str, error: SeakeepError, period: bool, drift: bool) -> str:
-    pooled = ["the encounter period"] * period + ["the pooled clock drifts"] * drift
-    return (
-        f"run '{run}' is left out of {' and of '.join(pooled) or 'the clocks'}: {error} "
-        f"Once it is repaired, prepare again; or state role = 'unused' in [runs.{run}]."
-    )
 
 
 def _period(run: Run, channel: str) -> tuple[float, float, float, float]:

@@ -233,7 +233,7 @@ def init(
         check_output(out, "draft", files)
     folder = out.parent if out else Path()
     marks = {"tab": "\t", "blank": " "}
-    mark = None if delimiter is None else marks.get(delimiter, delimiter)
+    mark = delimiter and marks.get(delimiter, delimiter)
     options = {"skip_rows": skip_rows, "delimiter": mark, "decimal": decimal, "group": group}
     text = draft_campaign(files, folder, options)
     if out is None:

@@ -249,8 +249,7 @@ def compare(
         fitted = _with_baselines(fitted, read)
     if nowcast:
         given = {"--start": start, "--band": band, "--workers": workers, "--scheduler": scheduler}
-        stated = {option: value is not None for option, value in given.items()}
-        refuse(stated | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
+        refuse(given | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
         serving = {n: each for n, each in fitted.items() if n in names or served(each)}
         _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
         return
@@ -407,10 +406,10 @@ def _band(
     from seakeep.models import is_ensemble
 
     ensembles = [each for each in models.values() if is_ensemble(each)]
-    given = {"--level": level is not None, "--band": band is not None, "--members": members}
+    given = {"--level": level, "--band": band, "--members": members}
     if not ensembles:
         alone = FOR_ENSEMBLES.format(", ".join(models))
-        refuse(given | {"--scheduler": scheduler is not None}, alone)
+        refuse(given | {"--scheduler": scheduler}, alone)
     if members:
         del given["--members"]
         refuse(given, NO_BAND)

@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Mapping
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from seakeep.arrays import FloatArray
 from seakeep.conventions import is_elevation
 from seakeep.core.readouts import SOFT
 from seakeep.core.spectra import PER_OCTAVE
-from seakeep.files import MARK, check_output, make_folder, templates, write_text
+from seakeep.files import MARK, check_output, make_folder, templates, version, write_text
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
@@ -126,7 +125,7 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
         direct = [f"rising({text}, {_number(top)}, {_number(by)})" for text, top, by in limited]
     content = {
         "name": name,
-        "mark": f"{MARK}: {KIND}, written by seakeep {metadata.version('seakeep')}:",
+        "mark": f"{MARK}: {KIND}, written by seakeep {version()}:",
         "model": model,
         "now": back,
         "delayed": delayed,

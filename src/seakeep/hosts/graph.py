@@ -1,6 +1,5 @@
 """ONNX graphs of a model: one step, or a forecast of a fixed number of steps."""
 
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from seakeep.arrays import FloatArray, IntArray, whole_number
 from seakeep.core.recursion import Place
 from seakeep.errors import needing
-from seakeep.files import MARK, check_output, replacing
+from seakeep.files import MARK, check_output, replacing, version
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.following import Following
@@ -226,12 +225,16 @@ def _model(model: HankelDMDcModel, steps: int) -> Any:
         graph_proto,
         doc_string=f"{MARK}: {KIND}. {timing(model)}",
         producer_name="seakeep",
-        producer_version=metadata.version("seakeep"),
+        producer_version=version(),
         opset_imports=[helper.make_opsetid("", OPSET)],
         ir_version=IR,
     )
-    words = {"dt": repr(signature.dt), "lead_samples": str(signature.lead_samples)}
-    words |= {"states": ", ".join(signature.states), "inputs": ", ".join(signature.inputs)}
+    words = {
+        "dt": repr(signature.dt),
+        "lead_samples": str(signature.lead_samples),
+        "states": ", ".join(signature.states),
+        "inputs": ", ".join(signature.inputs),
+    }
     helper.set_model_props(whole, words)
     return whole
 

@@ -299,9 +299,13 @@ def compare_motion(
     >>> round(found.lag, 3), round(found.correlation, 3)
     (0.1, 1.0)
     """
-    first = record(series, time, "the video")
-    second = record(reference, reference_time, "the reference")
-    (y1, t1), (y2, t2) = ((y[np.isfinite(y)], t[np.isfinite(y)]) for y, t in (first, second))
+    (y1, t1), (y2, t2) = (
+        (y[np.isfinite(y)], t[np.isfinite(y)])
+        for y, t in (
+            record(series, time, "the video"),
+            record(reference, reference_time, "the reference"),
+        )
+    )
     reach = min(LONGEST, 0.25 * min(np.ptp(t1), np.ptp(t2)))
     if max_lag is not None:
         reach = positive(max_lag, "max_lag", "s")

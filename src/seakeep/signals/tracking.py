@@ -314,33 +314,30 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
     if known:
         like &= abs(seen["length"] / (panel[0] / known) - 1) < SIZE_BAND
     if not like.any():
-        raise DataError(_not_found(seen, how, name))
+        there, wanted = seen["area"] > 0, f"{panel[0]:g} × {panel[1]:g} m"
+        if known:
+            wanted += f", {panel[0] / known:.0f} × {panel[1] / known:.0f} pixels"
+        why = (
+            "nothing is as bright as the thresholds ask. Reduce the least red, green and blue "
+            "(lower; --threshold), or correct the region."
+        )
+        if there.any():
+            length, height = (np.median(seen[side][there]) for side in ("length", "height"))
+            why = (
+                f"the largest bright component measures {length:.0f} × {height:.0f} pixels "
+                f"(median of {there.sum()} frames), which is not its shape. Raise the least red, "
+                "green and blue (lower; --threshold), state a region that holds no other bright "
+                "thing, or correct the panel's size."
+            )
+        raise DataError(
+            f"{name}: the panel ({wanted}) was not found in any of {there.size} frames: {why}"
+        )
     usual = {field: float(np.median(values[like])) for field, values in seen.items()}
     lowest = np.min([seen[corner][like] - usual[corner] for corner in CORNERS], axis=0)
     usual["corner_noise"] = 1.4826 * np.median(abs(lowest - np.median(lowest)))
     square = panel[0] * panel[1] / (usual["length"] * usual["height"])
     usual["scale"] = known or np.sqrt(square)
     return usual
-
-
-def _not_found(seen: Seen, how: TrackingSettings, name: str) -> str:
-    there, panel, known = seen["area"] > 0, how.panel, how.metres_per_pixel
-    wanted = f"{panel[0]:g} × {panel[1]:g} m"
-    if known:
-        wanted += f", {panel[0] / known:.0f} × {panel[1] / known:.0f} pixels"
-    start = f"{name}: the panel ({wanted}) was not found in any of {there.size} frames: "
-    if not there.any():
-        return start + (
-            "nothing is as bright as the thresholds ask. Reduce the least red, green and blue "
-            "(lower; --threshold), or correct the region."
-        )
-    length, height = (np.median(seen[side][there]) for side in ("length", "height"))
-    return start + (
-        f"the largest bright component measures {length:.0f} × {height:.0f} pixels (median of "
-        f"{there.sum()} frames), which is not its shape. Raise the least red, green and blue "
-        "(lower; --threshold), state a region that holds no other bright thing, or correct the "
-        "panel's size."
-    )
 
 
 def _judge(

@@ -165,22 +165,6 @@ def line_table(
     return table
 
 
-def _viscous(settings: TankSettings, hydro: Hydrodynamics) -> tuple[FloatArray, ...]:
-    vessel, losses = settings.vessel, settings.vessel.pool
-    linear, quadratic = (
-        [each.surge, each.heave, each.pitch]
-        for each in (vessel.linear_damping, vessel.quadratic_damping)
-    )
-    pool = np.zeros(3)
-    if hydro.pool:
-        linear += [0.0, losses.slosh_linear]
-        quadratic += [0.0, losses.slosh_quadratic]
-        contraction = (hydro.pool.area / hydro.pool.opening) ** 2
-        quadratic_loss = 0.5 * hydro.attrs["density"] * losses.loss_coefficient * contraction
-        pool = np.array([hydro.pool.centre, quadratic_loss * hydro.pool.area, losses.piston_linear])
-    return np.array(linear), np.array(quadratic), pool
-
-
 def _check_step(rig: Rig) -> None:
     """Refuse a step beyond the stability of the integrator or the resolution of the kernel."""
     dofs = len(rig.names)
@@ -217,16 +201,27 @@ def assemble_rig(settings: TankSettings, hydro: Hydrodynamics | None = None) -> 
                 "Set facility to the file's value, or build a file for this one: "
                 "tools/build_hydrodynamics.py SETTINGS.toml -o FILE.nc, in the source"
             )
-    linear, quadratic, pool = _viscous(settings, coefficients)
+    vessel, losses = settings.vessel, settings.vessel.pool
+    linear, quadratic = (
+        [each.surge, each.heave, each.pitch]
+        for each in (vessel.linear_damping, vessel.quadratic_damping)
+    )
+    flow = np.zeros(3)
+    if opening := coefficients.pool:
+        linear += [0.0, losses.slosh_linear]
+        quadratic += [0.0, losses.slosh_quadratic]
+        contraction = (opening.area / opening.opening) ** 2
+        quadratic_loss = 0.5 * coefficients.attrs["density"] * losses.loss_coefficient * contraction
+        flow[:] = opening.centre, quadratic_loss * opening.area, losses.piston_linear
     step = settings.simulation.step
     height = coefficients.attrs["centre_of_gravity"]
     rig = Rig(
         hydro=coefficients,
         kernel=radiation_kernel(coefficients, step, settings.simulation.kernel_length),
-        linear=linear,
-        quadratic=quadratic,
-        pool=pool,
-        lines=line_table(settings.moorings, settings.vessel.position, height),
+        linear=np.array(linear),
+        quadratic=np.array(quadratic),
+        pool=flow,
+        lines=line_table(settings.moorings, vessel.position, height),
         drift=settings.drift,
         step=step,
         ramp=settings.simulation.ramp,
@@ -272,7 +267,7 @@ def _drift_terms(
     out, along = far_field_at(rig.hydro, omega).swapaxes(0, 1)
     form = out - along
     form[:, 1:, 1:] += 0.5 * omega[:, None, None] ** 2 * losses
-    ratio = rig.drift.scale * wavenumber(omega, rig.hydro.water_depth) / omega
+    ratio = rig.drift.scale * wavenumber(omega, rig.hydro.attrs["water_depth"]) / omega
     return both, ratio[:, None] * np.einsum("nij,nj->ni", form, both)
 
 

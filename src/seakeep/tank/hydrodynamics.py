@@ -6,7 +6,6 @@ a moon pool, the absolute elevations of its piston and of its first longitudinal
 """
 
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -72,11 +71,6 @@ class Hydrodynamics:
     pool: Pool | None
     attrs: dict[str, Any]
 
-    @property
-    def water_depth(self) -> float:
-        """Depth for which the coefficients were computed, m."""
-        return self.attrs["water_depth"]
-
 
 @dataclass(frozen=True)
 class Kernel:
@@ -89,7 +83,7 @@ class Kernel:
 
 def shipped_hydrodynamics() -> Path:
     """Path of a file of coefficients that ships with the package."""
-    return Path(str(resources.files("seakeep.tank").joinpath("data", "ck14e.nc")))
+    return Path(__file__).with_name("data") / "ck14e.nc"
 
 
 def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
