@@ -275,8 +275,7 @@ def si_unit(unit: str) -> str:
     """
     base = _registry().get_base_units(_parsed(unit))[1]
     for name in ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "N", "N*m", "Pa", "W", "Hz", "V"):
-        candidate = _parsed(name)
-        if _registry().get_base_units(candidate)[1] == base:
+        if _registry().get_base_units(_parsed(name))[1] == base:
             return "N m" if name == "N*m" else name
     return f"{base:~C}".replace("**", "^").replace("*", " ") or "1"
 

@@ -362,9 +362,8 @@ def _guess(column: str, files: Files) -> Guess:
     channel = "" if why else suggest_channel(name, unit, logger or _stem(files[0].path))
     canonical = canonical_channel(channel)
     unit = unit if unit is not None else canonical.units if canonical else "-"
-    behind = "behind" in _kinds(_words(column))
     return Guess(column, header, unit, stated_by, channel, logger, _printable(why), gaps,
-                 behind=behind)  # fmt: skip
+                 behind="behind" in _kinds(_words(column)))  # fmt: skip
 
 
 def _printable(text: str) -> str:

@@ -173,9 +173,8 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
     for key, path in paths.items():
         options = settings.files
         if key:
-            keys = {"time", "time_unit", "sampling_rate"}
-            stated = settings.instruments[key].model_dump(include=keys, exclude_none=True)
-            options = options.model_copy(update=stated)
+            own, keys = settings.instruments[key], {"time", "time_unit", "sampling_rate"}
+            options = options.model_copy(update=own.model_dump(include=keys, exclude_none=True))
         columns = reader(path, options)
         if key and time_column(columns, options.time):
             options = options.model_copy(update={"sampling_rate": None})

@@ -109,11 +109,10 @@ def _unwrapped(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _rate(content: Mapping[str, Any]) -> float | None:
-    for keys, inverse in ((_RATE_KEYS, False), (_STEP_KEYS, True)):
-        for key in keys:
-            value = content.get(key)
-            if isinstance(value, int | float | np.number) and value > 0:
-                return 1.0 / value if inverse else float(value)
+    for key in (*_RATE_KEYS, *_STEP_KEYS):
+        value = content.get(key)
+        if isinstance(value, int | float | np.number) and value > 0:
+            return 1.0 / value if key in _STEP_KEYS else float(value)
     return None
 
 
