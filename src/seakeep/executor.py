@@ -102,7 +102,8 @@ def as_finished(
     if not executor:
         while items:
             item = items.popleft()
-            (result,) = _in_order(function, data, [item], None)
+            with one_blas_thread():
+                result = function(data, item)
             yield item, result
         return
     pending: dict[Future[list[Result]], Item] = {}

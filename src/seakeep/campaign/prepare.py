@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Groups, Progress, number, whole_number
@@ -242,6 +241,11 @@ class Campaign:
             self._run(name)
         settings = self._in_seconds(self.settings.campaign.encounter_period)
         channel = self.period_channel() if periods else None
+        if channel and not settings.period_runs:
+            raise RequestError(
+                f"{self.path} has no run with waves in use. Give a run another role, or state "
+                "encounter_period (s) in [campaign]."
+            )
         return survey(settings, self.files_of, wanted, channel, progress, failures)
 
     def period_channel(self) -> str:
@@ -286,7 +290,7 @@ class Campaign:
             If no run is left.
         """
         stated = self.settings.campaign.encounter_period
-        return stated or self._mean_period(self._survey([], True))
+        return stated or self._survey([], True).period
 
     def seconds(self, stated: float | str) -> float:
         """Seconds of a length or an instant that may be stated in encounter periods.
@@ -312,14 +316,6 @@ class Campaign:
         if length.unit != "T":
             raise RequestError(f"received '{stated}', a frequency. Give a length such as '15 T'.")
         return length.at(self.encounter_period())
-
-    def _mean_period(self, surveyed: Survey) -> float:
-        if not surveyed.periods:
-            raise RequestError(
-                f"{self.path} has no run with waves in use. Give a run another role, or state "
-                "encounter_period (s) in [campaign]."
-            )
-        return float(np.mean(list(surveyed.periods.values())))
 
     def prepare(
         self, names: Iterable[str] | None = None, progress: Progress | None = None
@@ -474,7 +470,7 @@ class Campaign:
         needed = self._counts_in_periods or (steps and preparation.steps_per_period)
         surveyed = self._survey(wanted, bool(needed) and not period, progress, failures)
         if needed and not period:
-            period = self._mean_period(surveyed)
+            period = surveyed.period
         dt = preparation.dt
         if preparation.steps_per_period and period:
             dt = period / preparation.steps_per_period

@@ -110,8 +110,8 @@ class Survey:
         Reads them.
     clocks : dict of str to dict of str to Clock
         By run and logger.
-    periods : dict of str to float
-        Zero-up-crossing period of the wave channel by run, s.
+    period : float
+        Mean zero-up-crossing period of the wave channel, s; NaN where it was not asked for.
     left_out : dict of str to str
         By run, what it is left out of because it cannot be read, and why.
     doubts : dict of str to (float, float)
@@ -122,7 +122,7 @@ class Survey:
     files_of: Callable[[str], Mapping[str, Path]]
     reader: ReadOnce
     clocks: Mapping[str, Mapping[str, Clock]]
-    periods: Mapping[str, float]
+    period: float
     left_out: Mapping[str, str]
     doubts: Mapping[str, tuple[float, float]]
 
@@ -180,13 +180,13 @@ def survey(
             )
     reader.keep = False
     long = {name: each for name, each in spans.items() if each[3] >= FEWEST} or spans
-    periods = {name: counted for name, (counted, *_) in long.items()}
+    period = float(np.mean([each[0] for each in long.values()])) if long else np.nan
     doubts = {
         name: (counted, energy)
         for name, (counted, energy, steady, _) in spans.items()
         if not 1 / LED <= energy / counted <= LED or steady > NOISY * counted
     }
-    if bad and (not clocks or (period_runs and not periods)):
+    if bad and (not clocks or (period_runs and not spans)):
         raise as_one(bad)
     for words in (words for name, words in left_out.items() if name not in asked):
         warn(words)
@@ -198,7 +198,7 @@ def survey(
         for each, clock in zip(having, pool_drift(known) if pools else known, strict=True):
             each[logger] = without_doubtful_drift(clock)
     alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}
-    return Survey(settings, files_of, reader, alone | clocks, periods, left_out, doubts)
+    return Survey(settings, files_of, reader, alone | clocks, period, left_out, doubts)
 
 
 def _period(run: Run, channel: str) -> tuple[float, float, float, float]:

@@ -345,7 +345,7 @@ def compare_motion(
         lag=float(lag),
         rms=float(np.std(difference)),
         offset=float(np.mean(difference)),
-        samples=int(t1.size),
+        samples=t1.size,
         at_limit=at_limit,
         max_lag=reach,
         period=float(2.0 * (t1[-1] - t1[0]) / max(crossings, 1)),
