@@ -32,7 +32,7 @@ CHANGES = {
     "campaign/pipeline.py": [
         ('{"accuracy": factor * each.accuracy}', '{"accuracy": each.accuracy}', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
         ("own > MOST_FINER * dt", "own < MOST_FINER * dt", "campaign/test_prepare.py::test_times_in_another_unit_are_refused_before_a_thousand_samples_are_made_of_one"),
-        ("return origin + dt * np.arange(first, last + 1)", "return origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
+        ("time = origin + dt * np.arange(first, last + 1)", "time = origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
         ("each.sign * factor * (logger.columns.values[column] + each.offset)", "each.sign * factor * logger.columns.values[column] + each.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],
     "campaign/prepare.py": [

@@ -58,34 +58,28 @@ def in_order(
     what: str = "member",
 ) -> Iterator[Result]:
     """Yield ``function(data, item)`` for each item, in the order of the items."""
-    results = _in_order(function, data, items, executor)
-    for done, result in enumerate(results, start=1):
+
+    def results() -> Iterator[Result]:
+        if not executor:
+            for item in items:
+                with one_blas_thread():
+                    result = function(data, item)
+                yield result
+            return
+        size = -(-len(items) // BATCHES)
+        batches = (items[first : first + size] for first in range(0, len(items), max(size, 1)))
+        with submitting(function, data, executor) as submit:
+            pending = deque(submit(batch) for batch in islice(batches, AHEAD))
+            while pending:
+                _wait_for_any([pending[0]], executor)
+                ready = pending.popleft().result()
+                pending.extend(submit(batch) for batch in islice(batches, 1))
+                yield from ready
+
+    for done, result in enumerate(results(), start=1):
         if progress:
             progress(done, len(items), f"{what} {done}")
         yield result
-
-
-def _in_order(
-    function: Function[Data, Item, Result],
-    data: Data,
-    items: Sequence[Item],
-    executor: Executor | None,
-) -> Iterator[Result]:
-    if not executor:
-        for item in items:
-            with one_blas_thread():
-                result = function(data, item)
-            yield result
-        return
-    size = -(-len(items) // BATCHES)
-    batches = (items[first : first + size] for first in range(0, len(items), max(size, 1)))
-    with submitting(function, data, executor) as submit:
-        pending = deque(submit(batch) for batch in islice(batches, AHEAD))
-        while pending:
-            _wait_for_any([pending[0]], executor)
-            results = pending.popleft().result()
-            pending.extend(submit(batch) for batch in islice(batches, 1))
-            yield from results
 
 
 def as_finished(
@@ -262,7 +256,7 @@ def submitting(
     Except in a pool of processes: it fails over a cancelled future when its workers are killed.
     """
     payload, token = pickle.dumps((data, versions()), protocol=5), uuid.uuid4().hex
-    under_way: set[Future[list[Result]]] = set()  # not the finished: they hold their results
+    under_way = set()  # not the finished: they hold their results
 
     def submit(items: Sequence[Item]) -> Future[list[Result]]:
         future = executor.submit(_work, token, payload, function, items)

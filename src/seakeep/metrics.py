@@ -270,8 +270,7 @@ def _with_bounds(
 def _ratio(values: FloatArray) -> FloatArray:
     """Ratio to the first entry; one for the first itself."""
     with undefined():
-        out: FloatArray = values / values[0]
-    return out
+        return values / values[0]
 
 
 is_slack = labelled(core.is_slack, "channel", label="slackness")

@@ -326,7 +326,14 @@ def validated(
     try:
         settings = root.model_validate(received)
     except ValidationError as error:
-        raise refusal(source, what, _mistakes_of(error, root)) from None
+        refused = []
+        for item in error.errors(include_url=False):
+            # Pydantic's own words: '[key]' of a table, '<number>' for a branch of a union.
+            place = [str(part) for part in item["loc"] if not str(part).startswith("<")]
+            table, description, depth = _place(place, root)
+            key = tuple(part for part in place[:depth] if part != "[key]")
+            refused.append((key, _reason(item, place, table, description)))
+        raise refusal(source, what, refused) from None
     if also and (mistakes := list(also(settings))):
         raise refusal(source, what, mistakes)
     return settings
@@ -363,18 +370,6 @@ def _line_of(text: str, place: tuple[str, ...]) -> int | None:
 
 def _parts(dotted: str) -> tuple[str, ...]:
     return tuple("".join(match) for match in _PART.findall(dotted))
-
-
-def _mistakes_of(error: ValidationError, root: type[BaseModel]) -> list[Mistake]:
-    """Turn what pydantic refused into our own words."""
-    out = []
-    for item in error.errors(include_url=False):
-        # Pydantic's own words in a place: '[key]' of a table, '<number>' for a branch of a union.
-        place = [str(part) for part in item["loc"] if not str(part).startswith("<")]
-        table, description, depth = _place(place, root)
-        key = tuple(part for part in place[:depth] if part != "[key]")
-        out.append((key, _reason(item, place, table, description)))
-    return out
 
 
 def _reason(item: Any, place: list[str], table: type[BaseModel] | None, description: str) -> str:

@@ -281,7 +281,7 @@ def tuned_campaign(
     from tomlkit.items import Table
 
     document = tomlkit.parse(text)
-    table: Any = document["model"] if model is None else document["models"][model]
+    table = document["model"] if model is None else document["models"][model]
     # Blank lines and comments there belong to the next table, if this one is in one place.
     between: list[Any] = []
     body = _end(table) if isinstance(table, Table) else []
@@ -359,7 +359,7 @@ def _end(table: Any) -> list[Any]:
     """Keys and items, lines without a key too, of the table that stands last inside a table."""
     from tomlkit.items import AoT, Table
 
-    body: list[Any] = table.value.body
+    body = table.value.body
     last = next((item for key, item in reversed(body) if key is not None), None)
     last = last[-1] if isinstance(last, AoT) else last
     return _end(last) if isinstance(last, Table) else body

@@ -466,7 +466,34 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
     The axis, unless `time` is given, holds multiples of the step from the reference's first
     instant, where every logger recorded; samples that are missing become NaN.
     """
-    time = _axis(run, dt) if time is None else time
+    if time is None:
+        times = {name: each["time"].values for name, each in run.groups.items()}
+        begin, end = max(t[0] for t in times.values()), min(t[-1] for t in times.values())
+        if end <= begin:
+            spans = ", ".join(
+                f"{name} {span_text(t[0], t[-1], usual_step(t))}" for name, t in times.items()
+            )
+            raise DataError(
+                f"run '{run.name}': its instruments never recorded together ({spans}, on the "
+                "reference's clock). Check the files of the run and the clocks."
+            )
+        own = min(map(usual_step, times.values()))
+        if own > MOST_FINER * dt:
+            raise DataError(
+                f"run '{run.name}' has {1 / own:.4g} samples per second by its times, and "
+                f"[preparation] asks for {1 / dt:.4g}. If its times are in ms, state time_unit = "
+                "'ms' in [files], or correct its header where that says s; else correct "
+                "sampling_rate, dt or steps_per_period."
+            )
+        origin = run.reference_time[0]
+        first = np.ceil((begin - origin) / dt - 1e-6)
+        last = np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6)
+        if last <= first:
+            raise RequestError(
+                f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. "
+                "Correct sampling_rate, dt or steps_per_period in [preparation]."
+            )
+        time = origin + dt * np.arange(first, last + 1)
     channels: dict[str, xr.Variable] = {}
     for group in run.groups.values():
         channels |= _on_axis(group, time, dt, run.settings.preparation, run.name)
@@ -474,9 +501,7 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         channels |= derive(channels, name, run.settings, dt, run.name)
     axis = xr.Variable("time", time, next(iter(run.groups.values()))["time"].attrs)
     data, coordinates = {}, {"time": axis}
-    for name in run.settings.channel_names:
-        if name not in channels:
-            continue
+    for name in [each for each in run.settings.channel_names if each in channels]:
         data[name] = channels[name]
         if (flags := channels.get(f"{name}_flags")) is not None:
             lost = (flags.values & MISSING) > 0
@@ -485,36 +510,6 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         if name in run.settings.rig.positions:
             data[name].attrs["x_position"] = run.settings.rig.positions[name]
     return replace(run, data=xr.Dataset(data, coordinates))
-
-
-def _axis(run: Run, dt: float) -> FloatArray:
-    times = {name: each["time"].values for name, each in run.groups.items()}
-    begin, end = max(t[0] for t in times.values()), min(t[-1] for t in times.values())
-    if end <= begin:
-        spans = ", ".join(
-            f"{name} {span_text(t[0], t[-1], usual_step(t))}" for name, t in times.items()
-        )
-        raise DataError(
-            f"run '{run.name}': its instruments never recorded together ({spans}, on the "
-            "reference's clock). Check the files of the run and the clocks."
-        )
-    own = min(map(usual_step, times.values()))
-    if own > MOST_FINER * dt:
-        raise DataError(
-            f"run '{run.name}' has {1 / own:.4g} samples per second by its times, and "
-            f"[preparation] asks for {1 / dt:.4g}. If its times are in ms, state time_unit = "
-            "'ms' in [files], or correct its header where that says s; else correct "
-            "sampling_rate, dt or steps_per_period."
-        )
-    origin = run.reference_time[0]
-    first = np.ceil((begin - origin) / dt - 1e-6)
-    last = np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6)
-    if last <= first:
-        raise RequestError(
-            f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. Correct "
-            "sampling_rate, dt or steps_per_period in [preparation]."
-        )
-    return origin + dt * np.arange(first, last + 1)
 
 
 def _on_axis(

@@ -67,7 +67,21 @@ def cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
     wave = settings.campaign.period_channel
     if wave is None or wave in settings.channel_names:
         yield from _period_mistakes(settings)
-    yield from _instrument_mistakes(settings)
+    known = list(settings.instruments.loggers)
+    used = {logger for run in settings.runs.values() for logger in run.files}
+    reference = settings.instruments.reference
+    if reference is not None and reference not in {*known, *used}:
+        near = did_you_mean(reference, sorted(used))
+        words = f"received {reference!r}, which no run has a file of.{near}"
+        yield ("instruments", "reference"), words
+    for run, each in settings.runs.items():
+        for logger in each.files:
+            if known and logger not in known:
+                yield (
+                    ("runs", run, "files", logger),
+                    f"no table [instruments.{logger}].{did_you_mean(logger, known)} "
+                    f"Instruments: {', '.join(known)}.",
+                )
     spelt: dict[str, str] = {}
     for run, each in settings.runs.items():
         if (other := spelt.setdefault(run.lower(), run)) != run:
@@ -126,24 +140,6 @@ def _period_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
                 f"zero-up-crossing period of {wave}. State encounter_period (s) in [campaign], or "
                 "this in seconds.",
             )
-
-
-def _instrument_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
-    known = list(settings.instruments.loggers)
-    used = {logger for run in settings.runs.values() for logger in run.files}
-    reference = settings.instruments.reference
-    if reference is not None and reference not in {*known, *used}:
-        near = did_you_mean(reference, sorted(used))
-        words = f"received {reference!r}, which no run has a file of.{near}"
-        yield ("instruments", "reference"), words
-    for run, each in settings.runs.items():
-        for logger in each.files:
-            if known and logger not in known:
-                yield (
-                    ("runs", run, "files", logger),
-                    f"no table [instruments.{logger}].{did_you_mean(logger, known)} "
-                    f"Instruments: {', '.join(known)}.",
-                )
 
 
 def _unit_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:

@@ -233,7 +233,9 @@ def compare(
     from seakeep.study.comparison import served
 
     make_folder(out)
-    names = _named(model)
+    # Names of model files: their stems, or their paths where two would be the same.
+    stems = [path.stem for path in model]
+    names = {p.stem if stems.count(p.stem) == 1 else str(p.with_suffix("")): p for p in model}
     fitted = {name: load_model(path) for name, path in names.items()}
     shown = _band(fitted, level, band, scheduler)
     read = read_campaign(campaign)
@@ -321,12 +323,6 @@ def _nowcast(
         for name, path in figures.items()
     ]
     say_written(written)
-
-
-def _named(files: list[Path]) -> dict[str, Path]:
-    """Names of model files: their stems, or their paths where two would be the same."""
-    stems = [path.stem for path in files]
-    return {p.stem if stems.count(p.stem) == 1 else str(p.with_suffix("")): p for p in files}
 
 
 def _figures(names: list[str], out: Path, suffix: str) -> dict[str, Path]:

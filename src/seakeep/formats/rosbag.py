@@ -62,7 +62,9 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> tuple[Any, ...]:
     for connection, instant, raw in reader.messages(chosen):
         message = reader.deserialize(raw, connection.msgtype)
         received.append(instant)
-        stamps.append(_stamp(message))
+        # Stamp of the header, ns; none where there is none or it was not stamped.
+        stamp = getattr(getattr(message, "header", None), "stamp", None)
+        stamps.append((stamp and int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)) or None)
         numbers.append(dict(_flat(message, "")))
     announced = sum(connection.msgcount for connection in chosen)
     if len(received) < announced:
@@ -99,14 +101,6 @@ def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
             "with group = 'TOPIC' in [files]."
         )
     return next(iter(types))
-
-
-def _stamp(message: Any) -> int | None:
-    """Stamp of the message's header, ns; None where it has none or was not stamped."""
-    stamp = getattr(getattr(message, "header", None), "stamp", None)
-    if not stamp:
-        return None
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec) or None
 
 
 def _flat(value: Any, name: str) -> Iterator[tuple[str, float]]:

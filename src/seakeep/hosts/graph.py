@@ -207,7 +207,12 @@ def _model(model: HankelDMDcModel, steps: int) -> Any:
     columns = {column: x[:, column : column + 1] for column in range(N)}
     for each in signature.readouts:
         if each.acts:
-            wave = each.load and _wave(u, each.load.place, signature, steps)
+            wave = None
+            if each.load:  # elevation and rate at the line, (steps, 2)
+                assert follows
+                taps, probes = follows.lines(None, (each.load.place,))
+                samples = signature.input_map.history(signature.input_delays) + np.arange(steps)
+                wave = _carried(u, samples, follows, taps, probes)
             columns[each.column] = each.read(x, wave).reshape(steps, 1)
     graph("Concat", *columns.values(), into="x", axis=1)
     given = [value("x_history", size, N)]
@@ -326,15 +331,6 @@ def _tables(
         "surge": (surge[last], (past,)),
         "line": (line.reshape(z * n), (z * n,)),
     }
-
-
-def _wave(u: _Value, place: float, signature: Signature, steps: int) -> _Value:
-    """Elevation and rate at the line of a load, (steps, 2)."""
-    follows = signature.input_map.follows
-    assert follows
-    taps, probes = follows.lines(None, (place,))
-    samples = signature.input_map.history(signature.input_delays) + np.arange(steps)
-    return _carried(u, samples, follows, taps, probes)
 
 
 def _carried(

@@ -145,8 +145,7 @@ def carried(taps: FloatArray, record: FloatArray) -> FloatArray:
     if len(record) < length:
         return np.zeros((0, places))
     windows = np.lib.stride_tricks.sliding_window_view(record, length, axis=0)
-    carried_to: FloatArray = windows.reshape(len(windows), -1) @ taps.reshape(places, -1).T
-    return carried_to
+    return windows.reshape(len(windows), -1) @ taps.reshape(places, -1).T
 
 
 def slow_position(surge: FloatArray, period: float) -> FloatArray:

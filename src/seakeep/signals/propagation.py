@@ -334,8 +334,14 @@ def misplaced_probes(
     phases move by up to a fifth of a wavelength with what the model reflects.
     """
     telling = {name: as_series(elevations[name]) for name in elevations if name in positions}
-    names = [name for name in sorted(telling, key=positions.__getitem__)
-             if _telling(telling[name])]  # fmt: skip
+    names = [
+        name
+        for name in sorted(telling, key=positions.__getitem__)
+        # Irregular waves, and enough of them.
+        if (x := telling[name]).size >= 64
+        and np.sum(np.diff(np.sign(x - x.mean())) > 0) >= LEAST_WAVES
+        and not is_regular(x)
+    ]
     pairs = list(pairwise(names))
     if len(names) > 2:
         pairs.append((names[0], names[-1]))
@@ -356,12 +362,6 @@ def misplaced_probes(
             certain = b not in backed and a in backed
             out.setdefault((b,) if certain else (a, b), Misplaced(b, a, separations[a, b], certain))
     return list(out.values())
-
-
-def _telling(series: FloatArray) -> bool:
-    """Whether a record holds irregular waves, and enough of them."""
-    rises = np.diff(np.sign(series - series.mean())) > 0
-    return series.size >= 64 and rises.sum() >= LEAST_WAVES and not is_regular(series)
 
 
 def probe_separation(

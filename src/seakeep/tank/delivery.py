@@ -63,14 +63,6 @@ def _decimals(column: xr.DataArray) -> int:
     return {"m": 5, "mm": 2}.get(column.attrs["units"], 4)
 
 
-def _filtered(settings: TankSettings) -> dict[str, str]:
-    """Low-passed channel of each probe without drop-outs: ``kn_fwd`` → ``eta_fwd``."""
-    probes = settings.instruments.probes
-    short = {n: n.partition("_")[2] or n for n, probe in probes.items() if probe.dropouts == 0}
-    unique = len(set(short.values())) == len(short)
-    return {name: f"eta_{short[name]}" if unique else f"eta_{name}_filtered" for name in short}
-
-
 def campaign_text(
     settings: TankSettings, files: Mapping[str, Mapping[str, str]], kind: str, one_logger: bool
 ) -> str:
@@ -80,7 +72,11 @@ def campaign_text(
     comment, since it is no table of a logger. `kind` is the format of the raw files.
     """
     # A single logger's file is for readers that know no gaps: its probes with drop-outs stay out.
-    every, filtered = settings.instruments.probes, _filtered(settings)
+    every = settings.instruments.probes
+    # Low-passed channel of each probe without drop-outs: ``kn_fwd`` → ``eta_fwd``.
+    short = {n: n.partition("_")[2] or n for n, probe in every.items() if probe.dropouts == 0}
+    unique = len(set(short.values())) == len(short)
+    filtered = {n: f"eta_{short[n]}" if unique else f"eta_{n}_filtered" for n in short}
     inputs = []
     if place := {name: every[name].position for name in filtered}:
         # The first probe downstream, and the one nearest to the vessel.
