@@ -158,7 +158,14 @@ def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
     rows = [row for row in rows[:first] if not _RULE.match(row[1])] + rows[first:]
     headers, *below = (_cells(line, delimiter) for _, line in rows[:2])
     above = lines[options.skip_rows : rows[0][0] - 1]
-    said, units, at = _remarks(above, marks, delimiter, len(headers)), None, 1
+    # Comment lines above the first row that may be a header: as many words as it has cells.
+    comments = [line.lstrip() for line in above if line.lstrip().startswith(marks)]
+    bare = [line.lstrip("".join(marks)).strip() for line in comments]
+    for mark in dict.fromkeys((delimiter, "\t", ";", ",")):
+        cells = [_cells(line, mark) for line in bare if not _RULE.match(line)]
+        if said := [each for each in cells if len(each) == len(headers) and not _numeric(each)]:
+            break
+    units, at = None, 1
     if _numeric(headers):
         if not said and len(rows) < min(len(headers), HEAD):
             words = "no header and more columns than rows, which looks"
@@ -179,19 +186,6 @@ def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
         raise DataError(f"{path} has a header and no rows of numbers. Export the run again.")
     decimal = options.decimal or _decimal(path, [line for _, line in rows[at:]], delimiter)
     return _Layout(delimiter, decimal, headers, units, rows[at:])
-
-
-def _remarks(
-    above: list[str], marks: tuple[str, ...], delimiter: str, width: int
-) -> list[list[str]]:
-    """Comment lines above the first row that may be a header: as many words as it has cells."""
-    comments = [line.lstrip() for line in above if line.lstrip().startswith(marks)]
-    bare = [line.lstrip("".join(marks)).strip() for line in comments]
-    for mark in dict.fromkeys((delimiter, "\t", ";", ",")):
-        cells = [_cells(line, mark) for line in bare if not _RULE.match(line)]
-        if remarks := [each for each in cells if len(each) == width and not _numeric(each)]:
-            return remarks
-    return []
 
 
 def _decimal(path: Path, body: list[str], delimiter: str) -> str:

@@ -67,19 +67,15 @@ def lowpass_taps(
         taps = scipy.signal.firwin(
             count, sum(edges) / 2, window=("kaiser", beta), fs=1.0, scale=True
         )
-        if _deviation(taps, edges) <= 10 ** (-attenuation / 20):
+        # Distances of the gain from one in the pass band and from zero in the stop band.
+        points = 64 * taps.size
+        gain, frequency = np.abs(np.fft.rfft(taps, points)), np.fft.rfftfreq(points)
+        at_edges = np.abs(np.exp(-2j * np.pi * np.outer(edges, np.arange(taps.size))) @ taps)
+        passing = np.append(gain[frequency <= edges[0]], at_edges[0])
+        stopped = np.append(gain[frequency >= edges[1]], at_edges[1])
+        if max(np.abs(passing - 1).max(), stopped.max()) <= 10 ** (-attenuation / 20):
             break
     return taps
-
-
-def _deviation(taps: FloatArray, edges: tuple[float, float]) -> float:
-    """Largest distance of the gain from one in the pass band and from zero in the stop band."""
-    points = 64 * taps.size
-    gain, frequency = np.abs(np.fft.rfft(taps, points)), np.fft.rfftfreq(points)
-    at_edges = np.abs(np.exp(-2j * np.pi * np.outer(edges, np.arange(taps.size))) @ taps)
-    passing = np.append(gain[frequency <= edges[0]], at_edges[0])
-    stopped = np.append(gain[frequency >= edges[1]], at_edges[1])
-    return max(np.abs(passing - 1).max(), stopped.max())
 
 
 def odd_extension(array: FloatArray, count: int) -> FloatArray:

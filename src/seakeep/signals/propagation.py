@@ -419,7 +419,14 @@ def probe_separation(
     """
     a, b = as_pair(first, second, minimum=64, moving=True)
     interval, place = time_step(dt), number(stated, "the stated separation")
-    cross, k = _spectra(a, b, interval, depth)
+    # Cross-spectrum over the records' norms, and wavenumbers, where there is energy.
+    taper = scipy.signal.windows.tukey(a.size, 0.2)
+    one, other = (fft.rfft(taper * (each - each.mean())) for each in (a, b))
+    frequency = fft.rfftfreq(a.size, interval)
+    cross = np.conj(one) * other / (np.linalg.norm(one[1:]) * np.linalg.norm(other[1:]))
+    smooth = np.convolve(np.abs(cross), np.ones(9) / 9, mode="same")
+    energetic = (smooth > ENERGY * smooth[1:].max()) & (frequency > 0)
+    cross, k = cross[energetic], wavenumber(2 * np.pi * frequency[energetic], depth)
     period = encounter_period(a, interval)
     reach = float(group_speed(2 * np.pi / period, depth)) * REACH * a.size * interval
     reach = max(reach, abs(place) + np.pi / k[np.argmax(np.abs(cross))])
@@ -447,19 +454,6 @@ def probe_separation(
         stated=place,
         input_error=math.sqrt(np.sum(weight * turned) / np.sum(weight)),
     )
-
-
-def _spectra(
-    a: FloatArray, b: FloatArray, dt: float, depth: float
-) -> tuple[ComplexArray, FloatArray]:
-    """Cross-spectrum over the records' norms, and wavenumbers, where there is energy."""
-    taper = scipy.signal.windows.tukey(a.size, 0.2)
-    first, second = (fft.rfft(taper * (each - each.mean())) for each in (a, b))
-    frequency = fft.rfftfreq(a.size, dt)
-    cross = np.conj(first) * second / (np.linalg.norm(first[1:]) * np.linalg.norm(second[1:]))
-    smooth = np.convolve(np.abs(cross), np.ones(9) / 9, mode="same")
-    energetic = (smooth > ENERGY * smooth[1:].max()) & (frequency > 0)
-    return cross[energetic], wavenumber(2 * np.pi * frequency[energetic], depth)
 
 
 def _scores(cross: ComplexArray, k: FloatArray, distances: FloatArray) -> FloatArray:

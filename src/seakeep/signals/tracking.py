@@ -447,33 +447,28 @@ def contact_sheet(path: Path | str, track: Track) -> bytes:
     tiles = []
     with _open_video(path) as video:
         for index in np.union1d(worst, spread):
-            video.capture.set(cv2.CAP_PROP_POS_FRAMES, int(track["picture"][index]))
+            here = {name: float(values[index]) for name, values in track.channels.items()}
+            video.capture.set(cv2.CAP_PROP_POS_FRAMES, here["picture"])
             read, frame = video.capture.read()
             if not read:
                 raise DataError(
-                    f"{path} has no frame {int(track['picture'][index])}: it is not the video that "
+                    f"{path} has no frame {here['picture']:.0f}: it is not the video that "
                     "was tracked, or was changed since. Track it again."
                 )
-            tiles.append(_tile(cv2, frame, track, int(index)))
+            colour = (60, 200, 60) if here["flag"] == FLAGS["good"] else (40, 40, 240)
+            if np.isfinite(here["centroid_x"]):
+                box = cv2.boxPoints((
+                    (here["centroid_x"], here["centroid_y"]),
+                    (here["panel_length"], here["panel_height"]),
+                    np.rad2deg(here["panel_angle"]),
+                ))  # fmt: skip
+                cv2.polylines(frame, [np.round(box).astype(np.int32)], True, colour, 2, cv2.LINE_AA)
+            small = cv2.resize(frame, (480, round(480 * frame.shape[0] / frame.shape[1])))
+            name = next(key for key, code in FLAGS.items() if code == here["flag"])
+            text = f"{track.time[index]:.2f} s  {name}  quality {here['quality']:.2f}"
+            cv2.putText(small, text, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
+            cv2.rectangle(small, (0, 0), (small.shape[1] - 1, small.shape[0] - 1), colour, 3)
+            tiles.append(small)
     tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % 3)
     rows = [np.hstack(tiles[i : i + 3]) for i in range(0, len(tiles), 3)]
     return bytes(cv2.imencode(".png", np.vstack(rows))[1])
-
-
-def _tile(cv2: Any, frame: Image, track: Track, index: int) -> Image:
-    """One frame, small, with the rectangle that was tracked, its instant and its flag."""
-    here = {name: float(values[index]) for name, values in track.channels.items()}
-    colour = (60, 200, 60) if here["flag"] == FLAGS["good"] else (40, 40, 240)
-    if np.isfinite(here["centroid_x"]):
-        box = cv2.boxPoints((
-            (here["centroid_x"], here["centroid_y"]),
-            (here["panel_length"], here["panel_height"]),
-            np.rad2deg(here["panel_angle"]),
-        ))  # fmt: skip
-        cv2.polylines(frame, [np.round(box).astype(np.int32)], True, colour, 2, cv2.LINE_AA)
-    small = cv2.resize(frame, (480, round(480 * frame.shape[0] / frame.shape[1])))
-    name = next(key for key, code in FLAGS.items() if code == here["flag"])
-    text = f"{track.time[index]:.2f} s  {name}  quality {here['quality']:.2f}"
-    cv2.putText(small, text, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
-    cv2.rectangle(small, (0, 0), (small.shape[1] - 1, small.shape[0] - 1), colour, 3)
-    return small

@@ -717,7 +717,11 @@ def find_leakage(
     for start in sorted(starts):
         piece = waves[start : start + length]
         for index, reference in ready:
-            match = _correlation(reference, piece)
+            # Normalised correlation of the piece at each place where it fits whole.
+            summed = np.conj(scipy.signal.correlate(reference, piece, mode="valid", method="fft"))
+            power = np.cumsum(np.concatenate([[0.0], np.abs(reference) ** 2]))
+            energy = power[length:] - power[:-length]
+            match = summed / np.sqrt(np.maximum(energy * np.sum(np.abs(piece) ** 2), 1e-300))
             at = np.argmax(np.abs(match))
             height, phase = float(np.abs(match[at])), float(np.angle(match[at]))
             if height >= REPEATED:
@@ -742,12 +746,3 @@ def _even(waves: ComplexArray) -> bool:
     margin = waves.size // 20  # the envelope of a cut record is bent at its ends
     envelope = np.abs(waves[margin : waves.size - margin])
     return bool(envelope.std() < REGULAR * envelope.mean())
-
-
-def _correlation(reference: ComplexArray, piece: ComplexArray) -> ComplexArray:
-    """Normalised correlation of a piece with a reference at each place where it fits whole."""
-    summed = np.conj(scipy.signal.correlate(reference, piece, mode="valid", method="fft"))
-    power = np.cumsum(np.concatenate([[0.0], np.abs(reference) ** 2]))
-    energy = power[piece.size :] - power[: -piece.size]
-    norm = np.sqrt(np.maximum(energy * np.sum(np.abs(piece) ** 2), 1e-300))
-    return summed / norm

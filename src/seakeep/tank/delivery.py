@@ -136,26 +136,6 @@ def _corners(points: FloatArray) -> npt.NDArray[np.int32]:
     return np.round(points * 2**FRACTION_BITS).astype(np.int32)
 
 
-def _fill_exactly(cv2: Any, frame: Image, points: FloatArray, level: int) -> None:
-    """Fill a polygon in grey, each pixel by the part that the polygon covers of it.
-
-    OpenCV's own smoothed edges are off by up to half a pixel, which would turn a level panel by
-    0.2 degrees; here a pixel is divided into 8 × 8.
-    """
-    begin = np.maximum(np.floor(points.min(axis=0)).astype(int) - 1, 0)
-    end = np.minimum(np.ceil(points.max(axis=0)).astype(int) + 2, [WIDTH, HEIGHT])
-    if np.any(end <= begin):
-        return
-    width, height = (int(n) for n in end - begin)
-    fine = np.zeros((SUBPIXELS * height, SUBPIXELS * width), np.uint8)
-    places = (points - begin + 0.5) * SUBPIXELS - 0.5
-    cv2.fillPoly(fine, [_corners(places)], 255, shift=FRACTION_BITS)
-    covered = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
-    part = frame[begin[1] : end[1], begin[0] : end[0]]
-    share = covered[:, :, None] / 255.0
-    part[:] = np.round(part + share * (level - part.astype(float))).astype(np.uint8)
-
-
 def _light() -> npt.NDArray[np.float32]:
     """Lighting that falls off from the upper right."""
     right = np.linspace(0.72, 1.06, WIDTH)[None, :, None]
@@ -195,7 +175,20 @@ def frame_of(
     polygon(frame, _turned(post, centre, pitch), (60, 60, 60))
     half = 0.5 * np.array(PANEL)
     panel = half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] + [0.0, PANEL_HEIGHT]
-    _fill_exactly(cv2, frame, _turned(panel, centre, pitch), 250)
+    # The panel, each pixel by the part that it covers: OpenCV's own smoothed edges are off by up to
+    # half a pixel, which would turn a level panel by 0.2 degrees.
+    points = _turned(panel, centre, pitch)
+    begin = np.maximum(np.floor(points.min(axis=0)).astype(int) - 1, 0)
+    end = np.minimum(np.ceil(points.max(axis=0)).astype(int) + 2, [WIDTH, HEIGHT])
+    if np.all(end > begin):
+        width, height = (int(n) for n in end - begin)
+        fine = np.zeros((SUBPIXELS * height, SUBPIXELS * width), np.uint8)
+        places = (points - begin + 0.5) * SUBPIXELS - 0.5
+        cv2.fillPoly(fine, [_corners(places)], 255, shift=FRACTION_BITS)
+        covered = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
+        part = frame[begin[1] : end[1], begin[0] : end[0]]
+        share = covered[:, :, None] / 255.0
+        part[:] = np.round(part + share * (250 - part.astype(float))).astype(np.uint8)
     across = LEFT + METRES_PER_PIXEL * WIDTH * np.linspace(0.0, 1.0, surface.size)
     edge = pixel_of(across, surface)
     water = frame.copy()
