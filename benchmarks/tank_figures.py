@@ -106,7 +106,7 @@ def realise(played: Played, name: str) -> Realised:
     true = truth(played, name)
     true = true.isel(time=true["time"].values >= run.startup)
     true["surge_fast"] = (true["surge"] - true["surge_slow"]).assign_attrs(units="m")
-    loads = [f"mooring_{line}" for line in played.rig.line_names]
+    loads = [f"mooring_{line}" for line in played.settings.moorings]
     motions = true[[*played.rig.names, "surge_fast", *loads]].to_dataframe()
     heights = wave_heights(eta, dt)
     return Realised(
@@ -242,7 +242,7 @@ def hydrodynamics_figure(rig: Rig, settings: TankSettings) -> Figure:
     hydro, omega = rig.hydro, rig.hydro.omega
     fine, waves = np.linspace(max(0.5, omega[0]), omega[-1], 500), np.linspace(1.6, 9.0, 600)
     motion = np.abs(linear_response(rig, waves))
-    slope = wavenumber(waves, hydro.water_depth)
+    slope = wavenumber(waves, hydro.attrs["water_depth"])
     diagonal = [np.diagonal(each, axis1=1, axis2=2) for each in (hydro.added_mass, hydro.damping)]
     points = [*diagonal, np.abs(hydro.excitation)]
     kernel = [np.diagonal(x, axis1=1, axis2=2) for x in kernel_coefficients(rig.kernel, fine)]

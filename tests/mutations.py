@@ -30,10 +30,10 @@ CHANGES = {
         ("rotation_matrix(angles)[:, 2, axis]", "rotation_matrix(angles)[:, axis, 2]", "campaign/test_steps.py::test_gravity_is_removed_from_one_accelerometer"),
     ],
     "campaign/pipeline.py": [
-        ('attributes["accuracy"] = factor * settings.accuracy', 'attributes["accuracy"] = settings.accuracy', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
+        ('{"accuracy": factor * each.accuracy}', '{"accuracy": each.accuracy}', "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
         ("own > MOST_FINER * dt", "own < MOST_FINER * dt", "campaign/test_prepare.py::test_times_in_another_unit_are_refused_before_a_thousand_samples_are_made_of_one"),
-        ("return origin + dt * np.arange(first, last + 1)", "return origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
-        ("settings.sign * factor * (logger.columns.values[column] + settings.offset)", "settings.sign * factor * logger.columns.values[column] + settings.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
+        ("time = origin + dt * np.arange(first, last + 1)", "time = origin + dt * np.arange(first, last)", "campaign/test_prepare.py::test_raw_run_is_in_si_units"),
+        ("each.sign * factor * (logger.columns.values[column] + each.offset)", "each.sign * factor * logger.columns.values[column] + each.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],
     "campaign/prepare.py": [
         ("dt = period / preparation.steps_per_period", "dt = period / (preparation.steps_per_period - 1)", "campaign/test_prepare.py::test_the_step_is_the_stated_one"),
@@ -207,7 +207,7 @@ CHANGES = {
         ("np.where(x == missing", "np.where(x <= missing + 900", "formats/test_read_text.py::test_a_number_for_no_reading_is_a_gap_in_every_format"),
     ],
     "formats/matlab.py": [
-        ("return 1.0 / float(value) if inverse", "return float(value) if inverse", "formats/test_read_binary.py::test_matlab"),
+        ("return 1.0 / value if key in", "return float(value) if key in", "formats/test_read_binary.py::test_matlab"),
     ],
     "formats/rosbag.py": [
         ("int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)", "int(stamp.sec) * 1_000_000_000", "formats/test_read_rosbag.py::test_a_standard_message"),
@@ -440,7 +440,7 @@ CHANGES = {
         ("(slope / dt if times == 1", "(slope if times == 1", "signals/test_rigid_body.py::test_blend_keeps_slow_motion_and_needs_no_drift_removal"),
         ("reflection = -2.0 * float(", "reflection = -1.0 * float(", "signals/test_prediction.py::test_an_autoregressive_process_is_continued_as_it_is_expected_to_go_on"),
         ("1.1 * high - frequency) / (0.2 * high)", "1.1 * high - frequency) / (0.4 * high)", "signals/test_calculus.py::test_gain_of_the_band"),
-        ("np.abs(analytic) ** 2", "np.abs(analytic)", "signals/test_calculus.py::test_envelope_of_a_group"),
+        ("axis=0)[padding:-padding]) ** 2", "axis=0)[padding:-padding])", "signals/test_calculus.py::test_envelope_of_a_group"),
         ("spectrum[:, 0] + fast * integral", "spectrum[:, 0] + integral", "signals/test_rigid_body.py::test_blend_keeps_slow_motion_and_needs_no_drift_removal"),
         ("left *= 1.0 - reflection**2", "left *= 1.0", "signals/test_prediction.py::test_the_power_of_innovations_is_that_of_a_known_process"),
         ("left * (series.size + order) / (series.size - order)", "left", "signals/test_prediction.py::test_departures_of_a_sea_are_the_errors_of_its_prediction"),
@@ -541,7 +541,7 @@ CHANGES = {
         ("w**2 / GRAVITY * slope +", "0 * slope +", "tank/test_dynamics.py::test_wave_drift_damping_is_aranhas"),
         ("(rig.hydro.mass + added) - 1j * w * damping", "(rig.hydro.mass + added) + 1j * w * damping", "tank/test_dynamics.py::test_mean_offset_beyond_the_slack_limit"),
         ("local = stiffness * np.outer(unit, unit)", "local = 0.0 * np.outer(unit, unit)", "tank/test_moorings.py::test_stiffness_is_the_slope_of_the_forces"),
-        ("tension * float(unit @ np.array([eye_x, eye_z]))", "-tension * float(unit @ np.array([eye_x, eye_z]))", "tank/test_moorings.py::test_stiffness_is_the_slope_of_the_forces"),
+        ("tension * (unit @ np.array([eye_x, eye_z]))", "-tension * (unit @ np.array([eye_x, eye_z]))", "tank/test_moorings.py::test_stiffness_is_the_slope_of_the_forces"),
     ],
     "tank/hydrodynamics.py": [
         ("(2.0 / np.pi) * np.cos", "(1.0 / np.pi) * np.cos", "tank/test_hydrodynamics.py::test_kernel_gives_the_damping_of_the_file_back"),
@@ -550,7 +550,7 @@ CHANGES = {
     "tank/instruments.py": [
         ("0.5 * self.sea.mean_wavenumber * squared", "self.sea.mean_wavenumber * squared", "tank/test_instruments.py::test_second_order_crest_of_a_regular_wave"),
         ("q[1] - settings.eye[0] * q[2]", "q[1] + settings.eye[0] * q[2]", "tank/test_instruments.py::test_a_pitch_that_lifts_the_bow_lifts_the_eye_of_its_line"),
-        ("share * values.size / rate / 0.11", "share * values.size / rate / 0.2", "tank/test_instruments.py::test_dropouts_take_the_stated_share"),
+        ("probe.dropouts * time.size / rate / 0.11", "probe.dropouts * time.size / rate / 0.2", "tank/test_instruments.py::test_dropouts_take_the_stated_share"),
     ],
     "tank/seas.py": [
         ("np.exp(-1.25 * relative)", "np.exp(-relative)", "tank/test_seas.py::test_height_and_peak_of_the_spectra"),

@@ -20,6 +20,7 @@ from seakeep.errors import SHOWN, DataError, RequestError, SeakeepError, did_you
 if TYPE_CHECKING:
     import xarray as xr
 
+ArrayLike = npt.ArrayLike
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.intp]
@@ -95,7 +96,7 @@ def as_real(
             f"{name} must be real numbers; received {type(values).__name__} of type "
             f"{array.dtype}. {remedy}."
         )
-    return np.asarray(array, dtype=np.float64)
+    return np.asarray(array, np.float64)
 
 
 def as_series(

@@ -5,19 +5,15 @@ Frame: x along the direction in which the waves run, z up, angles right-handed a
 (a positive pitch lifts the bow, which points against the waves).
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from functools import cache
+from itertools import accumulate
+from typing import Any
 
 from seakeep.arrays import Datasets, Groups, positive
 from seakeep.errors import RequestError, did_you_mean
-
-if TYPE_CHECKING:
-    import pint
 
 __all__ = [
     "MOTIONS",
@@ -78,7 +74,7 @@ _NAME = re.compile(
 )
 
 
-@lru_cache(maxsize=1024)
+@cache
 def canonical_channel(name: str) -> Channel | None:
     r"""Look a canonical channel up.
 
@@ -101,7 +97,7 @@ def canonical_channel(name: str) -> Channel | None:
     >>> canonical_channel("propeller_torque") is None
     True
     """
-    if (match := _NAME.match(name)) is None:
+    if not (match := _NAME.match(name)):
         return None
     motion, quantity, place, suffix = (part or "" for part in match.groups())
     unit, words, letter = _QUANTITIES[motion or quantity]
@@ -141,7 +137,7 @@ def is_elevation(name: str, rates: bool = False) -> bool:
     """
     known = canonical_channel(name)
     called = name == "eta" or name.startswith("eta_")
-    return called and (rates or known is None or known.units == "m")
+    return called and (rates or not known or known.units == "m")
 
 
 def displayed(units: str) -> tuple[float, str]:
@@ -207,11 +203,11 @@ percent = 0.01 = pct
 """
 
 
-@lru_cache(maxsize=1)
-def _registry() -> pint.UnitRegistry[Any]:
+@cache
+def _registry() -> Any:
     import pint  # here, because it takes a tenth of a second that not every command needs
 
-    registry: pint.UnitRegistry[Any] = pint.UnitRegistry(None)
+    registry: Any = pint.UnitRegistry(None)
     for line in _UNITS.strip().splitlines():
         registry.define(line)
     return registry
@@ -231,16 +227,7 @@ _PLAIN = re.compile(r"[\w°%.*/() +-]*\Z")
 _POWER = re.compile(r"\*\*(?!\s*\(?-?\d\)?(?!\s*\*\*|\d))")
 
 
-def _is_plain(text: str) -> bool:
-    """Whether a unit is short and its powers are single digits, not powers of powers."""
-    depth = deepest = 0
-    for letter in text:
-        depth += (letter == "(") - (letter == ")")
-        deepest = max(deepest, depth)
-    return len(text) <= 80 and deepest <= 2 and not _POWER.search(text) and bool(_PLAIN.match(text))
-
-
-@lru_cache(maxsize=256)
+@cache
 def _parsed(unit: str) -> Any:
     text = unit.strip().translate(_SIGNS)
     if text in ("", "-", "1", "none", "nondimensional", "dimensionless"):
@@ -248,8 +235,9 @@ def _parsed(unit: str) -> Any:
     text = re.sub("[⁻¹²³⁴]+", lambda match: "^" + match[0].translate(_RAISED), text)
     for pattern, replacement in _SPELLINGS.items():
         text = re.sub(pattern, replacement, text)
+    depths = accumulate((letter == "(") - (letter == ")") for letter in text)
     try:
-        if not _is_plain(text):
+        if len(text) > 80 or max(depths) > 2 or _POWER.search(text) or not _PLAIN.match(text):
             raise ValueError(text)
         return _registry().parse_units(text)
     except Exception as error:
@@ -261,7 +249,7 @@ def _parsed(unit: str) -> Any:
         ) from error
 
 
-@lru_cache(maxsize=256)
+@cache
 def si_unit(unit: str) -> str:
     """SI unit (radians for angles) of the same dimension as `unit`, in seakeep's spelling.
 
@@ -287,11 +275,9 @@ def si_unit(unit: str) -> str:
     """
     base = _registry().get_base_units(_parsed(unit))[1]
     for name in ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "N", "N*m", "Pa", "W", "Hz", "V"):
-        candidate = _parsed(name)
-        if _registry().get_base_units(candidate)[1] == base:
+        if _registry().get_base_units(_parsed(name))[1] == base:
             return "N m" if name == "N*m" else name
-    text = f"{base:~C}".replace("**", "^").replace("*", " ")
-    return text or "1"
+    return f"{base:~C}".replace("**", "^").replace("*", " ") or "1"
 
 
 def froude_factor(units: str, scale: float, density_ratio: float = 1.0) -> float:

@@ -4,8 +4,6 @@ Every message says the symptom, what was received, and how to fix it. The comman
 the message alone; ``exit_status`` is what it returns to the shell.
 """
 
-from __future__ import annotations
-
 import difflib
 import sys
 import warnings
@@ -64,6 +62,15 @@ def needing(doing: str, extra: str) -> Iterator[None]:
             f"{doing} needs {error.name}, which is not installed. Install it with: pip install "
             f"'seakeep[{extra}]'"
         ) from error
+
+
+@contextmanager
+def naming(place: str) -> Iterator[None]:
+    """Put the place of what is done within before the words of its errors."""
+    try:
+        yield
+    except SeakeepError as error:
+        raise type(error)(f"{place}: {error}") from None
 
 
 def warn(message: str) -> None:

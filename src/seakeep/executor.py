@@ -4,8 +4,6 @@ An executor is a pool of processes (:func:`processes`), Dask's ``client.get_exec
 object with ``submit``. Results do not depend on it: BLAS has one thread wherever work is done.
 """
 
-from __future__ import annotations
-
 import functools
 import multiprocessing
 import os
@@ -16,7 +14,7 @@ import signal
 import threading
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from concurrent.futures import ProcessPoolExecutor as Pool
 from concurrent.futures.process import BrokenProcessPool
@@ -60,34 +58,28 @@ def in_order(
     what: str = "member",
 ) -> Iterator[Result]:
     """Yield ``function(data, item)`` for each item, in the order of the items."""
-    results = _in_order(function, data, items, executor)
-    for done, result in enumerate(results, start=1):
-        if progress is not None:
+
+    def results() -> Iterator[Result]:
+        if not executor:
+            for item in items:
+                with one_blas_thread():
+                    result = function(data, item)
+                yield result
+            return
+        size = -(-len(items) // BATCHES)
+        batches = (items[first : first + size] for first in range(0, len(items), max(size, 1)))
+        with submitting(function, data, executor) as submit:
+            pending = deque(submit(batch) for batch in islice(batches, AHEAD))
+            while pending:
+                _wait_for_any([pending[0]], executor)
+                ready = pending.popleft().result()
+                pending.extend(submit(batch) for batch in islice(batches, 1))
+                yield from ready
+
+    for done, result in enumerate(results(), start=1):
+        if progress:
             progress(done, len(items), f"{what} {done}")
         yield result
-
-
-def _in_order(
-    function: Function[Data, Item, Result],
-    data: Data,
-    items: Sequence[Item],
-    executor: Executor | None,
-) -> Iterator[Result]:
-    if executor is None:
-        for item in items:
-            with one_blas_thread():
-                result = function(data, item)
-            yield result
-        return
-    size = -(-len(items) // BATCHES)
-    batches = (items[first : first + size] for first in range(0, len(items), max(size, 1)))
-    with submitting(function, data, executor) as submit:
-        pending = deque(submit(batch) for batch in islice(batches, AHEAD))
-        while pending:
-            _wait_for_any([pending[0]], executor)
-            results = pending.popleft().result()
-            pending.extend(submit(batch) for batch in islice(batches, 1))
-            yield from results
 
 
 def as_finished(
@@ -101,10 +93,11 @@ def as_finished(
     Items are taken from the left of `items`. Whoever iterates may append more: those that need a
     result which has just been yielded.
     """
-    if executor is None:
+    if not executor:
         while items:
             item = items.popleft()
-            (result,) = _in_order(function, data, [item], None)
+            with one_blas_thread():
+                result = function(data, item)
             yield item, result
         return
     pending: dict[Future[list[Result]], Item] = {}
@@ -191,7 +184,7 @@ def processes(workers: int) -> Iterator[Executor]:
 def _start_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
     parent = multiprocessing.parent_process()
-    if parent is not None:  # a parent that was killed leaves no worker behind
+    if parent:  # a parent that was killed leaves no worker behind
         sentinel = parent.sentinel
         threading.Thread(target=lambda: (wait_for([sentinel]), os._exit(1)), daemon=True).start()
 
@@ -263,7 +256,7 @@ def submitting(
     Except in a pool of processes: it fails over a cancelled future when its workers are killed.
     """
     payload, token = pickle.dumps((data, versions()), protocol=5), uuid.uuid4().hex
-    under_way: set[Future[list[Result]]] = set()  # not the finished: they hold their results
+    under_way = set()  # not the finished: they hold their results
 
     def submit(items: Sequence[Item]) -> Future[list[Result]]:
         future = executor.submit(_work, token, payload, function, items)
@@ -328,23 +321,17 @@ def _work(
     """Results of some items in a worker, which reads the data once."""
     global _received
     if (received := _received)[0] != token:
-        data, expected = pickle.loads(payload)
-        _check_versions(expected)
+        (data, expected), installed = pickle.loads(payload), versions()
+        other = [
+            f"{name} {installed[name]} (here {version})"
+            for name, version in expected.items()
+            if installed.get(name) != version
+        ]
+        if other:  # the arrays would not be those of the caller
+            raise RequestError(
+                f"the worker {platform.node()} would not compute the same arrays: it has "
+                f"{', '.join(other)}. Install the same versions everywhere."
+            )
         received = _received = token, data
     with one_blas_thread():
         return [function(received[1], item) for item in items]
-
-
-def _check_versions(expected: Mapping[str, str]) -> None:
-    """Refuse to work with other versions: the arrays would not be those of the caller."""
-    installed = versions()
-    other = [
-        f"{name} {installed[name]} (here {version})"
-        for name, version in expected.items()
-        if installed.get(name) != version
-    ]
-    if other:
-        raise RequestError(
-            f"the worker {platform.node()} would not compute the same arrays: it has "
-            f"{', '.join(other)}. Install the same versions everywhere."
-        )

@@ -10,6 +10,7 @@ import json
 import os
 import re
 import secrets
+import shutil
 import stat
 import zlib
 from collections.abc import Iterable, Iterator
@@ -21,7 +22,6 @@ from typing import TYPE_CHECKING, Any
 from seakeep.errors import DataError, MissingFileError, RequestError, did_you_mean
 
 if TYPE_CHECKING:
-    import h5py
     import xarray as xr
     from jinja2 import Environment
 
@@ -191,8 +191,7 @@ def _missing(path: Path) -> MissingFileError:
         )
     near = did_you_mean(path.name, beside)
     beside.sort(key=lambda name: -difflib.SequenceMatcher(None, path.name, name).ratio())
-    nearest = sorted(beside[:SHOWN])
-    listed = ", ".join(nearest) or "nothing"
+    listed = ", ".join(sorted(beside[:SHOWN])) or "nothing"
     if len(beside) > SHOWN:
         listed = f"{len(beside)} names, the nearest of them {listed}"
     return MissingFileError(
@@ -248,7 +247,7 @@ def replacing(path: Path) -> Iterator[Path]:
                 temporary.chmod(stat.S_IMODE(target.stat().st_mode) | stat.S_IWUSR)
             yield temporary
             if target.exists():
-                temporary.chmod(stat.S_IMODE(target.stat().st_mode))
+                shutil.copymode(target, temporary)
             temporary.replace(target)
         finally:
             temporary.unlink(missing_ok=True)
@@ -298,13 +297,21 @@ def write_netcdf(path: Path, dataset: xr.Dataset, groups: Datasets | None = None
         parts = {"": dataset, **(groups or {})}
         for name, part in parts.items():
             _write_group(file.create_group(name, track_order=True) if name else file, part)
-        contents = {name: _contents(part) for name, part in parts.items()}
+        # Attributes, coordinates, and dimensions, attributes and kind of each variable.
+        contents = {
+            name: [
+                part.attrs,
+                [*part.coords],
+                {key: (v.dims, v.attrs, v.dtype.kind) for key, v in part.variables.items()},
+            ]
+            for name, part in parts.items()
+        }
         file.attrs[CONTENTS] = json.dumps(contents, default=lambda value: value.tolist())
     with replacing(path) as temporary, temporary.open("wb") as file, buffer.getbuffer() as content:
         file.writelines([content, _seal_of(content)])
 
 
-def _write_group(place: h5py.Group, data: xr.Dataset) -> None:
+def _write_group(place: Any, data: xr.Dataset) -> None:
     """Write a Dataset as NetCDF-4: its dimensions are scales of HDF5."""
     import h5py
 
@@ -328,13 +335,7 @@ def _write_group(place: h5py.Group, data: xr.Dataset) -> None:
             h5py.h5ds.attach_scale(stored[key].id, stored[dim].id, number)
 
 
-def _contents(data: xr.Dataset) -> list[Any]:
-    """Attributes, coordinates, and dimensions, attributes and kind of each variable."""
-    variables = {key: (v.dims, v.attrs, v.dtype.kind) for key, v in data.variables.items()}
-    return [data.attrs, [*data.coords], variables]
-
-
-def _read_group(place: h5py.Group, contents: list[Any]) -> xr.Dataset:
+def _read_group(place: Any, contents: list[Any]) -> xr.Dataset:
     """Read what :func:`_write_group` wrote; an attribute of several values becomes a tuple."""
     import xarray as xr
 
@@ -558,7 +559,7 @@ def check_output(
     if path.suffix == ".nc" or start.startswith(HDF5):
         ours = _mark_of_netcdf(path) == kind
     elif path.suffix == ".csv":
-        ours = header is not None and re.match(header, both.decode("utf-8", "replace")) is not None
+        ours = bool(header and re.match(header, both.decode("utf-8", "replace")))
     else:
         ours = f"{MARK}: {kind}".encode() in both
     if not ours:

@@ -18,8 +18,6 @@ over runs and training sets see :func:`seakeep.statistics.two_way_interval`. Ext
 redrawn from the measured ones, so that their bounds are rough.
 """
 
-from __future__ import annotations
-
 import functools
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -238,7 +236,7 @@ def anrmse_differences(
         pairs = [_paired(each, truth) for each in forecasts]
         cases = [(of.arrays["predicted"], of.arrays["measured"], known) for of, known in pairs]
         block = max(_block(p, m) for p, m, _ in cases)
-        own = np.array([float(core.anrmse(predicted=p, measured=m, **k)) for p, m, k in cases])
+        own = np.array([core.anrmse(predicted=p, measured=m, **k) for p, m, k in cases])
         redrawn = np.stack([_redrawn(core.anrmse, p, m, k, block, seed) for p, m, k in cases])
         redrawn = np.where(np.isnan(own)[:, None], np.nan, redrawn)
         block_count = cases[0][1].shape[-2] / block
@@ -272,8 +270,7 @@ def _with_bounds(
 def _ratio(values: FloatArray) -> FloatArray:
     """Ratio to the first entry; one for the first itself."""
     with undefined():
-        out: FloatArray = values / values[0]
-    return out
+        return values / values[0]
 
 
 is_slack = labelled(core.is_slack, "channel", label="slackness")

@@ -1,7 +1,5 @@
 """Pairs of channels: those of one Dataset, each with that of the same name in others."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,7 +65,25 @@ def pair(**sides: xr.Dataset) -> Paired:
     lead = tuple(str(dim) for dim in reference[names[0]].dims if dim != "time")
     arrays = {first: _stacked(reference, names, (*lead, "time"), first)}
     for side, data in others:
-        _check_channels(names, reference, data, first, side)
+        known = [str(key) for key in data.data_vars]
+        for name in names:
+            if name not in known:
+                raise RequestError(
+                    f"{side} has no channel '{name}'.{did_you_mean(name, known)} It has: "
+                    f"{', '.join(known)}. Select the channels to judge: {first}[['heave']]."
+                )
+            if data[name].dtype.kind not in "iufb":
+                raise DataError(
+                    f"channel '{name}' of {side} is of type {data[name].dtype}, not a real number. "
+                    "Convert it."
+                )
+            units = [each[name].attrs.get("units") for each in (reference, data)]
+            if all(units) and units[0] != units[1]:
+                raise DataError(
+                    f"channel '{name}' is in '{units[0]}' in {first} and in '{units[1]}' in "
+                    f"{side}. Convert one of them and its units attribute."
+                )
+        channel_names(data[names], side)
         matched = _at_instants(data[names], reference, side, first)
         further = {str(dim) for dim in matched.dims} - {"time"}
         if strange := sorted(further - set(lead)):
@@ -79,8 +95,7 @@ def pair(**sides: xr.Dataset) -> Paired:
         values = _stacked(matched, names, (*(dim for dim in lead if dim in further), "time"), side)
         if further:
             missing = [axis for axis, dim in enumerate(lead) if dim not in further]
-            shape = arrays[first].shape
-            values = np.broadcast_to(np.expand_dims(values, missing), shape)
+            values = np.broadcast_to(np.expand_dims(values, missing), arrays[first].shape)
         arrays[side] = values
     return Paired(names, lead, arrays)
 
@@ -94,30 +109,6 @@ def _stacked(data: xr.Dataset, names: list[str], order: tuple[str, ...], side: s
             )
     columns = [data[name].transpose(*order).values.astype(float, copy=False) for name in names]
     return np.stack(columns, axis=-1)
-
-
-def _check_channels(
-    names: list[str], reference: xr.Dataset, data: xr.Dataset, first: str, side: str
-) -> None:
-    known = [str(key) for key in data.data_vars]
-    for name in names:
-        if name not in known:
-            raise RequestError(
-                f"{side} has no channel '{name}'.{did_you_mean(name, known)} It has: "
-                f"{', '.join(known)}. Select the channels to judge: {first}[['heave']]."
-            )
-        if data[name].dtype.kind not in "iufb":
-            raise DataError(
-                f"channel '{name}' of {side} is of type {data[name].dtype}, not a real number. "
-                "Convert it."
-            )
-        units = [each[name].attrs.get("units") for each in (reference, data)]
-        if all(units) and units[0] != units[1]:
-            raise DataError(
-                f"channel '{name}' is in '{units[0]}' in {first} and in '{units[1]}' in {side}. "
-                "Convert one of them and its units attribute."
-            )
-    channel_names(data[names], side)
 
 
 def _at_instants(data: xr.Dataset, reference: xr.Dataset, side: str, first: str) -> xr.Dataset:

@@ -6,8 +6,6 @@ by channel; text, such as the status of an ensemble's members, is left out. All 
 `numpy.random.Generator` that is passed.
 """
 
-from __future__ import annotations
-
 import functools
 import inspect
 import warnings
@@ -45,7 +43,7 @@ from seakeep.core.density import (
     kernel_density,
 )
 from seakeep.core.spectra import split_bands
-from seakeep.errors import DataError, RequestError, warn
+from seakeep.errors import DataError, RequestError, naming, warn
 from seakeep.pairing import channel_names, pair
 
 __all__ = [
@@ -155,11 +153,8 @@ def jsd_interval(
     for column, (name, child) in enumerate(zip(pairs.names, rng.spawn(p.shape[-1]), strict=True)):
         rows = p[..., column].reshape(-1, len(m))
         how = {"block_length": block_length, "rng": child, **settings}
-        try:
-            with warnings.catch_warnings(record=True) as caught:
-                draws.append(density.jsd_interval(rows, m[:, column], **how))
-        except DataError as error:
-            raise DataError(f"channel '{name}': {error}") from error
+        with naming(f"channel '{name}'"), warnings.catch_warnings(record=True) as caught:
+            draws.append(density.jsd_interval(rows, m[:, column], **how))
         for each in caught:
             warn(f"channel '{name}': {each.message}")
     arrays = ("draws", "noise", "grid", "predicted", "measured")

@@ -4,8 +4,6 @@ Pydantic tables derived from :class:`Table` describe a file. The description of 
 is the remedy in a message. Lengths in encounter periods are :class:`Length`.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib
@@ -14,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -100,7 +98,7 @@ def parse_length(text: str) -> Length:
     (30.0, 2.0)
     """
     match = _WRITTEN.fullmatch(text)
-    if match is None:
+    if not match:
         raise RequestError(
             "a text in place of a number counts in encounter periods, such as '1.5 T', or in "
             "seconds, such as '0.5 s'; samples and hertz are numbers without quotes"
@@ -136,29 +134,27 @@ def _rising(span: tuple[float | Length, float | Length]) -> tuple[float | Length
     return span
 
 
-def _branch(value: object) -> str:
-    return "<length>" if isinstance(value, str | Length) else "<number>"
-
-
 _Length = Annotated[Length, PlainValidator(_length), PlainSerializer(str)]
 _Number = TypeVar("_Number")
 _OrLength = Annotated[
     Annotated[_Number, Tag("<number>")] | Annotated[_Length, Tag("<length>")],
-    Discriminator(_branch),
+    Discriminator(lambda value: "<length>" if isinstance(value, str | Length) else "<number>"),
 ]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Pair = Annotated[tuple[Positive, Positive], Field(strict=False)]
+Listed = Field(strict=False)
+"""Of a tuple, which TOML writes as a list."""
+Pair = Annotated[tuple[Positive, Positive], Listed]
 Count = Annotated[int, Field(ge=1)]
-Names = Annotated[tuple[str, ...], Field(strict=False)]
+Names = Annotated[tuple[str, ...], Listed]
 Duration = Annotated[_OrLength[Positive], _is("finite and positive", lambda x: 0 < x < math.inf)]
 """A positive duration: seconds or a :class:`Length`."""
 Instant = Annotated[_OrLength[Finite], _is("finite", math.isfinite)]
 """An instant: seconds or a :class:`Length`."""
 _Edge = _OrLength[float]
-Span = Annotated[tuple[_Edge, _Edge], Field(strict=False), AfterValidator(_rising)]
+Span = Annotated[tuple[_Edge, _Edge], Listed, AfterValidator(_rising)]
 """Start and end, each in seconds or a :class:`Length`."""
 
 
@@ -212,8 +208,7 @@ def in_seconds(table: Settings, period: float) -> Settings:
     RequestError
         If a span of which one end counts in periods runs backwards.
     """
-    settings: Settings = _resolved(table, period, ())
-    return settings
+    return _resolved(table, period, ())
 
 
 def _resolved(value: Any, period: float, place: tuple[str, ...]) -> Any:
@@ -239,11 +234,8 @@ def _resolved(value: Any, period: float, place: tuple[str, ...]) -> Any:
     return value
 
 
-class Mistake(NamedTuple):
-    """One mistake in a file: the place of its key, and what is wrong there."""
-
-    place: tuple[str, ...]
-    words: str
+Mistake = tuple[tuple[str, ...], str]
+"""One mistake in a file: the place of its key, and what is wrong there."""
 
 
 def read_toml(path: Path, what: str, mend: str = "") -> dict[str, Any]:
@@ -334,8 +326,15 @@ def validated(
     try:
         settings = root.model_validate(received)
     except ValidationError as error:
-        raise refusal(source, what, _mistakes_of(error, root)) from None
-    if also is not None and (mistakes := list(also(settings))):
+        refused = []
+        for item in error.errors(include_url=False):
+            # Pydantic's own words: '[key]' of a table, '<number>' for a branch of a union.
+            place = [str(part) for part in item["loc"] if not str(part).startswith("<")]
+            table, description, depth = _place(place, root)
+            key = tuple(part for part in place[:depth] if part != "[key]")
+            refused.append((key, _reason(item, place, table, description)))
+        raise refusal(source, what, refused) from None
+    if also and (mistakes := list(also(settings))):
         raise refusal(source, what, mistakes)
     return settings
 
@@ -373,24 +372,13 @@ def _parts(dotted: str) -> tuple[str, ...]:
     return tuple("".join(match) for match in _PART.findall(dotted))
 
 
-def _mistakes_of(error: ValidationError, root: type[BaseModel]) -> list[Mistake]:
-    """Turn what pydantic refused into our own words."""
-    out = []
-    for item in error.errors(include_url=False):
-        # Pydantic's own words in a place: '[key]' of a table, '<number>' for a branch of a union.
-        place = [str(part) for part in item["loc"] if not str(part).startswith("<")]
-        table, description, depth = _place(place, root)
-        key = tuple(part for part in place[:depth] if part != "[key]")
-        out.append(Mistake(key, _reason(item, place, table, description)))
-    return out
-
-
 def _reason(item: Any, place: list[str], table: type[BaseModel] | None, description: str) -> str:
     kind, value = item["type"], item["input"]
     give = f" Give {description}." if description else ""
-    if kind == "extra_forbidden" and table is not None:
+    if kind == "extra_forbidden" and table:
         known = [field.alias or name for name, field in table.model_fields.items()]
-        return unknown_key(place[-1], value, known)
+        near, keys = did_you_mean(place[-1], known), ", ".join(known)
+        return f"unknown key, received {_shown(value)}.{near} Keys here: {keys}."
     if (kind == "missing" and place[-1].isdigit()) or kind == "too_long":
         return f"received {_shown(value)}, a list of the wrong length ({len(value)}).{give}"
     if kind == "too_short":
@@ -400,12 +388,6 @@ def _reason(item: Any, place: list[str], table: type[BaseModel] | None, descript
     if kind == "value_error":
         return f"{item['ctx']['error']}; received {_shown(value)}."
     return f"received {_shown(value)}, which {wanted(str(item['msg']))}.{give}"
-
-
-def unknown_key(key: str, value: object, known: list[str]) -> str:
-    """Words of a mistake: a key that its table does not have."""
-    near = did_you_mean(key, known)
-    return f"unknown key, received {_shown(value)}.{near} Keys here: {', '.join(known)}."
 
 
 def _shown(value: object) -> str:

@@ -190,10 +190,10 @@ def tune(
         spec,
         *given,
         vary=vary,
-        opened=() if spec.select is None else spec.select.opened,
+        opened=spec.select.opened if spec.select else (),
         horizon=horizon,
         folds=folds,
-        period=None if spec.select is None else spec.select.period,
+        period=spec.select.period if spec.select else None,
         kinds=RIVALS if "kind" in vary else (),
         executor=executor,
         progress=progress,
@@ -281,7 +281,7 @@ def tuned_campaign(
     from tomlkit.items import Table
 
     document = tomlkit.parse(text)
-    table: Any = document["model"] if model is None else document["models"][model]
+    table = document["model"] if model is None else document["models"][model]
     # Blank lines and comments there belong to the next table, if this one is in one place.
     between: list[Any] = []
     body = _end(table) if isinstance(table, Table) else []
@@ -318,18 +318,18 @@ def _choice(
     if spec.kind != HankelDMDc.kind:  # which takes no key of the table but those stated here
         stated, preset = {each.name for each in fields(spec) if each.init}, None
         values = {"kind": spec.kind} | {key: v for key, v in values.items() if key in stated}
-    if preset is not None and "alignment" in varied and spec.alignment is None:
+    if preset and "alignment" in varied and not spec.alignment:
         # The preset may bring an alignment, so that all which it states is stated in its place.
         stated |= {"readouts", *LENGTHS}
         values["delay_rows"] = spec.delay_rows
-    elif preset is not None:
+    elif preset:
         values["preset"] = preset
     for key in (each for each in LENGTHS if each in stated):
         count: int = getattr(spec, key)
         values[key] = count if isinstance(table.get(key), int) else _in_periods(count, period)
     if "observables" in stated:
         values["observables"] = [{"kind": o.kind} | _stated(o) for o in spec.observables]
-    if "alignment" in stated and spec.alignment is not None:
+    if "alignment" in stated and spec.alignment:
         values["alignment"] = _stated(spec.alignment, "mode", "surge")
     if "readouts" in stated:
         values["readouts"] = readouts_json(spec.readouts)
@@ -349,7 +349,7 @@ def _stated(settings: Any, *always: str) -> dict[str, Any]:
 
 def _in_periods(samples: int, period: float | None) -> int | str:
     """A number of samples as a file states it: in periods, which serve any sampling rate."""
-    if period is None:
+    if not period:
         return samples
     lengths = (Length(float(f"{samples / period:.{digits}g}")) for digits in range(2, 16))
     return str(next(each for each in lengths if round(each.at(period)) == samples))
@@ -359,7 +359,7 @@ def _end(table: Any) -> list[Any]:
     """Keys and items, lines without a key too, of the table that stands last inside a table."""
     from tomlkit.items import AoT, Table
 
-    body: list[Any] = table.value.body
+    body = table.value.body
     last = next((item for key, item in reversed(body) if key is not None), None)
     last = last[-1] if isinstance(last, AoT) else last
     return _end(last) if isinstance(last, Table) else body

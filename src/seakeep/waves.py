@@ -4,12 +4,14 @@ The dispersion relation is :math:`\omega^2 = g k \tanh(k h)`. Frequencies are an
 lengths in metres; all functions take scalars or arrays and broadcast.
 """
 
-from __future__ import annotations
-
 import numpy as np
-import numpy.typing as npt
 
-from seakeep.arrays import FloatArray, as_real, undefined
+from seakeep.arrays import (
+    ArrayLike,
+    FloatArray,
+    as_real,
+    undefined,
+)
 from seakeep.errors import RequestError
 
 __all__ = ["GRAVITY", "group_speed", "phase_speed", "wavelength_to_frequency", "wavenumber"]
@@ -19,7 +21,7 @@ GRAVITY = 9.81
 
 
 def _checked(
-    name: str, value: npt.ArrayLike, depth: npt.ArrayLike, positive: bool = False
+    name: str, value: ArrayLike, depth: ArrayLike, positive: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """A quantity that is zero or positive, beside the water depth at which it is wanted."""
     array, h = as_real(value, name), as_real(depth, "the water depth")
@@ -36,7 +38,7 @@ def _checked(
     return one, other
 
 
-def wavenumber(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> FloatArray:
+def wavenumber(frequency: ArrayLike, depth: ArrayLike = np.inf) -> FloatArray:
     r"""Wavenumber of the linear dispersion relation.
 
     Solves :math:`\omega^2 = g k \tanh(k h)` by Newton's method to rounding.
@@ -67,7 +69,7 @@ def wavenumber(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> Float
     """
     omega, h = _checked("the frequency", frequency, depth)
     deep = omega**2 / GRAVITY
-    k = np.array(deep, dtype=float)
+    k = np.array(deep, float)
     finite = np.isfinite(h) & (omega > 0)
     # In units of the depth: x tanh x = y. The start value is within 5 % for every y.
     y = deep[finite] * h[finite]
@@ -82,7 +84,7 @@ def wavenumber(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> Float
     return k
 
 
-def phase_speed(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> FloatArray:
+def phase_speed(frequency: ArrayLike, depth: ArrayLike = np.inf) -> FloatArray:
     r"""Phase speed :math:`c = \omega / k`, m/s; at ω = 0 its limit :math:`\sqrt{g h}`.
 
     Parameters
@@ -108,7 +110,7 @@ def phase_speed(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> Floa
         return np.where(omega > 0, omega / k, np.sqrt(GRAVITY * h))
 
 
-def group_speed(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> FloatArray:
+def group_speed(frequency: ArrayLike, depth: ArrayLike = np.inf) -> FloatArray:
     r"""Group speed :math:`c_g = \frac{c}{2}\left(1 + \frac{2kh}{\sinh 2kh}\right)`, m/s.
 
     Parameters
@@ -136,7 +138,7 @@ def group_speed(frequency: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> Floa
     return 0.5 * phase_speed(omega, h) * (1.0 + ratio)
 
 
-def wavelength_to_frequency(wavelength: npt.ArrayLike, depth: npt.ArrayLike = np.inf) -> FloatArray:
+def wavelength_to_frequency(wavelength: ArrayLike, depth: ArrayLike = np.inf) -> FloatArray:
     r"""Angular frequency of a wave of given length, :math:`\omega = \sqrt{g k \tanh k h}`.
 
     Parameters

@@ -15,7 +15,7 @@ from seakeep.campaign.settings import (
 )
 from seakeep.campaign.validation import sources_of
 from seakeep.conventions import TURNS, conversion, si_unit
-from seakeep.errors import DataError, RequestError, SeakeepError
+from seakeep.errors import DataError, RequestError, naming
 from seakeep.quality.faults import BRIDGED, MISSING, flag_attributes
 from seakeep.signals import (
     band_pass,
@@ -43,45 +43,38 @@ def derive(
     channels: Channels, name: str, settings: CampaignSettings, dt: float, run: str
 ) -> dict[str, xr.Variable]:
     """Make a derived channel from channels on one axis, with its flags if its sources have any."""
-    own = settings.derived[name]
-    try:
-        channel = _derived(channels, name, own, dt)
-    except SeakeepError as error:
-        raise type(error)(f"run '{run}', derived channel '{name}': {error}") from None
-    flags = np.zeros(channel.size, dtype=np.int16)
-    for source in sources_of(name, own, channels):
-        if (known := channels.get(f"{source}_flags")) is not None:
-            flags |= known.values & (MISSING | BRIDGED)
-    if not flags.any():
-        return {name: channel}
-    return {name: channel, f"{name}_flags": xr.Variable("time", flags, flag_attributes(name))}
-
-
-def _derived(dataset: Channels, name: str, settings: DerivedSettings, dt: float) -> xr.Variable:
-    label = f"the derived channel '{name}'"
-    source = {} if settings.source is None else dataset[settings.source].attrs
-    if settings.expression is not None:
-        expression = parse(settings.expression)
-        values = expression.evaluate({n: dataset[n].values for n in expression.channels})
-        unit = settings.unit or units_of(name, "-")
-        origin = settings.expression
-    else:
-        values, unit, words = _step(dataset, name, settings, dt)
-        origin = f"{settings.source}, {words}"
-        if settings.step == "envelope_squared":
-            origin = f"squared envelope of {settings.source}"
-        if settings.unit is not None:
-            conversion(unit, settings.unit, label)
-    target = units_of(name, unit)
-    values = values * conversion(unit, target, label)
+    own, label = settings.derived[name], f"the derived channel '{name}'"
+    with naming(f"run '{run}', derived channel '{name}'"):
+        if own.expression is not None:
+            expression = parse(own.expression)
+            values = expression.evaluate({n: channels[n].values for n in expression.channels})
+            unit = own.unit or units_of(name, "-")
+            origin = own.expression
+        else:
+            values, unit, words = _step(channels, name, own, dt)
+            origin = f"{own.source}, {words}"
+            if own.step == "envelope_squared":
+                origin = f"squared envelope of {own.source}"
+            if own.unit is not None:
+                conversion(unit, own.unit, label)
+        target = units_of(name, unit)
+        values = values * conversion(unit, target, label)
     attributes = {
         "units": target,
-        "long_name": long_name_of(name, settings.long_name),
+        "long_name": long_name_of(name, own.long_name),
         "derived_from": origin,
     }
-    if settings.step in ("low_pass", "band_pass") and "accuracy" in source:
-        attributes["accuracy"] = source["accuracy"]  # the same reading, in a band
-    return xr.Variable("time", values, attributes)
+    sources = sources_of(name, own, channels)
+    if own.step in ("low_pass", "band_pass") and "accuracy" in channels[sources[0]].attrs:
+        attributes["accuracy"] = channels[sources[0]].attrs["accuracy"]  # the same, in a band
+    out = {name: xr.Variable("time", values, attributes)}
+    flags = np.zeros(values.size, np.int16)
+    for source in sources:
+        if (known := channels.get(f"{source}_flags")) is not None:
+            flags |= known.values & (MISSING | BRIDGED)
+    if flags.any():
+        out[f"{name}_flags"] = xr.Variable("time", flags, flag_attributes(name))
+    return out
 
 
 def _step(

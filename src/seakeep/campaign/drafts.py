@@ -75,12 +75,25 @@ def draft_campaign(
     read = arranged(paths, [read_columns(path, settings) for path in paths])
     guesses = guess_channels(read)
     if not any(guess.channel for guess in guesses):
-        _refuse(read)
+        first = read[0]
+        for other in read[1:]:
+            if not set(first.table.names) & set(other.table.names) - {first.time}:
+                raise RequestError(
+                    f"{first.path} and {other.path} have no column in common. Name files of one "
+                    "logger, one per run; or those of several loggers as RUN/LOGGER.csv or "
+                    "RUN_LOGGER.csv."
+                )
+        raise RequestError(
+            f"{first.path}: no column has numbers that a channel could be made of (columns: "
+            f"{', '.join(first.table.names)}). Check delimiter and decimal mark of the file."
+        )
     wave = next(iter(_inputs(guesses)), None)
     seas = seas_of(read, guesses, wave) if wave else {}
     runs = list(dict.fromkeys(file.run for file in read))
     named = {run: kind for run in runs if (kind := waves_of_name(run))}
     kinds = {run: "regular" if sea.regular else "irregular" for run, sea in seas.items()} | named
+    rates = [file.rate for file in read if file.rate and math.isfinite(file.rate)]
+    shortest = min((sea.period for sea in seas.values()), default=0.0)
     common = Path(os.path.commonpath([file.path.resolve().parent for file in read]))
     return rendered(
         "campaign",
@@ -105,24 +118,12 @@ def draft_campaign(
         hysteresis=HYSTERESIS,
         steps=STEPS,
         short_gap=SHORT_GAP,
+        rates=rates,
+        shortest=shortest,
+        # One step for all, no finer than that of the fastest logger.
+        every=int(max(rates, default=0.0) * shortest / STEPS),
         **_loggers(read, guesses),
-        **_rates(read, seas),
         **_channels(guesses),
-    )
-
-
-def _refuse(files: Files) -> None:
-    first = files[0]
-    for other in files[1:]:
-        if not set(first.table.names) & set(other.table.names) - {first.time}:
-            raise RequestError(
-                f"{first.path} and {other.path} have no column in common. Name files of one "
-                "logger, one per run; or those of several loggers as RUN/LOGGER.csv or "
-                "RUN_LOGGER.csv."
-            )
-    raise RequestError(
-        f"{first.path}: no column has numbers that a channel could be made of (columns: "
-        f"{', '.join(first.table.names)}). Check delimiter and decimal mark of the file."
     )
 
 
@@ -153,19 +154,17 @@ def _roles(
     dead = dead_motions(files, guesses) if len(runs) > 1 else {}
     roles, whole = {}, []
     for name in runs:
-        why = "guessed: no waves were found, as in still water or decay tests"
-        roles[name] = (
-            "unused",
-            f"{why}. With waves = 'still' and role = 'test' check judges a decay",
+        why = (
+            "guessed: no waves were found, as in still water or decay tests. With waves = 'still' "
+            "and role = 'test' check judges a decay"
         )
-        lacking = loggers - {file.logger for file in files if file.run == name}
-        if lacking:
-            roles[name] = "unused", f"it has no file of {', '.join(sorted(lacking))}"
+        if lacking := loggers - {file.logger for file in files if file.run == name}:
+            why = f"it has no file of {', '.join(sorted(lacking))}"
         elif name in dead:
             why = f"guessed: {dead[name]} is constant, and moves in other runs: a dead sensor?"
-            roles[name] = "unused", why
         else:
             whole.append(name)
+        roles[name] = "unused", why
     if len(whole) == 1:
         return roles | {whole[0]: ("train", "the only run")}
     moved = [name for name in whole if name in seas or not seas]
@@ -213,14 +212,6 @@ def _relative(path: Path, folder: Path | str | None) -> str:
     if data and absolute.is_relative_to(data.resolve()):
         return "${SEAKEEP_DATA_DIR}/" + absolute.relative_to(data.resolve()).as_posix()
     return Path(os.path.relpath(absolute, Path(folder or ".").resolve())).as_posix()
-
-
-def _rates(files: Files, seas: Seas) -> dict[str, Any]:
-    """Rates of the files, and one step for all, no finer than that of the fastest logger."""
-    rates = [file.rate for file in files if file.rate and math.isfinite(file.rate)]
-    shortest = min((sea.period for sea in seas.values()), default=0.0)
-    every = int(max(rates, default=0.0) * shortest / STEPS)
-    return {"rates": rates, "shortest": shortest, "every": every}
 
 
 def _inputs(guesses: Guesses) -> list[Guess]:

@@ -68,8 +68,8 @@ class File:
     @property
     def rate(self) -> float | None:
         """Samples per second, where the file states them."""
-        step = time_step_of(self.table, self.time) if self.time else None
-        return self.table.sampling_rate if step is None else 1.0 / step
+        step = time_step_of(self.table, self.time)
+        return 1.0 / step if step else self.table.sampling_rate
 
     @property
     def time_unit(self) -> str:
@@ -88,12 +88,12 @@ class File:
         factor = conversion(unit, "s") if is_unit(unit) else 1.0
         return factor * times[0] if np.isfinite(times[0]) else 0.0
 
-    def series(self, column: str) -> FloatArray | None:
-        """A column without its gaps; None where there is too little of it, or it is constant."""
+    def series(self, column: str) -> FloatArray:
+        """A column without its gaps; empty where there is too little of it, or it is constant."""
         series = self.table.values.get(column, np.zeros(0))
         there = np.isfinite(series)
-        if self.rate is None or there.sum() < LONG or not np.ptp(series[there]):
-            return None
+        if not self.rate or there.sum() < LONG or not np.ptp(series[there]):
+            return np.zeros(0)
         return over_gaps(series)
 
 
@@ -159,14 +159,13 @@ Seas = Mapping[str, Sea]
 def seas_of(files: Files, guesses: Guesses, wave: Guess) -> dict[str, Sea]:
     """Waves, as one probe recorded them, of each run that has some; decay tests have none."""
     series = {f: f.series(wave.column) for f in files if f.logger == wave.logger}
-    seas = {f: sea for f, x in series.items() if x is not None and (sea := _sea(f, x)) is not None}
+    seas = {f: sea for f, x in series.items() if x.size and (sea := _sea(f, x))}
     highest = max((sea.height for sea in seas.values()), default=0.0)
     seas = {file: sea for file, sea in seas.items() if sea.height > STILL * highest}
     rate = min((file.rate or 1.0 for file in seas), default=1.0)
     records = {}
     for file in seas:
         x, own = series[file], file.rate or 1.0
-        assert x is not None
         records[file.run] = np.interp(np.arange(0, x.size, own / rate), np.arange(x.size), x)
     groups = repeated_waves(records, 1.0 / rate)
     return {
@@ -184,13 +183,13 @@ def _sea(file: File, series: FloatArray) -> Sea | None:
         peak = frequency[1 + np.argmax(power[1:])]
         off = np.abs(frequency - peak * np.clip(np.round(frequency / peak), 1, 3))
         near = off < max(0.1 * peak, 2.5 * frequency[1])
-        regular = bool(power[near].sum() > ONE_WAVE * power[1:].sum())
+        regular = power[near].sum() > ONE_WAVE * power[1:].sum()
         period = encounter_period(series, step)
         if noisy := period < energy_period(series, step) * (0.8 if regular else 0.5):
             period = encounter_period(series, step, HYSTERESIS)
     except DataError:
         return None
-    return Sea(float(series.std()), period, regular, noisy, 0.0, file.run)
+    return Sea(series.std(), period, regular, noisy, 0.0, file.run)
 
 
 def _start(run: str, files: Files, guesses: Guesses) -> float:
@@ -201,7 +200,7 @@ def _start(run: str, files: Files, guesses: Guesses) -> float:
         if file.run != run or file.logger != guess.logger:
             continue
         series = file.series(guess.column)
-        if series is None or not (is_elevation(name, rates=True) or name in MOTIONS):
+        if not series.size or not (is_elevation(name, rates=True) or name in MOTIONS):
             continue
         if begin := first_wave(series, name in MOTIONS):
             starts.append(1.0 / (file.rate or 1.0) * begin + file.start)
@@ -327,8 +326,7 @@ def guess_channels(files: Files) -> list[Guess]:
             series = [f.table.values[guess.column] for f in files if f.logger == guess.logger]
             spans = [np.percentile(each[np.isfinite(each)], [5, 95]) for each in series]
             unit = si_unit(guess.unit)
-            size = max(high - low for low, high in spans) * conversion(guess.unit, unit)
-            sizes[guess.channel] = unit, size
+            sizes[guess.channel] = unit, max(map(np.ptp, spans)) * conversion(guess.unit, unit)
     largest = {unit: max(x for u, x in sizes.values() if u == unit) for unit, _ in sizes.values()}
     rests = {name for name, (unit, size) in sizes.items() if size <= AT_REST * largest[unit]}
     return [replace(each, at_rest=each.channel in rests) for each in out]
@@ -364,9 +362,8 @@ def _guess(column: str, files: Files) -> Guess:
     channel = "" if why else suggest_channel(name, unit, logger or _stem(files[0].path))
     canonical = canonical_channel(channel)
     unit = unit if unit is not None else canonical.units if canonical else "-"
-    behind = "behind" in _kinds(_words(column))
     return Guess(column, header, unit, stated_by, channel, logger, _printable(why), gaps,
-                 behind=behind)  # fmt: skip
+                 behind="behind" in _kinds(_words(column)))  # fmt: skip
 
 
 def _printable(text: str) -> str:
@@ -380,14 +377,14 @@ def _fault(column: str, files: Files) -> tuple[str, Literal["", "short", "long"]
         return "not all of it are numbers, or its name is there twice", ""
     if bad := [f for f in files if column not in f.table.values]:
         return f"missing or unusable in {_listed(bad)}", ""
-    missing = [~np.isfinite(f.table.values[column]) for f in files]
-    if gapped := [f for f, m in zip(files, missing, strict=True) if m.mean() > 1 - USABLE]:
+    missing = {f: ~np.isfinite(f.table.values[column]) for f in files}
+    if gapped := [f for f, m in missing.items() if m.mean() > 1 - USABLE]:
         return f"has gaps in {_listed(gapped)}", "long"
     if all(_step_of(f.table.values[column]) == 1.0 for f in files):
         return "it counts; if it counts seconds, state time = …", ""
     lengths = [
         (end - start) / (f.rate or np.inf)
-        for f, m in zip(files, missing, strict=True)
+        for f, m in missing.items()
         for start, end in stretches(m)
     ]
     return "", "" if not lengths else "short" if max(lengths) <= SHORT_GAP else "long"

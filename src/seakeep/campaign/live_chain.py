@@ -12,10 +12,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import FloatArray, as_real
+from seakeep.arrays import (
+    ArrayLike,
+    FloatArray,
+    as_real,
+)
 from seakeep.campaign.pipeline import Logger, Run, cleaned, derived, mapped, resampled
 from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.conventions import conversion
@@ -54,7 +57,7 @@ class LiveChain:
         self._origin: float | None = None
         self._given = 0
 
-    def push(self, samples: Mapping[str, Mapping[str, npt.ArrayLike]]) -> xr.Dataset:
+    def push(self, samples: Mapping[str, Mapping[str, ArrayLike]]) -> xr.Dataset:
         """Take raw samples, and give the model samples that are ready.
 
         Parameters
@@ -157,15 +160,19 @@ class LiveChain:
         if self._origin is not None:
             newest = min(self._instants(key)[-1] for key in self._rows)
             ready = math.floor((newest - self.delay - self._origin) / self.dt + 1e-9) + 1
-        if ready - self._given < self.every:
+        if self._origin is None or ready - self._given < self.every:
             empty = dict.fromkeys(self._run.settings.channel_names, ("time", np.empty(0)))
             return xr.Dataset(empty, coords={"time": np.empty(0)})
-        run = self._prepared(self._given, ready)
+        run = self._prepared(self._origin, self._given, ready)
         self._given = ready
-        self._trim()
+        # Rows that have left the window are forgotten.
+        oldest = self._origin + ready * self.dt + self.delay - self.window
+        for key, table in self._rows.items():
+            first = np.searchsorted(self._instants(key), oldest)
+            self._rows[key] = {name: values[first:] for name, values in table.items()}
         return run
 
-    def _checked(self, key: str, table: Mapping[str, npt.ArrayLike]) -> dict[str, FloatArray]:
+    def _checked(self, key: str, table: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
         if key not in self._rows:
             raise RequestError(
                 f"there is no logger '{key}'.{did_you_mean(key, self._rows)} Loggers: "
@@ -212,10 +219,9 @@ class LiveChain:
                 "Send rows of it up to the others' instants, NaN in its columns."
             )
 
-    def _prepared(self, first: int, stop: int) -> xr.Dataset:
+    def _prepared(self, origin: float, first: int, stop: int) -> xr.Dataset:
         """Model samples of these numbers, by the chain over the whole window."""
-        dt, origin = self.dt, self._origin
-        assert origin is not None
+        dt = self.dt
         loggers = {
             key: replace(logger, columns=replace(logger.columns, values=self._rows[key]))
             for key, logger in self._run.loggers.items()
@@ -229,14 +235,6 @@ class LiveChain:
             time=slice(max(first - low, 0), stop - low)
         )
         return ready.reset_coords(drop=True)
-
-    def _trim(self) -> None:
-        """Forget rows that have left the window."""
-        assert self._origin is not None
-        oldest = self._origin + self._given * self.dt + self.delay - self.window
-        for key, table in self._rows.items():
-            first = np.searchsorted(self._instants(key), oldest)
-            self._rows[key] = {name: values[first:] for name, values in table.items()}
 
 
 def _time_column(logger: Logger) -> tuple[str, float]:

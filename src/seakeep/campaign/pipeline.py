@@ -18,7 +18,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -46,8 +45,7 @@ from seakeep.campaign.settings import (
 )
 from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
 from seakeep.conventions import MOTIONS, conversion
-from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean
-from seakeep.files import version
+from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean, naming
 from seakeep.formats import Columns, Options
 from seakeep.formats.columns import is_unit, meant_column, same_unit
 from seakeep.quality import Finding, Rate, Record, Redundant, check
@@ -175,9 +173,8 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
     for key, path in paths.items():
         options = settings.files
         if key:
-            keys = {"time", "time_unit", "sampling_rate"}
-            stated = settings.instruments[key].model_dump(include=keys, exclude_none=True)
-            options = options.model_copy(update=stated)
+            own, keys = settings.instruments[key], {"time", "time_unit", "sampling_rate"}
+            options = options.model_copy(update=own.model_dump(include=keys, exclude_none=True))
         columns = reader(path, options)
         if key and time_column(columns, options.time):
             options = options.model_copy(update={"sampling_rate": None})
@@ -189,17 +186,14 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
 
 def sync(run: Run, clocks: Mapping[str, Clock] | None = None) -> Run:
     """Step 2: find each logger's clock against the reference's, or take those that are known."""
-    if clocks is not None:
+    if clocks:
         return replace(run, clocks=clocks)
     reference, *others = run.loggers.values()
     by_reference = {reference.name: Clock()}
     instruments = run.settings.instruments
     for each in others:
-        try:
+        with naming(f"run '{run.name}', clock of '{each.name}' ({each.path})"):
             by_reference[each.name] = _clock(each, reference, instruments[each.name], instruments)
-        except SeakeepError as error:
-            place = f"run '{run.name}', clock of '{each.name}' ({each.path})"
-            raise type(error)(f"{place}: {error}") from None
     return replace(run, clocks=by_reference)
 
 
@@ -218,7 +212,7 @@ def _clock(
             own.offset or 0.0,
         )  # fmt: skip
     pair = own.shared or own.correlated
-    if pair is None:
+    if not pair:
         stated = own.offset is not None or own.drift is not None
         method = "as stated" if stated else ASSUMED
         return Clock(own.offset or 0.0, 1e-6 * (own.drift or 0.0), method=method)
@@ -252,11 +246,11 @@ def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
     every = channels_of(run.settings, run.own)
     chosen = {name: each for name, each in every.items() if name in needed}
     homes = _homes(run, chosen)
-    groups = {}
-    for key, logger in run.loggers.items():
-        own = {name: each for name, each in chosen.items() if homes[name] == key}
-        if own:
-            groups[key] = _channels(run, logger, own)
+    groups = {
+        key: _channels(run, logger, own)
+        for key, logger in run.loggers.items()
+        if (own := {name: each for name, each in chosen.items() if homes[name] == key})
+    }
     return replace(run, groups=groups)
 
 
@@ -304,48 +298,36 @@ def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings])
         records = _part(f"runs.{run.name}.record", (start, end), time, step, whole, slack)
     variables = {}
     for name, each in channels.items():
-        values, attributes = _converted(name, each, run, logger)
-        variables[name] = ("time", values[records], attributes)
+        wanted, path = each.column or name, logger.path
+        column = find_column(path, logger.columns, wanted)
+        said, unit = logger.columns.units.get(column), each.unit
+        changed = run.own.channels.get(name)
+        if (
+            unit is not None
+            and not (changed and "unit" in changed.model_fields_set)
+            and said not in (None, "", "-", "1")
+            and is_unit(said)
+            and not same_unit(said, unit)
+        ):
+            raise RequestError(
+                f"channels.{name}: the unit '{unit}' is stated, and run '{run.name}' ({path}) says "
+                f"'{said}' for the column '{wanted}'. Leave unit out where the files say it; or, "
+                f"if this file is wrong, state the unit in [runs.{run.name}.channels.{name}]."
+            )
+        unit = said if unit is None else unit
+        if unit is None:
+            raise RequestError(
+                f"channels.{name}: the column '{wanted}' of {path} states no unit. Add unit = '…' "
+                f"to [channels.{name}] ('-' for none)."
+            )
+        target = units_of(name, unit)
+        factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")
+        values = each.sign * factor * (logger.columns.values[column] + each.offset)
+        attributes = {"units": target, "long_name": long_name_of(name, each.long_name)}
+        accuracy = {} if each.accuracy is None else {"accuracy": factor * each.accuracy}
+        variables[name] = ("time", values[records], attributes | accuracy)
     coordinate = ("time", time[records], {"units": "s", "long_name": "time"})
     return xr.Dataset(variables, {"time": coordinate})
-
-
-def _converted(
-    name: str, settings: ChannelSettings, run: Run, logger: Logger
-) -> tuple[FloatArray, dict[str, Any]]:
-    """Values and attributes of a channel."""
-    wanted, path = settings.column or name, logger.path
-    column = find_column(path, logger.columns, wanted)
-    said, stated = logger.columns.units.get(column), settings.unit
-    changed = run.own.channels.get(name)
-    if (
-        stated is not None
-        and not (changed and "unit" in changed.model_fields_set)
-        and said not in (None, "", "-", "1")
-        and is_unit(said)
-        and not same_unit(said, stated)
-    ):
-        raise RequestError(
-            f"channels.{name}: the unit '{stated}' is stated, and run '{run.name}' ({path}) says "
-            f"'{said}' for the column '{wanted}'. Leave unit out where the files say it; or, if "
-            f"this file is wrong, state the unit in [runs.{run.name}.channels.{name}]."
-        )
-    unit = said if stated is None else stated
-    if unit is None:
-        raise RequestError(
-            f"channels.{name}: the column '{wanted}' of {path} states no unit. Add unit = '…' to "
-            f"[channels.{name}] ('-' for none)."
-        )
-    target = units_of(name, unit)
-    factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")
-    values = settings.sign * factor * (logger.columns.values[column] + settings.offset)
-    attributes: dict[str, Any] = {
-        "units": target,
-        "long_name": long_name_of(name, settings.long_name),
-    }
-    if settings.accuracy is not None:
-        attributes["accuracy"] = factor * settings.accuracy
-    return values, attributes
 
 
 def cleaned(run: Run) -> Run:
@@ -359,8 +341,7 @@ def cleaned(run: Run) -> Run:
         data = _regular(data, preparation, f"run '{run.name}' ({logger.path})")
         groups[key] = data = flag_samples(data, preparation)
         if logger.options.sampling_rate and logger.options.time is None:
-            aside = time_column(logger.columns)
-            step = None if aside is None else time_step_of(logger.columns, aside)
+            step = time_step_of(logger.columns, time_column(logger.columns))
             if step:  # the step of the file's times, where a stated rate is used
                 data.attrs["time_column_step"] = step
         elif counts_samples(logger.columns, logger.options):
@@ -424,48 +405,35 @@ def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Datas
     step = usual_step(data["time"].values)
     longest = preparation.longest_gap if preparation.gaps == "bridge" else 0.0
     for name in list(data.data_vars):
-        try:
-            values, flags, known = _flagged(
-                data[name].values, step, longest, preparation.outliers == "replace"
-            )
-        except DataError as error:
-            raise DataError(f"channel '{name}': {error}") from None
-        data[name] = data[name].copy(data=values).assign_attrs(known)
-        if flags.any():
-            data.coords[f"{name}_flags"] = ("time", flags, flag_attributes(str(name)))
-    return data
-
-
-def _flagged(
-    x: FloatArray, step: float, longest: float, replaced: bool
-) -> tuple[FloatArray, Any, dict[str, Any]]:
-    """Series without gaps, its flags, and the attributes that say what was done to it."""
-    flags, known, repaired = np.zeros(x.size, dtype=np.int16), dict[str, Any](), list[str]()
-    if not np.isfinite(x).all():
-        filled = bridge(x, step, longest)
-        x = filled.values
-        flags += (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
+        x, repaired = data[name].values, list[str]()
+        with naming(f"channel '{name}'"):
+            filled = bridge(x, step, longest)
+        x, known = filled.values, data[name].attrs
+        flags = (MISSING * filled.long + BRIDGED * filled.short).astype(np.int16)
         if count := filled.short.sum():
             seconds = f"{count * step:.3g} s of {x.size * step:.4g} s"
             repaired.append(f"{count} samples ({seconds}) bridged by monotone cubics")
-    if x.size >= 16 and np.ptp(x):
-        if np.isfinite(reading := reading_step(x)):
-            known["reading_step"] = reading
-        there = flags == 0
-        stuck = find_held(x, step) & there
-        for start, end in stretches(stuck):  # what stands before a gap that was filled
-            stuck[start:end] = end - start > 2
-        outlier, edge = find_outliers(x) & there & ~stuck, saturated(x, stuck)
-        flags[outlier] |= OUTLIER
-        flags[edge] |= SATURATED
-        flags[stuck & ~edge] |= STUCK
-        if replaced and outlier.any():
-            x = bridge(np.where(outlier, np.nan, x), step, np.inf).values
-            flags[outlier] |= REPLACED
-            repaired.append(f"{outlier.sum()} outliers replaced by monotone cubics")
-    if repaired:
-        known["repaired"] = "; ".join(repaired)
-    return x, flags, known
+        if x.size >= 16 and np.ptp(x):
+            if np.isfinite(reading := reading_step(x)):
+                known["reading_step"] = reading
+            there = flags == 0
+            stuck = find_held(x, step) & there
+            for start, end in stretches(stuck):  # what stands before a gap that was filled
+                stuck[start:end] = end - start > 2
+            outlier, edge = find_outliers(x) & there & ~stuck, saturated(x, stuck)
+            flags[outlier] |= OUTLIER
+            flags[edge] |= SATURATED
+            flags[stuck & ~edge] |= STUCK
+            if preparation.outliers == "replace" and outlier.any():
+                x = bridge(np.where(outlier, np.nan, x), step, np.inf).values
+                flags[outlier] |= REPLACED
+                repaired.append(f"{outlier.sum()} outliers replaced by monotone cubics")
+        if repaired:
+            known["repaired"] = "; ".join(repaired)
+        data[name] = data[name].copy(data=x)
+        if flags.any():
+            data.coords[f"{name}_flags"] = ("time", flags, flag_attributes(str(name)))
+    return data
 
 
 def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
@@ -498,7 +466,34 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
     The axis, unless `time` is given, holds multiples of the step from the reference's first
     instant, where every logger recorded; samples that are missing become NaN.
     """
-    time = _axis(run, dt) if time is None else time
+    if time is None:
+        times = {name: each["time"].values for name, each in run.groups.items()}
+        begin, end = max(t[0] for t in times.values()), min(t[-1] for t in times.values())
+        if end <= begin:
+            spans = ", ".join(
+                f"{name} {span_text(t[0], t[-1], usual_step(t))}" for name, t in times.items()
+            )
+            raise DataError(
+                f"run '{run.name}': its instruments never recorded together ({spans}, on the "
+                "reference's clock). Check the files of the run and the clocks."
+            )
+        own = min(map(usual_step, times.values()))
+        if own > MOST_FINER * dt:
+            raise DataError(
+                f"run '{run.name}' has {1 / own:.4g} samples per second by its times, and "
+                f"[preparation] asks for {1 / dt:.4g}. If its times are in ms, state time_unit = "
+                "'ms' in [files], or correct its header where that says s; else correct "
+                "sampling_rate, dt or steps_per_period."
+            )
+        origin = run.reference_time[0]
+        first = np.ceil((begin - origin) / dt - 1e-6)
+        last = np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6)
+        if last <= first:
+            raise RequestError(
+                f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. "
+                "Correct sampling_rate, dt or steps_per_period in [preparation]."
+            )
+        time = origin + dt * np.arange(first, last + 1)
     channels: dict[str, xr.Variable] = {}
     for group in run.groups.values():
         channels |= _on_axis(group, time, dt, run.settings.preparation, run.name)
@@ -506,9 +501,7 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         channels |= derive(channels, name, run.settings, dt, run.name)
     axis = xr.Variable("time", time, next(iter(run.groups.values()))["time"].attrs)
     data, coordinates = {}, {"time": axis}
-    for name in run.settings.channel_names:
-        if name not in channels:
-            continue
+    for name in [each for each in run.settings.channel_names if each in channels]:
         data[name] = channels[name]
         if (flags := channels.get(f"{name}_flags")) is not None:
             lost = (flags.values & MISSING) > 0
@@ -517,36 +510,6 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         if name in run.settings.rig.positions:
             data[name].attrs["x_position"] = run.settings.rig.positions[name]
     return replace(run, data=xr.Dataset(data, coordinates))
-
-
-def _axis(run: Run, dt: float) -> FloatArray:
-    times = {name: each["time"].values for name, each in run.groups.items()}
-    begin, end = max(t[0] for t in times.values()), min(t[-1] for t in times.values())
-    if end <= begin:
-        spans = ", ".join(
-            f"{name} {span_text(t[0], t[-1], usual_step(t))}" for name, t in times.items()
-        )
-        raise DataError(
-            f"run '{run.name}': its instruments never recorded together ({spans}, on the "
-            "reference's clock). Check the files of the run and the clocks."
-        )
-    own = min(map(usual_step, times.values()))
-    if own > MOST_FINER * dt:
-        raise DataError(
-            f"run '{run.name}' has {1 / own:.4g} samples per second by its times, and "
-            f"[preparation] asks for {1 / dt:.4g}. If its times are in ms, state time_unit = "
-            "'ms' in [files], or correct its header where that says s; else correct "
-            "sampling_rate, dt or steps_per_period."
-        )
-    origin = run.reference_time[0]
-    first = np.ceil((begin - origin) / dt - 1e-6)
-    last = np.floor((end - origin) / dt * (1 + 1e-9) + 1e-6)
-    if last <= first:
-        raise RequestError(
-            f"run '{run.name}' of {end - begin:g} s is shorter than two steps of {dt:g} s. Correct "
-            "sampling_rate, dt or steps_per_period in [preparation]."
-        )
-    return origin + dt * np.arange(first, last + 1)
 
 
 def _on_axis(
@@ -578,21 +541,17 @@ def _on_axis(
         str(name): xr.Variable("time", series[:, i].copy(), {**channel.attrs, **filtered})
         for i, (name, channel) in enumerate(channels.items())
     }
-    for name, flags in group.variables.items():
-        if str(name).endswith("_flags"):
-            new = _flags_at(flags.values, time, wanted, dt)
-            out[str(name)] = xr.Variable("time", new, flags.attrs)
-    return out
-
-
-def _flags_at(flags: Any, time: FloatArray, wanted: FloatArray, dt: float) -> Any:
-    """Flags at new instants: what any sample within half a new step of them carries."""
+    # Flags at new instants: what any sample within half a new step of them carries.
     half = 0.5 * max(dt, time[1] - time[0]) * (1 + 1e-9)
     begin = np.searchsorted(time, wanted - half)
     end = np.searchsorted(time, wanted + half, side="right")
     edges = np.column_stack([begin, end]).ravel()
-    seen = np.bitwise_or.reduceat(np.append(flags, 0), edges)[::2]
-    return np.where(begin < end, seen, 0).astype(np.int16)
+    for name, flags in group.variables.items():
+        if str(name).endswith("_flags"):
+            seen = np.bitwise_or.reduceat(np.append(flags.values, 0), edges)[::2]
+            new = np.where(begin < end, seen, 0).astype(np.int16)
+            out[str(name)] = xr.Variable("time", new, flags.attrs)
+    return out
 
 
 def strays(own: float, samples: int, dt: float) -> bool:
@@ -600,7 +559,7 @@ def strays(own: float, samples: int, dt: float) -> bool:
 
     Times written with few decimals give a step that is off by a part of a sample over the record.
     """
-    return bool(abs(own - dt) * samples > 0.05 * dt)
+    return abs(own - dt) * samples > 0.05 * dt
 
 
 def redundant_pairs(settings: CampaignSettings, period: float) -> Redundant:
@@ -660,9 +619,8 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
 def used_span(settings: RunSettings) -> tuple[float, float]:
     """First and last instant of a run that is used at all, s."""
     stated = (settings.span,) if settings.span else (settings.train, settings.test)
-    spans = [(number(each[0]), number(each[1])) for each in stated if each]
-    starts, ends = zip(*spans, strict=True) if spans else ((-np.inf,), (np.inf,))
-    return min(starts), max(ends)
+    edges = [number(edge) for span in stated if span for edge in span]
+    return min(edges, default=-np.inf), max(edges, default=np.inf)
 
 
 def cropped(run: Run) -> Run:
@@ -721,61 +679,17 @@ def _part(
     raise RequestError(f"{stated}. Lengthen the span, or move it into the run's {common}.")
 
 
-def attributes_of(
-    name: str, run: xr.Dataset, dt: float, clocks: Mapping[str, Clock], campaign: CampaignSettings
-) -> dict[str, Any]:
-    """Attributes that settings (lengths in seconds) and clocks give to a run that was cut."""
-    settings, rig, general = campaign.runs[name], campaign.rig, campaign.campaign
-    time = run["time"].values
-    attributes: dict[str, Any] = {
-        "run": name,
-        "seakeep_version": version(),
-        "file": settings.file or ", ".join(settings.files.values()),
-        "preparation_preset": campaign.preparation.preset,
-        "dt": dt,
-        "scale_factor": general.scale_factor,
-        "sea_state": settings.sea_state,
-        "role": settings.serves,
-        "waves": settings.waves,
-        "water_depth": rig.water_depth,
-        "wave_direction": rig.wave_direction,
-        "frame": rig.frame,
-        "encounter_period": general.encounter_period,
-        "probe_offset": settings.probe_offset,
-        "celerity": celerity_of(run.isel(time=inside(time, used_span(settings), dt)), dt, campaign),
-    }
-    whole = (time[0], time[-1])
-    for use in ("train", "test"):
-        span = getattr(settings, use)
-        if span is None and settings.serves == use:
-            span = whole
-        if span:
-            used = time[inside(time, span, dt)]
-            if used.size:
-                attributes[f"{use}_span"] = (float(used[0]), float(used[-1]))
-    for logger, clock in list(clocks.items())[1:]:
-        attributes |= {
-            f"clock_{logger}": clock.describe(),
-            f"clock_{logger}_method": clock.method,
-            f"clock_{logger}_count": clock.count,
-            f"clock_{logger}_offset": clock.offset,
-            f"clock_{logger}_offset_error": clock.offset_error,
-            f"clock_{logger}_drift_ppm": 1e6 * clock.drift,
-            f"clock_{logger}_drift_error_ppm": 1e6 * clock.drift_error,
-        }
-    attributes |= settings.parameters
-    return {key: value for key, value in attributes.items() if value is not None}
-
-
-def celerity_of(run: xr.Dataset, dt: float, campaign: CampaignSettings) -> float | None:
+def celerity_of(
+    run: xr.Dataset, dt: float, campaign: CampaignSettings, settings: RunSettings
+) -> float | None:
     """Effective celerity of the waves in the part of a run that is used, m/s; None if unknown."""
     channels, depth = campaign.celerity_channels, campaign.rig.water_depth
     if channels is None or depth is None or any(name not in run for name in channels):
         return None
     apart = campaign.rig.positions[channels[1]] - campaign.rig.positions[channels[0]]
     try:
-        first, last = (run[name].values for name in channels)
-        celerity = effective_celerity(first, last, dt, apart, depth)
+        used = inside(run["time"].values, used_span(settings), dt)
+        first, last = (run[name].values[used] for name in channels)
+        return effective_celerity(first, last, dt, apart, depth).celerity
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
         return None
-    return celerity.celerity

@@ -8,20 +8,20 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Groups, Progress, number, whole_number
 from seakeep.campaign.live_chain import LiveChain
-from seakeep.campaign.pipeline import attributes_of, checked, cropped, resampled, strays
+from seakeep.campaign.pipeline import celerity_of, checked, cropped, resampled, strays
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Failures, Survey, spare, survey
 from seakeep.campaign.validation import cross_checks
 from seakeep.errors import MissingFileError, RequestError, SeakeepError, did_you_mean
-from seakeep.files import expanded
+from seakeep.files import expanded, version
 from seakeep.quality import as_json, judge_probes, warn_of
 from seakeep.signals import Clock, uniform_step
+from seakeep.signals.time_axis import inside
 from seakeep.signals.waves import noise_floor
 from seakeep.toml import in_seconds, lengths, parse_length, read_toml, validated
 
@@ -114,8 +114,8 @@ class Campaign:
     @property
     def _measures_period(self) -> bool:
         settings = self.settings
-        asked = settings.preparation.steps_per_period is not None or self._counts_in_periods
-        return asked and settings.campaign.encounter_period is None
+        asked = settings.preparation.steps_per_period or self._counts_in_periods
+        return bool(asked) and not settings.campaign.encounter_period
 
     @cached_property
     def _counts_in_periods(self) -> bool:
@@ -124,7 +124,7 @@ class Campaign:
 
     def _in_seconds(self, period: float | None) -> CampaignSettings:
         """Settings with all that counts in encounter periods turned into seconds and hertz."""
-        if period is None or not self._counts_in_periods:
+        if not (period and self._counts_in_periods):
             return self.settings
         # Models keep their periods: their delays become samples.
         models = {"model": self.settings.model, "models": self.settings.models}
@@ -241,6 +241,11 @@ class Campaign:
             self._run(name)
         settings = self._in_seconds(self.settings.campaign.encounter_period)
         channel = self.period_channel() if periods else None
+        if channel and not settings.period_runs:
+            raise RequestError(
+                f"{self.path} has no run with waves in use. Give a run another role, or state "
+                "encounter_period (s) in [campaign]."
+            )
         return survey(settings, self.files_of, wanted, channel, progress, failures)
 
     def period_channel(self) -> str:
@@ -285,7 +290,7 @@ class Campaign:
             If no run is left.
         """
         stated = self.settings.campaign.encounter_period
-        return stated or self._mean_period(self._survey([], True))
+        return stated or self._survey([], True).period
 
     def seconds(self, stated: float | str) -> float:
         """Seconds of a length or an instant that may be stated in encounter periods.
@@ -311,14 +316,6 @@ class Campaign:
         if length.unit != "T":
             raise RequestError(f"received '{stated}', a frequency. Give a length such as '15 T'.")
         return length.at(self.encounter_period())
-
-    def _mean_period(self, surveyed: Survey) -> float:
-        if not surveyed.periods:
-            raise RequestError(
-                f"{self.path} has no run with waves in use. Give a run another role, or state "
-                "encounter_period (s) in [campaign]."
-            )
-        return float(np.mean(list(surveyed.periods.values())))
 
     def prepare(
         self, names: Iterable[str] | None = None, progress: Progress | None = None
@@ -385,7 +382,7 @@ class Campaign:
         reported = {(str(self.settings.wave_channel), "PERIOD")}  # the survey has warned of it
         for done, name in enumerate(wanted, 1):
             try:
-                if failures is not None and name in failures:
+                if failures and name in failures:
                     raise failures[name]
                 run = surveyed.channels(name)
                 own = uniform_step(run.reference_time, f"run '{name}'")
@@ -405,12 +402,12 @@ class Campaign:
             except SeakeepError as error:
                 is_named = f"'{name}'" in str(error)
                 spare(failures, name, error if is_named else type(error)(f"run '{name}': {error}"))
-                if progress is not None:
+                if progress:
                     progress(done, len(wanted), f"{name} cannot be prepared")
                 continue
             if period:
                 data.attrs["encounter_period"] = period
-            if progress is not None:
+            if progress:
                 progress(done, len(wanted), name)
             yield name, data
 
@@ -446,7 +443,7 @@ class Campaign:
         """
         surveyed, _, dt = self._whole([run])
         settings = surveyed.settings
-        if dt is None:
+        if not dt:
             dt = uniform_step(surveyed.channels(run).reference_time, run)
         late, length = self.seconds(delay), self.seconds(window)
         if not 0 <= 4 * late <= length:
@@ -470,10 +467,10 @@ class Campaign:
     ) -> tuple[Survey, float | None, float | None]:
         """Survey with settings in seconds, encounter period if needed, common step if stated."""
         preparation, period = self.settings.preparation, self.settings.campaign.encounter_period
-        needed = self._counts_in_periods or (steps and preparation.steps_per_period is not None)
-        surveyed = self._survey(wanted, needed and period is None, progress, failures)
-        if needed and period is None:
-            period = self._mean_period(surveyed)
+        needed = self._counts_in_periods or (steps and preparation.steps_per_period)
+        surveyed = self._survey(wanted, bool(needed) and not period, progress, failures)
+        if needed and not period:
+            period = surveyed.period
         dt = preparation.dt
         if preparation.steps_per_period and period:
             dt = period / preparation.steps_per_period
@@ -484,13 +481,52 @@ class Campaign:
     def _attributes(
         self, name: str, run: xr.Dataset, dt: float, surveyed: Survey
     ) -> dict[str, Any]:
-        own = {
+        """Attributes that settings (lengths in seconds) and clocks give to a run that was cut."""
+        campaign = surveyed.settings
+        settings, rig, general = campaign.runs[name], campaign.rig, campaign.campaign
+        time = run["time"].values
+        attributes: dict[str, Any] = {
             "campaign": self.name,
             "campaign_digest": self.digest,
             "file_sha256": self.checksum_of(name),
             "basis_sha256": self.basis_of(name),
+            "run": name,
+            "seakeep_version": version(),
+            "file": settings.file or ", ".join(settings.files.values()),
+            "preparation_preset": campaign.preparation.preset,
+            "dt": dt,
+            "scale_factor": general.scale_factor,
+            "sea_state": settings.sea_state,
+            "role": settings.serves,
+            "waves": settings.waves,
+            "water_depth": rig.water_depth,
+            "wave_direction": rig.wave_direction,
+            "frame": rig.frame,
+            "encounter_period": general.encounter_period,
+            "probe_offset": settings.probe_offset,
+            "celerity": celerity_of(run, dt, campaign, settings),
         }
-        return own | attributes_of(name, run, dt, surveyed.clocks[name], surveyed.settings)
+        whole = (time[0], time[-1])
+        for use in ("train", "test"):
+            span = getattr(settings, use)
+            if not span and settings.serves == use:
+                span = whole
+            if span:
+                used = time[inside(time, span, dt)]
+                if used.size:
+                    attributes[f"{use}_span"] = (float(used[0]), float(used[-1]))
+        for logger, clock in list(surveyed.clocks[name].items())[1:]:
+            attributes |= {
+                f"clock_{logger}": clock.describe(),
+                f"clock_{logger}_method": clock.method,
+                f"clock_{logger}_count": clock.count,
+                f"clock_{logger}_offset": clock.offset,
+                f"clock_{logger}_offset_error": clock.offset_error,
+                f"clock_{logger}_drift_ppm": 1e6 * clock.drift,
+                f"clock_{logger}_drift_error_ppm": 1e6 * clock.drift_error,
+            }
+        attributes |= settings.parameters
+        return {key: value for key, value in attributes.items() if value is not None}
 
 
 def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:

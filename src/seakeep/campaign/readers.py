@@ -3,7 +3,7 @@
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -59,10 +59,10 @@ def expand(file: str, folder: Path) -> Path:
 
 def checksum(path: Path) -> str:
     """SHA-256 of a file, or of the names and contents of the files in a bag's folder."""
-    if folder_reader(path) is None:
+    if not folder_reader(path):
         return sha256_of(path)
     digest = hashlib.sha256()
-    for part in sorted(each for each in path.iterdir() if each.is_file()):
+    for part in sorted(filter(Path.is_file, path.iterdir())):
         digest.update(part.name.encode() + b"\0" + bytes.fromhex(sha256_of(part)))
     return digest.hexdigest()
 
@@ -161,14 +161,14 @@ def _said_unit(table: Columns, name: str) -> str:
     return table.units.get(name, "").split(" since ")[0].strip()
 
 
-def time_step_of(table: Columns, name: str) -> float | None:
-    """Step of a time column in s, gaps left out; None where it has too few values."""
-    times, unit = table.values.get(name), time_unit_of(table, name)
-    if times is None or times.size < 3:
+def time_step_of(table: Columns, name: str | None) -> float | None:
+    """Step of a time column in s, gaps left out; None without one, or of too few values."""
+    if name not in table.values or (times := table.values[name]).size < 3:
         return None
-    step = float(times[-1] - times[0]) / (times.size - 1)
+    step = (times[-1] - times[0]) / (times.size - 1)
     usual = usual_step(times)
     step = step if abs(step - usual) < 0.01 * abs(usual) else usual
+    unit = time_unit_of(table, name)
     step *= conversion(unit, "s", f"the time column '{name}'") if is_unit(unit) else 1.0
     return step if step > 0 else None
 
@@ -191,7 +191,7 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
             f"{path} has no time column '{options.time}'.{did_you_mean(options.time, table.names)} "
             f"Its columns: {', '.join(table.names)}. State one of them as time in [files]."
         )
-    if name is None and rate is None:
+    if name is None and not rate:
         raise RequestError(
             f"{path} has no column with a usual name of times. State time = 'NAME' or "
             f"sampling_rate (Hz) in [files]. Its columns: {', '.join(table.names)}."
@@ -212,28 +212,19 @@ def times_of(path: Path, table: Columns, options: FileSettings) -> tuple[str | N
             "[files]."
         )
     times = table.values[name] * factor
-    _refuse_stuck_clock(path, times, [x for each, x in table.values.items() if each != name])
+    # Rows that are there twice are left to `check_order`.
+    if (again := np.flatnonzero(np.diff(times) == 0)).size:
+        pairs = [(x[again], x[again + 1]) for each, x in table.values.items() if each != name]
+        same = [(a == b) | ~(np.isfinite(a) | np.isfinite(b)) for a, b in pairs]
+        if pairs and np.all(same, axis=0).mean() <= 0.5:
+            first = again[0]
+            raise DataError(
+                f"the times of {path} repeat: {instant_text(times[first], 0)} s stands at samples "
+                f"{first} and {first + 1} ({again.size} repetitions in all), and the readings "
+                "beside them differ, so no row is double: the clock stood still, or is written "
+                "with too few decimals. If the readings went on evenly, leave time out of [files] "
+                "and state sampling_rate (Hz) there; of one logger of several, export the file "
+                "without its times and state sampling_rate in [instruments.NAME]. Else export it "
+                "with more decimals."
+            )
     return name, check_order(times, str(path))
-
-
-def _refuse_stuck_clock(path: Path, times: FloatArray, others: Sequence[FloatArray]) -> None:
-    """Refuse times that repeat while readings go on: no row is double, the clock is wrong.
-
-    Rows that are there twice are left to :func:`check_order`.
-    """
-    again = np.flatnonzero(np.diff(times) == 0)
-    if not again.size or not others:
-        return
-    pairs = [(x[again], x[again + 1]) for x in others]
-    same = [(a == b) | ~(np.isfinite(a) | np.isfinite(b)) for a, b in pairs]
-    if np.all(same, axis=0).mean() > 0.5:
-        return
-    first = again[0]
-    raise DataError(
-        f"the times of {path} repeat: {instant_text(times[first], 0)} s stands at samples {first} "
-        f"and {first + 1} ({again.size} repetitions in all), and the readings beside them differ, "
-        "so no row is double: the clock stood still, or is written with too few decimals. If the "
-        "readings went on evenly, leave time out of [files] and state sampling_rate (Hz) there; "
-        "of one logger of several, export the file without its times and state sampling_rate in "
-        "[instruments.NAME]. Else export it with more decimals."
-    )

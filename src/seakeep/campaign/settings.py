@@ -19,6 +19,7 @@ from seakeep.toml import (
     Duration,
     Finite,
     Instant,
+    Listed,
     Names,
     NotNegative,
     Pair,
@@ -144,8 +145,8 @@ some."""
 ChannelName = Annotated[str, AfterValidator(_channel_name)]
 RunName = Annotated[str, AfterValidator(_run_name)]
 Band = Annotated[Pair, AfterValidator(_rising_band)]
-TwoColumns = Annotated[tuple[str, str], Field(strict=False)]
-Vector = Annotated[tuple[Finite, Finite, Finite], Field(strict=False)]
+TwoColumns = Annotated[tuple[str, str], Listed]
+Vector = Annotated[tuple[Finite, Finite, Finite], Listed]
 
 
 class InstrumentSettings(TimesSettings):
@@ -183,7 +184,7 @@ class InstrumentSettings(TimesSettings):
 class InstrumentsSettings(Table):
     """``[instruments]``: whose clock is time, and a table for each logger."""
 
-    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+    model_config = ConfigDict(extra="allow")
     others: ClassVar = InstrumentSettings
     __pydantic_extra__: dict[str, InstrumentSettings] = Field(init=False)
 
@@ -238,7 +239,7 @@ class DerivedSettings(Table):
     axis: Literal["x", "y", "z"] | None = optional(
         "direction of a channel that is not called surge, sway or heave"
     )
-    components: Annotated[tuple[str, str, str], Field(strict=False)] | None = optional(
+    components: Annotated[tuple[str, str, str], Listed] | None = optional(
         "'remove_gravity': accelerometers along x, y and z of the body"
     )
     zeroed: bool | None = optional(
@@ -252,8 +253,9 @@ class DerivedSettings(Table):
     def _one_way(self) -> DerivedSettings:
         if (self.expression is None) == (self.step is None):
             raise ValueError("a derived channel needs either 'expression', or 'from' and 'step'")
-        keys = {key for needed, others, _ in _STEPS.values() for key in (*needed, *others)}
-        given = {key for key in keys if getattr(self, key) is not None}
+        given = self.model_fields_set.difference(
+            ("expression", "source", "step", "unit", "long_name")
+        )
         if self.step is None:
             if self.source is not None or given:
                 raise ValueError("'from' and the keys of steps do not go with 'expression'")
@@ -425,7 +427,7 @@ class ModelSettings(Table):
     the preset or the constructor decides.
     """
 
-    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+    model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Annotated[Any, BeforeValidator(_read_lengths)]] = Field(
         init=False
     )

@@ -65,7 +65,7 @@ def write_prepared(
     done = len(steps)
 
     def report(count: int, _: int, name: str) -> None:
-        if progress is not None:
+        if progress:
             progress(done + count, len(wanted), name)
 
     for name, run in campaign.each_prepared(missing, report, failed):

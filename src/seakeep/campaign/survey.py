@@ -18,7 +18,7 @@ from seakeep.campaign.pipeline import (
     used_span,
 )
 from seakeep.campaign.settings import CampaignSettings
-from seakeep.errors import DataError, MissingFileError, SeakeepError, warn
+from seakeep.errors import DataError, MissingFileError, SeakeepError, naming, warn
 from seakeep.formats import Columns, Options, read_columns
 from seakeep.quality import Finding, warn_of
 from seakeep.quality.clocks import ClocksKind
@@ -110,8 +110,8 @@ class Survey:
         Reads them.
     clocks : dict of str to dict of str to Clock
         By run and logger.
-    periods : dict of str to float
-        Zero-up-crossing period of the wave channel by run, s.
+    period : float
+        Mean zero-up-crossing period of the wave channel, s; NaN where it was not asked for.
     left_out : dict of str to str
         By run, what it is left out of because it cannot be read, and why.
     doubts : dict of str to (float, float)
@@ -122,7 +122,7 @@ class Survey:
     files_of: Callable[[str], Mapping[str, Path]]
     reader: ReadOnce
     clocks: Mapping[str, Mapping[str, Clock]]
-    periods: Mapping[str, float]
+    period: float
     left_out: Mapping[str, str]
     doubts: Mapping[str, tuple[float, float]]
 
@@ -151,41 +151,43 @@ def survey(
     where the campaign does not say otherwise, and one that is not certain is left out.
     """
     reader, pools = ReadOnce(), settings.instruments.pool_drift
-    own = [name for name in asked if settings.runs[name].files]
-    others = settings.used_runs if own and pools else ()  # whose drifts are pooled with theirs
-    clock_runs = dict.fromkeys([*own, *filter(lambda name: settings.runs[name].files, others)])
+    # Those whose drifts are pooled with theirs, too.
+    pooled = settings.used_runs if pools and any(settings.runs[n].files for n in asked) else ()
+    clock_runs = [n for n in dict.fromkeys([*asked, *pooled]) if settings.runs[n].files]
     period_runs = () if channel is None else settings.period_runs
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
     clocks = {}
     spans = {}
-    bad = {}
+    bad, left_out = {}, {}
     for count, name in enumerate(runs, 1):
-        if progress is not None:
+        if progress:
             progress(0, len(runs), f"clocks and waves of {name} ({count} of {len(runs)})")
         reader.keep = name in asked
         try:
             run = sync(read(name, settings, files_of(name), reader))
             clocks[name] = dict(run.clocks)
-            if channel is not None and name in period_runs:
+            if channel and name in period_runs:
                 spans[name] = _period(run, channel)
         except SeakeepError as error:
             if name in asked:
                 spare(failures, name, error)
             bad[name] = error
+            lacks = ["the encounter period"] * (name in period_runs)
+            lacks += ["the pooled clock drifts"] * (name in clock_runs and name not in clocks)
+            left_out[name] = (
+                f"run '{name}' is left out of {' and of '.join(lacks) or 'the clocks'}: {error} "
+                f"Once it is repaired, prepare again; or state role = 'unused' in [runs.{name}]."
+            )
     reader.keep = False
     long = {name: each for name, each in spans.items() if each[3] >= FEWEST} or spans
-    periods = {name: counted for name, (counted, *_) in long.items()}
+    period = float(np.mean([each[0] for each in long.values()])) if long else np.nan
     doubts = {
         name: (counted, energy)
         for name, (counted, energy, steady, _) in spans.items()
         if not 1 / LED <= energy / counted <= LED or steady > NOISY * counted
     }
-    if bad and (not clocks or (period_runs and not periods)):
+    if bad and (not clocks or (period_runs and not spans)):
         raise as_one(bad)
-    left_out = {
-        name: _left_out(name, error, name in period_runs, name in clock_runs and name not in clocks)
-        for name, error in bad.items()
-    }
     for words in (words for name, words in left_out.items() if name not in asked):
         warn(words)
     kind = ClocksKind.PERIOD
@@ -196,15 +198,7 @@ def survey(
         for each, clock in zip(having, pool_drift(known) if pools else known, strict=True):
             each[logger] = without_doubtful_drift(clock)
     alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}
-    return Survey(settings, files_of, reader, alone | clocks, periods, left_out, doubts)
-
-
-def _left_out(run: str, error: SeakeepError, period: bool, drift: bool) -> str:
-    pooled = ["the encounter period"] * period + ["the pooled clock drifts"] * drift
-    return (
-        f"run '{run}' is left out of {' and of '.join(pooled) or 'the clocks'}: {error} "
-        f"Once it is repaired, prepare again; or state role = 'unused' in [runs.{run}]."
-    )
+    return Survey(settings, files_of, reader, alone | clocks, period, left_out, doubts)
 
 
 def _period(run: Run, channel: str) -> tuple[float, float, float, float]:
@@ -217,7 +211,7 @@ def _period(run: Run, channel: str) -> tuple[float, float, float, float]:
     step = uniform_step(time, f"run '{run.name}'")
     used = inside(time, used_span(run.own), step)
     series = series[used] if used.sum() > 2 else series
-    try:
+    with naming(f"run '{run.name}', channel '{channel}'"):
         stated = run.settings.campaign.period_hysteresis
         counted = encounter_period(series, step, stated)
         steady = counted
@@ -225,7 +219,5 @@ def _period(run: Run, channel: str) -> tuple[float, float, float, float]:
             # A spike would make the SD so large that no wave is left.
             clipped = np.clip(series, *np.quantile(series, [0.001, 0.999]))
             steady = encounter_period(clipped, step, max(stated, 0.1))
-    except DataError as error:
-        raise DataError(f"run '{run.name}', channel '{channel}': {error}") from None
     energy = energy_period(series[waves_part(series, step)], step)
     return counted, energy, steady, series.size * step / counted

@@ -67,18 +67,32 @@ def cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
     wave = settings.campaign.period_channel
     if wave is None or wave in settings.channel_names:
         yield from _period_mistakes(settings)
-    yield from _instrument_mistakes(settings)
+    known = list(settings.instruments.loggers)
+    used = {logger for run in settings.runs.values() for logger in run.files}
+    reference = settings.instruments.reference
+    if reference is not None and reference not in {*known, *used}:
+        near = did_you_mean(reference, sorted(used))
+        words = f"received {reference!r}, which no run has a file of.{near}"
+        yield ("instruments", "reference"), words
+    for run, each in settings.runs.items():
+        for logger in each.files:
+            if known and logger not in known:
+                yield (
+                    ("runs", run, "files", logger),
+                    f"no table [instruments.{logger}].{did_you_mean(logger, known)} "
+                    f"Instruments: {', '.join(known)}.",
+                )
     spelt: dict[str, str] = {}
     for run, each in settings.runs.items():
         if (other := spelt.setdefault(run.lower(), run)) != run:
-            yield Mistake(
+            yield (
                 ("runs", run),
                 f"'{other}' differs only in the case of its letters, and files are named after "
                 "both. Rename one.",
             )
         for name in each.channels:
             if name not in settings.channels:
-                yield Mistake(
+                yield (
                     ("runs", run, "channels", name),
                     f"no table [channels.{name}] to change.{did_you_mean(name, settings.channels)} "
                     "Add it there first.",
@@ -101,17 +115,17 @@ def _name_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
         if name not in names:
             received = "" if place[-1] == name else f"received {name!r}, "
             near = did_you_mean(name, names)
-            yield Mistake(place, f"{received}no such channel.{near} Channels: {', '.join(names)}.")
+            yield place, f"{received}no such channel.{near} Channels: {', '.join(names)}."
 
 
 def _period_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
     """Keys in encounter periods where there is no period, or where it is measured with them."""
     places = list(lengths(settings))
     wave = settings.wave_channel
-    if not places or settings.campaign.encounter_period is not None:
+    if not places or settings.campaign.encounter_period:
         return
     if wave is None:
-        yield Mistake(
+        yield (
             places[0],
             "counts in encounter periods, and the campaign has none. State encounter_period (s) or "
             "period_channel in [campaign], or name a channel eta_…",
@@ -120,30 +134,12 @@ def _period_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
     for place in places:
         head, name, *_ = place
         if (head == "runs" and name in settings.period_runs) or head == "instruments":
-            yield Mistake(
+            yield (
                 place,
                 "counts in encounter periods, and the period is measured with it, as the "
                 f"zero-up-crossing period of {wave}. State encounter_period (s) in [campaign], or "
                 "this in seconds.",
             )
-
-
-def _instrument_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
-    known = list(settings.instruments.loggers)
-    used = {logger for run in settings.runs.values() for logger in run.files}
-    reference = settings.instruments.reference
-    if reference is not None and reference not in {*known, *used}:
-        near = did_you_mean(reference, sorted(used))
-        words = f"received {reference!r}, which no run has a file of.{near}"
-        yield Mistake(("instruments", "reference"), words)
-    for run, each in settings.runs.items():
-        for logger in each.files:
-            if known and logger not in known:
-                yield Mistake(
-                    ("runs", run, "files", logger),
-                    f"no table [instruments.{logger}].{did_you_mean(logger, known)} "
-                    f"Instruments: {', '.join(known)}.",
-                )
 
 
 def _unit_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
@@ -157,7 +153,7 @@ def _unit_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
             try:
                 conversion(each.unit, units_of(place[-1], each.unit), place[-1])
             except RequestError as error:
-                yield Mistake((*place, "unit"), str(error))
+                yield (*place, "unit"), str(error)
 
 
 def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
@@ -166,23 +162,23 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
     for name, each in settings.derived.items():
         place = ("derived", name)
         if name in settings.channels:
-            yield Mistake(place, f"[channels.{name}] exists too. Rename one of them.")
+            yield place, f"[channels.{name}] exists too. Rename one of them."
         try:
             sources = sources_of(name, each, names)
         except RequestError as error:
             sound = False
-            yield Mistake((*place, "expression"), str(error))
+            yield (*place, "expression"), str(error)
             continue
         key = "expression" if each.expression is not None else "from"
         for source in sources:
             if source not in names:
                 near = did_you_mean(source, names)
-                yield Mistake(
+                yield (
                     (*place, key),
                     f"the channel '{source}' does not exist.{near} Channels: {', '.join(names)}.",
                 )
         if each.expression is not None and each.unit is None and canonical_channel(name) is None:
-            yield Mistake(
+            yield (
                 (*place, "unit"),
                 f"missing. '{name}' is a free name; state the unit of the expression, such as "
                 "unit = 'm' ('-' for none).",
@@ -191,4 +187,4 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
         try:
             derivation_order(settings.derived, names)
         except RequestError as error:
-            yield Mistake(("derived",), str(error))
+            yield ("derived",), str(error)

@@ -16,7 +16,6 @@ from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import check_output, is_there, write_text
 
 if TYPE_CHECKING:
-    from seakeep.arrays import Datasets
     from seakeep.campaign import Campaign
 
 
@@ -51,7 +50,7 @@ def tank(
     from seakeep.tank.play import play
     from seakeep.tank.settings import default_settings, read_tank, with_waves
 
-    chosen = default_settings() if settings is None else read_tank(settings)
+    chosen = read_tank(settings) if settings else default_settings()
     chosen = with_waves(chosen, seed, spacing)
     with progress_bar("Playing") as progress:
         files = play(
@@ -185,7 +184,7 @@ def track(
         bridge=bridge,
         passband=passband if passband != 0 else None,
     )
-    reference = None if mru is None else read_table(mru, columns=("heave", "pitch"))
+    reference = read_table(mru, columns=("heave", "pitch")) if mru else None
     with progress_bar("Tracking") as progress:
         track = track_video(video, settings, progress)
     if sheet:
@@ -231,9 +230,9 @@ def init(
         if is_there(out) and not force:
             raise RequestError(f"{out} exists already. Give another name, or --force.")
         check_output(out, "draft", files)
-    folder = Path() if out is None else out.parent
+    folder = out.parent if out else Path()
     marks = {"tab": "\t", "blank": " "}
-    mark = None if delimiter is None else marks.get(delimiter, delimiter)
+    mark = delimiter and marks.get(delimiter, delimiter)
     options = {"skip_rows": skip_rows, "delimiter": mark, "decimal": decimal, "group": group}
     text = draft_campaign(files, folder, options)
     if out is None:
@@ -305,31 +304,14 @@ def _report_runs(
 ) -> None:
     """Print steps and findings of prepared runs, and write their sheet unless it is fresh."""
     from seakeep.campaign import load_prepared
+    from seakeep.quality import findings_of
     from seakeep.report.quality_sheet import is_newer, steps_of, write_quality_sheet
 
     folder = next(iter(files.values())).parent
     runs = load_prepared(read, folder, list(files))
     words = steps_of(next(iter(runs.values())))
     say(f"{words[0].upper()}{words[1:]}.")
-    _print_findings(runs)
-    page = folder / "quality.html"
-    pictures = {path.stem.removeprefix("quality_") for path in folder.glob("quality_*.png")}
-    same = pictures == set(files) and all(is_newer(page, file) for file in files.values())
-    if not sheet or (same and not failures):
-        return
-    unread = {name: str(error) for name, error in failures.items()}
-    try:
-        write_quality_sheet(runs, read.settings, read.name, folder, unread)
-    except RequestError as error:
-        say(f"Note: no data-quality sheet: {error}", style="yellow")
-        return
-    say(f"Wrote {page}: check it before you use the runs.")
-
-
-def _print_findings(runs: Datasets) -> None:
-    """Print what the checks found and no warning said: one line per channel and kind."""
-    from seakeep.quality import findings_of
-
+    # What the checks found and no warning said: one line per channel and kind.
     groups = defaultdict(list)
     for run in runs.values():
         for each in findings_of(run):
@@ -341,6 +323,18 @@ def _print_findings(runs: Datasets) -> None:
         say(f"Found in {same[0].run}: {same[0].channel}: {same[0].text}{alike}")
     if len(groups) > SHOWN:
         say(f"Found {len(groups) - SHOWN} more: the sheet lists them.")
+    page = folder / "quality.html"
+    pictures = {path.stem.removeprefix("quality_") for path in folder.glob("quality_*.png")}
+    fresh = pictures == set(files) and all(is_newer(page, file) for file in files.values())
+    if not sheet or (fresh and not failures):
+        return
+    unread = {name: str(error) for name, error in failures.items()}
+    try:
+        write_quality_sheet(runs, read.settings, read.name, folder, unread)
+    except RequestError as error:
+        say(f"Note: no data-quality sheet: {error}", style="yellow")
+        return
+    say(f"Wrote {page}: check it before you use the runs.")
 
 
 datasets = typer.Typer(
@@ -352,7 +346,7 @@ datasets = typer.Typer(
 
 @datasets.callback()
 def _list(context: typer.Context) -> None:
-    if context.invoked_subcommand is not None:
+    if context.invoked_subcommand:
         return
     from rich import box
     from rich.table import Table
@@ -389,7 +383,7 @@ def _fetch(
 
     dataset = find_dataset(name)
     folder = to or data_folder()
-    if folder is None:
+    if not folder:
         raise RequestError(
             "no data folder is known. Give --to DIR, or set the environment variable "
             "SEAKEEP_DATA_DIR."

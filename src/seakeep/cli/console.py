@@ -227,8 +227,8 @@ def say_written(paths: Iterable[Path]) -> None:
     say(f"Wrote {', '.join(map(str, paths))}")
 
 
-def refuse(given: Mapping[str, bool], words: str) -> None:
-    """Refuse the first option that is given."""
-    for option, is_given in given.items():
-        if is_given:
+def refuse(given: Mapping[str, object], words: str) -> None:
+    """Refuse the first option that is given: with a value, or a flag that is set."""
+    for option, value in given.items():
+        if value is not None and value is not False:
             raise RequestError(f"{option} {words}")

@@ -233,7 +233,9 @@ def compare(
     from seakeep.study.comparison import served
 
     make_folder(out)
-    names = _named(model)
+    # Names of model files: their stems, or their paths where two would be the same.
+    stems = [path.stem for path in model]
+    names = {p.stem if stems.count(p.stem) == 1 else str(p.with_suffix("")): p for p in model}
     fitted = {name: load_model(path) for name, path in names.items()}
     shown = _band(fitted, level, band, scheduler)
     read = read_campaign(campaign)
@@ -249,8 +251,7 @@ def compare(
         fitted = _with_baselines(fitted, read)
     if nowcast:
         given = {"--start": start, "--band": band, "--workers": workers, "--scheduler": scheduler}
-        stated = {option: value is not None for option, value in given.items()}
-        refuse(stated | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
+        refuse(given | {"--full-scale": full_scale, "--radians": not degrees}, NO_NOWCAST)
         serving = {n: each for n, each in fitted.items() if n in names or served(each)}
         _nowcast(serving, read, runs, steps, shown["level"], out, figures, used)
         return
@@ -324,15 +325,9 @@ def _nowcast(
     say_written(written)
 
 
-def _named(files: list[Path]) -> dict[str, Path]:
-    """Names of model files: their stems, or their paths where two would be the same."""
-    stems = [path.stem for path in files]
-    return {p.stem if stems.count(p.stem) == 1 else str(p.with_suffix("")): p for p in files}
-
-
 def _figures(names: list[str], out: Path, suffix: str) -> dict[str, Path]:
     """Files of figures by name, where figures can be drawn."""
-    if find_spec("matplotlib") is None:
+    if not find_spec("matplotlib"):
         say(
             "Note: no figures, because matplotlib is not installed. "
             "Install it with: pip install 'seakeep[figures]'"
@@ -407,15 +402,15 @@ def _band(
     from seakeep.models import is_ensemble
 
     ensembles = [each for each in models.values() if is_ensemble(each)]
-    given = {"--level": level is not None, "--band": band is not None, "--members": members}
+    given = {"--level": level, "--band": band, "--members": members}
     if not ensembles:
         alone = FOR_ENSEMBLES.format(", ".join(models))
-        refuse(given | {"--scheduler": scheduler is not None}, alone)
+        refuse(given | {"--scheduler": scheduler}, alone)
     if members:
         del given["--members"]
         refuse(given, NO_BAND)
-    calibrations = [each.calibration for each in ensembles if each.calibration is not None]
-    if calibrations and band is None and not members:
+    calibrations = [each.calibration for each in ensembles if each.calibration]
+    if calibrations and not (band or members):
         say(
             "Note: the ensemble is calibrated, and the band shown is that of its members. "
             "--band calibrated shows the calibrated one."

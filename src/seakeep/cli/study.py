@@ -96,7 +96,7 @@ def reproduce(
             play = partial(
                 reproduce_study, out, preset, size=size, seed=seed, executor=executor, progress=tell
             )
-            if (near := on_this_machine(executor)) is None:
+            if not (near := on_this_machine(executor)):
                 results = play()
             else:
                 with submitting(_write_act, None, near) as submit:  # while the next act runs
@@ -140,7 +140,7 @@ def _write_reproduction(
     from seakeep.report.acts import write_reproduction
     from seakeep.report.sections import write_report
 
-    for each in results.values() if on_this_machine(executor) is None else ():
+    for each in () if on_this_machine(executor) else results.values():
         with progress_bar(f"Report of {each.attrs['study']}") as tell:
             write_report(each, tell)
     with progress_bar("Report") as tell:

@@ -174,11 +174,14 @@ def unique_names(headers: Iterable[str]) -> tuple[list[str], list[str | None]]:
     return names, [unit for _, unit in pairs]
 
 
-def check_lengths(path: Path, vectors: Mapping[str, FloatArray], mend: str = "") -> None:
+def check_lengths(
+    path: Path,
+    vectors: Mapping[str, FloatArray],
+    mend: str = "Save channels of one clock, each as long as the time.",
+) -> None:
     """Refuse channels that differ in length."""
     if len({vector.size for vector in vectors.values()}) > 1:
         listed = ", ".join(f"{name} {vector.size}" for name, vector in vectors.items())
-        mend = mend or "Save channels of one clock, each as long as the time."
         raise DataError(f"{path}: the channels differ in length ({listed}). {mend}")
 
 

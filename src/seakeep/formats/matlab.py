@@ -1,20 +1,15 @@
 """Tables in MATLAB files of every version."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError
 from seakeep.formats.columns import Columns, Options, check_lengths, decoding, unique_names
-
-if TYPE_CHECKING:
-    import h5py
 
 _NAME_KEYS = ("names", "channels", "labels", "channel_names", "name")
 _UNIT_KEYS = ("units", "unit")
@@ -75,7 +70,7 @@ def _tidy(value: Any, in_order: bool) -> Any:
         items = sorted(value.items()) if in_order else value.items()
         return {key: _tidy(each, in_order) for key, each in items}
     if isinstance(value, list):
-        cells = np.empty(len(value), dtype=object)
+        cells = np.empty(len(value), object)
         cells[:] = [_tidy(each, in_order) for each in value]
         return cells
     return value
@@ -87,7 +82,7 @@ def _opaque(path: Path) -> dict[str, str]:
 
     opaque = {}
 
-    def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
+    def look(name: str, item: Any) -> None:
         if name.startswith("#"):
             return
         if "MATLAB_sparse" in item.attrs:
@@ -114,11 +109,10 @@ def _unwrapped(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _rate(content: Mapping[str, Any]) -> float | None:
-    for keys, inverse in ((_RATE_KEYS, False), (_STEP_KEYS, True)):
-        for key in keys:
-            value = content.get(key)
-            if isinstance(value, int | float | np.number) and value > 0:
-                return 1.0 / float(value) if inverse else float(value)
+    for key in (*_RATE_KEYS, *_STEP_KEYS):
+        value = content.get(key)
+        if isinstance(value, int | float | np.number) and value > 0:
+            return 1.0 / value if key in _STEP_KEYS else float(value)
     return None
 
 
@@ -129,7 +123,7 @@ def _first(content: Mapping[str, Any], keys: tuple[str, ...]) -> Any:
 def _texts(content: Mapping[str, Any], keys: tuple[str, ...]) -> list[str]:
     """Texts of a list under one of the keys; none where it holds others."""
     value = _first(content, keys)
-    cells = [] if isinstance(value, str) else list(np.atleast_1d(np.asarray(value, dtype=object)))
+    cells = [] if isinstance(value, str) else list(np.atleast_1d(np.asarray(value, object)))
     return [cell.strip() for cell in cells] if all(isinstance(c, str) for c in cells) else []
 
 

@@ -1,20 +1,14 @@
 """Tables in NetCDF and HDF5 files."""
 
-from __future__ import annotations
-
 import io
 import warnings
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
 from seakeep.errors import DataError, did_you_mean
 from seakeep.formats.columns import Columns, Options, decoding
-
-if TYPE_CHECKING:
-    import h5py
 
 WIDEST = 64
 """Columns of a two-dimensional set beyond which it is a picture or a field, not channels."""
@@ -42,7 +36,10 @@ def read_netcdf(path: Path, options: Options) -> Columns:
             f"{path} holds no channels; found variables {', '.join(map(str, dataset.variables))}. "
             "Expected one variable per channel along one dimension."
         )
-    axis = _time_axis(flat, options.time)
+    dims = [array.dims[0] for array in flat.values()]
+    axis = "time" if "time" in dims else max(dims, key=dims.count, default="time")
+    if options.time in flat:
+        axis = flat[options.time].dims[0]
     length = next((array.size for array in flat.values() if array.dims == (axis,)), 0)
     values, units = {}, {}
     for name, array in flat.items():
@@ -92,7 +89,7 @@ def _group(path: Path, wanted: str | None) -> str | None:
 
     holding: dict[str, int] = {}
 
-    def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
+    def look(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.ndim and item.dtype.kind in "fiub":
             parent = name.rpartition("/")[0]
             holding[parent] = holding.get(parent, 0) + 1
@@ -113,13 +110,6 @@ def _group(path: Path, wanted: str | None) -> str | None:
             "'NAME' in [files], or give --group NAME to seakeep init."
         )
     return next(iter(holding))
-
-
-def _time_axis(flat: Mapping[str, xr.DataArray], time: str | None) -> object:
-    if time is not None and time in flat:
-        return flat[time].dims[0]
-    dims = [array.dims[0] for array in flat.values()]
-    return "time" if "time" in dims else max(dims, key=dims.count, default="time")
 
 
 def _split(path: Path, name: str, array: xr.DataArray) -> dict[str, xr.DataArray]:

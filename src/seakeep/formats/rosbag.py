@@ -62,7 +62,9 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> tuple[Any, ...]:
     for connection, instant, raw in reader.messages(chosen):
         message = reader.deserialize(raw, connection.msgtype)
         received.append(instant)
-        stamps.append(_stamp(message))
+        # Stamp of the header, ns; none where there is none or it was not stamped.
+        stamp = getattr(getattr(message, "header", None), "stamp", None)
+        stamps.append((stamp and int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)) or None)
         numbers.append(dict(_flat(message, "")))
     announced = sum(connection.msgcount for connection in chosen)
     if len(received) < announced:
@@ -84,10 +86,10 @@ def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
     types = {}
     for connection in connections:
         first = next(iter(reader.messages([connection])), None)
-        if first is None:
+        if not first:
             continue
         message = reader.deserialize(first[2], connection.msgtype)
-        if next(iter(_flat(message, "")), None) is not None:
+        if any(True for _ in _flat(message, "")):
             types[connection.topic] = f"{connection.msgtype}, {connection.msgcount}"
     if not types:
         topics = ", ".join(sorted({connection.topic for connection in connections})) or "none"
@@ -99,14 +101,6 @@ def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:
             "with group = 'TOPIC' in [files]."
         )
     return next(iter(types))
-
-
-def _stamp(message: Any) -> int | None:
-    """Stamp of the message's header, ns; None where it has none or was not stamped."""
-    stamp = getattr(getattr(message, "header", None), "stamp", None)
-    if stamp is None:
-        return None
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec) or None
 
 
 def _flat(value: Any, name: str) -> Iterator[tuple[str, float]]:
@@ -167,7 +161,7 @@ def _columns(
 
 def _seconds(instants: list[int], begin: int) -> FloatArray:
     # Subtracted as integers: a count of nanoseconds since 1970 has more digits than a float.
-    return 1e-9 * np.array([instant - begin for instant in instants], dtype=float)
+    return 1e-9 * np.array([instant - begin for instant in instants], float)
 
 
 def _unit(kind: str, name: str) -> str | None:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import numpy.typing as npt
 
 from seakeep.arrays import FloatArray
 from seakeep.errors import DataError, RequestError, did_you_mean, needing
@@ -49,7 +48,35 @@ def read_tdms(path: Path, options: Options) -> Columns:
                 if len(channel) > 1 and np.dtype(channel.dtype or object).kind in "fiubM"
             ]
             data = [channel[:] for channel in channels]
-    return _columns(path, channels, data)
+    if not channels:
+        raise DataError(
+            f"{path} holds no channels of numbers with at least two samples. Export the run again."
+        )
+    check_lengths(
+        path,
+        {channel.name: values for channel, values in zip(channels, data, strict=True)},
+        "Put channels of one clock into one group, and state it with group = 'NAME' in [files].",
+    )
+    bare = Counter(channel.name for channel in channels)
+    names = [
+        channel.name if bare[channel.name] == 1 else f"{channel.group_name}/{channel.name}"
+        for channel in channels
+    ]
+    values, units = {}, {}
+    for name, channel, numbers in zip(names, channels, data, strict=True):
+        if numbers.dtype.kind == "M":
+            after = numbers - numbers[0]  # NaN where one is missing
+            values[name], units[name] = after / np.timedelta64(1, "ns") * 1e-9, "s"
+            continue
+        values[name] = numbers.astype(float)
+        stated = (channel.properties[key] for key in _UNITS if key in channel.properties)
+        if unit := str(next(stated, "")).strip():
+            units[name] = unit
+    time = _waveform_time(path, channels, data[0].size)
+    if time is not None and not any(name.lower() == "time" for name in names):
+        values = {"time": time, **values}
+        units["time"] = "s"
+    return Columns(values, units)
 
 
 def _check_whole(raw: BinaryIO) -> None:
@@ -95,38 +122,6 @@ def _chosen(path: Path, file: Any, wanted: str | None) -> Sequence[Any]:
             "with group = 'NAME' in [files]."
         )
     return [channel for channels in filled.values() for channel in channels]
-
-
-def _columns(path: Path, channels: list[Any], data: list[npt.NDArray[Any]]) -> Columns:
-    if not channels:
-        raise DataError(
-            f"{path} holds no channels of numbers with at least two samples. Export the run again."
-        )
-    check_lengths(
-        path,
-        {channel.name: values for channel, values in zip(channels, data, strict=True)},
-        "Put channels of one clock into one group, and state it with group = 'NAME' in [files].",
-    )
-    bare = Counter(channel.name for channel in channels)
-    names = [
-        channel.name if bare[channel.name] == 1 else f"{channel.group_name}/{channel.name}"
-        for channel in channels
-    ]
-    values, units = {}, {}
-    for name, channel, numbers in zip(names, channels, data, strict=True):
-        if numbers.dtype.kind == "M":
-            after = numbers - numbers[0]  # NaN where one is missing
-            values[name], units[name] = after / np.timedelta64(1, "ns") * 1e-9, "s"
-            continue
-        values[name] = numbers.astype(float)
-        stated = (channel.properties[key] for key in _UNITS if key in channel.properties)
-        if unit := str(next(stated, "")).strip():
-            units[name] = unit
-    time = _waveform_time(path, channels, data[0].size)
-    if time is not None and not any(name.lower() == "time" for name in names):
-        values = {"time": time, **values}
-        units["time"] = "s"
-    return Columns(values, units)
 
 
 def _waveform_time(path: Path, channels: list[Any], count: int) -> FloatArray | None:

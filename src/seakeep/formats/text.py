@@ -50,7 +50,15 @@ def read_text(path: Path, options: Options) -> Columns:
 
     Empty cells and ``nan`` are NaN. The body is parsed once, by pandas.
     """
-    lines = _decoded(path, _unpacked(path), options.encoding).split("\n")
+    raw = path.read_bytes()
+    if raw.startswith(b"\x1f\x8b"):
+        try:
+            raw = gzip.decompress(raw)
+        except (EOFError, OSError, zlib.error) as error:
+            raise DataError(
+                f"{path} is cut off or damaged (gzip: {error}). Copy or download it again."
+            ) from None
+    lines = _decoded(path, raw, options.encoding).split("\n")
     try:
         layout = _layout(path, lines, options)
     except csv.Error as error:
@@ -59,8 +67,13 @@ def read_text(path: Path, options: Options) -> Columns:
             "delimiter or skip_rows in [files]; else export the run as CSV."
         ) from None
     frame = _frame(path, lines, layout)
-    if lines[-1]:
-        _warn_of_a_short_end(path, lines, layout)
+    if lines[-1]:  # the last line has no end: is its last cell shorter than those above?
+        *above, last = (_cells(row, layout.delimiter)[-1] for _, row in layout.rows[-SHORT_END:])
+        if len(above) > 1 and len(last) < min(map(len, above)):
+            warn(
+                f"{path} ends within line {len(lines)}, at {last!r}: it seems to be cut off. "
+                "Export it again, or end the last line if it is whole."
+            )
     names, units = unique_names(layout.headers)
     if layout.units:
         for name, row, unit in zip(names, layout.units, units, strict=True):
@@ -87,28 +100,6 @@ def read_text(path: Path, options: Options) -> Columns:
     )
 
 
-def _warn_of_a_short_end(path: Path, lines: list[str], layout: _Layout) -> None:
-    """Warn where the last line has no end and its last cell is shorter than those above."""
-    *above, last = (_cells(row, layout.delimiter)[-1] for _, row in layout.rows[-SHORT_END:])
-    if len(above) > 1 and len(last) < min(map(len, above)):
-        warn(
-            f"{path} ends within line {len(lines)}, at {last!r}: it seems to be cut "
-            "off. Export it again, or end the last line if it is whole."
-        )
-
-
-def _unpacked(path: Path) -> bytes:
-    raw = path.read_bytes()
-    if not raw.startswith(b"\x1f\x8b"):
-        return raw
-    try:
-        return gzip.decompress(raw)
-    except (EOFError, OSError, zlib.error) as error:
-        raise DataError(
-            f"{path} is cut off or damaged (gzip: {error}). Copy or download it again."
-        ) from None
-
-
 def _decoded(path: Path, raw: bytes, encoding: str | None) -> str:
     """Text with plain ends of lines, from any encoding."""
     if not raw or raw.isspace():
@@ -129,7 +120,14 @@ def _decoded(path: Path, raw: bytes, encoding: str | None) -> str:
                 f"{path} is not {encoding}: {where} does not fit. Correct 'encoding' in [files], "
                 "or leave it out."
             ) from None
-        text = _western(path, raw)
+        letters = {byte for byte in set(raw) if byte >= 0x80}
+        if not letters <= _SIGNS:
+            warn(
+                f"{path} is not UTF-8 and was read as Windows-1252 (Latin-1); check the letters of "
+                "its header, or state encoding in [files]."
+            )
+        # Five bytes are not letters of Windows-1252; Latin-1 has control characters there.
+        text = raw.decode("latin-1" if _UNUSED & letters else "cp1252")
     except (LookupError, ValueError):
         raise DataError(
             f"{path}: the encoding {encoding!r} is not known. Write 'utf-8', 'latin-1' or 'cp1252'."
@@ -142,17 +140,6 @@ _SIGNS = frozenset("°µ²³·".encode("latin-1"))
 """Signs of units that are the same byte in Latin-1, its relatives and Windows-1252."""
 
 
-def _western(path: Path, raw: bytes) -> str:
-    letters = {byte for byte in set(raw) if byte >= 0x80}
-    if not letters <= _SIGNS:
-        warn(
-            f"{path} is not UTF-8 and was read as Windows-1252 (Latin-1); check the letters of its "
-            "header, or state encoding in [files]."
-        )
-    # Five bytes are not letters of Windows-1252; Latin-1 has control characters there.
-    return raw.decode("latin-1" if _UNUSED & letters else "cp1252")
-
-
 def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
     marks = (options.comment,) if options.comment else ("#", "%")
     rows = [
@@ -161,7 +148,7 @@ def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
         if line.strip(" \t,;") and not line.lstrip().startswith(marks)
     ]
     text = next((line for _, line in rows[:HEAD] if not _RULE.match(line)), None)
-    if text is None:
+    if not text:
         raise DataError(
             f"{path} holds no rows, only comments and blank lines. Export the run again."
         )
@@ -171,7 +158,14 @@ def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
     rows = [row for row in rows[:first] if not _RULE.match(row[1])] + rows[first:]
     headers, *below = (_cells(line, delimiter) for _, line in rows[:2])
     above = lines[options.skip_rows : rows[0][0] - 1]
-    said, units, at = _remarks(above, marks, delimiter, len(headers)), None, 1
+    # Comment lines above the first row that may be a header: as many words as it has cells.
+    comments = [line.lstrip() for line in above if line.lstrip().startswith(marks)]
+    bare = [line.lstrip("".join(marks)).strip() for line in comments]
+    for mark in dict.fromkeys((delimiter, "\t", ";", ",")):
+        cells = [_cells(line, mark) for line in bare if not _RULE.match(line)]
+        if said := [each for each in cells if len(each) == len(headers) and not _numeric(each)]:
+            break
+    units, at = None, 1
     if _numeric(headers):
         if not said and len(rows) < min(len(headers), HEAD):
             words = "no header and more columns than rows, which looks"
@@ -192,19 +186,6 @@ def _layout(path: Path, lines: list[str], options: Options) -> _Layout:
         raise DataError(f"{path} has a header and no rows of numbers. Export the run again.")
     decimal = options.decimal or _decimal(path, [line for _, line in rows[at:]], delimiter)
     return _Layout(delimiter, decimal, headers, units, rows[at:])
-
-
-def _remarks(
-    above: list[str], marks: tuple[str, ...], delimiter: str, width: int
-) -> list[list[str]]:
-    """Comment lines above the first row that may be a header: as many words as it has cells."""
-    comments = [line.lstrip() for line in above if line.lstrip().startswith(marks)]
-    bare = [line.lstrip("".join(marks)).strip() for line in comments]
-    for mark in dict.fromkeys((delimiter, "\t", ";", ",")):
-        cells = [_cells(line, mark) for line in bare if not _RULE.match(line)]
-        if remarks := [each for each in cells if len(each) == width and not _numeric(each)]:
-            return remarks
-    return []
 
 
 def _decimal(path: Path, body: list[str], delimiter: str) -> str:
@@ -279,17 +260,36 @@ def _units(cells: list[str], headers: list[str]) -> list[str] | None:
 
 def _frame(path: Path, lines: list[str], layout: _Layout) -> pd.DataFrame:
     """Cells of the body, as pandas parses them, with as many in each row as the header has."""
-    _check_widths(path, lines, layout)
+    # Rows with more or fewer cells than the header, which pandas would fill or cut.
+    wanted, mark = len(layout.headers), layout.delimiter
+    counts = [
+        len(_cells(row, mark))
+        if '"' in row
+        else len(re.findall("[^ \t]+", row))
+        if mark == " "
+        else row.count(mark) + 1
+        for _, row in layout.rows
+    ]
+    if wrong := [i for i, count in enumerate(counts) if count != wanted]:
+        first = wrong[0]
+        shown = {" ": "blanks", "\t": "tabs"}.get(mark, f"'{mark}'")
+        mend = "It is the last line: the file was cut off. Export it again, or remove the line."
+        if first < len(counts) - 1:
+            mend = _widths_mend(wanted, counts, mark, lines)
+        raise DataError(
+            f"{path}, line {layout.rows[first][0]}: {counts[first]} cells where the header "
+            f"has {wanted} ({len(wrong)} such line(s), columns divided by {shown}). {mend}"
+        )
     body = "\n".join([line for _, line in layout.rows])
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # columns of several kinds: each cell is looked at here
             frame = pd.read_csv(  # type: ignore[call-overload]
                 io.StringIO(body),
-                sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
+                sep=r"\s+" if mark == " " else mark,
                 decimal=layout.decimal,
                 header=None,
-                names=range(len(layout.headers)),
+                names=range(wanted),
                 index_col=False,
                 skip_blank_lines=False,
                 skipinitialspace=" " in body,
@@ -304,31 +304,6 @@ def _frame(path: Path, lines: list[str], layout: _Layout) -> pd.DataFrame:
             "closed."
         )
     return frame
-
-
-def _check_widths(path: Path, lines: list[str], layout: _Layout) -> None:
-    """Refuse rows with more or fewer cells than the header, which pandas would fill or cut."""
-    wanted, mark = len(layout.headers), layout.delimiter
-    counts = [
-        len(_cells(row, mark))
-        if '"' in row
-        else len(re.findall("[^ \t]+", row))
-        if mark == " "
-        else row.count(mark) + 1
-        for _, row in layout.rows
-    ]
-    wrong = [i for i, count in enumerate(counts) if count != wanted]
-    if not wrong:
-        return
-    first = wrong[0]
-    shown = {" ": "blanks", "\t": "tabs"}.get(mark, f"'{mark}'")
-    mend = "It is the last line: the file was cut off. Export it again, or remove the line."
-    if first < len(counts) - 1:
-        mend = _widths_mend(wanted, counts, mark, lines)
-    raise DataError(
-        f"{path}, line {layout.rows[first][0]}: {counts[first]} cells where the header "
-        f"has {wanted} ({len(wrong)} such line(s), columns divided by {shown}). {mend}"
-    )
 
 
 def _widths_mend(wanted: int, counts: list[int], mark: str, lines: list[str]) -> str:

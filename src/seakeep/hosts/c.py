@@ -1,11 +1,8 @@
 """C99 sources of a model and of its estimator, without any dependency."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +12,7 @@ import numpy.typing as npt
 from seakeep.arrays import FloatArray
 from seakeep.conventions import is_elevation
 from seakeep.core.readouts import SOFT
-from seakeep.files import MARK, check_output, make_folder, templates, write_text
+from seakeep.files import MARK, check_output, make_folder, templates, version, write_text
 from seakeep.hosts.program import exportable
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.engine import GROWTH, fading
@@ -112,10 +109,10 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
     """Text of the C files of a model by their names, and of its estimator where it is live."""
     signature, input_map = model.signature, model.signature.input_map
     follows, observed = input_map.follows, input_map.observed
-    back = 0 if follows is None else follows.back
+    back = follows.back if follows else 0
     kernels: list[FloatArray] = []
     every = [Text(f"u[{place}]", _number) for place in range(len(signature.inputs))]
-    u = np.array([every], dtype=object)
+    u = np.array([every], object)
     delayed, direct = list(map(str, every)), list[str]()
     if observed:
         for each in observed.bound:
@@ -127,7 +124,7 @@ def sources(model: HankelDMDcModel, name: str, live: Live | None = None) -> dict
         direct = [f"rising({text}, {_number(top)}, {_number(by)})" for text, top, by in limited]
     content = {
         "name": name,
-        "mark": f"{MARK}: {KIND}, written by seakeep {metadata.version('seakeep')}:",
+        "mark": f"{MARK}: {KIND}, written by seakeep {version()}:",
         "model": model,
         "now": back,
         "delayed": delayed,

@@ -1,7 +1,5 @@
 """Functional mock-up units: the C sources of a model behind FMI 2.0 for co-simulation."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import platform
@@ -12,12 +10,11 @@ import tempfile
 import uuid
 import zipfile
 from collections.abc import Mapping
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from seakeep.errors import RequestError
-from seakeep.files import MARK, check_output, replacing
+from seakeep.files import MARK, check_output, replacing, version
 from seakeep.hosts.c import identifier, rendered, sources
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
@@ -80,7 +77,6 @@ def write_fmu(
     digest = hashlib.sha256("".join(files.values()).encode()).digest()
     content = {
         "name": name,
-        "upper": name.upper(),
         "mark": f"{MARK}: {KIND},",
         "guid": f"{{{uuid.UUID(bytes=digest[:16])}}}",
         "dt": model.dt,
@@ -115,7 +111,7 @@ def compiler() -> list[str] | None:
     if named := shlex.split(os.environ.get("CC", "")):
         return named
     path = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-    return None if path is None else [path]
+    return [path] if path else None
 
 
 def _compiled(compiler: list[str], folder: Path, name: str, suffix: str) -> Path:
@@ -173,7 +169,7 @@ def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
         ]
         channels, groups = [*given, *measured, *answered, *coming], []
     return {
-        "version": metadata.version("seakeep"),
+        "version": version(),
         "timing": timing(model, ahead is not None),
         # Structured names are ASCII.
         "convention": "structured" if all(c["name"].isascii() for c in channels) else "flat",

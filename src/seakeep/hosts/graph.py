@@ -1,10 +1,7 @@
 """ONNX graphs of a model: one step, or a forecast of a fixed number of steps."""
 
-from __future__ import annotations
-
-from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
@@ -12,16 +9,13 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from seakeep.arrays import FloatArray, IntArray, whole_number
 from seakeep.core.recursion import Place
 from seakeep.errors import needing
-from seakeep.files import MARK, check_output, replacing
+from seakeep.files import MARK, check_output, replacing, version
 from seakeep.hosts.program import exportable, timing
 from seakeep.models import HankelDMDcModel, Model
 from seakeep.models.following import Following
 from seakeep.models.inputs import Signature
 from seakeep.models.observables import Observed
 from seakeep.models.terms import SlowSquare, Term
-
-if TYPE_CHECKING:
-    import onnx
 
 KIND = "graph for ONNX"
 OPSET, IR = 17, 8
@@ -97,8 +91,8 @@ class _Graph:
 
     def __init__(self, prefix: str = "") -> None:
         self.prefix = prefix
-        self.nodes: list[onnx.NodeProto] = []
-        self.constants: list[onnx.TensorProto] = []
+        self.nodes: list[Any] = []
+        self.constants: list[Any] = []
 
     def __call__(self, operator: str, *inputs: Any, into: str = "", **attributes: Any) -> _Value:
         """Value of an operator; inputs are values or constants."""
@@ -153,11 +147,11 @@ class _Array(NDArrayOperatorsMixin):
         return self.graph("Reshape", self, shape)
 
 
-def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
+def _model(model: HankelDMDcModel, steps: int) -> Any:
     """The forecast as a graph: regressors of all steps, then a scan over them."""
     from onnx import TensorProto, helper
 
-    def value(name: str, *shape: int) -> onnx.ValueInfoProto:
+    def value(name: str, *shape: int) -> Any:
         return helper.make_tensor_value_info(name, TensorProto.DOUBLE, shape)
 
     signature, coefficients = model.signature, model.coefficients
@@ -205,16 +199,20 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
     graph.nodes.append(scan)
 
     x = _Array(graph, "series") * scale.std + scale.mean
-    if follows is None:  # delayed rows that are regressed are no past
+    if not follows:  # delayed rows that are regressed are no past
         last = _Array(graph, "last_state").reshape(s + 1, N)[np.arange(s, -1, -1)]
         graph("Add", last * scale.std, scale.mean, into="x_after")
     else:
-        every = graph("Concat", history, x, axis=0)
-        graph("Slice", every, [steps], [END], [0], into="x_after")
+        graph("Slice", graph("Concat", history, x, axis=0), [steps], [END], [0], into="x_after")
     columns = {column: x[:, column : column + 1] for column in range(N)}
     for each in signature.readouts:
         if each.acts:
-            wave = None if each.load is None else _wave(u, each.load.place, signature, steps)
+            wave = None
+            if each.load:  # elevation and rate at the line, (steps, 2)
+                assert follows
+                taps, probes = follows.lines(None, (each.load.place,))
+                samples = signature.input_map.history(signature.input_delays) + np.arange(steps)
+                wave = _carried(u, samples, follows, taps, probes)
             columns[each.column] = each.read(x, wave).reshape(steps, 1)
     graph("Concat", *columns.values(), into="x", axis=1)
     given = [value("x_history", size, N)]
@@ -232,12 +230,16 @@ def _model(model: HankelDMDcModel, steps: int) -> onnx.ModelProto:
         graph_proto,
         doc_string=f"{MARK}: {KIND}. {timing(model)}",
         producer_name="seakeep",
-        producer_version=metadata.version("seakeep"),
+        producer_version=version(),
         opset_imports=[helper.make_opsetid("", OPSET)],
         ir_version=IR,
     )
-    words = {"dt": repr(signature.dt), "lead_samples": str(signature.lead_samples)}
-    words |= {"states": ", ".join(signature.states), "inputs": ", ".join(signature.inputs)}
+    words = {
+        "dt": repr(signature.dt),
+        "lead_samples": str(signature.lead_samples),
+        "states": ", ".join(signature.states),
+        "inputs": ", ".join(signature.inputs),
+    }
     helper.set_model_props(whole, words)
     return whole
 
@@ -250,7 +252,7 @@ def _forcing(
     z, n, observed = signature.input_delays, signature.input_scale.mean.size, input_map.observed
     now = input_map.history(z)
     groups, parts = [], []
-    if signature.inputs and input_map.follows is None:
+    if signature.inputs and not input_map.follows:
         rows = u[now - z + input_map.lead : now + input_map.lead + steps]
         values = signature.input_scale.deviations(_with_delayed(observed, rows))
         windows = values[np.arange(steps)[:, None] + np.arange(z, -1, -1)]
@@ -329,15 +331,6 @@ def _tables(
         "surge": (surge[last], (past,)),
         "line": (line.reshape(z * n), (z * n,)),
     }
-
-
-def _wave(u: _Value, place: float, signature: Signature, steps: int) -> _Value:
-    """Elevation and rate at the line of a load, (steps, 2)."""
-    follows = signature.input_map.follows
-    assert follows is not None
-    taps, probes = follows.lines(None, (place,))
-    samples = signature.input_map.history(signature.input_delays) + np.arange(steps)
-    return _carried(u, samples, follows, taps, probes)
 
 
 def _carried(

@@ -4,8 +4,6 @@ A step from instant k takes the inputs of instant k + ``lead_samples``, so that 
 observables and carriers have a finite reach is causal in its newest input. Inputs are as measured.
 """
 
-from __future__ import annotations
-
 import xarray as xr
 
 from seakeep.arrays import FloatArray
@@ -68,7 +66,7 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             "recursion runs on every host, fed with the probes as they are measured; or without "
             "alignment."
         )
-    for bound in () if observed is None else observed.bound:
+    for bound in observed.bound if observed else ():
         if not bound.terms:
             raise RequestError(
                 f"the observable '{bound.labels[0].name}' states no terms, by which other "

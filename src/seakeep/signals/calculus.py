@@ -1,16 +1,19 @@
 """Integrals, derivatives and envelopes of series, and the join of two sensors of one motion."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 from scipy import fft
 
-from seakeep.arrays import FloatArray, as_pair, as_series, time_step
+from seakeep.arrays import (
+    ArrayLike,
+    FloatArray,
+    as_pair,
+    as_series,
+    time_step,
+)
 from seakeep.errors import RequestError
 
 SHORTEST_RECORD = 0.05
@@ -20,16 +23,6 @@ SHORTEST_RECORD = 0.05
 def rising(place: FloatArray) -> FloatArray:
     """Raised cosine from 0 at places up to zero to 1 at those from one on."""
     return 0.5 - 0.5 * np.cos(np.pi * np.clip(place, 0.0, 1.0))
-
-
-def band_gain(frequency: FloatArray, band: tuple[float, float]) -> FloatArray:
-    """Gain of a band with raised-cosine flanks, one half at either edge.
-
-    The lower flank is half the lower edge wide, the upper one a fifth of the upper edge.
-    """
-    low, high = band
-    rise = rising((frequency - 0.75 * low) / (0.5 * low))
-    return rise * rising((1.1 * high - frequency) / (0.2 * high))
 
 
 def autoregression(series: FloatArray, order: int, noise: float = 0.0) -> tuple[FloatArray, float]:
@@ -122,7 +115,7 @@ def _transformed(
     return frequency, fft.rfft(extended, axis=0), back
 
 
-def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> FloatArray:
+def band_pass(series: ArrayLike, dt: float, band: tuple[float, float]) -> FloatArray:
     """Keep a band of frequencies, without phase shift.
 
     Parameters
@@ -148,7 +141,7 @@ def band_pass(series: npt.ArrayLike, dt: float, band: tuple[float, float]) -> Fl
 
 
 def integrate(
-    series: npt.ArrayLike, dt: float, band: tuple[float, float], times: int = 1
+    series: ArrayLike, dt: float, band: tuple[float, float], times: int = 1
 ) -> FloatArray:
     r"""Integrate once or twice within a band of frequencies.
 
@@ -202,12 +195,14 @@ def integrate(
     columns = np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
     columns = columns - columns.mean(axis=1, keepdims=True)
     frequency, spectrum, back = _transformed(columns.T, dt, low, "the lower edge of the band")
-    gain = band_gain(frequency, band)
+    # The lower flank is half the lower edge wide, the upper one a fifth of the upper edge.
+    gain = rising((frequency - 0.75 * low) / (0.5 * low))
+    gain *= rising((1.1 * high - frequency) / (0.2 * high))
     omega = 2 * np.pi * np.where(gain > 0, frequency, 1.0)
     return back(spectrum * (gain / (1j * omega) ** times)[:, None]).reshape(array.shape)
 
 
-def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
+def differentiate(series: ArrayLike, dt: float) -> FloatArray:
     """First derivative by fourth-order central differences.
 
     Parameters
@@ -245,7 +240,7 @@ def differentiate(series: npt.ArrayLike, dt: float) -> FloatArray:
     return scipy.signal.savgol_filter(x, 5, 4, deriv=1, delta=step, axis=0)
 
 
-def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
+def envelope_squared(series: ArrayLike, dt: float) -> FloatArray:
     r"""Squared envelope of a narrow-banded series, :math:`|x + i\,\mathcal H x|^2`.
 
     The slow part of the squared wave elevation, to which mean drift and slow drift are
@@ -281,13 +276,12 @@ def envelope_squared(series: npt.ArrayLike, dt: float) -> FloatArray:
     array = array - array.mean(axis=0)
     padding = array.shape[0] - 1
     extended = np.concatenate([array[:0:-1], array, array[-2::-1]])
-    analytic = scipy.signal.hilbert(extended, axis=0)[padding:-padding]
-    return np.abs(analytic) ** 2
+    return np.abs(scipy.signal.hilbert(extended, axis=0)[padding:-padding]) ** 2
 
 
 def complementary_filter(
-    position: npt.ArrayLike,
-    acceleration: npt.ArrayLike,
+    position: ArrayLike,
+    acceleration: ArrayLike,
     dt: float,
     crossover: float,
     times: int = 1,

@@ -7,8 +7,6 @@ elevation at a distance and a lead from there: least squares over the products o
 occur; noise on the diagonal keeps the filter short and calm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -118,8 +116,7 @@ def carriers(
         phase = np.outer(place, k) - np.outer(instant, omega)
         return np.concatenate([np.cos(phase) * amplitude, np.sin(phase) * amplitude], 1)
 
-    places = np.repeat(probes, lags.size)
-    read = waves(places, np.tile(lags * dt, len(probes)))
+    read = waves(np.repeat(probes, lags.size), np.tile(lags * dt, len(probes)))
     wanted = waves(targets, leads.astype(float) * dt)
     products = read @ read.T
     products[np.diag_indices_from(products)] += NOISE

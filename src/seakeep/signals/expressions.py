@@ -16,9 +16,12 @@ from functools import partialmethod
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from seakeep.arrays import FloatArray, as_real
+from seakeep.arrays import (
+    ArrayLike,
+    FloatArray,
+    as_real,
+)
 from seakeep.errors import DataError, RequestError, did_you_mean
 
 GREATEST_EXPONENT = 16
@@ -60,7 +63,7 @@ class Expression:
     _tree: ast.expr = field(repr=False, compare=False)
     _quoted: Mapping[str, str] = field(repr=False, compare=False)
 
-    def evaluate(self, values: Mapping[str, npt.ArrayLike]) -> FloatArray:
+    def evaluate(self, values: Mapping[str, ArrayLike]) -> FloatArray:
         """Value of the expression.
 
         Parameters
@@ -237,8 +240,7 @@ def parse(text: str) -> Expression:
     plain = re.sub(r"`([^`]*)`", stand_in, text)
     channels: dict[str, str] = {}
     try:
-        tree = ast.parse(plain, mode="eval").body
-        named = Expression(text, (), tree, quoted)
+        named = Expression(text, (), ast.parse(plain, mode="eval").body, quoted)
         with np.errstate(all="ignore"):
             named.of(lambda name: Text(channels.setdefault(name, name)))
     except (SyntaxError, _RefusedError) as error:

@@ -4,16 +4,21 @@ All functions filter along the first axis, take one series or several side by si
 array of the shape they were given.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 from scipy import special
 
-from seakeep.arrays import FloatArray, as_real, as_series, number, positive, time_step
+from seakeep.arrays import (
+    ArrayLike,
+    FloatArray,
+    as_real,
+    as_series,
+    number,
+    positive,
+    time_step,
+)
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import span_text, uniform_step
 
@@ -63,19 +68,15 @@ def lowpass_taps(
         taps = scipy.signal.firwin(
             count, sum(edges) / 2, window=("kaiser", beta), fs=1.0, scale=True
         )
-        if _deviation(taps, edges) <= 10 ** (-attenuation / 20):
+        # Distances of the gain from one in the pass band and from zero in the stop band.
+        points = 64 * taps.size
+        gain, frequency = np.abs(np.fft.rfft(taps, points)), np.fft.rfftfreq(points)
+        at_edges = np.abs(np.exp(-2j * np.pi * np.outer(edges, np.arange(taps.size))) @ taps)
+        passing = np.append(gain[frequency <= edges[0]], at_edges[0])
+        stopped = np.append(gain[frequency >= edges[1]], at_edges[1])
+        if max(np.abs(passing - 1).max(), stopped.max()) <= 10 ** (-attenuation / 20):
             break
     return taps
-
-
-def _deviation(taps: FloatArray, edges: tuple[float, float]) -> float:
-    """Largest distance of the gain from one in the pass band and from zero in the stop band."""
-    points = 64 * taps.size
-    gain, frequency = np.abs(np.fft.rfft(taps, points)), np.fft.rfftfreq(points)
-    at_edges = np.abs(np.exp(-2j * np.pi * np.outer(edges, np.arange(taps.size))) @ taps)
-    passing = np.append(gain[frequency <= edges[0]], at_edges[0])
-    stopped = np.append(gain[frequency >= edges[1]], at_edges[1])
-    return float(max(np.abs(passing - 1).max(), stopped.max()))
 
 
 def odd_extension(array: FloatArray, count: int) -> FloatArray:
@@ -90,7 +91,7 @@ def odd_extension(array: FloatArray, count: int) -> FloatArray:
 
 
 def low_pass(
-    series: npt.ArrayLike,
+    series: ArrayLike,
     dt: float,
     passband: float,
     stopband: float | None = None,
@@ -146,9 +147,9 @@ PASSBAND = 0.8
 
 
 def resample(
-    series: npt.ArrayLike,
-    time: npt.ArrayLike,
-    new_time: npt.ArrayLike,
+    series: ArrayLike,
+    time: ArrayLike,
+    new_time: ArrayLike,
     attenuation: float = 60.0,
     anti_alias: bool = True,
 ) -> FloatArray:
@@ -234,7 +235,16 @@ def _sinc_sums(
     base = np.floor(position).astype(int)
     place = (position - base) * PHASES
     phase = np.minimum(place.astype(int), PHASES - 1)
-    cubic = _lagrange(place - phase)
+    x = place - phase
+    # Weights of the cubic through rows at -1, 0, 1 and 2 of the bank.
+    cubic = np.stack(
+        [
+            -x * (x - 1) * (x - 2) / 6,
+            (x + 1) * (x - 1) * (x - 2) / 2,
+            -(x + 1) * x * (x - 2) / 2,
+            (x + 1) * x * (x - 1) / 6,
+        ]
+    )
     columns = odd_extension(array, half).reshape(array.shape[0] + 2 * half, -1).T
     views = [
         np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(each), 2 * half)
@@ -269,15 +279,3 @@ def _kernels(half: int, beta: float, band: float) -> FloatArray:
     kernels = window * np.sinc(band * lag)
     kernels /= kernels.sum(axis=1, keepdims=True)
     return kernels
-
-
-def _lagrange(x: FloatArray) -> FloatArray:
-    """Weights of the cubic through values at -1, 0, 1 and 2, at `x` between 0 and 1."""
-    return np.stack(
-        [
-            -x * (x - 1) * (x - 2) / 6,
-            (x + 1) * (x - 1) * (x - 2) / 2,
-            -(x + 1) * x * (x - 2) / 2,
-            (x + 1) * x * (x - 1) / 6,
-        ]
-    )

@@ -1,15 +1,20 @@
 """Lag of one series behind another: over a whole record, and window by window."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, IntArray, as_pair, positive, time_step, undefined
+from seakeep.arrays import (
+    ArrayLike,
+    FloatArray,
+    IntArray,
+    as_pair,
+    positive,
+    time_step,
+    undefined,
+)
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import record, usual_step
 
@@ -34,8 +39,8 @@ class Lags:
 
 
 def windowed_lags(
-    series: npt.ArrayLike,
-    reference: npt.ArrayLike,
+    series: ArrayLike,
+    reference: ArrayLike,
     dt: float,
     window: float,
     largest_lag: float,
@@ -110,7 +115,7 @@ def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float
 
 
 def correlation_peak(
-    first: npt.ArrayLike, second: npt.ArrayLike, dt: float, bounds: tuple[float, float]
+    first: ArrayLike, second: ArrayLike, dt: float, bounds: tuple[float, float]
 ) -> tuple[float, float]:
     r"""Highest peak of :math:`\mathrm{corr}[a(t), b(t+\Delta t)]` among given lags.
 
@@ -161,8 +166,7 @@ def correlation_peak(
             f"{bounds[1]:g} s (highest {values[1:-1].max():.2f}, at an end). Check which probe "
             "stands upstream, their positions, and the water depth."
         )
-    best = int(peaks[np.argmax(values[peaks])])
-    place, height = parabola_peak(values, best)
+    place, height = parabola_peak(values, peaks[np.argmax(values[peaks])])
     return float((lags[0] + place) * step), height
 
 
@@ -260,10 +264,10 @@ class MotionAgreement:
 
 
 def compare_motion(
-    series: npt.ArrayLike,
-    time: npt.ArrayLike,
-    reference: npt.ArrayLike,
-    reference_time: npt.ArrayLike,
+    series: ArrayLike,
+    time: ArrayLike,
+    reference: ArrayLike,
+    reference_time: ArrayLike,
     max_lag: float | None = None,
 ) -> MotionAgreement:
     """Compare a motion tracked in a video with that of a motion reference unit.
@@ -295,9 +299,13 @@ def compare_motion(
     >>> round(found.lag, 3), round(found.correlation, 3)
     (0.1, 1.0)
     """
-    first = record(series, time, "the video")
-    second = record(reference, reference_time, "the reference")
-    (y1, t1), (y2, t2) = ((y[np.isfinite(y)], t[np.isfinite(y)]) for y, t in (first, second))
+    (y1, t1), (y2, t2) = (
+        (y[np.isfinite(y)], t[np.isfinite(y)])
+        for y, t in (
+            record(series, time, "the video"),
+            record(reference, reference_time, "the reference"),
+        )
+    )
     reach = min(LONGEST, 0.25 * min(np.ptp(t1), np.ptp(t2)))
     if max_lag is not None:
         reach = positive(max_lag, "max_lag", "s")
@@ -328,19 +336,19 @@ def compare_motion(
             lambda shift: -correlation(shift), lags[best - 1], lags[best + 1], xtol=1e-4 * step
         )
     peaks = scipy.signal.find_peaks(values)[0]
-    others = peaks[np.abs(peaks - best) > 1]
-    rival = others[np.argmax(values[others])] if others.size else None
-    crossings = int(np.count_nonzero(np.diff(y1 > np.mean(y1))))
+    rivals = [(values[at], lags[at]) for at in peaks if abs(at - best) > 1]
+    rival, rival_lag = max(rivals, default=(np.nan, np.nan))
+    crossings = np.count_nonzero(np.diff(y1 > np.mean(y1)))
     difference = y1 - spline(t1 - lag)
     return MotionAgreement(
         correlation=correlation(lag),
         lag=float(lag),
         rms=float(np.std(difference)),
         offset=float(np.mean(difference)),
-        samples=int(t1.size),
+        samples=t1.size,
         at_limit=at_limit,
         max_lag=reach,
         period=float(2.0 * (t1[-1] - t1[0]) / max(crossings, 1)),
-        rival_lag=np.nan if rival is None else float(lags[rival]),
-        rival_correlation=np.nan if rival is None else float(values[rival]),
+        rival_lag=rival_lag,
+        rival_correlation=rival,
     )

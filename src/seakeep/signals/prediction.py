@@ -1,17 +1,20 @@
 """Waves to come: what an autoregressive model of a record expects, and what a probe up-wave saw."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import BoolArray, FloatArray, as_series, whole_number
+from seakeep.arrays import (
+    ArrayLike,
+    BoolArray,
+    FloatArray,
+    as_series,
+    whole_number,
+)
 from seakeep.signals.calculus import autoregression, continued
 from seakeep.signals.propagation import LEAST_CORRELATION, band_limit, carry_by_dispersion
 from seakeep.waves import group_speed
@@ -29,7 +32,7 @@ SLOWLY, QUICKLY = 0.99, 0.05
 """Shares of a record's variance below the waves that arrive last, and below the first ones."""
 
 
-def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
+def predict_waves(series: ArrayLike, count: int) -> FloatArray:
     """Continue elevations by linear prediction, each from its own record.
 
     Parameters
@@ -66,8 +69,7 @@ def predict_waves(series: npt.ArrayLike, count: int) -> FloatArray:
     True
     """
     array = as_series(series, minimum=4, channels=True)
-    table = array.reshape(len(array), -1)
-    return foresee(table, count).expected.reshape(-1, *array.shape[1:])
+    return foresee(array.reshape(len(array), -1), count).expected.reshape(-1, *array.shape[1:])
 
 
 class Foreseen(NamedTuple):
@@ -90,11 +92,11 @@ class Foreseen(NamedTuple):
 
 
 def foresee(
-    series: npt.ArrayLike,
+    series: ArrayLike,
     count: int,
     *,
     dt: float = 1.0,
-    positions: npt.ArrayLike = math.nan,
+    positions: ArrayLike = math.nan,
     depth: float = math.inf,
 ) -> Foreseen:
     r"""Continue elevations at probes that see the same waves, and say how they may depart from it.
@@ -149,7 +151,7 @@ def foresee(
         expected[:, column] = values.mean() + continued(deviations, whitening, number)
         departures[column, :, column] = scipy.signal.lfilter([1.0], whitening, first)
 
-    places = np.broadcast_to(np.asarray(positions, dtype=float), channels)
+    places = np.broadcast_to(np.asarray(positions, float), channels)
     order = np.argsort(places)[: np.isfinite(places).sum()].tolist()
     for column in set(range(channels)) - set(order[1:]):
         follow(column, array[:, column])
@@ -245,7 +247,7 @@ def fill_future(
     return futures, first, found.freedom
 
 
-def predictable_time(series: npt.ArrayLike, dt: float, distance: float, depth: float) -> float:
+def predictable_time(series: ArrayLike, dt: float, distance: float, depth: float) -> float:
     r"""Time for which the waves at a place are known from a probe up-wave of it.
 
     Parameters

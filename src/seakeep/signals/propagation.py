@@ -7,20 +7,18 @@ them. The wavenumber follows linear dispersion, or one celerity c for all freque
 :math:`\eta(t) = \eta_{kn}(t - d(t)/c)`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 from numpy.polynomial import chebyshev
 from scipy import fft
 
 from seakeep.arrays import (
+    ArrayLike,
     ComplexArray,
     FloatArray,
     as_pair,
@@ -88,7 +86,7 @@ class EffectiveCelerity:
 
 
 def phase_celerity(
-    upstream: npt.ArrayLike, downstream: npt.ArrayLike, dt: float, separation: float, depth: float
+    upstream: ArrayLike, downstream: ArrayLike, dt: float, separation: float, depth: float
 ) -> PhaseCelerity:
     r"""Phase speed between two probes from the phase of their cross-spectrum.
 
@@ -141,8 +139,8 @@ def phase_celerity(
 
 
 def effective_celerity(
-    upstream: npt.ArrayLike,
-    downstream: npt.ArrayLike,
+    upstream: ArrayLike,
+    downstream: ArrayLike,
     dt: float,
     separation: float,
     depth: float,
@@ -287,7 +285,7 @@ class Misplaced:
 
 
 def misplaced_probes(
-    elevations: Mapping[str, npt.ArrayLike],
+    elevations: Mapping[str, ArrayLike],
     positions: Mapping[str, float],
     dt: float,
     depth: float,
@@ -336,8 +334,14 @@ def misplaced_probes(
     phases move by up to a fifth of a wavelength with what the model reflects.
     """
     telling = {name: as_series(elevations[name]) for name in elevations if name in positions}
-    names = [name for name in sorted(telling, key=positions.__getitem__)
-             if _telling(telling[name])]  # fmt: skip
+    names = [
+        name
+        for name in sorted(telling, key=positions.__getitem__)
+        # Irregular waves, and enough of them.
+        if (x := telling[name]).size >= 64
+        and np.sum(np.diff(np.sign(x - x.mean())) > 0) >= LEAST_WAVES
+        and not is_regular(x)
+    ]
     pairs = list(pairwise(names))
     if len(names) > 2:
         pairs.append((names[0], names[-1]))
@@ -360,16 +364,8 @@ def misplaced_probes(
     return list(out.values())
 
 
-def _telling(series: FloatArray) -> bool:
-    """Whether a record holds irregular waves, and enough of them."""
-    if series.size < 64 or np.ptp(series) == 0:
-        return False
-    rises = np.diff(np.sign(series - series.mean())) > 0
-    return bool(rises.sum() >= LEAST_WAVES) and not is_regular(series)
-
-
 def probe_separation(
-    first: npt.ArrayLike, second: npt.ArrayLike, dt: float, depth: float, stated: float
+    first: ArrayLike, second: ArrayLike, dt: float, depth: float, stated: float
 ) -> ProbeSeparation:
     r"""Separation of two wave probes from the phases of their cross-spectrum.
 
@@ -423,7 +419,14 @@ def probe_separation(
     """
     a, b = as_pair(first, second, minimum=64, moving=True)
     interval, place = time_step(dt), number(stated, "the stated separation")
-    cross, k = _spectra(a, b, interval, depth)
+    # Cross-spectrum over the records' norms, and wavenumbers, where there is energy.
+    taper = scipy.signal.windows.tukey(a.size, 0.2)
+    one, other = (fft.rfft(taper * (each - each.mean())) for each in (a, b))
+    frequency = fft.rfftfreq(a.size, interval)
+    cross = np.conj(one) * other / (np.linalg.norm(one[1:]) * np.linalg.norm(other[1:]))
+    smooth = np.convolve(np.abs(cross), np.ones(9) / 9, mode="same")
+    energetic = (smooth > ENERGY * smooth[1:].max()) & (frequency > 0)
+    cross, k = cross[energetic], wavenumber(2 * np.pi * frequency[energetic], depth)
     period = encounter_period(a, interval)
     reach = float(group_speed(2 * np.pi / period, depth)) * REACH * a.size * interval
     reach = max(reach, abs(place) + np.pi / k[np.argmax(np.abs(cross))])
@@ -451,19 +454,6 @@ def probe_separation(
         stated=place,
         input_error=math.sqrt(np.sum(weight * turned) / np.sum(weight)),
     )
-
-
-def _spectra(
-    a: FloatArray, b: FloatArray, dt: float, depth: float
-) -> tuple[ComplexArray, FloatArray]:
-    """Cross-spectrum over the records' norms, and wavenumbers, where there is energy."""
-    taper = scipy.signal.windows.tukey(a.size, 0.2)
-    first, second = (fft.rfft(taper * (each - each.mean())) for each in (a, b))
-    frequency = fft.rfftfreq(a.size, dt)
-    cross = np.conj(first) * second / (np.linalg.norm(first[1:]) * np.linalg.norm(second[1:]))
-    smooth = np.convolve(np.abs(cross), np.ones(9) / 9, mode="same")
-    energetic = (smooth > ENERGY * smooth[1:].max()) & (frequency > 0)
-    return cross[energetic], wavenumber(2 * np.pi * frequency[energetic], depth)
 
 
 def _scores(cross: ComplexArray, k: FloatArray, distances: FloatArray) -> FloatArray:
@@ -518,16 +508,16 @@ class CarriedElevation:
     highest: float
     terms: FloatArray = field(repr=False)
 
-    def at(self, distance: npt.ArrayLike, sample: int | slice = slice(None)) -> FloatArray:
+    def at(self, distance: ArrayLike, sample: int | slice = slice(None)) -> FloatArray:
         """Elevation at a distance from where it was measured."""
         half = 0.5 * (self.highest - self.lowest)
-        place = np.asarray(distance, dtype=float) - 0.5 * (self.highest + self.lowest)
+        place = np.asarray(distance, float) - 0.5 * (self.highest + self.lowest)
         scaled = np.clip(place / half, -1.0, 1.0) if half > 0 else np.zeros_like(place)
         x = scaled[:, None] if scaled.ndim else scaled
         return np.asarray(chebyshev.chebval(x, self.terms[:, sample], tensor=False))
 
 
-def band_limit(series: npt.ArrayLike, dt: float, share: float = WAVE_SHARE) -> float:
+def band_limit(series: ArrayLike, dt: float, share: float = WAVE_SHARE) -> float:
     """Frequency below which a given part of a record's variance lies."""
     array = as_series(series, channels=True)
     flat = array.reshape(array.shape[0], -1)
@@ -544,7 +534,7 @@ def band_limit(series: npt.ArrayLike, dt: float, share: float = WAVE_SHARE) -> f
 
 
 def carry_by_dispersion(
-    series: npt.ArrayLike,
+    series: ArrayLike,
     dt: float,
     distances: tuple[float, float],
     depth: float,
@@ -567,7 +557,7 @@ def carry_by_dispersion(
 
 
 def carry_by_celerity(
-    series: npt.ArrayLike, dt: float, distances: tuple[float, float], celerity: float
+    series: ArrayLike, dt: float, distances: tuple[float, float], celerity: float
 ) -> CarriedElevation:
     """Prepare a record to be carried over a range of distances (m) at one celerity (m/s)."""
     speed = positive(celerity, "the celerity", "m/s")

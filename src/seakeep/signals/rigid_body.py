@@ -5,18 +5,19 @@ Axes: x along the waves, y, z up; roll, pitch and yaw are right-handed about the
 Angular velocities and accelerations are those a gyroscope fixed in the body gives.
 """
 
-from __future__ import annotations
-
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from seakeep.arrays import FloatArray, as_real
+from seakeep.arrays import (
+    ArrayLike,
+    FloatArray,
+    as_real,
+)
 from seakeep.errors import RequestError
 from seakeep.waves import GRAVITY
 
 
-def _vectors(**values: npt.ArrayLike) -> list[FloatArray]:
+def _vectors(**values: ArrayLike) -> list[FloatArray]:
     """Vectors of one length in time, or of one instant; names are those of the arguments."""
     arrays = [as_real(each, name) for name, each in values.items()]
     lengths = {len(array) for array in arrays if array.ndim == 2} - {1}
@@ -29,7 +30,7 @@ def _vectors(**values: npt.ArrayLike) -> list[FloatArray]:
     return arrays
 
 
-def _offset(offset: npt.ArrayLike) -> FloatArray:
+def _offset(offset: ArrayLike) -> FloatArray:
     array = as_real(offset, "the offset")
     if array.shape != (3,) or not np.all(np.isfinite(array)):
         raise RequestError(
@@ -38,7 +39,7 @@ def _offset(offset: npt.ArrayLike) -> FloatArray:
     return array
 
 
-def rotation_matrix(angles: npt.ArrayLike) -> FloatArray:
+def rotation_matrix(angles: ArrayLike) -> FloatArray:
     """Rotation from the body's axes to those of space.
 
     Parameters
@@ -66,9 +67,7 @@ def rotation_matrix(angles: npt.ArrayLike) -> FloatArray:
     return Rotation.from_euler("xyz", _vectors(angles=angles)[0]).as_matrix()
 
 
-def transfer_position(
-    position: npt.ArrayLike, angles: npt.ArrayLike, offset: npt.ArrayLike
-) -> FloatArray:
+def transfer_position(position: ArrayLike, angles: ArrayLike, offset: ArrayLike) -> FloatArray:
     """Displacement of one point of a body from that of another.
 
     Parameters
@@ -103,10 +102,10 @@ def transfer_position(
 
 
 def transfer_velocity(
-    velocity: npt.ArrayLike,
-    angles: npt.ArrayLike,
-    rates: npt.ArrayLike,
-    offset: npt.ArrayLike,
+    velocity: ArrayLike,
+    angles: ArrayLike,
+    rates: ArrayLike,
+    offset: ArrayLike,
 ) -> FloatArray:
     """Velocity of one point of a body from that of another.
 
@@ -135,11 +134,11 @@ def transfer_velocity(
 
 
 def transfer_acceleration(
-    acceleration: npt.ArrayLike,
-    angles: npt.ArrayLike,
-    rates: npt.ArrayLike,
-    angular_acceleration: npt.ArrayLike,
-    offset: npt.ArrayLike,
+    acceleration: ArrayLike,
+    angles: ArrayLike,
+    rates: ArrayLike,
+    angular_acceleration: ArrayLike,
+    offset: ArrayLike,
 ) -> FloatArray:
     r"""Acceleration of one point of a body from that of another.
 
@@ -175,8 +174,8 @@ def transfer_acceleration(
 
 
 def remove_gravity(
-    specific_force: npt.ArrayLike,
-    angles: npt.ArrayLike,
+    specific_force: ArrayLike,
+    angles: ArrayLike,
     zeroed: bool = False,
 ) -> FloatArray:
     r"""Acceleration in space from what three accelerometers on the body read.

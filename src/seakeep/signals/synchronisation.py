@@ -12,10 +12,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import FloatArray, IntArray, as_real
+from seakeep.arrays import (
+    ArrayLike,
+    FloatArray,
+    IntArray,
+    as_real,
+)
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import windowed_lags
 from seakeep.signals.time_axis import record, stretches, uniform_step, usual_step
@@ -68,11 +72,11 @@ class Clock:
     modulus: float = np.inf
     centre: float = 0.0
 
-    def reference(self, readings: npt.ArrayLike) -> FloatArray:
+    def reference(self, readings: ArrayLike) -> FloatArray:
         """Reference time of readings of this clock, s."""
         return (as_real(readings, "the readings") - self.offset) / (1.0 + self.drift)
 
-    def reading(self, time: npt.ArrayLike) -> FloatArray:
+    def reading(self, time: ArrayLike) -> FloatArray:
         """What this clock reads at reference times, s."""
         return self.offset + (1.0 + self.drift) * as_real(time, "the times")
 
@@ -100,7 +104,7 @@ class Clock:
 
 def _line(own: FloatArray, reference: FloatArray, errors: FloatArray, method: str) -> Clock:
     """Straight line of one clock over another, outliers left out, at least as wrong as `errors`."""
-    late, inliers = own - reference, np.ones(own.size, dtype=bool)
+    late, inliers = own - reference, np.ones(own.size, bool)
     for _ in range(5):
         centre, level = float(reference[inliers].mean()), float(late[inliers].mean())
         away = reference - centre
@@ -144,10 +148,10 @@ def _adjusted(
 
 
 def clock_from_pulses(
-    trigger: npt.ArrayLike,
-    time: npt.ArrayLike,
-    reference_trigger: npt.ArrayLike,
-    reference_time: npt.ArrayLike,
+    trigger: ArrayLike,
+    time: ArrayLike,
+    reference_trigger: ArrayLike,
+    reference_time: ArrayLike,
     expected_offset: float = 0.0,
 ) -> Clock:
     """Clock of a logger from a trigger that it and the reference record.
@@ -212,10 +216,10 @@ def clock_from_pulses(
 
 
 def clock_from_correlation(
-    series: npt.ArrayLike,
-    time: npt.ArrayLike,
-    reference: npt.ArrayLike,
-    reference_time: npt.ArrayLike,
+    series: ArrayLike,
+    time: ArrayLike,
+    reference: ArrayLike,
+    reference_time: ArrayLike,
     window: float,
     largest_lag: float,
     least_correlation: float = 0.6,
@@ -277,10 +281,10 @@ def clock_from_correlation(
 
 
 def clock_from_shared(
-    series: npt.ArrayLike,
-    time: npt.ArrayLike,
-    reference: npt.ArrayLike,
-    reference_time: npt.ArrayLike,
+    series: ArrayLike,
+    time: ArrayLike,
+    reference: ArrayLike,
+    reference_time: ArrayLike,
     window: float = 20.0,
     largest_lag: float = 5.0,
 ) -> Clock:

@@ -1,15 +1,19 @@
 """Time axes: order, step, gaps and jitter; gaps bridged where that is asked for."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
-from seakeep.arrays import BoolArray, FloatArray, IntArray, as_real, time_step
+from seakeep.arrays import (
+    ArrayLike,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    as_real,
+    time_step,
+)
 from seakeep.errors import DataError
 
 STEP_TOLERANCE = 0.01
@@ -35,7 +39,7 @@ def span_text(begin: float, end: float, dt: float) -> str:
     return f"{instant_text(begin, dt)} to {instant_text(end, dt)} s"
 
 
-def check_order(time: npt.ArrayLike, name: str = "the run") -> FloatArray:
+def check_order(time: ArrayLike, name: str = "the run") -> FloatArray:
     """Return the times as floats; refuse values that are not finite, repeated or unsorted."""
     t = as_real(time, f"the times of {name}", DataError)
     if t.ndim != 1 or t.size < 2:
@@ -71,7 +75,7 @@ def _shown(t: FloatArray, sample: int | np.intp) -> str:
     return f"{instant_text(t[sample], np.median(np.abs(np.diff(t))))} s"
 
 
-def record(series: npt.ArrayLike, time: npt.ArrayLike, owner: str) -> tuple[FloatArray, FloatArray]:
+def record(series: ArrayLike, time: ArrayLike, owner: str) -> tuple[FloatArray, FloatArray]:
     """Signal of an owner, not finite where it has gaps, and its instants in their order."""
     x, t = as_real(series, f"the signal of {owner}"), check_order(time, owner)
     if np.isfinite(x).sum() < 2:
@@ -85,12 +89,12 @@ def inside(time: FloatArray, span: tuple[float, float], dt: float) -> BoolArray:
     return (time >= span[0] - slack) & (time <= span[1] + slack)
 
 
-def usual_step(time: npt.ArrayLike) -> float:
+def usual_step(time: ArrayLike) -> float:
     """Median step of instants, s."""
     return float(np.median(np.diff(time)))
 
 
-def uniform_step(time: npt.ArrayLike, name: str = "the run") -> float:
+def uniform_step(time: ArrayLike, name: str = "the run") -> float:
     """Time step of a uniformly sampled axis.
 
     Parameters
@@ -203,7 +207,7 @@ class TimeReport:
         return not self.gaps and not self.jittered
 
 
-def inspect_times(time: npt.ArrayLike, name: str = "the run") -> TimeReport:
+def inspect_times(time: ArrayLike, name: str = "the run") -> TimeReport:
     """Look for gaps and jitter in a time axis.
 
     Parameters
@@ -251,7 +255,7 @@ def _grid(t: FloatArray) -> tuple[IntArray, float, float]:
 
 
 def onto_uniform(
-    time: npt.ArrayLike, series: npt.ArrayLike, name: str = "the run"
+    time: ArrayLike, series: ArrayLike, name: str = "the run"
 ) -> tuple[FloatArray, FloatArray]:
     """Put series onto a uniform axis, NaN where samples are missing.
 
@@ -356,7 +360,7 @@ class Bridged:
     long: BoolArray
 
 
-def bridge(series: npt.ArrayLike, dt: float, longest: float) -> Bridged:
+def bridge(series: ArrayLike, dt: float, longest: float) -> Bridged:
     """Fill gaps by a monotone cubic through the samples beside them.
 
     Parameters
@@ -389,8 +393,6 @@ def bridge(series: npt.ArrayLike, dt: float, longest: float) -> Bridged:
     time_step(dt)
     missing = ~np.isfinite(x)
     short, long = np.zeros_like(missing), np.zeros_like(missing)
-    if not missing.any():
-        return Bridged(x, short, long)
     there = np.flatnonzero(~missing)
     if there.size < 2:
         raise DataError(

@@ -10,8 +10,6 @@ the right of the picture the camera looks along +y and sees the vessel's port si
 downstream to the left it stands on the other side of the tank.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -114,7 +112,7 @@ class _Video:
 
         first, previous, count = 0.0, -1, 0
         while (read := self.capture.read())[0]:
-            stamp = 1e-3 * float(self.capture.get(cv2.CAP_PROP_POS_MSEC))
+            stamp = 1e-3 * self.capture.get(cv2.CAP_PROP_POS_MSEC)
             first = stamp if count == 0 else first
             number = round((stamp - first) * self.rate)
             if not np.isfinite(stamp) or (count and stamp <= first):
@@ -151,7 +149,7 @@ def _open_video(path: Path | str) -> Iterator[_Video]:
                 "has its table of frames at the end), or is a file of another kind. Copy or export "
                 "it again."
             )
-        rate = float(capture.get(cv2.CAP_PROP_FPS))
+        rate = capture.get(cv2.CAP_PROP_FPS)
         if not SLOWEST <= rate <= FASTEST:
             raise DataError(
                 f"{path} states {rate:g} frames per second, which is impossible. Encode it again "
@@ -276,7 +274,7 @@ def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) ->
     """What was seen of the panel and of the lamp in each frame; NaN of one that was dropped."""
     numbers: list[int] = []
     rows: list[list[float]] = []
-    at_rest = how.origin is None
+    at_rest = not how.origin
     if how.lamp:
         x, y, radius = how.lamp
         below, right = np.ogrid[: video.size[1], : video.size[0]]
@@ -297,9 +295,9 @@ def _measure(video: _Video, how: TrackingSettings, progress: Progress | None) ->
             row["lamp"] = float(np.mean(frame[disc])) / 255.0
         numbers.append(number)
         rows.append([row.get(field, np.nan) for field in FIELDS])
-        if progress is not None and len(rows) % REPORT_EVERY == 0:
+        if progress and len(rows) % REPORT_EVERY == 0:
             progress(len(rows), max(video.announced, len(rows)), "frames")
-    if progress is not None:
+    if progress:
         progress(len(rows), len(rows), "frames")
     return seen()
 
@@ -316,33 +314,30 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
     if known:
         like &= abs(seen["length"] / (panel[0] / known) - 1) < SIZE_BAND
     if not like.any():
-        raise DataError(_not_found(seen, how, name))
+        there, wanted = seen["area"] > 0, f"{panel[0]:g} × {panel[1]:g} m"
+        if known:
+            wanted += f", {panel[0] / known:.0f} × {panel[1] / known:.0f} pixels"
+        why = (
+            "nothing is as bright as the thresholds ask. Reduce the least red, green and blue "
+            "(lower; --threshold), or correct the region."
+        )
+        if there.any():
+            length, height = (np.median(seen[side][there]) for side in ("length", "height"))
+            why = (
+                f"the largest bright component measures {length:.0f} × {height:.0f} pixels "
+                f"(median of {there.sum()} frames), which is not its shape. Raise the least red, "
+                "green and blue (lower; --threshold), state a region that holds no other bright "
+                "thing, or correct the panel's size."
+            )
+        raise DataError(
+            f"{name}: the panel ({wanted}) was not found in any of {there.size} frames: {why}"
+        )
     usual = {field: float(np.median(values[like])) for field, values in seen.items()}
     lowest = np.min([seen[corner][like] - usual[corner] for corner in CORNERS], axis=0)
     usual["corner_noise"] = 1.4826 * np.median(abs(lowest - np.median(lowest)))
     square = panel[0] * panel[1] / (usual["length"] * usual["height"])
-    usual["scale"] = known or float(np.sqrt(square))
+    usual["scale"] = known or np.sqrt(square)
     return usual
-
-
-def _not_found(seen: Seen, how: TrackingSettings, name: str) -> str:
-    there, panel, known = seen["area"] > 0, how.panel, how.metres_per_pixel
-    wanted = f"{panel[0]:g} × {panel[1]:g} m"
-    if known:
-        wanted += f", {panel[0] / known:.0f} × {panel[1] / known:.0f} pixels"
-    start = f"{name}: the panel ({wanted}) was not found in any of {there.size} frames: "
-    if not there.any():
-        return start + (
-            "nothing is as bright as the thresholds ask. Reduce the least red, green and blue "
-            "(lower; --threshold), or correct the region."
-        )
-    length, height = (np.median(seen[side][there]) for side in ("length", "height"))
-    return start + (
-        f"the largest bright component measures {length:.0f} × {height:.0f} pixels (median of "
-        f"{there.sum()} frames), which is not its shape. Raise the least red, green and blue "
-        "(lower; --threshold), state a region that holds no other bright thing, or correct the "
-        "panel's size."
-    )
 
 
 def _judge(
@@ -409,7 +404,7 @@ def _motions(
             )
         table[:, :2] -= table[rest, :2].mean(axis=0)
     table[~good] = np.nan
-    filled = np.zeros(good.size, dtype=bool)
+    filled = np.zeros(good.size, bool)
     for begin, end in stretches(~good):
         inner = begin > 0 and end < good.size
         filled[begin:end] = inner and end - begin <= how.bridge * rate + 1e-9
@@ -452,33 +447,28 @@ def contact_sheet(path: Path | str, track: Track) -> bytes:
     tiles = []
     with _open_video(path) as video:
         for index in np.union1d(worst, spread):
-            video.capture.set(cv2.CAP_PROP_POS_FRAMES, int(track["picture"][index]))
+            here = {name: float(values[index]) for name, values in track.channels.items()}
+            video.capture.set(cv2.CAP_PROP_POS_FRAMES, here["picture"])
             read, frame = video.capture.read()
             if not read:
                 raise DataError(
-                    f"{path} has no frame {int(track['picture'][index])}: it is not the video that "
+                    f"{path} has no frame {here['picture']:.0f}: it is not the video that "
                     "was tracked, or was changed since. Track it again."
                 )
-            tiles.append(_tile(cv2, frame, track, int(index)))
+            colour = (60, 200, 60) if here["flag"] == FLAGS["good"] else (40, 40, 240)
+            if np.isfinite(here["centroid_x"]):
+                box = cv2.boxPoints((
+                    (here["centroid_x"], here["centroid_y"]),
+                    (here["panel_length"], here["panel_height"]),
+                    np.rad2deg(here["panel_angle"]),
+                ))  # fmt: skip
+                cv2.polylines(frame, [np.round(box).astype(np.int32)], True, colour, 2, cv2.LINE_AA)
+            small = cv2.resize(frame, (480, round(480 * frame.shape[0] / frame.shape[1])))
+            name = next(key for key, code in FLAGS.items() if code == here["flag"])
+            text = f"{track.time[index]:.2f} s  {name}  quality {here['quality']:.2f}"
+            cv2.putText(small, text, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
+            cv2.rectangle(small, (0, 0), (small.shape[1] - 1, small.shape[0] - 1), colour, 3)
+            tiles.append(small)
     tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % 3)
     rows = [np.hstack(tiles[i : i + 3]) for i in range(0, len(tiles), 3)]
     return bytes(cv2.imencode(".png", np.vstack(rows))[1])
-
-
-def _tile(cv2: Any, frame: Image, track: Track, index: int) -> Image:
-    """One frame, small, with the rectangle that was tracked, its instant and its flag."""
-    here = {name: float(values[index]) for name, values in track.channels.items()}
-    colour = (60, 200, 60) if here["flag"] == FLAGS["good"] else (40, 40, 240)
-    if np.isfinite(here["centroid_x"]):
-        box = cv2.boxPoints((
-            (here["centroid_x"], here["centroid_y"]),
-            (here["panel_length"], here["panel_height"]),
-            np.rad2deg(here["panel_angle"]),
-        ))  # fmt: skip
-        cv2.polylines(frame, [np.round(box).astype(np.int32)], True, colour, 2, cv2.LINE_AA)
-    small = cv2.resize(frame, (480, round(480 * frame.shape[0] / frame.shape[1])))
-    name = next(key for key, code in FLAGS.items() if code == here["flag"])
-    text = f"{track.time[index]:.2f} s  {name}  quality {here['quality']:.2f}"
-    cv2.putText(small, text, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
-    cv2.rectangle(small, (0, 0), (small.shape[1] - 1, small.shape[0] - 1), colour, 3)
-    return small

@@ -3,21 +3,18 @@
 Whether a test input repeats a training input, which makes the test meaningless.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 from scipy import fft
 
 from seakeep.arrays import (
+    ArrayLike,
     ComplexArray,
     FloatArray,
-    IntArray,
     as_series,
     number,
     time_step,
@@ -54,7 +51,7 @@ STILL = 0.2
 """Running standard deviation, as a part of the waves', below which water counts as still."""
 
 
-def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
+def waves_part(series: ArrayLike, dt: float, still: float = STILL) -> slice:
     """Part of a record in which there are waves: still water before and after them is left out.
 
     Parameters
@@ -104,7 +101,7 @@ def waves_part(series: npt.ArrayLike, dt: float, still: float = STILL) -> slice:
     return slice(begin, end)
 
 
-def first_wave(series: npt.ArrayLike, is_motion: bool) -> int:
+def first_wave(series: ArrayLike, is_motion: bool) -> int:
     """Sample at which the waves have come: of a motion by its rate, which slow drifts hide less."""
     return waves_part(np.gradient(series) if is_motion else series, 1.0).start
 
@@ -124,7 +121,7 @@ PER_WAVE = 8
 """Samples of the shortest waves that are enough to compare records."""
 
 
-def repeated_waves(records: Mapping[str, npt.ArrayLike], dt: float) -> dict[str, str]:
+def repeated_waves(records: Mapping[str, ArrayLike], dt: float) -> dict[str, str]:
     """Group records in which the same waves come again, such as repetitions of one test.
 
     Parameters
@@ -172,7 +169,7 @@ def _are_alike(one: FloatArray, other: FloatArray) -> bool:
     return 0 < small >= ALIKE * large and bool(np.corrcoef(one, other)[0, 1] >= ALIKE)
 
 
-def dominant_period(series: npt.ArrayLike, dt: float) -> float:
+def dominant_period(series: ArrayLike, dt: float) -> float:
     """Period at the peak of a series' spectrum, s (Hann window, three bins smoothed).
 
     NaN for fewer than eight samples, and for a constant.
@@ -186,7 +183,7 @@ def dominant_period(series: npt.ArrayLike, dt: float) -> float:
     return _spectrum(series, dt)[2]
 
 
-def _spectrum(series: npt.ArrayLike, dt: float) -> tuple[FloatArray, FloatArray, float]:
+def _spectrum(series: ArrayLike, dt: float) -> tuple[FloatArray, FloatArray, float]:
     """Power of a series, its frequencies, and the period at the peak, as `dominant_period`."""
     x = as_series(series)
     if x.size < 8 or not np.ptp(x):
@@ -210,7 +207,7 @@ def _dominant_period(x: FloatArray) -> float:
 
 
 def zero_up_crossings(
-    series: npt.ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
+    series: ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
 ) -> FloatArray:
     """Instants at which a series, less its mean, crosses zero upwards.
 
@@ -255,23 +252,18 @@ def zero_up_crossings(
     x = as_series(series)[part]
     x = x - x.mean()
     before = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
-    if hysteresis > 0:
-        before = _clear(x, before, hysteresis * x.std())
+    if hysteresis > 0:  # of those between a clear trough and the next clear crest, the middle one
+        beyond = np.flatnonzero(np.abs(x) > hysteresis * x.std())
+        rising = np.flatnonzero((x[beyond[:-1]] < 0) & (x[beyond[1:]] > 0))
+        lowest = np.searchsorted(before, beyond[rising])
+        highest = np.searchsorted(before, beyond[rising + 1]) - 1
+        before = before[(lowest + highest) // 2]
     first = before - x[before] / (x[before + 1] - x[before])
     return (part.start + first) * time_step(dt)
 
 
-def _clear(x: FloatArray, before: IntArray, limit: float) -> IntArray:
-    """Of the crossings between a clear trough and the next clear crest, the middle one."""
-    beyond = np.flatnonzero(np.abs(x) > limit)
-    rising = np.flatnonzero((x[beyond[:-1]] < 0) & (x[beyond[1:]] > 0))
-    lowest = np.searchsorted(before, beyond[rising])
-    highest = np.searchsorted(before, beyond[rising + 1]) - 1
-    return before[(lowest + highest) // 2]
-
-
 def encounter_period(
-    series: npt.ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
+    series: ArrayLike, dt: float, hysteresis: float = 0.0, still: float = STILL
 ) -> float:
     r"""Mean zero-up-crossing period of a wave record.
 
@@ -322,7 +314,7 @@ def encounter_period(
     return float((crossings[-1] - crossings[0]) / (crossings.size - 1))
 
 
-def energy_period(series: npt.ArrayLike, dt: float) -> float:
+def energy_period(series: ArrayLike, dt: float) -> float:
     r"""Energy period :math:`T_{-1,0} = m_{-1} / m_0` of a record's spectrum, s.
 
     What is slower than a quarter of the record is left out as drift; NaN where nothing is left.
@@ -339,7 +331,7 @@ def energy_period(series: npt.ArrayLike, dt: float) -> float:
     return float((power / lines).sum() / power.sum()) if power.any() else np.nan
 
 
-def significant_height(series: npt.ArrayLike) -> float:
+def significant_height(series: ArrayLike) -> float:
     """Significant wave height of a record, four times its standard deviation.
 
     Parameters
@@ -360,7 +352,7 @@ def significant_height(series: npt.ArrayLike) -> float:
     return 4.0 * float(np.std(as_series(series)))
 
 
-def wave_heights(series: npt.ArrayLike, dt: float) -> FloatArray:
+def wave_heights(series: ArrayLike, dt: float) -> FloatArray:
     """Heights of the single waves between successive zero-up-crossings.
 
     Parameters
@@ -386,27 +378,11 @@ def wave_heights(series: npt.ArrayLike, dt: float) -> FloatArray:
     x = as_series(series)
     edges = np.ceil(zero_up_crossings(x, dt) / dt).astype(int)
     waves = [x[first:last] for first, last in pairwise(edges)]
-    return np.array([np.ptp(wave) for wave in waves], dtype=float)
-
-
-def welch_segments(
-    samples: int, dt: float, segment: int | None, overlap: int | None
-) -> tuple[int, int]:
-    """Length and overlap of Welch's segments in samples; defaults and errors of `wave_spectrum`."""
-    most = round(min(samples, 60.0 / dt))
-    length = most if segment is None else whole_number(segment, "segment", least=0)
-    shared = length // 2 if overlap is None else whole_number(overlap, "overlap", least=0)
-    if not 1 < length <= samples or not 0 <= shared < length:
-        raise RequestError(
-            f"Welch's method needs segments of 2 to {samples} samples and an overlap below one "
-            f"segment; received segments of {length} and an overlap of {shared}. Shorten them, or "
-            "give a longer record."
-        )
-    return length, shared
+    return np.array([np.ptp(wave) for wave in waves], float)
 
 
 def wave_spectrum(
-    series: npt.ArrayLike,
+    series: ArrayLike,
     dt: float,
     segment: int | None = None,
     overlap: int | None = None,
@@ -453,13 +429,19 @@ def wave_spectrum(
     >>> round(float(f[np.argmax(density)]), 2), round(float(np.sum(density) * f[1]), 2)
     (0.5, 0.5)
     """
-    x = as_series(series)
-    rate = 1.0 / time_step(dt)
-    length, shared = welch_segments(x.shape[0], dt, segment, overlap)
-    frequency, density = scipy.signal.welch(
-        x, rate, window=window, nperseg=length, noverlap=shared, nfft=padded
+    x, step = as_series(series), time_step(dt)
+    most = round(min(x.size, 60.0 / step))
+    length = most if segment is None else whole_number(segment, "segment", least=0)
+    shared = length // 2 if overlap is None else whole_number(overlap, "overlap", least=0)
+    if not 1 < length <= x.size or not 0 <= shared < length:
+        raise RequestError(
+            f"Welch's method needs segments of 2 to {x.size} samples and an overlap below one "
+            f"segment; received segments of {length} and an overlap of {shared}. Shorten them, or "
+            "give a longer record."
+        )
+    return scipy.signal.welch(
+        x, 1.0 / step, window=window, nperseg=length, noverlap=shared, nfft=padded
     )
-    return frequency, density
 
 
 def paper_welch(dt: float) -> tuple[int, int, int]:
@@ -477,7 +459,7 @@ def paper_welch(dt: float) -> tuple[int, int, int]:
     return segment, min(overlap, segment - 1), padded
 
 
-def peak_period(series: npt.ArrayLike, dt: float) -> float:
+def peak_period(series: ArrayLike, dt: float) -> float:
     """Peak period T_p of a wave record, by Welch's method over segments of 60 s with half overlap.
 
     Parameters
@@ -514,7 +496,7 @@ def peak_period(series: npt.ArrayLike, dt: float) -> float:
     return float(1.0 / (parabola_peak(density)[0] * frequency[1]))
 
 
-def wave_statistics(series: npt.ArrayLike, dt: float) -> WaveStatistics:
+def wave_statistics(series: ArrayLike, dt: float) -> WaveStatistics:
     r"""Height and periods of a wave record.
 
     Parameters
@@ -565,7 +547,7 @@ Pierson-Moskowitz spectrum, whose tail is the highest of the usual ones, 1.5 % o
 :math:`1 - \\exp(-1.25 / 3^4)`."""
 
 
-def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, float]:
+def energy_above(series: ArrayLike, dt: float, edge: float) -> tuple[float, float]:
     """Fraction of the energy of waves that lies above a frequency.
 
     Noise and ringing above three times the peak's frequency do not count: to lose them does no
@@ -586,7 +568,7 @@ def energy_above(series: npt.ArrayLike, dt: float, edge: float) -> tuple[float, 
     return float(power[waves & (lines > edge)].sum() / power[waves].sum()), period
 
 
-def noise_floor(series: npt.ArrayLike) -> float:
+def noise_floor(series: ArrayLike) -> float:
     r"""Standard deviation of the noise of a record that is sampled well above its waves.
 
     The level of the spectrum between one half and three quarters of the Nyquist frequency, taken
@@ -616,7 +598,7 @@ def noise_floor(series: npt.ArrayLike) -> float:
     >>> round(noise_floor(waves + 0.05 * rng.standard_normal(2000)), 2)
     0.05
     """
-    x = np.asarray(series, dtype=float)
+    x = np.asarray(series, float)
     if np.isfinite(x).sum() < 64:
         return 0.0
     x = scipy.signal.detrend(over_gaps(x))
@@ -666,8 +648,8 @@ class Leakage:
 
 
 def find_leakage(
-    training: Sequence[npt.ArrayLike],
-    test: npt.ArrayLike,
+    training: Sequence[ArrayLike],
+    test: ArrayLike,
     dt: float,
 ) -> Leakage | None:
     r"""Look for stretches of a test input that the training input holds, up to a constant phase.
@@ -718,7 +700,7 @@ def find_leakage(
     """
     step = time_step(dt)
     record = as_series(test, minimum=8)
-    if np.ptp(record) == 0 or np.sum(np.diff(np.sign(record - record.mean())) > 0) < 2:
+    if np.sum(np.diff(np.sign(record - record.mean())) > 0) < 2:
         return None
     part = waves_part(record, step)
     record = record[part]
@@ -728,15 +710,19 @@ def find_leakage(
     if _even(waves) or record.size < SHORTEST * period:
         return None
     found = []
-    repeated = np.zeros(record.size, dtype=bool)
+    repeated = np.zeros(record.size, bool)
     pool = [as_series(each, minimum=8) for each in training]
     ready = [(index, _analytic(each)) for index, each in enumerate(pool) if each.size >= length]
     starts = {*range(0, record.size - length + 1, max(length // 2, 1)), record.size - length}
     for start in sorted(starts):
         piece = waves[start : start + length]
         for index, reference in ready:
-            match = _correlation(reference, piece)
-            at = int(np.argmax(np.abs(match)))
+            # Normalised correlation of the piece at each place where it fits whole.
+            summed = np.conj(scipy.signal.correlate(reference, piece, mode="valid", method="fft"))
+            power = np.cumsum(np.concatenate([[0.0], np.abs(reference) ** 2]))
+            energy = power[length:] - power[:-length]
+            match = summed / np.sqrt(np.maximum(energy * np.sum(np.abs(piece) ** 2), 1e-300))
+            at = np.argmax(np.abs(match))
             height, phase = float(np.abs(match[at])), float(np.angle(match[at]))
             if height >= REPEATED:
                 repeated[start : start + length] = True
@@ -751,7 +737,7 @@ def _analytic(series: FloatArray) -> ComplexArray:
     return scipy.signal.hilbert(centred, fft.next_fast_len(centred.size))[: centred.size]
 
 
-def is_regular(series: npt.ArrayLike) -> bool:
+def is_regular(series: ArrayLike) -> bool:
     """Whether a record's envelope is as even as that of regular waves."""
     return _even(_analytic(as_series(series, minimum=8)))
 
@@ -760,12 +746,3 @@ def _even(waves: ComplexArray) -> bool:
     margin = waves.size // 20  # the envelope of a cut record is bent at its ends
     envelope = np.abs(waves[margin : waves.size - margin])
     return bool(envelope.std() < REGULAR * envelope.mean())
-
-
-def _correlation(reference: ComplexArray, piece: ComplexArray) -> ComplexArray:
-    """Normalised correlation of a piece with a reference at each place where it fits whole."""
-    summed = np.conj(scipy.signal.correlate(reference, piece, mode="valid", method="fft"))
-    power = np.cumsum(np.concatenate([[0.0], np.abs(reference) ** 2]))
-    energy = power[piece.size :] - power[: -piece.size]
-    norm = np.sqrt(np.maximum(energy * np.sum(np.abs(piece) ** 2), 1e-300))
-    return summed / norm

@@ -199,7 +199,7 @@ def mistakes_of(
         try:
             resolve_model(settings, 1.0, 1.0 / 32, preset=preset)  # any period and step
         except RequestError as error:
-            return [Mistake(place, str(error))]
+            return [(place, str(error))]
     return []
 
 

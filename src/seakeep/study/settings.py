@@ -313,11 +313,11 @@ def read_study(path: Path | str) -> Study:
 def _cross_checks(study: Study) -> list[Mistake]:
     """What the study says against what the campaign has."""
     campaign, settings = study.campaign, study.settings
-    mistakes = []
+    mistakes: list[Mistake] = []
     known = campaign.settings.channel_names
     for key, names in (("states", study.states), ("inputs", study.inputs)):
         mistakes += [
-            Mistake(
+            (
                 ("study", key),
                 f"received {name!r}, and the campaign has no such channel."
                 f"{did_you_mean(name, known)} Channels: {', '.join(known)}.",
@@ -327,7 +327,7 @@ def _cross_checks(study: Study) -> list[Mistake]:
         ]
     if both := set(study.states) & set(study.inputs):
         words = f"{sorted(both)[0]!r} is among the states too; choose one."
-        mistakes.append(Mistake(("study", "inputs"), words))
+        mistakes.append((("study", "inputs"), words))
     tables: dict[tuple[str, ...], Names]
     tables = {("tests", name): each.runs for name, each in settings.tests.items()}
     for table, runs in {("training",): settings.training.runs, **tables}.items():
@@ -337,7 +337,7 @@ def _cross_checks(study: Study) -> list[Mistake]:
                     f"received {run!r}, and the campaign has no such run."
                     f"{did_you_mean(run, campaign.runs)} Runs: {', '.join(campaign.runs)}."
                 )
-                mistakes.append(Mistake((*table, "runs"), words))
+                mistakes.append(((*table, "runs"), words))
     for name, model in settings.models.items():
         mistakes += mistakes_of(model, ("models", name), settings.study.preset)
         for key in ("states", "inputs"):
@@ -346,5 +346,5 @@ def _cross_checks(study: Study) -> list[Mistake]:
                     "all models of a study share their channels, so that they can be compared. "
                     f"State {key} in [study]."
                 )
-                mistakes.append(Mistake(("models", name, key), words))
+                mistakes.append((("models", name, key), words))
     return mistakes

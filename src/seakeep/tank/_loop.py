@@ -15,10 +15,11 @@ from seakeep.arrays import FloatArray, IntArray
 # Reassociation lets the memory integral run in vector registers; NaN is still NaN. Contraction to
 # fused multiply-adds is left out: code compiled in this process and code read from the cache fuse
 # other pairs, and the last bits would differ between the first run and the second.
-_FAST = {"reassoc"}
+_fast = numba.njit(cache=True, fastmath={"reassoc"})
+_exact = numba.njit(cache=True)
 
 
-@numba.njit(cache=True)
+@_exact
 def line_tension(
     line: FloatArray, surge: float, heave: float, pitch: float, velocity: FloatArray
 ) -> tuple[float, float, float, float]:
@@ -42,7 +43,7 @@ def line_tension(
     return tension, force_x, force_z, arm_z * force_x - arm_x * force_z
 
 
-@numba.njit(cache=True)
+@_exact
 def line_tensions(lines: FloatArray, position: FloatArray, velocity: FloatArray) -> FloatArray:
     """Tensions of all lines, shape (line, time), along a motion of shape (dof, time)."""
     out = np.zeros((lines.shape[0], position.shape[1]))
@@ -53,7 +54,7 @@ def line_tensions(lines: FloatArray, position: FloatArray, velocity: FloatArray)
     return out
 
 
-@numba.njit(cache=True, fastmath=_FAST)
+@_fast
 def _wave_forces(
     real: FloatArray,
     imag: FloatArray,
@@ -104,7 +105,7 @@ def _wave_forces(
     return slow
 
 
-@numba.njit(cache=True, fastmath=_FAST)
+@_fast
 def _body_forces(
     q: FloatArray,
     v: FloatArray,
@@ -136,7 +137,7 @@ def _body_forces(
         force[2] += moment
 
 
-@numba.njit(cache=True, fastmath=_FAST)
+@_fast
 def _memory_ahead(
     pairs: IntArray, kernel: FloatArray, v: FloatArray, origin: int, out: FloatArray
 ) -> None:
@@ -152,7 +153,7 @@ def _memory_ahead(
         out[pairs[p, 0]] += total
 
 
-@numba.njit(cache=True, fastmath=_FAST)
+@_fast
 def _phases(
     waves: FloatArray,
     phase: FloatArray,
@@ -169,7 +170,7 @@ def _phases(
             real[part, n], imag[part, n] = math.cos(angle), math.sin(angle)
 
 
-@numba.njit(cache=True, fastmath=_FAST)
+@_fast
 def _advance(
     q: FloatArray, v: FloatArray, step: int, origin: int, dt: float, slopes: FloatArray
 ) -> None:
@@ -184,14 +185,14 @@ def _advance(
                 v[i, origin + 1] = v[i, origin] + total
 
 
-@numba.njit(cache=True)
+@_exact
 def _ramp(elapsed: float, ramp_time: float) -> float:
     if elapsed >= ramp_time:
         return 1.0
     return 0.5 * (1.0 - math.cos(math.pi * elapsed / ramp_time))
 
 
-@numba.njit(cache=True, fastmath=_FAST)
+@_fast
 def integrate(
     steps: int,
     dt: float,

@@ -8,18 +8,22 @@ moves in a plane of 2.5 mm per pixel. A lamp in the upper left corner shows the 
 
 import io
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+from numpy.random import Generator
 
-from seakeep.arrays import FloatArray
+from seakeep.arrays import (
+    ArrayLike,
+    FloatArray,
+)
 from seakeep.errors import SeakeepError
 from seakeep.files import MARK, write_netcdf, write_text
-from seakeep.signals.panel import opencv
+from seakeep.signals.panel import Image, opencv
 from seakeep.tank.instruments import Played, clock_instants, trigger
 from seakeep.tank.settings import TankSettings
 from seakeep.toml import rendered
@@ -59,14 +63,6 @@ def _decimals(column: xr.DataArray) -> int:
     return {"m": 5, "mm": 2}.get(column.attrs["units"], 4)
 
 
-def _filtered(settings: TankSettings) -> dict[str, str]:
-    """Low-passed channel of each probe without drop-outs: ``kn_fwd`` → ``eta_fwd``."""
-    probes = settings.instruments.probes
-    short = {n: n.partition("_")[2] or n for n, probe in probes.items() if probe.dropouts == 0}
-    unique = len(set(short.values())) == len(short)
-    return {name: f"eta_{short[name]}" if unique else f"eta_{name}_filtered" for name in short}
-
-
 def campaign_text(
     settings: TankSettings, files: Mapping[str, Mapping[str, str]], kind: str, one_logger: bool
 ) -> str:
@@ -76,7 +72,11 @@ def campaign_text(
     comment, since it is no table of a logger. `kind` is the format of the raw files.
     """
     # A single logger's file is for readers that know no gaps: its probes with drop-outs stay out.
-    every, filtered = settings.instruments.probes, _filtered(settings)
+    every = settings.instruments.probes
+    # Low-passed channel of each probe without drop-outs: ``kn_fwd`` → ``eta_fwd``.
+    short = {n: n.partition("_")[2] or n for n, probe in every.items() if probe.dropouts == 0}
+    unique = len(set(short.values())) == len(short)
+    filtered = {n: f"eta_{short[n]}" if unique else f"eta_{n}_filtered" for n in short}
     inputs = []
     if place := {name: every[name].position for name in filtered}:
         # The first probe downstream, and the one nearest to the vessel.
@@ -101,8 +101,6 @@ def campaign_text(
     )
 
 
-Image = npt.NDArray[np.uint8]
-
 WIDTH, HEIGHT = 1280, 720
 METRES_PER_PIXEL = 0.0025
 PANEL = (0.30, 0.10)  # m
@@ -118,53 +116,24 @@ HULL = ((-0.70, 0.20), (-0.62, -0.06), (-0.47, -0.083), (0.42, -0.083), (0.64, -
 """Outline of the CK-14e-like hull, m from the place at rest; any hull is drawn so."""
 
 
-def pixel_of(x: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
+def pixel_of(x: ArrayLike, z: ArrayLike) -> FloatArray:
     """Pixels to the right and downwards from the first pixel's centre, of a point in the plane.
 
     `x` from the centre of gravity's at rest, `z` above still water, m.
     """
-    points = np.stack([np.asarray(x, dtype=float) - LEFT, TOP - np.asarray(z, dtype=float)], -1)
+    points = np.stack([np.asarray(x, float) - LEFT, TOP - np.asarray(z, float)], -1)
     return points / METRES_PER_PIXEL
 
 
-def _turned(points: npt.ArrayLike, centre: tuple[float, float], pitch: float) -> FloatArray:
+def _turned(points: ArrayLike, centre: tuple[float, float], pitch: float) -> FloatArray:
     """Points of the vessel (m from its centre of gravity) after surge, heave and pitch."""
-    x, z = np.asarray(points, dtype=float).T
+    x, z = np.asarray(points, float).T
     cosine, sine = np.cos(pitch), np.sin(pitch)
     return pixel_of(centre[0] + x * cosine + z * sine, centre[1] - x * sine + z * cosine)
 
 
 def _corners(points: FloatArray) -> npt.NDArray[np.int32]:
     return np.round(points * 2**FRACTION_BITS).astype(np.int32)
-
-
-def _fill_exactly(cv2: Any, frame: Image, points: FloatArray, level: int) -> None:
-    """Fill a polygon in grey, each pixel by the part that the polygon covers of it.
-
-    OpenCV's own smoothed edges are off by up to half a pixel, which would turn a level panel by
-    0.2 degrees; here a pixel is divided into 8 × 8.
-    """
-    begin = np.maximum(np.floor(points.min(axis=0)).astype(int) - 1, 0)
-    end = np.minimum(np.ceil(points.max(axis=0)).astype(int) + 2, [WIDTH, HEIGHT])
-    if np.any(end <= begin):
-        return
-    width, height = (int(n) for n in end - begin)
-    fine = np.zeros((SUBPIXELS * height, SUBPIXELS * width), np.uint8)
-    places = (points - begin + 0.5) * SUBPIXELS - 0.5
-    cv2.fillPoly(fine, [_corners(places)], 255, shift=FRACTION_BITS)
-    covered = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
-    part = frame[begin[1] : end[1], begin[0] : end[0]]
-    share = covered[:, :, None] / 255.0
-    part[:] = np.round(part + share * (level - part.astype(float))).astype(np.uint8)
-
-
-def _background() -> Image:
-    """Tank wall: a vertical gradient with faint tiles."""
-    rows = np.linspace(105.0, 70.0, HEIGHT)[:, None, None] * np.array([1.0, 0.93, 0.82])
-    wall = np.broadcast_to(rows, (HEIGHT, WIDTH, 3)).copy()
-    wall[::80] *= 0.88
-    wall[:, ::80] *= 0.88
-    return wall.astype(np.uint8)
 
 
 def _light() -> npt.NDArray[np.float32]:
@@ -177,7 +146,7 @@ def _light() -> npt.NDArray[np.float32]:
 
 def frame_of(
     cv2: Any,
-    motion: tuple[float, float, float],
+    motion: Iterable[float],
     surface: FloatArray,
     lamp: float,
     centre_of_gravity: float,
@@ -189,30 +158,48 @@ def frame_of(
     """
     surge, heave, pitch = motion
     centre = (surge, heave + centre_of_gravity)
-    frame = _background()
+    # The tank's wall: a vertical gradient with faint tiles.
+    rows = np.linspace(105.0, 70.0, HEIGHT)[:, None, None] * np.array([1.0, 0.93, 0.82])
+    wall = np.broadcast_to(rows, (HEIGHT, WIDTH, 3)).copy()
+    wall[::80] *= 0.88
+    wall[:, ::80] *= 0.88
+    frame = wall.astype(np.uint8)
 
-    def polygon(points: FloatArray, colour: tuple[int, int, int]) -> None:
-        cv2.fillPoly(frame, [_corners(points)], colour, lineType=cv2.LINE_AA, shift=FRACTION_BITS)
+    def polygon(picture: Image, points: FloatArray, colour: tuple[int, int, int]) -> None:
+        corners = [_corners(points)]
+        cv2.fillPoly(picture, corners, colour, lineType=cv2.LINE_AA, shift=FRACTION_BITS)
 
     hull = np.array(HULL) - [0.0, centre_of_gravity]
-    polygon(_turned(hull, centre, pitch), (40, 120, 190))
+    polygon(frame, _turned(hull, centre, pitch), (40, 120, 190))
     post = [(-0.02, 0.1), (0.02, 0.1), (0.02, PANEL_HEIGHT), (-0.02, PANEL_HEIGHT)]
-    polygon(_turned(post, centre, pitch), (60, 60, 60))
+    polygon(frame, _turned(post, centre, pitch), (60, 60, 60))
     half = 0.5 * np.array(PANEL)
     panel = half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] + [0.0, PANEL_HEIGHT]
-    _fill_exactly(cv2, frame, _turned(panel, centre, pitch), 250)
+    # The panel, each pixel by the part that it covers: OpenCV's own smoothed edges are off by up to
+    # half a pixel, which would turn a level panel by 0.2 degrees.
+    points = _turned(panel, centre, pitch)
+    begin = np.maximum(np.floor(points.min(axis=0)).astype(int) - 1, 0)
+    end = np.minimum(np.ceil(points.max(axis=0)).astype(int) + 2, [WIDTH, HEIGHT])
+    if np.all(end > begin):
+        width, height = (int(n) for n in end - begin)
+        fine = np.zeros((SUBPIXELS * height, SUBPIXELS * width), np.uint8)
+        places = (points - begin + 0.5) * SUBPIXELS - 0.5
+        cv2.fillPoly(fine, [_corners(places)], 255, shift=FRACTION_BITS)
+        covered = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
+        part = frame[begin[1] : end[1], begin[0] : end[0]]
+        share = covered[:, :, None] / 255.0
+        part[:] = np.round(part + share * (250 - part.astype(float))).astype(np.uint8)
     across = LEFT + METRES_PER_PIXEL * WIDTH * np.linspace(0.0, 1.0, surface.size)
     edge = pixel_of(across, surface)
     water = frame.copy()
-    below = np.concatenate([edge, [[WIDTH, HEIGHT], [0, HEIGHT]]])
-    cv2.fillPoly(water, [_corners(below)], (95, 70, 30), lineType=cv2.LINE_AA, shift=FRACTION_BITS)
+    polygon(water, np.concatenate([edge, [[WIDTH, HEIGHT], [0, HEIGHT]]]), (95, 70, 30))
     frame = cv2.addWeighted(water, 0.75, frame, 0.25, 0.0)
     level = int(40 + 190 * np.clip(lamp, 0.0, 1.0))
     cv2.circle(frame, (40, 40), 14, (level // 4, level // 2, level), -1, cv2.LINE_AA)
     return np.asarray(frame, dtype=np.uint8)
 
 
-def _noise(cv2: Any, rng: np.random.Generator) -> list[npt.NDArray[np.float32]]:
+def _noise(cv2: Any, rng: Generator) -> list[npt.NDArray[np.float32]]:
     """Draw a stock of noise pictures; each frame takes one, shifted at random.
 
     The grain is four pixels wide, as a camera's compression leaves it; finer grain would make
@@ -222,13 +209,13 @@ def _noise(cv2: Any, rng: np.random.Generator) -> list[npt.NDArray[np.float32]]:
     return [cv2.resize(c, (WIDTH, HEIGHT), interpolation=cv2.INTER_LINEAR) for c in coarse]
 
 
-def side_view(played: Played, rng: np.random.Generator, instants: npt.ArrayLike) -> Iterator[Image]:
+def side_view(played: Played, rng: Generator, instants: ArrayLike) -> Iterator[Image]:
     """Frames (blue, green, red) as the camera at the tank's side would see them.
 
     At the given reference instants. Raises RequestError if OpenCV is not installed.
     """
     cv2 = opencv("rendering")
-    time = np.asarray(instants, dtype=float)
+    time = np.asarray(instants, float)
     instruments = played.settings.instruments
     position, _, _ = played.states(time)
     lamp = trigger(time, instruments.trigger_period, instruments.trigger_width)
@@ -236,11 +223,9 @@ def side_view(played: Played, rng: np.random.Generator, instants: npt.ArrayLike)
     place = played.settings.vessel.position
     surface = np.stack([played.elevation(place + x, time) for x in across], axis=1)
     light, stock = _light(), _noise(cv2, rng)
-    height = float(played.rig.hydro.attrs["centre_of_gravity"])
-    for i in range(time.size):
-        q = position[:3, i]
-        motion = (float(q[0]), float(q[1]), float(q[2]))
-        frame = frame_of(cv2, motion, surface[i], float(lamp[i]), height)
+    height = played.rig.hydro.attrs["centre_of_gravity"]
+    for motion, heights, brightness in zip(position[:3].T, surface, lamp, strict=True):
+        frame = frame_of(cv2, motion, heights, brightness, height)
         grain = np.roll(stock[rng.integers(NOISE_FRAMES)], rng.integers(WIDTH), axis=1)
         lit = cv2.multiply(frame.astype(np.float32), light)
         lit += grain[:, :, None]
@@ -248,7 +233,7 @@ def side_view(played: Played, rng: np.random.Generator, instants: npt.ArrayLike)
 
 
 def render_side_view(
-    played: Played, path: Path, rng: np.random.Generator, length: float | None = None
+    played: Played, path: Path, rng: Generator, length: float | None = None
 ) -> Path:
     """Render a run, or its first `length` seconds by the video's clock, to an MP4 file.
 
@@ -261,7 +246,7 @@ def render_side_view(
     """
     cv2 = opencv("rendering")
     clock = played.settings.instruments.clocks["video"]
-    _, instants = clock_instants(clock, played.length if length is None else length)
+    _, instants = clock_instants(clock, length or played.length)
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         part = Path(folder) / "side_view.mp4"
         code = cv2.VideoWriter_fourcc(*"mp4v")

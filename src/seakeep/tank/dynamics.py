@@ -9,14 +9,17 @@ Wave forces act at the slow part of surge (surge less its linear wave-frequency 
 the full surge they would feign a mean force.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from seakeep.arrays import ComplexArray, FloatArray, IntArray
+from seakeep.arrays import (
+    ArrayLike,
+    ComplexArray,
+    FloatArray,
+)
 from seakeep.errors import RequestError, SeakeepError, needing
 from seakeep.tank.hydrodynamics import (
     Hydrodynamics,
@@ -60,7 +63,6 @@ class Rig:
     quadratic: FloatArray
     pool: FloatArray
     lines: FloatArray
-    line_names: tuple[str, ...]
     drift: DriftSettings
     step: float
     ramp: float
@@ -77,16 +79,29 @@ class Rig:
 
     @property
     def mooring_stiffness(self) -> FloatArray:
-        """Linear stiffness of the taut lines at rest, shape (dof, dof)."""
+        """Stiffness and geometric stiffness of the taut lines at rest, shape (dof, dof)."""
         total = np.zeros_like(self.hydro.mass)
-        total[:3, :3] = mooring_stiffness(self.lines)
+        for eye_x, eye_z, pole_x, pole_z, stiffness, unstretched, _ in self.lines:
+            along = np.array([pole_x - eye_x, pole_z - eye_z])
+            length = np.hypot(*along)
+            stretch = length - unstretched
+            if stretch <= 0:
+                continue
+            unit = along / length
+            tension = stiffness * stretch
+            local = stiffness * np.outer(unit, unit)
+            local += tension / length * (np.eye(2) - np.outer(unit, unit))
+            arm = np.array([[1.0, 0.0, eye_z], [0.0, 1.0, -eye_x]])
+            total[:3, :3] += arm.T @ local @ arm
+            # A turned eye keeps its tension: its second derivative with pitch is minus the arm.
+            total[2, 2] += tension * (unit @ np.array([eye_x, eye_z]))
         return total
 
     @property
     def flow(self) -> FloatArray:
         """Flows that lose energy per velocity: of each motion and out of the pool's opening."""
         through = np.zeros(len(self.names))
-        if self.hydro.pool is not None:
+        if self.hydro.pool:
             through[1:4] = -1.0, self.pool[0], 1.0
         return np.vstack([np.eye(len(self.names)), through])
 
@@ -106,11 +121,11 @@ class Motion:
 
     time: FloatArray
     names: tuple[str, ...]
-    position: FloatArray = field(repr=False)
-    velocity: FloatArray = field(repr=False)
-    acceleration: FloatArray = field(repr=False)
-    memory: FloatArray = field(repr=False)
-    slow_surge: FloatArray = field(repr=False)
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    memory: FloatArray
+    slow_surge: FloatArray
 
 
 def _loop() -> ModuleType:
@@ -137,7 +152,7 @@ def line_table(
     for row, (name, line) in zip(table, lines.items(), strict=True):
         eye = (line.eye[0], line.eye[1] - centre_of_gravity)
         pole = (line.pole[0] - position, line.pole[1] - centre_of_gravity)
-        rest = float(np.hypot(line.pole[0] - position - line.eye[0], line.pole[1] - line.eye[1]))
+        rest = np.hypot(line.pole[0] - position - line.eye[0], line.pole[1] - line.eye[1])
         stretch = line.pretension / line.stiffness
         length = rest - stretch
         if length <= 0:
@@ -150,42 +165,6 @@ def line_table(
     return table
 
 
-def mooring_stiffness(table: FloatArray) -> FloatArray:
-    """Stiffness and geometric stiffness of all taut lines at rest: surge, heave and pitch."""
-    total = np.zeros((3, 3))
-    for eye_x, eye_z, pole_x, pole_z, stiffness, unstretched, _ in table:
-        along = np.array([pole_x - eye_x, pole_z - eye_z])
-        length = float(np.hypot(*along))
-        stretch = length - unstretched
-        if stretch <= 0:
-            continue
-        unit = along / length
-        tension = stiffness * stretch
-        local = stiffness * np.outer(unit, unit)
-        local += tension / length * (np.eye(2) - np.outer(unit, unit))
-        arm = np.array([[1.0, 0.0, eye_z], [0.0, 1.0, -eye_x]])
-        total += arm.T @ local @ arm
-        # A turned eye keeps its tension: its second derivative with pitch is minus the arm.
-        total[2, 2] += tension * float(unit @ np.array([eye_x, eye_z]))
-    return total
-
-
-def _viscous(settings: TankSettings, hydro: Hydrodynamics) -> tuple[FloatArray, ...]:
-    vessel, losses = settings.vessel, settings.vessel.pool
-    linear, quadratic = (
-        [each.surge, each.heave, each.pitch]
-        for each in (vessel.linear_damping, vessel.quadratic_damping)
-    )
-    pool = np.zeros(3)
-    if hydro.pool is not None:
-        linear += [0.0, losses.slosh_linear]
-        quadratic += [0.0, losses.slosh_quadratic]
-        contraction = (hydro.pool.area / hydro.pool.opening) ** 2
-        quadratic_loss = 0.5 * hydro.density * losses.loss_coefficient * contraction
-        pool = np.array([hydro.pool.centre, quadratic_loss * hydro.pool.area, losses.piston_linear])
-    return np.array(linear), np.array(quadratic), pool
-
-
 def _check_step(rig: Rig) -> None:
     """Refuse a step beyond the stability of the integrator or the resolution of the kernel."""
     dofs = len(rig.names)
@@ -194,7 +173,7 @@ def _check_step(rig: Rig) -> None:
     system[:dofs, dofs:] = np.eye(dofs)
     system[dofs:, :dofs] = -np.linalg.solve(rig.inertia, stiffness)
     system[dofs:, dofs:] = -np.linalg.solve(rig.inertia, rig.linear_damping)
-    fastest = float(np.max(np.abs(np.linalg.eigvals(system))))
+    fastest = np.max(np.abs(np.linalg.eigvals(system)))
     largest = min(STABLE / fastest, 2.0 / KERNEL_RATE)
     if rig.step > largest:
         raise RequestError(
@@ -214,27 +193,35 @@ def assemble_rig(settings: TankSettings, hydro: Hydrodynamics | None = None) -> 
         step is too large.
     """
     coefficients = hydro or load_hydrodynamics(settings.vessel.hydrodynamics)
-    for name, wanted, built in (
-        ("water_depth", settings.facility.water_depth, coefficients.water_depth),
-        ("density", settings.facility.density, coefficients.density),
-    ):
+    for name in ("water_depth", "density"):
+        wanted, built = getattr(settings.facility, name), coefficients.attrs[name]
         if abs(wanted - built) > 1e-6 * built:
             raise RequestError(
                 f"facility.{name} is {wanted:g} and the hydrodynamics file was made for {built:g}. "
                 "Set facility to the file's value, or build a file for this one: "
                 "tools/build_hydrodynamics.py SETTINGS.toml -o FILE.nc, in the source"
             )
-    linear, quadratic, pool = _viscous(settings, coefficients)
+    vessel, losses = settings.vessel, settings.vessel.pool
+    linear, quadratic = (
+        [each.surge, each.heave, each.pitch]
+        for each in (vessel.linear_damping, vessel.quadratic_damping)
+    )
+    flow = np.zeros(3)
+    if opening := coefficients.pool:
+        linear += [0.0, losses.slosh_linear]
+        quadratic += [0.0, losses.slosh_quadratic]
+        contraction = (opening.area / opening.opening) ** 2
+        quadratic_loss = 0.5 * coefficients.attrs["density"] * losses.loss_coefficient * contraction
+        flow[:] = opening.centre, quadratic_loss * opening.area, losses.piston_linear
     step = settings.simulation.step
-    height = float(coefficients.attrs["centre_of_gravity"])
+    height = coefficients.attrs["centre_of_gravity"]
     rig = Rig(
         hydro=coefficients,
         kernel=radiation_kernel(coefficients, step, settings.simulation.kernel_length),
-        linear=linear,
-        quadratic=quadratic,
-        pool=pool,
-        lines=line_table(settings.moorings, settings.vessel.position, height),
-        line_names=tuple(settings.moorings),
+        linear=np.array(linear),
+        quadratic=np.array(quadratic),
+        pool=flow,
+        lines=line_table(settings.moorings, vessel.position, height),
         drift=settings.drift,
         step=step,
         ramp=settings.simulation.ramp,
@@ -276,12 +263,11 @@ def _drift_terms(
     :math:`D = \frac{k}{\omega}\,[P_\mathrm{absorbed} + \int p(\theta)(1 - \cos\theta)\,d\theta]`.
     Every part is a quadratic form in u. Shape (frequency, 1 + dof) each.
     """
-    motion = linear_response(rig, omega, losses)
-    both = np.column_stack([np.ones(omega.size), motion])
+    both = np.column_stack([np.ones(omega.size), linear_response(rig, omega, losses)])
     out, along = far_field_at(rig.hydro, omega).swapaxes(0, 1)
     form = out - along
     form[:, 1:, 1:] += 0.5 * omega[:, None, None] ** 2 * losses
-    ratio = rig.drift.scale * wavenumber(omega, rig.hydro.water_depth) / omega
+    ratio = rig.drift.scale * wavenumber(omega, rig.hydro.attrs["water_depth"]) / omega
     return both, ratio[:, None] * np.einsum("nij,nj->ni", form, both)
 
 
@@ -347,7 +333,7 @@ def linear_response(rig: Rig, omega: FloatArray, losses: FloatArray | None = Non
     w = omega[:, None, None]
     dynamic = -(w**2) * (rig.hydro.mass + added) - 1j * w * damping
     dynamic = dynamic + rig.hydro.stiffness + rig.mooring_stiffness
-    return np.asarray(np.linalg.solve(dynamic, force)[..., 0], dtype=complex)
+    return np.asarray(np.linalg.solve(dynamic, force)[..., 0], complex)
 
 
 def _wave_arrays(rig: Rig, sea: Sea) -> tuple[Any, ...]:
@@ -361,24 +347,14 @@ def _wave_arrays(rig: Rig, sea: Sea) -> tuple[Any, ...]:
     signs, envelopes = drift_envelopes(rig, sea)
     damping = 0.0
     if rig.drift.damping:
-        damping = float(np.sum(drift_coefficient(rig, sea)[1] * sea.amplitude**2))
+        damping = np.sum(drift_coefficient(rig, sea)[1] * sea.amplitude**2)
     parts = (np.concatenate([x.real, x.imag]) for x in (force.T, envelopes))
     excitation, drift = (np.ascontiguousarray(x) for x in parts)
     return waves, excitation, signs, drift, damping
 
 
-def _kernel_arrays(rig: Rig) -> tuple[IntArray, FloatArray]:
-    """Pairs of degrees of freedom that have a memory, and their weights from the oldest lag."""
-    values = rig.kernel.values
-    pairs = np.argwhere(np.any(values != 0.0, axis=0))
-    rows = (values * trapezoid(len(values), rig.step)[:, None, None])[
-        ::-1, pairs[:, 0], pairs[:, 1]
-    ].T
-    return pairs, np.ascontiguousarray(rows)
-
-
 def simulate(
-    rig: Rig, sea: Sea, duration: float, start: npt.ArrayLike | None = None, begin: float = 0.0
+    rig: Rig, sea: Sea, duration: float, start: ArrayLike | None = None, begin: float = 0.0
 ) -> Motion:
     """Simulate a run.
 
@@ -406,8 +382,11 @@ def simulate(
     dofs = len(rig.names)
     steps = max(1, round(duration / rig.step))
     waves, excitation, *drift = _wave_arrays(rig, sea)
-    pairs, kernel = _kernel_arrays(rig)
-    state = np.zeros((2, dofs)) if start is None else np.array(start, dtype=float)
+    # Pairs of degrees of freedom that have a memory, and their weights from the oldest lag.
+    memories = rig.kernel.values * trapezoid(rig.kernel.lags.size, rig.step)[:, None, None]
+    pairs = np.argwhere(np.any(memories != 0.0, axis=0))
+    kernel = np.ascontiguousarray(memories[::-1, pairs[:, 0], pairs[:, 1]].T)
+    state = np.zeros((2, dofs)) if start is None else np.array(start, float)
     inverse, hydro = np.linalg.inv(rig.inertia), rig.hydro
     body = (inverse, hydro.stiffness, rig.linear, rig.quadratic, rig.pool, rig.lines)
     q, v, a, memory, slow, failed, which = loop.integrate(

@@ -6,16 +6,18 @@ a moon pool, the absolute elevations of its piston and of its first longitudinal
 """
 
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 import xarray as xr
 
-from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.arrays import (
+    ArrayLike,
+    ComplexArray,
+    FloatArray,
+)
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import reading
 from seakeep.signals.calculus import rising
@@ -69,16 +71,6 @@ class Hydrodynamics:
     pool: Pool | None
     attrs: dict[str, Any]
 
-    @property
-    def water_depth(self) -> float:
-        """Depth for which the coefficients were computed, m."""
-        return float(self.attrs["water_depth"])
-
-    @property
-    def density(self) -> float:
-        """Density of the water, kg/m³."""
-        return float(self.attrs["density"])
-
 
 @dataclass(frozen=True)
 class Kernel:
@@ -91,7 +83,7 @@ class Kernel:
 
 def shipped_hydrodynamics() -> Path:
     """Path of a file of coefficients that ships with the package."""
-    return Path(str(resources.files("seakeep.tank").joinpath("data", "ck14e.nc")))
+    return Path(__file__).with_name("data") / "ck14e.nc"
 
 
 def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
@@ -134,18 +126,15 @@ def load_hydrodynamics(path: Path | str = "") -> Hydrodynamics:
     force, far_field = data["excitation"].values, data["far_field"].values.astype(float)
     pool = None
     if "piston" in names:
-        pool = Pool(*(float(data.attrs[f"pool_{key}"]) for key in ("centre", "area", "opening")))
+        pool = Pool(*(data.attrs[f"pool_{key}"] for key in ("centre", "area", "opening")))
+    as_stored = ("omega", "added_mass", "damping", "mass", "stiffness")
     return Hydrodynamics(
         names=names,
-        omega=data["omega"].values,
-        added_mass=data["added_mass"].values,
-        damping=data["damping"].values,
         excitation=force[0] + 1j * force[1],
-        mass=data["mass"].values,
-        stiffness=data["stiffness"].values,
         far_field=far_field[:, 0] + 1j * far_field[:, 1],
         pool=pool,
         attrs=dict(data.attrs),
+        **{key: data[key].values for key in as_stored},
     )
 
 
@@ -172,7 +161,7 @@ def passive_damping(hydro: Hydrodynamics) -> tuple[FloatArray, FloatArray]:
     )
     tail = np.where(omega > last, (last / np.maximum(omega, last)) ** 3, 1.0)
     weight = np.ones((omega.size, len(hydro.names)))
-    if hydro.pool is not None:
+    if hydro.pool:
         low, high = POOL_TAPER
         weight[:, 3:] -= rising((omega - low) / (high - low))[:, None]
     # A congruence keeps the matrices passive.
@@ -200,18 +189,17 @@ def radiation_kernel(
     values = (2.0 / np.pi) * np.cos(np.outer(lags, omega)) @ flat
     band = (hydro.omega >= 2.0) & (hydro.omega <= POOL_TAPER[0])
     if not np.any(band):
-        band = np.ones(hydro.omega.size, dtype=bool)
+        band = np.ones(hydro.omega.size, bool)
     added = 0.5 * (hydro.added_mass + hydro.added_mass.swapaxes(1, 2))[band]
     sines = np.sin(np.outer(hydro.omega[band], lags)) * trapezoid(lags.size, step)
     sines /= hydro.omega[band, None]
     infinite = added + (sines @ values).reshape(added.shape)
-    shape = hydro.mass.shape
-    return Kernel(lags, values.reshape(-1, *shape), infinite.mean(axis=0))
+    return Kernel(lags, values.reshape(-1, *hydro.mass.shape), infinite.mean(axis=0))
 
 
-def kernel_coefficients(kernel: Kernel, omega: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+def kernel_coefficients(kernel: Kernel, omega: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Added mass and damping that a kernel reproduces, each of shape (frequency, dof, dof)."""
-    frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
+    frequencies = np.atleast_1d(np.asarray(omega, float))
     weights = trapezoid(kernel.lags.size, kernel.lags[1])
     flat = kernel.values.reshape(kernel.lags.size, -1) * weights[:, None]
     phase = np.outer(frequencies, kernel.lags)
@@ -220,8 +208,9 @@ def kernel_coefficients(kernel: Kernel, omega: npt.ArrayLike) -> tuple[FloatArra
     return added, (np.cos(phase) @ flat).reshape(shape)
 
 
-def _inside(hydro: Hydrodynamics, omega: npt.ArrayLike) -> FloatArray:
-    wanted = np.atleast_1d(np.asarray(omega, dtype=float))
+def _between(hydro: Hydrodynamics, values: ComplexArray, omega: ArrayLike) -> ComplexArray:
+    """Values between the solver's frequencies, by cubic splines."""
+    wanted = np.atleast_1d(np.asarray(omega, float))
     low, high = hydro.omega[0], hydro.omega[-1]
     if wanted.size and (wanted.min() < low or wanted.max() > high):
         raise RequestError(
@@ -229,15 +218,10 @@ def _inside(hydro: Hydrodynamics, omega: npt.ArrayLike) -> FloatArray:
             f"hydrodynamics file, {low:g} to {high:g} rad/s. Narrow the spectrum, or build a file "
             "with more frequencies."
         )
-    return wanted
+    return scipy.interpolate.CubicSpline(hydro.omega, values, axis=0)(wanted)
 
 
-def _between(hydro: Hydrodynamics, values: ComplexArray, omega: npt.ArrayLike) -> ComplexArray:
-    """Values between the solver's frequencies, by cubic splines."""
-    return scipy.interpolate.CubicSpline(hydro.omega, values, axis=0)(_inside(hydro, omega))
-
-
-def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
+def excitation_at(hydro: Hydrodynamics, omega: ArrayLike) -> ComplexArray:
     """Wave excitation per metre of amplitude, shape (frequency, dof), by cubic splines.
 
     Raises RequestError if a frequency lies outside the file's band.
@@ -245,6 +229,6 @@ def excitation_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
     return _between(hydro, hydro.excitation, omega)
 
 
-def far_field_at(hydro: Hydrodynamics, omega: npt.ArrayLike) -> ComplexArray:
+def far_field_at(hydro: Hydrodynamics, omega: ArrayLike) -> ComplexArray:
     """Forms of the outgoing waves between the solver's frequencies, by cubic splines."""
     return _between(hydro, hydro.far_field, omega)

@@ -9,11 +9,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 import xarray as xr
+from numpy.random import Generator
 
-from seakeep.arrays import BoolArray, FloatArray, Groups
+from seakeep.arrays import (
+    ArrayLike,
+    BoolArray,
+    FloatArray,
+    Groups,
+)
 from seakeep.signals.calculus import rising
 from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea
@@ -54,9 +59,9 @@ class Played:
         """Part of their height to which the waves have grown, shape (time,)."""
         return rising((time - self.motion.time[0]) / self.rig.ramp)
 
-    def elevation(self, place: npt.ArrayLike, time: FloatArray) -> FloatArray:
+    def elevation(self, place: ArrayLike, time: FloatArray) -> FloatArray:
         """Linear elevation at a place in the tank (m from the wave maker), m."""
-        x = np.asarray(place, dtype=float) - self.settings.vessel.position
+        x = np.asarray(place, float) - self.settings.vessel.position
         return self.ramp(time) * self.sea.elevation(x, time)
 
     def crest(self, place: float, time: FloatArray) -> FloatArray:
@@ -91,7 +96,7 @@ def trigger(time: FloatArray, period: float, width: float) -> FloatArray:
 
 
 def slap_pulses(
-    time: FloatArray, immersed: BoolArray, slap: SlapSettings, rng: np.random.Generator
+    time: FloatArray, immersed: BoolArray, slap: SlapSettings, rng: Generator
 ) -> FloatArray:
     """Decaying pulses (N) at each immersion and emergence of a line, at uniform instants.
 
@@ -108,20 +113,7 @@ def slap_pulses(
     return out
 
 
-def _dropouts(
-    values: FloatArray, rate: float, share: float, rng: np.random.Generator
-) -> FloatArray:
-    """Replace bursts of 20–200 ms by NaN, on average for `share` of the time."""
-    if share <= 0:
-        return values
-    out = values.copy()
-    bursts = rng.poisson(share * values.size / rate / 0.11)
-    for start in np.sort(rng.integers(0, values.size, bursts)):
-        out[start : start + max(1, round(rng.uniform(0.02, 0.2) * rate))] = np.nan
-    return out
-
-
-def _probes(played: Played, time: FloatArray, rate: float, rng: np.random.Generator) -> Columns:
+def _probes(played: Played, time: FloatArray, rate: float, rng: Generator) -> Columns:
     instruments = played.settings.instruments
 
     @functools.cache
@@ -132,36 +124,36 @@ def _probes(played: Played, time: FloatArray, rate: float, rng: np.random.Genera
     columns = {}
     for name, probe in instruments.probes.items():
         values = wave(probe.position) + probe.noise * rng.standard_normal(time.size)
-        columns[name] = "mm", 1e3 * _dropouts(values, rate, probe.dropouts, rng)
+        # Bursts of 20–200 ms are lost; without any nothing is drawn.
+        bursts = rng.poisson(probe.dropouts * time.size / rate / 0.11)
+        for start in np.sort(rng.integers(0, time.size, bursts)):
+            values[start : start + max(1, round(rng.uniform(0.02, 0.2) * rate))] = np.nan
+        columns[name] = "mm", 1e3 * values
     return columns
 
 
-def _mru(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -> Columns:
+def _mru(played: Played, time: FloatArray, _: float, rng: Generator) -> Columns:
     noise = played.settings.instruments
     q, v, a = played.states(time)
     zero = np.zeros(time.size)
-    true = {
-        "acceleration_x": ("m/s^2", a[0], noise.acceleration_noise),
-        "acceleration_y": ("m/s^2", zero, noise.acceleration_noise),
-        "acceleration_z": ("m/s^2", a[1], noise.acceleration_noise),
-        "rate_x": ("deg/s", zero, noise.rate_noise),
-        "rate_y": ("deg/s", v[2], noise.rate_noise),
-        "rate_z": ("deg/s", zero, noise.rate_noise),
-        "heave": ("m", q[1], noise.heave_noise),
-        "roll": ("deg", zero, noise.angle_noise),
-        "pitch": ("deg", q[2], noise.angle_noise),
-        "yaw": ("deg", zero, noise.angle_noise),
+    degree = np.rad2deg(1.0)
+    true = [
+        ("m/s^2", 1.0, noise.acceleration_noise,
+         {"acceleration_x": a[0], "acceleration_y": zero, "acceleration_z": a[1]}),
+        ("deg/s", degree, noise.rate_noise, {"rate_x": zero, "rate_y": v[2], "rate_z": zero}),
+        ("m", 1.0, noise.heave_noise, {"heave": q[1]}),
+        ("deg", degree, noise.angle_noise, {"roll": zero, "pitch": q[2], "yaw": zero}),
+    ]  # fmt: skip
+    return {
+        name: (unit, factor * (values + sigma * rng.standard_normal(time.size)))
+        for unit, factor, sigma, channels in true
+        for name, values in channels.items()
     }
-    columns = {}
-    for name, (unit, values, sigma) in true.items():
-        factor = np.rad2deg(1.0) if unit.startswith("deg") else 1.0
-        columns[name] = unit, factor * (values + sigma * rng.standard_normal(time.size))
-    return columns
 
 
-def _immersed(played: Played, time: FloatArray, line: int) -> BoolArray:
+def _immersed(played: Played, time: FloatArray, line: str) -> BoolArray:
     """Whether the middle of a line is under water."""
-    settings = played.settings.moorings[played.rig.line_names[line]]
+    settings = played.settings.moorings[line]
     q, _, _ = played.states(time)
     eye_x = q[0] + settings.eye[0] + played.settings.vessel.position
     eye_z = q[1] - settings.eye[0] * q[2] + settings.eye[1]
@@ -169,28 +161,26 @@ def _immersed(played: Played, time: FloatArray, line: int) -> BoolArray:
     return played.elevation(middle_x, time) > middle_z
 
 
-def _loads(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -> Columns:
+def _loads(played: Played, time: FloatArray, _: float, rng: Generator) -> Columns:
     instruments = played.settings.instruments
     # Whether a line is wet changes slowly: every tenth sample finds the crossings.
     coarse = time[::10]
     columns = {}
-    for line, (name, true) in enumerate(
-        zip(played.rig.line_names, played.loads(time), strict=True)
-    ):
+    for name, true in zip(played.settings.moorings, played.loads(time), strict=True):
         values = true + instruments.load_noise * rng.standard_normal(time.size)
-        if (slap := instruments.slap.get(name)) is not None:
-            wet = np.repeat(_immersed(played, coarse, line), 10)[: time.size]
+        if slap := instruments.slap.get(name):
+            wet = np.repeat(_immersed(played, coarse, name), 10)[: time.size]
             values = values + slap_pulses(time, wet, slap, rng)
         columns[f"mooring_{name}"] = "N", values
     return columns
 
 
-def _video(played: Played, time: FloatArray, _: float, rng: np.random.Generator) -> Columns:
+def _video(played: Played, time: FloatArray, _: float, rng: Generator) -> Columns:
     noise = played.settings.instruments.surge_noise * rng.standard_normal(time.size)
     return {"surge": ("m", played.states(time)[0][0] + noise)}
 
 
-_LOGGERS: dict[Logger, Callable[..., Columns]] = {
+LOGGERS: dict[Logger, Callable[..., Columns]] = {
     "wave_probes": _probes,
     "mru": _mru,
     "loads": _loads,
@@ -204,9 +194,7 @@ def _record(readings: FloatArray, columns: Columns) -> xr.Dataset:
     return xr.Dataset(channels, coords={"time": ("time", readings, {"units": "s"})})
 
 
-def record_run(
-    played: Played, rng: np.random.Generator, single_rate: float | None = None
-) -> Groups:
+def record_run(played: Played, rng: Generator, single_rate: float | None = None) -> Groups:
     """Record a run with all instruments, each with its own noise.
 
     Parameters
@@ -227,11 +215,11 @@ def record_run(
     instruments = played.settings.instruments
     records: Groups = {}
     together: Columns = {}
-    for (name, make), child in zip(_LOGGERS.items(), rng.spawn(len(_LOGGERS)), strict=True):
-        clock = instruments.clocks[name] if single_rate is None else ClockSettings(rate=single_rate)
+    for (name, make), child in zip(LOGGERS.items(), rng.spawn(len(LOGGERS)), strict=True):
+        clock = ClockSettings(rate=single_rate) if single_rate else instruments.clocks[name]
         readings, instants = clock_instants(clock, played.length)
         columns: Columns = {}
-        if single_rate is None:
+        if not single_rate:
             pulse = trigger(instants, instruments.trigger_period, instruments.trigger_width)
             noise = child.standard_normal(instants.size)
             if name == "video":
@@ -241,4 +229,4 @@ def record_run(
         columns |= make(played, instants, clock.rate, child)
         records[name] = _record(readings, columns)
         together |= columns
-    return records if single_rate is None else {"all": _record(readings, together)}
+    return {"all": _record(readings, together)} if single_rate else records

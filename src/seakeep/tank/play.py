@@ -11,7 +11,7 @@ import xarray as xr
 
 from seakeep.arrays import Progress
 from seakeep.conventions import canonical_channel
-from seakeep.errors import RequestError, did_you_mean
+from seakeep.errors import RequestError, did_you_mean, naming
 from seakeep.executor import in_order
 from seakeep.files import MARK, check_output, is_there, make_folder, write_netcdf, write_text
 from seakeep.signals.panel import opencv
@@ -27,12 +27,11 @@ from seakeep.tank.delivery import (
 )
 from seakeep.tank.dynamics import Rig, assemble_rig, simulate
 from seakeep.tank.hydrodynamics import excitation_at
-from seakeep.tank.instruments import Played, record_run
+from seakeep.tank.instruments import LOGGERS, Played, record_run
 from seakeep.tank.seas import Sea, sea_of_run
 from seakeep.tank.settings import TankSettings
 
 CAMPAIGN_FILE = "campaign.toml"
-LOGGERS = ("wave_probes", "mru", "loads", "video", "all")
 SINGLE_RATE = 100.0  # Hz, where all instruments share a logger
 MARGIN = 2.0  # s simulated before and after what any logger records
 STREAMS = {"waves": 0, "instruments": 1, "video": 3}
@@ -51,10 +50,8 @@ def _sea(settings: TankSettings, rig: Rig, name: str) -> Sea:
         )
     rng = generator(settings, name, "waves")
     sea = sea_of_run(name, settings.runs[name], settings.facility, rng)
-    try:
+    with naming(f"runs.{name}"):
         excitation_at(rig.hydro, sea.omega)
-    except RequestError as error:
-        raise RequestError(f"runs.{name}: {error}") from error
     return sea
 
 
@@ -82,7 +79,7 @@ def play_run(settings: TankSettings, name: str, rig: Rig | None = None) -> Playe
 
     A rig from :func:`check_settings` saves its making for each run.
     """
-    assembled = assemble_rig(settings) if rig is None else rig
+    assembled = rig or assemble_rig(settings)
     sea = _sea(settings, assembled, name)
     run = settings.runs[name]
     clocks = settings.instruments.clocks.values()
@@ -120,8 +117,8 @@ def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
         (``eta_NAME_crest``); clocks and seed in the attributes.
     """
     settings = played.settings
-    dt = played.rig.step if step is None else step
-    time = dt * np.arange(int(np.floor(played.length / dt + 1e-9)) + 1, dtype=float)
+    dt = step or played.rig.step
+    time = dt * np.arange(int(played.length / dt + 1e-9) + 1, dtype=float)
     q, v, a = played.states(time)
     values = {}
     for index, dof in enumerate(played.rig.names):
@@ -129,7 +126,7 @@ def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
         if index < 3:
             values[f"{dof}_rate"], values[f"{dof}_acceleration"] = v[index], a[index]
     values["surge_slow"] = np.interp(time, played.motion.time, played.motion.slow_surge)
-    for line, load in zip(played.rig.line_names, played.loads(time), strict=True):
+    for line, load in zip(settings.moorings, played.loads(time), strict=True):
         values[f"mooring_{line}"] = load
     values["eta_vessel"] = played.elevation(settings.vessel.position + q[0], time)
     for probe, at in settings.instruments.probes.items():
@@ -140,8 +137,8 @@ def truth(played: Played, name: str, step: float | None = None) -> xr.Dataset:
     data["time"].attrs = {"units": "s", "long_name": "time, reference clock"}
     for key, value in values.items():
         channel = canonical_channel(key)
-        known = (channel.units, channel.long_name) if channel else POOL_AND_DRIFT[key]
-        data[key] = "time", value, dict(zip(("units", "long_name"), known, strict=True))
+        unit, words = (channel.units, channel.long_name) if channel else POOL_AND_DRIFT[key]
+        data[key] = "time", value, {"units": unit, "long_name": words}
     for probe, at in settings.instruments.probes.items():
         data[f"eta_{probe}"].attrs["x_position"] = at.position
     data.attrs = {
@@ -177,7 +174,7 @@ def _check_outputs(folder: Path, names: list[str], kind: str) -> None:
         if hidden.exists():
             check_output(hidden, TRUTH)
         for path in written:
-            if path.stem in LOGGERS:
+            if path.stem in (*LOGGERS, "all"):
                 check_output(path, RAW, header=FIRST_LINE)
 
 
@@ -242,7 +239,7 @@ def play(
     files = {}
     for name, made in zip(chosen, in_order(_record_run, asked, chosen, executor), strict=True):
         files[name] = made
-        if progress is not None:
+        if progress:
             progress(len(files), len(chosen), name)
     relative = {
         run: {key: path.relative_to(folder).as_posix() for key, path in paths.items()}

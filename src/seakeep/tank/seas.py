@@ -7,9 +7,13 @@ the vessel's position at rest, downstream.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+from numpy.random import Generator
 
-from seakeep.arrays import ComplexArray, FloatArray
+from seakeep.arrays import (
+    ArrayLike,
+    ComplexArray,
+    FloatArray,
+)
 from seakeep.errors import RequestError
 from seakeep.tank.settings import FacilitySettings, RunPlan, SpectrumSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber
@@ -26,17 +30,17 @@ class Sea:
     phase: FloatArray
     wavenumber: FloatArray
 
-    def analytic(self, x: npt.ArrayLike, time: npt.ArrayLike) -> ComplexArray:
+    def analytic(self, x: ArrayLike, time: ArrayLike) -> ComplexArray:
         """Complex elevation: its real part is the elevation, its modulus the envelope.
 
         Places (m) are broadcast against instants (s).
         """
-        place, t = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(time, dtype=float))
+        place, t = np.broadcast_arrays(np.asarray(x, float), np.asarray(time, float))
         if np.ndim(x) == 0 and t.ndim == 1 and t.size > BLOCK:
             steps = np.diff(t)
             if np.ptp(steps) < 1e-9 * abs(steps[0]) + 1e-11:
-                return self._at_rest(float(place[0]), t)
-        out = np.zeros(t.shape, dtype=complex)
+                return self._at_rest(place[0], t)
+        out = np.zeros(t.shape, complex)
         for w, a, p, k in zip(self.omega, self.amplitude, self.phase, self.wavenumber, strict=True):
             out += a * np.exp(1j * (k * place - w * t + p))
         return out
@@ -50,10 +54,9 @@ class Sea:
         )
         inside = np.exp(-1j * np.outer(self.omega, step * np.arange(BLOCK)))
         # einsum, not a matrix product: its bits do not depend on the number of threads.
-        blocks = np.einsum("sn,nb->sb", heads, inside)
-        return blocks.ravel()[: time.size]
+        return np.einsum("sn,nb->sb", heads, inside).ravel()[: time.size]
 
-    def elevation(self, x: npt.ArrayLike, time: npt.ArrayLike) -> FloatArray:
+    def elevation(self, x: ArrayLike, time: ArrayLike) -> FloatArray:
         """Elevation at places and instants, m; a moving place has one x per instant."""
         return self.analytic(x, time).real
 
@@ -63,11 +66,11 @@ class Sea:
         energy = self.amplitude**2
         if not energy.sum() > 0:
             return 0.0
-        middle = int(np.argmin(np.abs(self.omega - np.average(self.omega, weights=energy))))
-        return float(self.wavenumber[middle])
+        middle = np.argmin(np.abs(self.omega - np.average(self.omega, weights=energy)))
+        return self.wavenumber[middle]
 
 
-def pierson_moskowitz(frequency: npt.ArrayLike, height: float, peak_period: float) -> FloatArray:
+def pierson_moskowitz(frequency: ArrayLike, height: float, peak_period: float) -> FloatArray:
     """Pierson–Moskowitz spectrum (m²/Hz; equation eq:pm of the paper) at frequencies in Hz.
 
     Examples
@@ -76,13 +79,13 @@ def pierson_moskowitz(frequency: npt.ArrayLike, height: float, peak_period: floa
     >>> round(float(4 * np.sqrt(np.sum(pierson_moskowitz(f, 0.15, 2.12)) * 0.001)), 4)
     0.15
     """
-    f = np.asarray(frequency, dtype=float)
+    f = np.asarray(frequency, float)
     relative = (peak_period * f) ** -4.0
     return 5 / 16 * height**2 * relative / f * np.exp(-1.25 * relative)
 
 
 def jonswap(
-    frequency: npt.ArrayLike, height: float, peak_period: float, peak_enhancement: float = 3.3
+    frequency: ArrayLike, height: float, peak_period: float, peak_enhancement: float = 3.3
 ) -> FloatArray:
     """JONSWAP spectrum (m²/Hz), normalised so that its significant height is `height`.
 
@@ -97,25 +100,24 @@ def jonswap(
 
     grid = np.geomspace(0.1, 40.0, 8001) / peak_period
     variance = np.trapezoid(shape(grid), grid)
-    return shape(np.asarray(frequency, dtype=float)) * (height**2 / 16 / variance)
+    return shape(np.asarray(frequency, float)) * (height**2 / 16 / variance)
 
 
-def spectral_density(settings: SpectrumSettings, frequency: npt.ArrayLike) -> FloatArray:
+def spectral_density(settings: SpectrumSettings, frequency: ArrayLike) -> FloatArray:
     """Density of a spectrum that settings describe, m²/Hz at frequencies in Hz.
 
     A table is interpolated linearly and is zero outside its span.
     """
-    f = np.asarray(frequency, dtype=float)
     if settings.kind == "table":
-        known = (np.asarray(settings.frequencies), np.asarray(settings.densities))
-        return np.interp(f, *known, left=0.0, right=0.0)
+        f = np.asarray(frequency, float)
+        return np.interp(f, settings.frequencies, settings.densities, left=0.0, right=0.0)
     height, period = settings.height or 0.0, settings.peak_period or 0.0
     if settings.kind == "jonswap":
-        return jonswap(f, height, period, settings.peak_enhancement)
-    return pierson_moskowitz(f, height, period)
+        return jonswap(frequency, height, period, settings.peak_enhancement)
+    return pierson_moskowitz(frequency, height, period)
 
 
-def irregular_sea(settings: SpectrumSettings, depth: float, rng: np.random.Generator) -> Sea:
+def irregular_sea(settings: SpectrumSettings, depth: float, rng: Generator) -> Sea:
     """Draw the components of an irregular sea, of amplitude √(2 E Δf) and random phase.
 
     Equal spacing repeats the sea's envelope after one over the spacing; jittered frequencies (one
@@ -135,14 +137,14 @@ def irregular_sea(settings: SpectrumSettings, depth: float, rng: np.random.Gener
 
 
 def regular_sea(
-    wavelength: float, height: float, unsteadiness: float, depth: float, rng: np.random.Generator
+    wavelength: float, height: float, unsteadiness: float, depth: float, rng: Generator
 ) -> Sea:
     """Draw a regular wave, with a sideband at either side unless it is steady.
 
     The sidebands lie 3–6 % away in frequency, `unsteadiness` of the wave's amplitude each, and
     make the height wander as a real wave maker's does.
     """
-    centre = float(wavelength_to_frequency(wavelength, depth))
+    centre = wavelength_to_frequency(wavelength, depth)
     phase = rng.uniform(0.0, 2 * np.pi, 3)
     shift = rng.uniform(0.03, 0.06, 2)
     omega = centre * np.array([1.0, 1.0 - shift[0], 1.0 + shift[1]])
@@ -152,19 +154,17 @@ def regular_sea(
     return Sea(omega, amplitude, phase, wavenumber(omega, depth))
 
 
-def sea_of_run(
-    name: str, run: RunPlan, facility: FacilitySettings, rng: np.random.Generator
-) -> Sea:
+def sea_of_run(name: str, run: RunPlan, facility: FacilitySettings, rng: Generator) -> Sea:
     """Sea of one run, checked against what the tank can make.
 
     Raises RequestError if a frequency or the height is beyond the wave maker.
     """
     low, high = facility.wave_band
     depth = facility.water_depth
-    if run.spectrum is not None:
+    if run.spectrum:
         sea = irregular_sea(run.spectrum, depth, rng)
         asked = run.spectrum.band
-        height = 4.0 * float(np.sqrt(0.5 * np.sum(sea.amplitude**2)))
+        height = 4.0 * np.sqrt(0.5 * np.sum(sea.amplitude**2))
     else:
         length, height = run.wavelength or 0.0, run.height or 0.0
         sea = regular_sea(length, height, run.unsteadiness, depth, rng)

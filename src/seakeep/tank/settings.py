@@ -15,6 +15,7 @@ from seakeep.files import read_bytes
 from seakeep.toml import (
     Count,
     Finite,
+    Listed,
     NotNegative,
     Pair,
     Positive,
@@ -26,7 +27,7 @@ from seakeep.toml import (
 
 DEFAULT = "tank/data/ck14e.toml"
 Logger = Literal["wave_probes", "mru", "loads", "video"]
-Point = Annotated[tuple[Finite, Finite], Field(strict=False)]
+Point = Annotated[tuple[Finite, Finite], Listed]
 Depth = Annotated[float, Field(ge=0.01, le=1e4, description="a depth of 0.01 to 10 000 m")]
 
 
@@ -107,8 +108,8 @@ class SpectrumSettings(Table):
     height: Positive | None = None
     peak_period: Positive | None = None
     peak_enhancement: Annotated[float, Field(ge=1, le=20)] = 3.3
-    frequencies: Annotated[tuple[Positive, ...], Field(strict=False)] = ()
-    densities: Annotated[tuple[NotNegative, ...], Field(strict=False)] = ()
+    frequencies: Annotated[tuple[Positive, ...], Listed] = ()
+    densities: Annotated[tuple[NotNegative, ...], Listed] = ()
     file: str = ""
     band: Band = (0.28, 1.13)
     components: Count = 100
@@ -117,7 +118,7 @@ class SpectrumSettings(Table):
     @model_validator(mode="after")
     def _complete(self) -> Self:
         if self.kind != "table":
-            if self.height is None or self.peak_period is None:
+            if not (self.height and self.peak_period):
                 raise ValueError(f"a {self.kind} spectrum needs height (m) and peak_period (s)")
             return self
         counts = len(self.frequencies), len(self.densities)
@@ -295,7 +296,7 @@ def with_waves(
     if seed is not None:
         table["seed"] = seed
     for run in table["runs"].values():
-        if spacing is not None and run["spectrum"] is not None:
+        if spacing and run["spectrum"]:
             run["spectrum"]["spacing"] = spacing
     return TankSettings.model_validate(table)
 

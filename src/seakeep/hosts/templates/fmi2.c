@@ -1,3 +1,4 @@
+{% set upper = name | upper %}
 /* {{ mark }} FMI 2.0 co-simulation around {{ name }}.c
  *
  * Types and functions are those of the FMI standard 2.0, sections 2.1 and 4.2.
