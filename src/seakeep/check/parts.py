@@ -175,6 +175,11 @@ def gathered(
     return results
 
 
+def deviations(runs: Mapping[str, FreeRun], kind: str) -> list[FloatArray]:
+    """Forecast or measurement ("forecast", "measured") of each free run, less its mean."""
+    return [x - x.mean(axis=0) for x in (getattr(run, kind) for run in runs.values())]
+
+
 def ratio(values: FloatArray, per: FloatArray) -> FloatArray:
     """Quotient; NaN where nothing is divided by."""
     out = np.full(values.shape, np.nan)

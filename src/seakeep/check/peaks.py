@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
-from seakeep.check.parts import Known, free_runs, irregular, judged, units_of
+from seakeep.check.parts import Known, deviations, free_runs, irregular, judged, units_of
 from seakeep.core.density import jensen_shannon, kernel_density
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
 from seakeep.errors import SeakeepError
@@ -58,10 +58,7 @@ def statistics(
     if duration is None:
         scale = next(iter(waves.values())).attrs.get("scale_factor", 1.0)
         duration = 3600 * HOURS / np.sqrt(scale)
-    moved = {
-        kind: [x - x.mean(axis=0) for x in (getattr(run, kind) for run in known.values())]
-        for kind in KINDS
-    }
+    moved = {kind: deviations(known, kind) for kind in KINDS}
     parts = []
     for column in range(len(model.states)):
         laws = [_law([x[:, column] for x in of], model.dt, duration) for of in moved.values()]

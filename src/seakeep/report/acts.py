@@ -477,13 +477,13 @@ def short_table(results: Results) -> Table:
     """
     last = list(results)[-1]
     rows = [
-        (said, *(" / ".join(pair) for pair in _pairs(results[act], model)))
+        (said, *(Number(" / ".join(pair)) for pair in _pairs(results[act], model)))
         for act, model, said in (*WORDS["rows"], (last, "hold_last", "last measured state"))
         if act in results
     ]
     first = results[last]
     seas = [*map(first.sea_of, first.tests)]
-    return table("short", rows, columns=("model", *seas), numeric=range(1, 1 + len(seas)))
+    return table("short", rows, columns=("model", *seas))
 
 
 def finding(results: Results) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, SupportsFloat
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import xarray as xr
 
 from seakeep.files import replacing, write_text
@@ -49,8 +49,7 @@ class Table:
         Cells.
     note : str
         What a reader must know about it.
-    numeric : sequence of int, optional
-        Columns of numbers; by default those whose cells are :class:`Number`.
+
     elsewhere : sequence of int
         Columns that come from another data set.
     averages : sequence of int
@@ -69,7 +68,7 @@ class Table:
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
-    numeric: Sequence[int] | None = None
+
     elsewhere: Sequence[int] = ()
     averages: Sequence[int] = ()
     marked: Sequence[int] = ()
@@ -78,9 +77,7 @@ class Table:
 
     @cached_property
     def numbers(self) -> frozenset[int]:
-        """Columns that hold numbers."""
-        if self.numeric is not None:
-            return frozenset(self.numeric)
+        """Columns that hold numbers: those whose cells are :class:`Number`."""
         columns = ([each for each in column if each] for column in zip(*self.rows, strict=True))
         return frozenset(
             k
@@ -382,11 +379,11 @@ def plain_cell(text: str) -> str:
     return text if text in ("-", MISSING) else f"'{text}"
 
 
-def write_csv(table: Table, path: Path) -> Path:
-    """Write a table as CSV (UTF-8)."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerows([*map(plain_cell, row)] for row in (table.columns, *table.rows))
+def write_frame(frame: pd.DataFrame, path: Path) -> Path:
+    """Write a table as CSV (UTF-8), in which no cell is a formula."""
+    plain = frame.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell)
+    with replacing(path) as temporary:
+        plain.rename(columns=plain_cell).to_csv(temporary, index=False, lineterminator="\n")
     return path
 
 
