@@ -71,7 +71,7 @@ CHANGES = {
     "check/response.py": [
         ("* dynamics.state_scale.std[:, None] / scale", "/ scale", "check/test_response.py::test_the_response_is_that_of_python_control"),
         ("early = np.exp(2j * np.pi", "early = np.exp(-2j * np.pi", "check/test_response.py::test_the_response_is_what_a_free_run_settles_to"),
-        ("np.hypot(radius, moved)[:, 0]", "radius[:, 0]", "check/test_response.py::test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectrum"),
+        ("np.hypot(radius, np.abs(gain - other(spectra.frequency)))", "radius", "check/test_response.py::test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectrum"),
         ("type_b = np.hypot(accuracy[1:], ratio * accuracy[0])", "type_b = np.hypot(accuracy[1:], 0 * ratio)", "check/test_response.py::test_accuracy_of_the_instruments_widens_the_interval"),
         ("phasors = np.nan_to_num(np.exp(-1j * turns))", "phasors = np.nan_to_num(np.exp(1j * turns))", "check/test_response.py::test_a_passing_wave_adds_the_probes"),
     ],

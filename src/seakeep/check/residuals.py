@@ -68,9 +68,23 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
     known = free_runs(model, runs, free)
     period = mean_period(runs, model.inputs) * model.dt
     lags = round(period / model.dt)
+
+    def one_step(name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Errors of one step over the test part, inputs and measured states at its instants."""
+        run = runs[name]
+        first, last = window_of(model, run)
+        forecasts = free_windows(model, run, run["time"].values[first:last], 1)[:, 0]
+        after = slice(first + 1, last + 1)
+        measured = channel_matrix(run, model.states, name, after)
+        inputs = channel_matrix(run, model.inputs, name, after)
+        sound = np.isfinite(forecasts).all(axis=1) & np.isfinite(measured).all(axis=1)
+        if sound.sum() < 2:
+            raise DataError("the model diverges, or nothing is measured.")
+        return (forecasts - measured)[sound], inputs[sound], measured[sound]
+
     stepped = gathered(
         known,
-        lambda name: _one_step(model, runs[name], name),
+        one_step,
         "no run can be judged. One-step errors of",
         "left out: one-step errors of",
     )
@@ -113,21 +127,6 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         },
         attrs={"instants": count, "encounter_period": period, "of": of},
     )
-
-
-def _one_step(
-    model: Model, run: xr.Dataset, name: str
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Errors of one step over the test part, inputs and measured states at the same instants."""
-    first, last = window_of(model, run)
-    forecasts = free_windows(model, run, run["time"].values[first:last], 1)[:, 0]
-    after = slice(first + 1, last + 1)
-    measured = channel_matrix(run, model.states, name, after)
-    inputs = channel_matrix(run, model.inputs, name, after)
-    sound = np.isfinite(forecasts).all(axis=1) & np.isfinite(measured).all(axis=1)
-    if sound.sum() < 2:
-        raise DataError("the model diverges, or nothing is measured.")
-    return (forecasts - measured)[sound], inputs[sound], measured[sound]
 
 
 def _aged(model: Model, run: xr.Dataset, name: str, lags: int) -> FloatArray:

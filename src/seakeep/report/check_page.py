@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -47,14 +48,13 @@ USES = {
 
 def worth_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the error over the tests beside that of baselines, the look-ahead and the verdict."""
-    points = [*_verdicts(result, checked.repeats)]
-    if (ahead := float(result["look_ahead"].max())) > 0:
-        points.append(
-            f"Look-ahead: the model reads the waves up to {ahead:.3g} s after the instant that it "
-            "forecasts. They must be measured up-wave, or predicted."
+    ahead = "none. No wave after the instant of the forecast is read."
+    if (seconds := float(result["look_ahead"].max())) > 0:
+        ahead = (
+            f"the model reads the waves up to {seconds:.3g} s after the instant that it forecasts. "
+            "They must be measured up-wave, or predicted."
         )
-    else:
-        points.append("Look-ahead: none. No wave after the instant of the forecast is read.")
+    points = [*_verdicts(result, checked.repeats), f"Look-ahead: {ahead}"]
     if state := result.attrs["conditional_on"]:
         points.append(
             f"All errors are conditional on measured {state}, which is read after the start."
@@ -172,20 +172,19 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
     measured, reference = checked.results.get("measured_response"), result.attrs["reference"]
     if "validation" in checked.refused:  # points beside the answer to something else
         measured = None
-    per, words, kinds, tables = reference, [], set(), []
+    per, words, tables = reference, [], []
     if "wave" in result["input"]:
         per = f"a wave that passes all probes, counted from {reference}"
     unknown = result["amplitude"].isnull().all(["input", "frequency"])
     if read := ", ".join(map(str, result["state"].values[unknown])):
         words.append(f"{read}: read off other states, so that no linear response stands for it.")
     if measured:
-        kinds = {*measured["kind"].values}
         tables.append(table("measured_response", _points(measured, result)))
-    if "irregular" in kinds:
-        words.append(
-            "Points of irregular waves are of all runs, training included. Their bars hold chance, "
-            "and the change from segments half as long, by which leakage is judged."
-        )
+        if "irregular" in measured["kind"]:
+            words.append(
+                "Points of irregular waves are of all runs, training included. Their bars hold "
+                "chance, and the change from segments half as long, by which leakage is judged."
+            )
     if "validation" in checked.results:
         tables.append(_validation_table(checked.results["validation"]))
     figure = drawing("response", checks.response, result, measured)
@@ -195,12 +194,11 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
 def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
     """Some variables in the units that are shown, and ``shown``: each state with its unit."""
     factors, units = zip(*map(displayed, result["units"].values), strict=True)
-    factor = xr.DataArray(list(factors), dims="state")
     names = [
         f"{state} [{shown_unit(unit)}]"
         for state, unit in zip(result["state"].values, units, strict=True)
     ]
-    scaled = {key: result[key] * factor for key in keys}
+    scaled = result[[*keys]] * xr.DataArray([*factors], dims="state")
     return result.assign(scaled).assign_coords(shown=("state", names))
 
 
@@ -238,8 +236,7 @@ def _validation_table(result: xr.Dataset) -> Table:
 def possible_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return coherence, and the least error of a linear map beside the model's."""
     rows, trained = [], checked.results.get("training_coherence")
-    advice = defaultdict(list)
-    unjudged = defaultdict(list)
+    advice, unjudged = defaultdict(list), defaultdict(list)
     worth, segment = checked.results.get("worth"), result.attrs["segment"]
     ahead = worth is not None and bool((worth["look_ahead"] > 0).any())
     for state in result["state"].values:
@@ -333,13 +330,10 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
 
 def _decay_table(result: xr.Dataset, measured: xr.Dataset | None) -> Table:
     """Period and damping of each motion of the model, and of each measured decay."""
-    cases = [(own, "model") for own in entries(result.assign(q=0), "motion")]
-    if measured:
-        cases += [(own, own["run"].item()) for own in entries(measured, "run")]
-    rows = [
-        (*row(own, "motion", period=3, damping_ratio=3, p=3, q=0 if of == "model" else 3), of)
-        for own, of in cases
-    ]
+    cells = partial(row, period=3, damping_ratio=3, p=3)
+    rows = [(*cells(own, "motion", q=0), "model") for own in entries(result.assign(q=0), "motion")]
+    for own in entries(measured, "run") if measured else ():
+        rows.append((*cells(own, "motion", q=3), *row(own, "run")))
     return table("decay", rows)
 
 
