@@ -4,7 +4,7 @@ import numpy as np
 import scipy
 import xarray as xr
 
-from seakeep.arrays import ComplexArray, Datasets, FloatArray, IntArray
+from seakeep.arrays import ComplexArray, Datasets, FloatArray
 from seakeep.check.parts import (
     HERTZ,
     driven,
@@ -190,6 +190,8 @@ PERIODS = 32
 """Encounter periods in which all probing waves repeat: differences are multiples of its inverse."""
 DIFFERENCES = 4
 """Difference frequencies, besides zero."""
+PROBED = 12
+"""Frequencies, of those that were trained, at which waves probe."""
 
 
 def drift(model: Model, runs: Datasets) -> xr.Dataset:
@@ -235,7 +237,11 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     reference = reference_probe(model, runs)
     samples = round(PERIODS * mean_period(runs, model.inputs))
     step = 1.0 / (samples * model.dt)
-    bins = _probed(single, step)
+    every = np.arange(1, int(0.4 / model.dt / step))
+    known = every[single.coverage.is_trained(step * every.astype(float)).any(axis=0)]
+    if not known.size:
+        raise DataError("training holds no waves by which the model could be probed.")
+    bins = known[np.linspace(0, known.size - 1, min(PROBED, known.size)).round().astype(int)]
     turns = wave_turns(model, runs, step * np.arange(bins[-1] + DIFFERENCES + 1), reference)
     if turns is None:
         if len(model.inputs) > 1:
@@ -248,12 +254,14 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     differences = step * np.arange(DIFFERENCES + 1, dtype=float)
     slow = transfer(model, single.dynamics, differences)
     still = _columns(single, np.zeros((samples, len(single.inputs))))
+    turn = 2 * np.pi * np.arange(samples) / samples
     forces = np.empty((len(single.states), DIFFERENCES + 1, bins.size), dtype=complex)
     for number, first in enumerate(bins):
         for apart in range(DIFFERENCES + 1):
-            waves = [first] if apart == 0 else [first, first + apart]
-            elevation = sum(_wave(samples, each, turns[each], amplitude) for each in waves)
-            rows = _columns(single, np.asarray(elevation)) - still
+            waves = np.unique([first, first + apart])[:, None, None]
+            cosines = np.cos(waves * turn[:, None] - turns[waves[:, 0]])
+            # Inputs that are not elevations are zero.
+            rows = _columns(single, amplitude * np.nan_to_num(cosines).sum(axis=0)) - still
             parts = np.fft.fft(rows, axis=0)[apart] / samples * (1 if apart == 0 else 2)
             forces[:, apart, number] = slow[apart] @ parts / (amplitude**2 * (2 if apart else 1))
     forces[read_off(model)] = np.nan
@@ -274,21 +282,6 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
         },
         attrs={"amplitude": amplitude, "reference": model.inputs[reference]},
     )
-
-
-def _probed(model: HankelDMDcModel, step: float) -> IntArray:
-    """Multiples of the step at which waves probe: up to twelve that were trained."""
-    every = np.arange(1, int(0.4 / model.dt / step))
-    known = every[model.coverage.is_trained(step * every.astype(float)).any(axis=0)]
-    if not known.size:
-        raise DataError("training holds no waves by which the model could be probed.")
-    return known[np.linspace(0, known.size - 1, min(12, known.size)).round().astype(int)]
-
-
-def _wave(samples: int, cycles: int, turns: FloatArray, amplitude: float) -> FloatArray:
-    """A wave at each input, (samples, input); inputs that are not elevations are zero."""
-    turn = 2 * np.pi * cycles * np.arange(samples) / samples
-    return amplitude * np.nan_to_num(np.cos(turn[:, None] - turns))
 
 
 def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:

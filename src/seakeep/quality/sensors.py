@@ -282,12 +282,26 @@ def compare_sensors(
     if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
         return nothing
     stuck = np.zeros(x.size, bool) if stuck_samples is None else np.asarray(stuck_samples, bool)
-    windows, spans = _windows(x, y, dt, length, period, stuck)
+
+    def moving(length: float) -> tuple[Lags, list[slice]]:
+        """Lags in windows with enough motion, and the samples of these."""
+        lags = windowed_lags(x, y, dt, length, 0.5 * period)
+        edges = np.stack([lags.centre - 0.5 * length, lags.centre + 0.5 * length], axis=1) / dt
+        spans = [slice(*each) for each in edges.round().astype(int).clip(0)]
+        motion = np.array([y[span].std() for span in spans])
+        free = np.array([not stuck[span].any() for span in spans])
+        moves = (motion > 0.3 * motion.max()) & np.isfinite(lags.lag)
+        # A sensor that sticks all the time is judged all the same.
+        moves &= free | ~np.any(moves & free)
+        clear = Lags(lags.centre[moves], lags.lag[moves], lags.correlation[moves])
+        return clear, [spans[k] for k in np.flatnonzero(moves)]
+
+    windows, spans = moving(length)
     if not spans:
         return nothing
     error, moved, own = (np.array([z[span].std() for span in spans]) for z in (x - y, y, x))
     motion, lags = float(np.sqrt(np.mean(moved**2))), windows.lag[_together(windows)]
-    short, _ = _windows(x, y, dt, 0.5 * length, period, stuck)
+    short, _ = moving(0.5 * length)
     straight = np.unwrap(short.lag[_together(short)], period=period)
     middle = float(np.median(lags))
     return Agreement(
@@ -303,22 +317,6 @@ def compare_sensors(
         centre=windows.centre,
         lags=windows.lag,
     )
-
-
-def _windows(
-    x: FloatArray, y: FloatArray, dt: float, length: float, period: float, stuck: BoolArray
-) -> tuple[Lags, list[slice]]:
-    """Lags in windows with enough motion, and the samples of these."""
-    lags = windowed_lags(x, y, dt, length, 0.5 * period)
-    edges = np.stack([lags.centre - 0.5 * length, lags.centre + 0.5 * length], axis=1) / dt
-    spans = [slice(*each) for each in edges.round().astype(int).clip(0)]
-    motion = np.array([y[span].std() for span in spans])
-    free = np.array([not stuck[span].any() for span in spans])
-    moving = (motion > 0.3 * motion.max()) & np.isfinite(lags.lag)
-    # A sensor that sticks all the time is judged all the same.
-    moving &= free | ~np.any(moving & free)
-    clear = Lags(lags.centre[moving], lags.lag[moving], lags.correlation[moving])
-    return clear, [spans[k] for k in np.flatnonzero(moving)]
 
 
 def _together(lags: Lags) -> BoolArray:

@@ -54,11 +54,11 @@ SINGLE, ENSEMBLE = "deterministic", "bayesian"
 def claims_table(results: Results) -> Table:
     """Each claim, our figure, and whether it holds, in the first act."""
     verdicts = {True: "holds", False: "does not", None: "cannot tell"}
-    limits = {"useful": USEFUL, "aged": 100 * AGED, "almost": 100 * ALMOST}
     acts, rows = Claims(results["paper"], Evidence(results["raw"])), []
     for key, (claim, how) in WORDS["claims"].items():
         figure, holds = acts.judge(key)
-        rows.append((claim, figure, verdicts[holds], how.format(**limits)))
+        judged = how.format(useful=USEFUL, aged=100 * AGED, almost=100 * ALMOST)
+        rows.append((claim, figure, verdicts[holds], judged))
     return table("claims", rows)
 
 
@@ -136,8 +136,7 @@ class Evidence:
     def variants(self, key: str) -> dict[str, FloatArray]:
         """A number of the models with λ, without, and truncated, over (training, 1)."""
         data = self.result.groups[f"regularisation/{SINGLE}"][key].transpose("variant", "training")
-        names = map(str, data["variant"].values)
-        return dict(zip(names, data.values[:, self.order, None], strict=True))
+        return {each["variant"].item(): each.values[self.order, None] for each in data}
 
 
 def _flat(drawn: FloatArray) -> FloatArray:
@@ -186,12 +185,14 @@ def _against_single(
     act: Evidence, tests: Sequence[str] = SEA, statistic: Statistic = _median
 ) -> dict[str, Interval]:
     """A statistic of the ensemble over that of the single model, in both measures."""
-    both = {
-        words: [act.cells(tests, (), key, m) for m in (ENSEMBLE, SINGLE)]
+    return {
+        words: act.interval(
+            _ratio(statistic),
+            *(act.cells(tests, (), key, model) for model in (ENSEMBLE, SINGLE)),
+            tests=tests,
+        )
         for key, words in HEADING.items()
     }
-    ratio = _ratio(statistic)
-    return {words: act.interval(ratio, *each, tests=tests) for words, each in both.items()}
 
 
 def _changes(ratios: Mapping[str, Interval]) -> str:
@@ -207,8 +208,10 @@ def _band(act: Evidence, channels: Sequence[str]) -> list[Interval]:
     inside = ((measured >= lower) & (measured <= upper)).mean(axis=2)
     width = (upper - lower).mean(axis=2) / measured.std(axis=1, ddof=1)
     judged = test["judged"].values[act.order][..., None]
-    cells = (np.where(judged, values, np.nan) for values in (inside, width))
-    return [act.interval(lambda drawn: average_of(_flat(drawn)), each) for each in cells]
+    return [
+        act.interval(lambda drawn: average_of(_flat(drawn)), np.where(judged, each, np.nan))
+        for each in (inside, width)
+    ]
 
 
 def _slack(act: Evidence, test: str, line: str) -> Interval:
@@ -370,10 +373,9 @@ class Claims(Evidence):
         errors = [self.error((test,), (line,)) for test in REGULAR]
         slack = [_slack(self.raw, test, line) for test in REGULAR]
         falls = [
-            errors[longer].below_other(errors[shorter])
-            for shorter, longer in pairwise(range(len(REGULAR)))
-            if slack[longer].upper + SLACKER < slack[shorter].lower
-            and np.isfinite([errors[longer].value, errors[shorter].value]).all()
+            longer.below_other(shorter)
+            for (shorter, wet), (longer, dry) in pairwise(zip(errors, slack, strict=True))
+            if dry.upper + SLACKER < wet.lower and np.isfinite([longer.value, shorter.value]).all()
         ]
         listed = ", ".join(e.text() if np.isfinite(e.value) else "only noise" for e in errors)
         parts = ", ".join(each.part() for each in slack)
@@ -427,31 +429,9 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
         "seed": last.attrs["seed"],
         "finished": finished(last),
     }
-    sections = [_summary(results)]
-    if {"paper", "raw"} <= set(results):
-        sections.append(section("claims", claims_table(results)))
-    divergence = divergence_table(first, "bayesian", "paper")
-    links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
-    sections += [
-        section("channels", acts_table(results)),
-        Section(
-            "densities", "Divergence of the densities, beside the paper's", tables=(divergence,)
-        ),
-        section("waves", *wave_tables(first)),
-        section("studies", links=links),
-    ]
-    return write_page(folder, "The paper's study on the virtual tank", stamp, sections, progress)
-
-
-def _played(results: Results) -> list[Act]:
-    return [act for act in ACTS if act.name in results]
-
-
-def _summary(results: Results) -> Section:
-    """What the acts found: one sentence, one figure, one short table."""
     short = short_table(results)
-    repeats = [result.groups.get("repeats") for result in results.values()]
-    return section(
+    repeats = [result.groups.get("repeats") for result in every]
+    summary = section(
         "summary",
         drawing("acts", acts_figure, results),
         replace(short, note=f"{short.note} {still_water(results)}"),
@@ -460,6 +440,23 @@ def _summary(results: Results) -> Section:
         # Once what several studies warn of.
         notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each)),
     )
+    sections = [summary]
+    if {"paper", "raw"} <= set(results):
+        sections.append(section("claims", claims_table(results)))
+    divergence = divergence_table(first, "bayesian", "paper")
+    title = "Divergence of the densities, beside the paper's"
+    links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
+    sections += [
+        section("channels", acts_table(results)),
+        Section("densities", title, tables=(divergence,)),
+        section("waves", *wave_tables(first)),
+        section("studies", links=links),
+    ]
+    return write_page(folder, "The paper's study on the virtual tank", stamp, sections, progress)
+
+
+def _played(results: Results) -> list[Act]:
+    return [act for act in ACTS if act.name in results]
 
 
 def short_table(results: Results) -> Table:

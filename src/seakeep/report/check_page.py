@@ -306,10 +306,15 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
     words, points = [], []
     parts: list[Drawing | Table] = []
     if result := checked.results.get("decay"):
-        parts = [
-            drawing("decay", checks.decay, result),
-            _decay_table(result, checked.results.get("measured_decay")),
+        cells = partial(row, period=3, damping_ratio=3, p=3)
+        rows = [
+            (*cells(own, "motion", q=0), "model") for own in entries(result.assign(q=0), "motion")
         ]
+        if measured := checked.results.get("measured_decay"):
+            rows += [
+                (*cells(at, "motion", q=3), *row(at, "run")) for at in entries(measured, "run")
+            ]
+        parts = [drawing("decay", checks.decay, result), table("decay", rows)]
         most = np.abs(result["displacement"].values).max(axis=1)
         # None swings farther than it was moved in still water.
         points = [
@@ -324,26 +329,14 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
             "with fewer than three extremes has neither period nor damping: it creeps back, or its "
             "forecast leans on the waves and forgets the state."
         )
-    figure = drawing("modes", checks.modes, modes) if modes.sizes["state"] > 1 else None
-    return section("modes", *parts, figure, _modes_table(modes), more=words, points=points)
-
-
-def _decay_table(result: xr.Dataset, measured: xr.Dataset | None) -> Table:
-    """Period and damping of each motion of the model, and of each measured decay."""
-    cells = partial(row, period=3, damping_ratio=3, p=3)
-    rows = [(*cells(own, "motion", q=0), "model") for own in entries(result.assign(q=0), "motion")]
-    for own in entries(measured, "run") if measured else ():
-        rows.append((*cells(own, "motion", q=3), *row(own, "run")))
-    return table("decay", rows)
-
-
-def _modes_table(result: xr.Dataset) -> Table:
     rows = []
-    for own in entries(result, "mode"):
-        parts = own["participation"].to_series().sort_values(ascending=False, kind="stable")[:2]
-        taking = ", ".join(f"{state} {part:.2f}" for state, part in parts.items())
+    for own in entries(modes, "mode"):
+        shares = own["participation"].to_series().sort_values(ascending=False, kind="stable")[:2]
+        taking = ", ".join(f"{state} {part:.2f}" for state, part in shares.items())
         rows.append((*row(own, period=4, damping_ratio=4, decay_time=4, modulus=4), taking))
-    return table("modes", rows, modes=len(rows))
+    figure = drawing("modes", checks.modes, modes) if modes.sizes["state"] > 1 else None
+    listed = table("modes", rows, modes=len(rows))
+    return section("modes", *parts, figure, listed, more=words, points=points)
 
 
 def residuals_section(result: xr.Dataset, checked: Checked) -> Section:

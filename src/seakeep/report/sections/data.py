@@ -101,23 +101,21 @@ UNITS = WORDS["units"]
 
 
 def settings(result: StudyResult) -> Section:
-    """Return settings, training sets and test windows."""
+    """Return settings, defaults included, training sets and test windows."""
     note = result.attrs.get("waves_note")
     waves = f"Waves of the virtual tank: {note}." if note else ""
     models = [
-        (
-            model_words(model),
-            key.replace("_", " "),
-            setting_text(key, each["value"]),
-            each["source"],
-        )
-        for model, stated in result.model_settings.items()
+        (model_words(m), key.replace("_", " "), setting_text(key, each["value"]), each["source"])
+        for m, stated in result.model_settings.items()
         for key, each in stated["settings"].items()
     ]
+    every = {key: value for key, value in result.settings.items() if key != "models"}
+    every["statistics"] = {**every["statistics"], "calibrate": result.is_calibrated}
+    stated = [(key, setting_text(key, value)) for key, value in _leaves("", every)]
     return section(
         "settings",
         table("models", models),
-        table("settings", [*_data_settings(result), *_stated_settings(result)]),
+        table("settings", [*_data_settings(result), *stated]),
         _windows_table(result),
         more=(waves, training_overlap(result)[1], test_overlap(result)),
     )
@@ -183,14 +181,6 @@ def _data_settings(result: StudyResult) -> Iterator[tuple[str, str]]:
     yield "mean encounter period T̂", f"{period:.4f} s, {origin}"
     yield "time step", f"{dt:.4g} s, {period / dt:.4g} samples per period"
     yield "filter before resampling", " and ".join(filters) or "none"
-
-
-def _stated_settings(result: StudyResult) -> Iterator[tuple[str, str]]:
-    """Settings of the study, defaults included."""
-    every = {key: value for key, value in result.settings.items() if key != "models"}
-    every["statistics"] = {**every["statistics"], "calibrate": result.is_calibrated}
-    for key, value in _leaves("", every):
-        yield key, setting_text(key, value)
 
 
 def _windows_table(result: StudyResult) -> Table:
@@ -301,12 +291,10 @@ def test_overlap(result: StudyResult) -> str:
         for test, share in shares.items()
         if share >= APART
     ]
-    if not said:
-        return ""
     return (
         f"Test windows overlap; the mean share of one that others cover too: {', '.join(said)}. "
         "Errors over them are not independent."
-    )
+    ) * bool(said)
 
 
 def finished(result: StudyResult) -> str:
