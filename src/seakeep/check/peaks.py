@@ -1,5 +1,7 @@
 """Statistics of responses, as designers read them: measured against forecast."""
 
+from contextlib import suppress
+
 import numpy as np
 import xarray as xr
 
@@ -90,25 +92,18 @@ def _densities(both: FloatArray) -> tuple[FloatArray, FloatArray]:
     return grids, densities
 
 
-def _peaks(moved: list[FloatArray], dt: float) -> tuple[FloatArray, FloatArray]:
-    """Peaks and zero-crossing periods of the deviations of several records."""
-    peaks, periods = [np.empty(0)], [np.empty(0)]
+def _law(moved: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
+    """Statistics of the deviations of several records of a state; peaks largest first."""
+    every, between = [np.empty(0)], [np.empty(0)]  # peaks and zero-crossing periods
     for x in moved:
         if not np.all(np.isfinite(x)):
             continue  # a free run that was lost
-        try:
+        with suppress(SeakeepError):  # a record without waves has no peaks
             crossings = zero_up_crossings(x, dt)
-        except SeakeepError:  # a record without waves has no peaks
-            continue
-        if crossings.size > 1:
-            peaks.append(peaks_between(x, crossings / dt))
-            periods.append(np.diff(crossings))
-    return np.concatenate(peaks), np.concatenate(periods)
-
-
-def _law(moved: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
-    """Statistics of the deviations of several records of a state; peaks largest first."""
-    peaks, periods = _peaks(moved, dt)
+            if crossings.size > 1:
+                every.append(peaks_between(x, crossings / dt))
+                between.append(np.diff(crossings))
+    peaks, periods = np.concatenate(every), np.concatenate(between)
     rank = np.arange(1, peaks.size + 1)
     spread = np.sqrt(np.mean(np.concatenate(moved) ** 2))
     period = periods.mean() if periods.size else np.nan

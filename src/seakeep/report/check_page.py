@@ -179,7 +179,20 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
     if read := ", ".join(map(str, result["state"].values[unknown])):
         words.append(f"{read}: read off other states, so that no linear response stands for it.")
     if measured:
-        tables.append(table("measured_response", _points(measured, result)))
+        # Those of irregular waves stand in the figure.
+        at = measured.sel(point=measured["kind"] == "regular")
+        at = at.assign_coords(units=("state", result["units"].isel(input=-1).values))
+        points = [
+            (
+                *row(own, "run", frequency=3, wave_amplitude=4),
+                *row(own, "shown"),
+                *(uncertain(own[k], own[f"{k}_uncertainty"]) for k in ("amplitude", "phase")),
+            )
+            for own in entries(
+                _as_shown(at, "amplitude", "amplitude_uncertainty"), "point", "state"
+            )
+        ]
+        tables.append(table("measured_response", points))
         if "irregular" in measured["kind"]:
             words.append(
                 "Points of irregular waves are of all runs, training included. Their bars hold "
@@ -200,20 +213,6 @@ def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
     ]
     scaled = result[[*keys]] * xr.DataArray([*factors], dims="state")
     return result.assign(scaled).assign_coords(shown=("state", names))
-
-
-def _points(measured: xr.Dataset, result: xr.Dataset) -> list[tuple[str, ...]]:
-    """Measured response in regular waves; irregular ones stand in the figure."""
-    at = measured.sel(point=measured["kind"] == "regular")
-    at = at.assign_coords(units=("state", result["units"].isel(input=-1).values))
-    return [
-        (
-            *row(own, "run", frequency=3, wave_amplitude=4),
-            *row(own, "shown"),
-            *(uncertain(own[key], own[f"{key}_uncertainty"]) for key in ("amplitude", "phase")),
-        )
-        for own in entries(_as_shown(at, "amplitude", "amplitude_uncertainty"), "point", "state")
-    ]
 
 
 def _validation_table(result: xr.Dataset) -> Table:

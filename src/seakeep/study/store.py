@@ -95,7 +95,15 @@ class UnitFolder:
         with storing(self.folder):
             units.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=units).close()
-        started = _read_header(header) if header.exists() else None
+        started = None
+        if header.exists():
+            with suppress(RequestError, ValueError, RecursionError):
+                started = json.loads(read_bytes(header))
+            if not isinstance(started, dict) or "digest" not in started:
+                raise RequestError(
+                    f"{header} is damaged or belongs to no study. Give another folder with -o, or "
+                    "remove this one."
+                )
         is_finished = (self.folder / RESULT).exists()
         if started is not None and (is_finished or any(units.glob("*.nc"))):
             if started["digest"] != self.digest:
@@ -183,19 +191,6 @@ class UnitFolder:
             path.unlink(missing_ok=True)
         with suppress(OSError):  # files of others stay
             (self.folder / UNITS).rmdir()
-
-
-def _read_header(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(read_bytes(path))
-    except (RequestError, ValueError, RecursionError):
-        content = None
-    if not isinstance(content, dict) or "digest" not in content:
-        raise RequestError(
-            f"{path} is damaged or belongs to no study. Give another folder with -o, or remove "
-            "this one."
-        )
-    return content
 
 
 @dataclass(frozen=True, eq=False)

@@ -447,8 +447,14 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
             at.set_facecolor(PALETTE["blush"])
         at.plot(time, x, color=COLOURS["measured"], linewidth=0.6)
         at.set_ylabel(label, fontsize=8)
-        if f"{name}_flags" in run.coords:
-            _mark(at, time, x, run[f"{name}_flags"].values)
+        if f"{name}_flags" in run.coords and (flags := run[f"{name}_flags"].values).any():
+            filled = over_gaps(x)  # a sample that is not there stands between its neighbours
+            for word, bit in FLAGS.items():
+                if (hit := (flags & bit) > 0).any():
+                    style = {**FLAGGED[word], "markersize": 3.5, "linestyle": "none"}
+                    at.plot(time[hit], filled[hit], label=word, zorder=3, **style)
+            place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
+            at.legend(**place, fontsize=7, ncols=6, borderpad=0.1)
         known = x[np.isfinite(x)]
         if known.size and np.ptp(known) <= 1e-9 * max(np.abs(known).max(), 1e-300):
             value = known[0]  # an axis that shows no rounding
@@ -477,18 +483,6 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
     left_out = len(run.data_vars) - len(names)
     axes[-1].set_xlabel("time [s]" + f" ({left_out} more channels)" * bool(left_out))
     return figure
-
-
-def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
-    filled = over_gaps(x)  # a sample that is not there stands between its neighbours
-    for word, bit in FLAGS.items():
-        hit = (flags & bit) > 0
-        if hit.any():
-            style = {**FLAGGED[word], "markersize": 3.5, "linestyle": "none"}
-            at.plot(time[hit], filled[hit], label=word, zorder=3, **style)
-    if flags.any():
-        place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
-        at.legend(**place, fontsize=7, ncols=6, borderpad=0.1)
 
 
 @figure_style()
