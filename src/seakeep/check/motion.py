@@ -1,10 +1,12 @@
 """Motion by a model's matrices: its modes, its decay beside the vessel's, and its second order."""
 
+from typing import Any
+
 import numpy as np
 import scipy
 import xarray as xr
 
-from seakeep.arrays import ComplexArray, Datasets, FloatArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
     HERTZ,
     driven,
@@ -254,17 +256,31 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     differences = step * np.arange(DIFFERENCES + 1, dtype=float)
     slow = transfer(model, single.dynamics, differences)
     still = _columns(single, np.zeros((samples, len(single.inputs))))
-    turn = 2 * np.pi * np.arange(samples) / samples
     forces = np.empty((len(single.states), DIFFERENCES + 1, bins.size), dtype=complex)
     for number, first in enumerate(bins):
         for apart in range(DIFFERENCES + 1):
             waves = np.unique([first, first + apart])[:, None, None]
-            cosines = np.cos(waves * turn[:, None] - turns[waves[:, 0]])
+            turn = 2 * np.pi * waves * np.arange(samples)[:, None] / samples
             # Inputs that are not elevations are zero.
-            rows = _columns(single, amplitude * np.nan_to_num(cosines).sum(axis=0)) - still
+            elevation = amplitude * np.nan_to_num(np.cos(turn - turns[waves[:, 0]]))
+            rows = _columns(single, elevation.sum(axis=0)) - still
             parts = np.fft.fft(rows, axis=0)[apart] / samples * (1 if apart == 0 else 2)
             forces[:, apart, number] = slow[apart] @ parts / (amplitude**2 * (2 if apart else 1))
     forces[read_off(model)] = np.nan
+    # Offsets of regular runs from the model's rest, per amplitude squared.
+    offsets: dict[str, Any] = {}
+    if regular := {name: run for name, run in runs.items() if is_regular(run)}:
+        at = measured_response(model, regular)
+        means = np.concatenate([single.input_scale.mean, single.signature.direct_scale.mean])
+        rest = single.state_mean + slow[0].real @ (still[0] - means)
+        square = at["wave_amplitude"].values[:, None] ** 2
+        offset = at["offset"].values + single.state_scale.centre - rest
+        offsets = {
+            "offset": (("point", "state"), offset / square),
+            "offset_uncertainty": (("point", "state"), at["offset_uncertainty"].values / square),
+            "run": ("point", at["run"].values),
+            "point_frequency": ("point", at["frequency"].values, {"units": "Hz"}),
+        }
     slow_response = np.abs(forces)
     slow_response[:, 0] = forces[:, 0].real  # the mean has a sign
     dims = ("state", "difference", "frequency")
@@ -272,7 +288,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
         {
             "slow_response": (dims, slow_response),
             "phase": (dims, np.degrees(np.angle(forces)), {"units": "deg"}),
-            **_offsets(single, runs, slow[0], still),
+            **offsets,
         },
         coords={
             "state": single.states,
@@ -292,24 +308,3 @@ def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:
     first = before * size
     tiled = np.tile(inputs, (before + 1 + after, 1))
     return driven(input_map, tiled, None, first, first + size)
-
-
-def _offsets(
-    model: HankelDMDcModel, runs: Datasets, static: ComplexArray, still: FloatArray
-) -> dict[str, object]:
-    """Offsets of regular runs from the model's rest, per amplitude squared."""
-    regular = {name: run for name, run in runs.items() if is_regular(run)}
-    if not regular:
-        return {}
-    at = measured_response(model, regular)
-    means = np.concatenate([model.input_scale.mean, model.signature.direct_scale.mean])
-    rest = model.state_mean + static.real @ (still[0] - means)
-    square = at["wave_amplitude"].values[:, None] ** 2
-    offset = at["offset"].values + model.state_scale.centre - rest
-    over = ("point", "state")
-    return {
-        "offset": (over, offset / square),
-        "offset_uncertainty": (over, at["offset_uncertainty"].values / square),
-        "run": ("point", at["run"].values),
-        "point_frequency": ("point", at["frequency"].values, {"units": "Hz"}),
-    }

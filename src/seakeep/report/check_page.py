@@ -65,12 +65,19 @@ def worth_section(result: xr.Dataset, checked: Checked) -> Section:
         points += [
             f"{run}: outside what trained the model ({why})." for run, why in _outside(validity)
         ]
+    verdicts = []
+    for own in entries(result.isel(state=slice(1, None)), "waves", "state"):
+        beside = (MISSING, MISSING, MISSING)
+        if best := own["best"].item():
+            beside = (best, number(own["nrmse"].sel(model=best)), _change(own, best))
+        use = USES.get(float(own["limit"]), "not judged").partition(" (")[0]
+        verdicts.append((*row(own, "state", "waves"), *_cells(own, "nrmse")[:2], *beside, use))
     one, runs = result.attrs["of"].removesuffix("s"), result["run"].values
     errors = [(each["channel"].item(), *numbers(each)) for each in result["run_nrmse"]]
     return section(
         "worth",
         _by_run(result, one),
-        _by_state(result),
+        table("verdicts", verdicts),
         table("worth_of_runs", errors, columns=("state", *runs)),
         one=one,
         runs=runs.size,
@@ -147,18 +154,6 @@ def _cells(at: xr.Dataset, key: str) -> list[Number]:
     """Error of the model, its interval, and the errors of the baselines."""
     first, *others = numbers(at[key])
     return [first, interval(at.sel(model="model"), key), *others]
-
-
-def _by_state(result: xr.Dataset) -> Table:
-    """Mean error of each state, the best baseline, and the verdict."""
-    rows = []
-    for one in entries(result.isel(state=slice(1, None)), "waves", "state"):
-        beside = (MISSING, MISSING, MISSING)
-        if best := one["best"].item():
-            beside = (best, number(one["nrmse"].sel(model=best)), _change(one, best))
-        use = USES.get(float(one["limit"]), "not judged").partition(" (")[0]
-        rows.append((*row(one, "state", "waves"), *_cells(one, "nrmse")[:2], *beside, use))
-    return table("verdicts", rows)
 
 
 def _outside(validity: xr.Dataset) -> list[tuple[str, str]]:

@@ -67,7 +67,7 @@ class Section:
     terms : sequence of (str, str)
         Words and what they mean.
     histories : dict, optional
-        Data of an interactive plot, from :func:`seakeep.report.sections.histories.history_data`.
+        Data of an interactive plot, from :func:`seakeep.report.sections.histories.explorer`.
     figures : sequence of Drawing
         Figures.
     tables : sequence of Table

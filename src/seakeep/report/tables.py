@@ -463,13 +463,26 @@ def latex_text(text: str) -> str:
 
 def write_latex(table: Table, path: Path) -> Path:
     r"""Write a table as LaTeX with booktabs rules; longer than a page it is a longtable."""
+    columns = list(zip(table.columns, *table.rows, strict=True))
+    longest = [max(map(len, column)) for column in columns]
+    wide = [length for length in longest if length > WIDE]
+    room = 1.0 - sum(length + 2 for length in longest if length <= WIDE) / LINE
+    part = max(room, 0.12 * len(wide)) / max(sum(wide), 1)
+    breaks = sum(longest) > LINE
+    # Numbers to the right, text to the left, long text in lines that break.
+    form = "".join(
+        rf"p{{{part * length:.2f}\linewidth}}"
+        if breaks and length > WIDE
+        else "lr"[k in table.numbers]
+        for k, length in enumerate(longest)
+    )
     rows = [
         "\\midrule\n" * (k in table.averages) + _latex_line(row) for k, row in enumerate(table.rows)
     ]
     text = (_LONG if len(table.rows) > PAGE else _SHORT).format(
         name=table.name,
         caption=latex_text(f"{table.title}. {table.note}".strip()),
-        form=_latex_columns(table),
+        form=form,
         head=f"\\toprule\n{_latex_line(table.columns)}\n\\midrule",
         body="\n".join(rows),
     )
@@ -504,19 +517,3 @@ _LONG = r"""\begingroup\small
 
 def _latex_line(cells: Iterable[str]) -> str:
     return " & ".join(map(latex_text, cells)) + r" \\"
-
-
-def _latex_columns(table: Table) -> str:
-    """Columns of numbers to the right, of text to the left, of long text in lines that break."""
-    columns = list(zip(table.columns, *table.rows, strict=True))
-    longest = [max(map(len, column)) for column in columns]
-    wide = [length for length in longest if length > WIDE]
-    room = 1.0 - sum(length + 2 for length in longest if length <= WIDE) / LINE
-    part = max(room, 0.12 * len(wide)) / max(sum(wide), 1)
-    breaks = sum(longest) > LINE
-    return "".join(
-        rf"p{{{part * length:.2f}\linewidth}}"
-        if breaks and length > WIDE
-        else "lr"[k in table.numbers]
-        for k, length in enumerate(longest)
-    )

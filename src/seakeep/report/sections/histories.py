@@ -18,11 +18,6 @@ from seakeep.study import StudyResult
 MISSING = 65535
 
 
-def explorer(result: StudyResult) -> Section:
-    """Return the interactive plot: all windows and training sets."""
-    return section("explore", histories=history_data(result))
-
-
 def histories(result: StudyResult) -> Section:
     """Return figures of the cells that are shown."""
     words = {
@@ -54,15 +49,15 @@ def pack(values: npt.ArrayLike) -> dict[str, Any]:
     return {"low": low, "high": high, "data": base64.b64encode(codes.tobytes()).decode()}
 
 
-def history_data(result: StudyResult) -> dict[str, Any] | None:
-    """What there is to choose from, and the cell that the plot opens with; None if there are none.
+def explorer(result: StudyResult) -> Section:
+    """Return the interactive plot: what there is to choose from, and the cell that it opens with.
 
     All other cells lie in files of :func:`write_histories`, which the page loads when they are
     chosen.
     """
     cells = shown_cells(result)
     if not cells:
-        return None
+        return section("explore")
     test, training, window = cells[0]
     units = _shown(result)
     channels, waves = (
@@ -97,7 +92,7 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
         }
         for name, data in result.tests.items()
     ]
-    return {
+    data = {
         "step": result.dt,
         "channels": channels,
         "waves": waves,
@@ -111,6 +106,7 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
             "cell": _cells(result, test)(training, window),
         },
     }
+    return section("explore", histories=data)
 
 
 def write_histories(result: StudyResult) -> None:

@@ -182,7 +182,19 @@ def findings(result: StudyResult) -> list[str]:
     said += filter(None, [unequal_training(result)])
     for model in ensembles:
         said += _coverage_findings(result, model)
-    return said + _fewer_windows(result)
+    # Of which windows, placed without overlap, fewer fit than were asked for.
+    settings, places = result.settings, []
+    if settings["training"]["scheme"] == "halves":
+        used = result.groups["training"].sizes["training"]
+        places.append(("training windows", settings["training"]["windows"], used))
+    for name, data in result.tests.items():
+        asked = settings["tests"][name]["windows"]
+        places.append((f"test windows of {result.label_of(name)}", asked, data.sizes["window"]))
+    return said + [
+        f"{used} {what} were used of the {asked} asked for: no more fit without overlap."
+        for what, asked, used in places
+        if asked is not None and used < asked
+    ]
 
 
 def _verdict(result: StudyResult, test: str, ensemble: str, single: str, measure: str) -> str:
@@ -223,22 +235,6 @@ def _coverage_findings(result: StudyResult, model: str) -> list[str]:
         f"{percent(inside)} % of the measured instants of {result.label_of(first)}, {words}: "
         f"it carries the spread of the hyperparameters, and no noise or model error.{calibrated}",
         f"{lost} of {total} member forecasts diverged and were left out of mean and band.",
-    ]
-
-
-def _fewer_windows(result: StudyResult) -> list[str]:
-    """Say of which windows, placed without overlap, fewer fit than were asked for."""
-    settings, places = result.settings, []
-    if settings["training"]["scheme"] == "halves":
-        used = result.groups["training"].sizes["training"]
-        places.append(("training windows", settings["training"]["windows"], used))
-    for name, data in result.tests.items():
-        asked = settings["tests"][name]["windows"]
-        places.append((f"test windows of {result.label_of(name)}", asked, data.sizes["window"]))
-    return [
-        f"{used} {what} were used of the {asked} asked for: no more fit without overlap."
-        for what, asked, used in places
-        if asked is not None and used < asked
     ]
 
 
