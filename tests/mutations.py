@@ -500,7 +500,7 @@ CHANGES = {
         ("each[..., 1, :] - 1j * each[..., 2, :] for each", "each[..., 1, :] + 1j * each[..., 2, :] for each", "study/test_response.py::test_the_parts_are_what_the_forecast_was_made_of"),
         ("low, high = np.maximum(count - 1, 0) // 2, count // 2", "low, high = count // 2, count // 2", "study/test_statistics.py::test_medians_leave_out_what_is_not_judged"),
         ("fitted - offset, total - fitted])", "fitted - offset, total])", "study/test_response.py::test_the_parts_are_what_the_forecast_was_made_of"),
-        ("ratio(cells[None])[0], *bounds]) - 1.0", "ratio(cells[None])[0], *bounds])", "study/test_statistics.py::test_differences_between_models_have_intervals_and_verdicts"),
+        ("blocks=blocks, n_series=DIFFERENCES) - 1.0", "blocks=blocks, n_series=DIFFERENCES)", "study/test_statistics.py::test_differences_between_models_have_intervals_and_verdicts"),
         ("measured.var(axis=1, ddof=1)", "measured.var(axis=1)", "study/test_response.py::test_the_squares_add_up_to_that_of_the_error"),
     ],
     "study/plan.py": [

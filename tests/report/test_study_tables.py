@@ -5,14 +5,13 @@ import io
 import re
 
 import numpy as np
-import pandas as pd
 import pytest
 import xarray as xr
 from rich.console import Console
 
 from seakeep.report.quality_sheet import clock_rows
 from seakeep.report.sections.data import setting_text
-from seakeep.report.tables import Table, number, rich_tables, write_frame
+from seakeep.report.tables import Table, number, rich_tables, write_csv
 from seakeep.signals.synchronisation import Clock
 
 
@@ -45,8 +44,8 @@ def test_settings_are_words_and_not_code(key, value, words):
 def test_no_cell_of_a_csv_file_is_a_formula(tmp_path):
     names = ("=1+1", "@SUM(A1)", "+cmd|' /C calc'!A0", "-2+HYPERLINK(A1)", "\tx")
     numbers = ("-0.4", "+370.00 ± 0.10 ms", "–", "-", "heave")
-    table = pd.DataFrame({"=head": names + numbers})
-    with write_frame(table, tmp_path / "t.csv").open(encoding="utf-8", newline="") as file:
+    table = Table("t", "T", ("=head",), tuple((each,) for each in names + numbers))
+    with write_csv(table, tmp_path / "t.csv").open(encoding="utf-8", newline="") as file:
         rows = [row[0] for row in csv.reader(file)]
     assert rows == ["'=head", *(f"'{name}" for name in names), *numbers]
 

@@ -1,6 +1,6 @@
 """The page over the acts of ``seakeep reproduce``: side by side, and against the paper's claims."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain, pairwise
@@ -19,22 +19,22 @@ from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.results import divergence_table
 from seakeep.report.style import HEADING, model_words
 from seakeep.report.tables import WORDS, Interval, Number, Table, number, numbers, ratio_of, table
-from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import (
+    Statistic,
     average_of,
     band_of,
     blocks_of,
     median_of,
     phase_leads,
     training_order,
+    with_bounds,
 )
 from seakeep.study.plan import random_stream
 from seakeep.study.reproduce import ACTS, NOTE, SLOW, Act
 
 Results = Mapping[str, StudyResult]
-Statistic = Callable[..., FloatArray]
 Judged = tuple[str, bool | None]
 """Our number, and whether the claim holds: None where the study cannot tell."""
 
@@ -125,9 +125,8 @@ class Evidence:
         of_tests = [self.result.tests[test] for test in tests]
         blocks = blocks_of(of_tests, self.result.groups["training"])
         rng = random_stream(int(self.result.attrs["seed"]), "claims")
-        bounds = two_way_interval(statistic, *cells, rng=rng, blocks=blocks, signed=signed)
-        value = statistic(*(each[None] for each in cells))
-        return Interval(*map(float, (*value, *bounds)))
+        numbers = with_bounds(statistic, *cells, rng=rng, blocks=blocks, signed=signed)
+        return Interval(*map(float, numbers))
 
     def error(self, tests: Sequence[str] = SEA, *of: Any, **named: str) -> Interval:
         """Median of the errors of :meth:`cells`, averaged over the channels."""
@@ -322,12 +321,9 @@ class Claims(Evidence):
             for values in (test["measured"].values, forecasts)
         )
         errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
-        of_lines = [self.raw.interval(_median, errors[..., [k]]) for k in range(len(LOADS))]
-        words = ", ".join(
-            f"{name.removeprefix('mooring_')} {each.text()}"
-            for name, each in zip(LOADS, of_lines, strict=True)
-        )
-        return f"act (b): {words}", all_of(each.below(1.0) for each in of_lines)
+        of = {line: self.raw.interval(_median, errors[..., [k]]) for k, line in enumerate(LOADS)}
+        words = [f"{line.removeprefix('mooring_')} {each.text()}" for line, each in of.items()]
+        return f"act (b): {', '.join(words)}", all_of(each.below(1.0) for each in of.values())
 
     def _peaks(self) -> Judged:
         loads = self.error(SEA, LOADS, "nammae")

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -156,10 +157,9 @@ def _cells(at: xr.Dataset, key: str) -> list[Number]:
     return [first, interval(at.sel(model="model"), key), *others]
 
 
-def _outside(validity: xr.Dataset) -> list[tuple[str, str]]:
+def _outside(validity: xr.Dataset) -> list[tuple[Any, str]]:
     """Tests outside the training, and why."""
-    pairs = zip(validity["run"].values, validity["outside"].values, strict=True)
-    return [(run, why) for run, why in pairs if why]
+    return [(run, why) for run, why in validity["outside"].to_series().items() if why]
 
 
 def response_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -309,13 +309,13 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
                 (*cells(at, "motion", q=3), *row(at, "run")) for at in entries(measured, "run")
             ]
         parts = [drawing("decay", checks.decay, result), table("decay", rows)]
-        most = np.abs(result["displacement"].values).max(axis=1)
+        most = abs(result["displacement"]).max("time", skipna=False)
         # None swings farther than it was moved in still water.
         points = [
             f"{motion}: after its release the model swings to {reach:.2g} times the offset, where "
             "a vessel in still water swings back by less than it was moved. Read no period and no "
             "damping off it: the state of this model follows the waves, or its delays fit noise."
-            for motion, reach in zip(result["motion"].values, most, strict=True)
+            for motion, reach in most.to_series().items()
             if reach > OVERSHOOT
         ]
         words.append(
@@ -407,10 +407,8 @@ def drift_section(result: xr.Dataset, checked: Checked) -> Section:
     rows = []
     if "offset" in result:
         shown = _as_shown(result, "slow_response", "offset", "offset_uncertainty")
-        for own in entries(shown, "state"):
+        for own in entries(shown.dropna("state", how="all", subset=["slow_response"]), "state"):
             mean, points = own["slow_response"][0], own["point_frequency"].values
-            if not np.isfinite(own["slow_response"]).any():
-                continue
             modelled = np.interp(points, mean["frequency"], mean, left=np.nan, right=np.nan)
             for value, at in zip(modelled, entries(own, "point"), strict=True):
                 offset = uncertain(at["offset"], at["offset_uncertainty"])

@@ -12,13 +12,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from markupsafe import Markup, escape
 
 from seakeep.arrays import Progress
 from seakeep.files import MARK, check_output, templates, write_text
 from seakeep.report.style import Figure, figure_style, save_figure
-from seakeep.report.tables import WORDS, Table, shade, write_frame, write_latex
+from seakeep.report.tables import WORDS, Table, shade, write_csv, write_latex
 from seakeep.study.store import storing
 
 UNFINISHED = f"""<!DOCTYPE html>
@@ -167,8 +166,7 @@ def write_page(
             (folder / kind).mkdir(exist_ok=True)
         for each in sections:
             for table in each.tables:
-                frame = pd.DataFrame([*table.rows], columns=[*table.columns])
-                write_frame(frame, folder / "tables" / f"{table.name}.csv")
+                write_csv(table, folder / "tables" / f"{table.name}.csv")
                 write_latex(table, folder / "tables" / f"{table.name}.tex")
         for number, drawing in enumerate(drawings):
             tell(number, len(drawings), f"drawing {drawing.name.replace('_', ' ')}")

@@ -78,12 +78,8 @@ class Table:
     @cached_property
     def numbers(self) -> frozenset[int]:
         """Columns that hold numbers: those whose cells are :class:`Number`."""
-        columns = ([each for each in column if each] for column in zip(*self.rows, strict=True))
-        return frozenset(
-            k
-            for k, cells in enumerate(columns)
-            if cells and all(isinstance(each, Number) for each in cells)
-        )
+        columns = enumerate(zip(*self.rows, strict=True))
+        return frozenset(k for k, cells in columns if {*map(type, filter(None, cells))} == {Number})
 
 
 WORDS = packaged("report/templates/words.toml")
@@ -377,6 +373,11 @@ def plain_cell(text: str) -> str:
     if re.match(r"[+-]?(\d|\.\d|inf|nan)", text) and not re.search(r"[=(!|]", text):
         return text
     return text if text in ("-", MISSING) else f"'{text}"
+
+
+def write_csv(table: Table, path: Path) -> Path:
+    """Write a table as :func:`write_frame` does."""
+    return write_frame(pd.DataFrame([*table.rows], columns=[*table.columns]), path)
 
 
 def write_frame(frame: pd.DataFrame, path: Path) -> Path:

@@ -8,7 +8,7 @@ the block length of Politis and White.
 
 import warnings
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from itertools import product
 from typing import Any, Literal
@@ -38,6 +38,7 @@ VARIANTS = {
 }
 SHOWN = 5
 """Lost forecasts that a warning names."""
+Statistic = Callable[..., FloatArray]
 DIFFERENCES = 500
 """Redrawn tables of cells for the interval of a difference between models."""
 
@@ -135,7 +136,7 @@ def lost_forecasts(groups: Datasets, tests: Iterable[str]) -> xr.Dataset | None:
     for name in tests:
         test = groups[f"tests/{name}"]
         gone = test["mean"].isnull().any(("time", "channel")) & test["judged"]
-        for model, training, window in zip(*np.nonzero(gone.values), strict=True):
+        for model, training, window in np.argwhere(gone.values):
             at = test.isel(model=model, training=training, window=window)
             cell = {key: at[key].item() for key in ("model", "training", "window", "run", "start")}
             rows.append(cell | {"test": name})
@@ -199,15 +200,23 @@ def difference_table(
         with undefined():
             return middle[:, :, None] / middle[:, None]
 
-    bounds = statistics.two_way_interval(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES)
     coords = {
         "model": test["model"].values,
         "other": test["model"].values,
         "measure": test["measure"].values,
         "channel": _names(test),
     }
-    values = np.stack([ratio(cells[None])[0], *bounds]) - 1.0
+    values = with_bounds(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES) - 1.0
     return numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
+
+
+def with_bounds(statistic: Statistic, *cells: FloatArray, **how: Any) -> FloatArray:
+    """A statistic of crossed cells and its bounds, shape (3, …).
+
+    Arguments are those of :func:`seakeep.statistics.two_way_interval`.
+    """
+    bounds = statistics.two_way_interval(statistic, *cells, **how)
+    return np.stack([statistic(*(each[None] for each in cells))[0], *bounds])
 
 
 def _names(test: xr.Dataset) -> list[str]:
@@ -401,10 +410,10 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
             return np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
 
     blocks = blocks_of([test], training)[1], 1
-    bounds = statistics.two_way_interval(
-        change, level, growth, rng=rng, blocks=blocks, n_series=DIFFERENCES, signed=True
-    )
-    values = np.stack([change(level.values[None], growth.values[None])[0], *bounds])
+    values = with_bounds(
+        change, level.values, growth.values, rng=rng, blocks=blocks, n_series=DIFFERENCES,
+        signed=True,
+    )  # fmt: skip
     growths = numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
     lines = numbered(series, (*coords, "number", "time"), TREND_LINES, {**coords, "time": time})
     return xr.merge([growths, lines])

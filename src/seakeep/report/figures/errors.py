@@ -277,8 +277,8 @@ def error_figure(table: xr.Dataset) -> Figure:
     """
     table = table.sortby("wave_period")
     labels = [
-        plain_text(run) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
-        for run, period in zip(table["run"].values, table["wave_period"].values, strict=True)
+        plain_text(str(run)) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
+        for run, period in table["wave_period"].to_series().items()
     ]
     figure = new_figure(max(4.5, 1.5 + 0.8 * len(labels)), 3.2)
     axes = figure.subplots()

@@ -423,11 +423,9 @@ DRAWN = 50
 """Channels that a picture shows at most, each in a row of its own; the table lists all."""
 LABELS = -0.06
 """Where labels of the vertical axes stand, in widths of the axes: beyond six figures."""
-WELCH = {
-    "paper": ("8.2 s (paper)", COLOURS["forecast"], DASHED),
-    "recommended": ("60 s", COLOURS["ensemble"], "-"),
-}
-"""Segments, colour and dash of a measured spectrum, by how it is estimated."""
+WELCH = {"paper": (COLOURS["forecast"], DASHED), "recommended": (COLOURS["ensemble"], "-")}
+"""Colour and dash of a measured spectrum, by how it is estimated."""
+Spectrum = tuple[FloatArray, FloatArray]
 
 
 @figure_style()
@@ -494,31 +492,48 @@ def spectrum_figure(result: StudyResult) -> Figure:
     irregular = every[runs["waves"].values != "regular"]
     names = irregular if irregular.size else every
 
-    def curves(kind: str, of: Iterable[str]) -> list[tuple[FloatArray, FloatArray]]:
+    def curves(kind: str, of: Iterable[str]) -> list[Spectrum]:
         """Frequency and density of runs, without the bins beyond their own."""
         chosen = [spectra.sel(run=run, kind=kind).dropna("bin", subset=["density"]) for run in of]
         return [(at["frequency"].values, at["density"].values) for at in chosen if at["bin"].size]
 
+    words = {
+        "paper": "measured, segments of 8.2 s (paper)",
+        "recommended": "measured, segments of 60 s",
+    }
+    measured = {kind: (words[kind], curves(kind, names)) for kind in WELCH}
+    known = result.groups.get("nominal", xr.Dataset())
+    nominal = [
+        (str(each.attrs.get("long_name", name)), (known["frequency"].values, each.values))
+        for name, each in known.data_vars.items()
+    ]
     figure = new_figure(8.5, 4.2)
     axes = figure.subplots()
-    known = result.groups.get("nominal", xr.Dataset())
-    for number, (name, each) in enumerate(known.data_vars.items()):
-        style = {"color": COLOURS["measured"], "linestyle": "-:"[number % 2]}
-        axes.plot(known["frequency"], each, **style, label=each.attrs.get("long_name", name))
-    for kind, (segments, colour, dash) in WELCH.items():
-        if measured := curves(kind, names):
-            f, _ = measured[0]  # of the first: records differ in length
-            mean = np.mean([np.interp(f, *each) for each in measured], axis=0)
-            words = f"measured, segments of {segments}"
-            axes.plot(f, mean, color=colour, linestyle=dash, label=words)
-    regular = runs["wave_frequency"].values
+    draw_spectra(axes, nominal, measured, runs["wave_frequency"].values)
+    peaks = [f[np.argmax(density)] for f, density in curves("recommended", every)]
+    axes.set_xlim(0, 2.2 * max(peaks, default=1.0))
+    channel = plain_text(result.words_of(spectra.attrs["channel"]))
+    axes.set(xlabel="frequency [Hz]", ylabel=f"spectral density of {channel} [m²/Hz]")
+    return figure
+
+
+def draw_spectra(
+    axes: Any,
+    nominal: Sequence[tuple[str, Spectrum]],
+    measured: Mapping[str, tuple[str, Sequence[Spectrum]]],
+    regular: FloatArray,
+) -> None:
+    """Draw nominal spectra, the mean of measured ones, and the frequencies of regular waves."""
+    for (label, curve), dash in zip(nominal, ("-", ":") * len(nominal), strict=False):
+        axes.plot(*curve, label=label, color=COLOURS["measured"], linestyle=dash)
+    for kind, (label, curves) in measured.items():
+        if curves:  # at the frequencies of the first: records differ in length
+            f, (colour, dash) = curves[0][0], WELCH[kind]
+            mean = np.mean([np.interp(f, *each) for each in curves], axis=0)
+            axes.plot(f, mean, label=label, color=colour, linestyle=dash)
     for number, frequency in enumerate(np.unique(regular[np.isfinite(regular)].round(3))):
         style = {"color": COLOURS["start"], "linewidth": 0.9, "linestyle": "--"}
         axes.axvline(frequency, **style, label=None if number else "regular waves")
-    peaks = [f[np.argmax(density)] for f, density in curves("recommended", every)]
-    channel = plain_text(result.words_of(spectra.attrs["channel"]))
-    axes.set(xlabel="frequency [Hz]", ylabel=f"spectral density of {channel} [m²/Hz]")
-    axes.set(xlim=(0, 2.2 * max(peaks, default=1.0)), ylim=(0, None))
+    axes.set_ylim(bottom=0)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8)
-    return figure
