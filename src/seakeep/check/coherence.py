@@ -11,6 +11,7 @@ from seakeep.check.parts import (
     FreeRun,
     Known,
     beside,
+    deviations,
     free_runs,
     irregular,
     judged,
@@ -123,11 +124,12 @@ def coherence(
         for k, each in enumerate(still)
     ])  # fmt: skip
     unjudged = still | (slow > segment * model.dt / 3)
+    nrmse, correlation = _skill(own)
     variables = {
         "ordinary": (("state", "input", "frequency"), spectra.ordinary()[..., :size].T),
         "spectrum": (over, spectra.outputs[:, :size].T),
-        "nrmse": ("state", np.where(still, np.nan, pooled_nrmse(own))),
-        "correlation": ("state", np.where(still, np.nan, _correlation(own))),
+        "nrmse": ("state", np.where(still, np.nan, nrmse)),
+        "correlation": ("state", np.where(still, np.nan, correlation)),
         "still": ("state", still),
         "period": ("state", slow, {"units": "s"}),
     }
@@ -176,16 +178,11 @@ def _bound(
     return np.minimum(error[:, *best], 1.0), np.clip(alike, 0, 1).T
 
 
-def _correlation(runs: Mapping[str, FreeRun]) -> FloatArray:
-    """Correlation of forecast and measurement of each state, over all free runs."""
-    pairs = [[x - x.mean(axis=0) for x in (run.forecast, run.measured)] for run in runs.values()]
-    forecast, measured = map(np.concatenate, zip(*pairs, strict=True))
-    norms = np.sqrt((forecast**2).sum(axis=0) * (measured**2).sum(axis=0))
-    return ratio((forecast * measured).sum(axis=0), norms)
-
-
-def pooled_nrmse(runs: Mapping[str, FreeRun]) -> FloatArray:
-    """NRMSE of each state over all free runs, deviations from the mean of each run."""
+def _skill(runs: Mapping[str, FreeRun]) -> tuple[FloatArray, FloatArray]:
+    """NRMSE of each state over all free runs, and correlation of forecast and measurement."""
     errors = np.concatenate([run.forecast - run.measured for run in runs.values()])
-    moved = np.concatenate([run.measured - run.measured.mean(axis=0) for run in runs.values()])
-    return np.sqrt(ratio((errors**2).sum(axis=0), (moved**2).sum(axis=0)))
+    forecast, moved = (np.concatenate(deviations(runs, k)) for k in ("forecast", "measured"))
+    power = (moved**2).sum(axis=0)
+    norms = np.sqrt((forecast**2).sum(axis=0) * power)
+    nrmse = np.sqrt(ratio((errors**2).sum(axis=0), power))
+    return nrmse, ratio((forecast * moved).sum(axis=0), norms)

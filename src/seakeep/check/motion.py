@@ -1,10 +1,12 @@
 """Motion by a model's matrices: its modes, its decay beside the vessel's, and its second order."""
 
+from typing import Any
+
 import numpy as np
 import scipy
 import xarray as xr
 
-from seakeep.arrays import ComplexArray, Datasets, FloatArray, IntArray
+from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
     HERTZ,
     driven,
@@ -190,6 +192,8 @@ PERIODS = 32
 """Encounter periods in which all probing waves repeat: differences are multiples of its inverse."""
 DIFFERENCES = 4
 """Difference frequencies, besides zero."""
+PROBED = 12
+"""Frequencies, of those that were trained, at which waves probe."""
 
 
 def drift(model: Model, runs: Datasets) -> xr.Dataset:
@@ -235,7 +239,11 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     reference = reference_probe(model, runs)
     samples = round(PERIODS * mean_period(runs, model.inputs))
     step = 1.0 / (samples * model.dt)
-    bins = _probed(single, step)
+    every = np.arange(1, int(0.4 / model.dt / step))
+    known = every[single.coverage.is_trained(step * every.astype(float)).any(axis=0)]
+    if not known.size:
+        raise DataError("training holds no waves by which the model could be probed.")
+    bins = known[np.linspace(0, known.size - 1, min(PROBED, known.size)).round().astype(int)]
     turns = wave_turns(model, runs, step * np.arange(bins[-1] + DIFFERENCES + 1), reference)
     if turns is None:
         if len(model.inputs) > 1:
@@ -251,12 +259,28 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     forces = np.empty((len(single.states), DIFFERENCES + 1, bins.size), dtype=complex)
     for number, first in enumerate(bins):
         for apart in range(DIFFERENCES + 1):
-            waves = [first] if apart == 0 else [first, first + apart]
-            elevation = sum(_wave(samples, each, turns[each], amplitude) for each in waves)
-            rows = _columns(single, np.asarray(elevation)) - still
+            waves = np.unique([first, first + apart])[:, None, None]
+            turn = 2 * np.pi * waves * np.arange(samples)[:, None] / samples
+            # Inputs that are not elevations are zero.
+            elevation = amplitude * np.nan_to_num(np.cos(turn - turns[waves[:, 0]]))
+            rows = _columns(single, elevation.sum(axis=0)) - still
             parts = np.fft.fft(rows, axis=0)[apart] / samples * (1 if apart == 0 else 2)
             forces[:, apart, number] = slow[apart] @ parts / (amplitude**2 * (2 if apart else 1))
     forces[read_off(model)] = np.nan
+    # Offsets of regular runs from the model's rest, per amplitude squared.
+    offsets: dict[str, Any] = {}
+    if regular := {name: run for name, run in runs.items() if is_regular(run)}:
+        at = measured_response(model, regular)
+        means = np.concatenate([single.input_scale.mean, single.signature.direct_scale.mean])
+        rest = single.state_mean + slow[0].real @ (still[0] - means)
+        square = at["wave_amplitude"].values[:, None] ** 2
+        offset = at["offset"].values + single.state_scale.centre - rest
+        offsets = {
+            "offset": (("point", "state"), offset / square),
+            "offset_uncertainty": (("point", "state"), at["offset_uncertainty"].values / square),
+            "run": ("point", at["run"].values),
+            "point_frequency": ("point", at["frequency"].values, {"units": "Hz"}),
+        }
     slow_response = np.abs(forces)
     slow_response[:, 0] = forces[:, 0].real  # the mean has a sign
     dims = ("state", "difference", "frequency")
@@ -264,7 +288,7 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
         {
             "slow_response": (dims, slow_response),
             "phase": (dims, np.degrees(np.angle(forces)), {"units": "deg"}),
-            **_offsets(single, runs, slow[0], still),
+            **offsets,
         },
         coords={
             "state": single.states,
@@ -276,21 +300,6 @@ def drift(model: Model, runs: Datasets) -> xr.Dataset:
     )
 
 
-def _probed(model: HankelDMDcModel, step: float) -> IntArray:
-    """Multiples of the step at which waves probe: up to twelve that were trained."""
-    every = np.arange(1, int(0.4 / model.dt / step))
-    known = every[model.coverage.is_trained(step * every.astype(float)).any(axis=0)]
-    if not known.size:
-        raise DataError("training holds no waves by which the model could be probed.")
-    return known[np.linspace(0, known.size - 1, min(12, known.size)).round().astype(int)]
-
-
-def _wave(samples: int, cycles: int, turns: FloatArray, amplitude: float) -> FloatArray:
-    """A wave at each input, (samples, input); inputs that are not elevations are zero."""
-    turn = 2 * np.pi * cycles * np.arange(samples) / samples
-    return amplitude * np.nan_to_num(np.cos(turn[:, None] - turns))
-
-
 def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:
     """Regressors over one repetition of inputs that repeat, (samples, n + m)."""
     input_map = model.signature.input_map
@@ -299,24 +308,3 @@ def _columns(model: HankelDMDcModel, inputs: FloatArray) -> FloatArray:
     first = before * size
     tiled = np.tile(inputs, (before + 1 + after, 1))
     return driven(input_map, tiled, None, first, first + size)
-
-
-def _offsets(
-    model: HankelDMDcModel, runs: Datasets, static: ComplexArray, still: FloatArray
-) -> dict[str, object]:
-    """Offsets of regular runs from the model's rest, per amplitude squared."""
-    regular = {name: run for name, run in runs.items() if is_regular(run)}
-    if not regular:
-        return {}
-    at = measured_response(model, regular)
-    means = np.concatenate([model.input_scale.mean, model.signature.direct_scale.mean])
-    rest = model.state_mean + static.real @ (still[0] - means)
-    square = at["wave_amplitude"].values[:, None] ** 2
-    offset = at["offset"].values + model.state_scale.centre - rest
-    over = ("point", "state")
-    return {
-        "offset": (over, offset / square),
-        "offset_uncertainty": (over, at["offset_uncertainty"].values / square),
-        "run": ("point", at["run"].values),
-        "point_frequency": ("point", at["frequency"].values, {"units": "Hz"}),
-    }

@@ -145,7 +145,20 @@ def free_runs(
 
     def played(name: str) -> FreeRun:
         if (label, name) not in known:
-            known[label, name] = _free_run(model, runs[name], name, (like or {}).get(name))
+            run, own = runs[name], (like or {}).get(name)
+            if own is None:
+                at, last = window_of(model, run)
+                time = run["time"].values
+                measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
+                empty = np.full_like(measured, np.nan)
+                own = FreeRun(float(time[at]), time[at + 1 : last + 1], empty, measured)
+            if is_ensemble(model):
+                steps = len(own.time)
+                forecast = model.forecast_summary(run, own.start, steps).sel(statistic="mean")
+            else:
+                forecast = model.forecast(run, own.start, len(own.time))
+            forecasts = channel_matrix(forecast, model.states, name)
+            known[label, name] = own._replace(forecast=forecasts)
         return known[label, name]
 
     names = runs if like is None else like
@@ -173,6 +186,11 @@ def gathered(
     for reason in reasons:
         warn(f"{left_out} {reason}")
     return results
+
+
+def deviations(runs: Mapping[str, FreeRun], kind: str) -> list[FloatArray]:
+    """Forecast or measurement ("forecast", "measured") of each free run, less its mean."""
+    return [x - x.mean(axis=0) for x in (getattr(run, kind) for run in runs.values())]
 
 
 def ratio(values: FloatArray, per: FloatArray) -> FloatArray:
@@ -276,21 +294,6 @@ def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
     return max(begins)
 
 
-def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:
-    if like is None:
-        at, last = window_of(model, run)
-        time = run["time"].values
-        measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
-        empty = np.full_like(measured, np.nan)
-        like = FreeRun(float(time[at]), time[at + 1 : last + 1], empty, measured)
-    steps = len(like.time)
-    if is_ensemble(model):
-        forecast = model.forecast_summary(run, like.start, steps).sel(statistic="mean")
-    else:
-        forecast = model.forecast(run, like.start, steps)
-    return like._replace(forecast=channel_matrix(forecast, model.states, name))
-
-
 def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) -> FloatArray:
     """Free runs from several starts, (window, steps, N); for an ensemble the members' mean."""
     forecasts = model.forecast_windows(run, starts.tolist(), steps)
@@ -318,7 +321,13 @@ def regressors(model: Model, part: Part) -> FloatArray:
     ndarray, shape (time, column)
         NaN where a row reads what is not there.
     """
-    input_map = _at_once(model.signature.input_map)
+    # Without look-ahead and lags, and without limits of what is above training.
+    input_map = model.signature.input_map
+    follows, observed = input_map.follows, input_map.observed
+    if observed:
+        observed = replace(observed, observables=tuple(map(at_once, observed.observables)), tops=())
+    still = replace(follows, lead=0) if follows else None
+    input_map = replace(input_map, lead=0, observed=observed, follows=still, reference=0)
     run = part.run.sel(time=part.time)
     size, reach = run.sizes["time"], input_map.reads(Span(0, 0, 1))
     first, stop = -reach.first, size - (reach.stop - 1)
@@ -326,20 +335,10 @@ def regressors(model: Model, part: Part) -> FloatArray:
     out = np.full((size, width), np.nan)
     if stop > first:
         values, surge = channel_matrix(run, model.inputs, "the run"), None
-        if follows := model.signature.input_map.follows:
+        if follows:
             surge = channel_matrix(run, [model.states[follows.column]], "the run")[:, 0]
         out[first:stop] = driven(input_map, values, run, first, stop, surge)
     return out
-
-
-def _at_once(input_map: InputMap) -> InputMap:
-    """The map without look-ahead and lags, and without limits of what is above training."""
-    follows, observed = input_map.follows, input_map.observed
-    if observed:
-        observed = replace(observed, observables=tuple(map(at_once, observed.observables)), tops=())
-    if follows:
-        follows = replace(follows, lead=0)
-    return replace(input_map, lead=0, observed=observed, follows=follows, reference=0)
 
 
 def single_model(model: Model) -> HankelDMDcModel:

@@ -1,10 +1,12 @@
 """Statistics of responses, as designers read them: measured against forecast."""
 
+from contextlib import suppress
+
 import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
-from seakeep.check.parts import Known, free_runs, irregular, judged, units_of
+from seakeep.check.parts import Known, deviations, free_runs, irregular, judged, units_of
 from seakeep.core.density import jensen_shannon, kernel_density
 from seakeep.core.extremes import fit_weibull, most_probable_extreme, peaks_between
 from seakeep.errors import SeakeepError
@@ -58,10 +60,7 @@ def statistics(
     if duration is None:
         scale = next(iter(waves.values())).attrs.get("scale_factor", 1.0)
         duration = 3600 * HOURS / np.sqrt(scale)
-    moved = {
-        kind: [x - x.mean(axis=0) for x in (getattr(run, kind) for run in known.values())]
-        for kind in KINDS
-    }
+    moved = {kind: deviations(known, kind) for kind in KINDS}
     parts = []
     for column in range(len(model.states)):
         laws = [_law([x[:, column] for x in of], model.dt, duration) for of in moved.values()]
@@ -93,25 +92,18 @@ def _densities(both: FloatArray) -> tuple[FloatArray, FloatArray]:
     return grids, densities
 
 
-def _peaks(moved: list[FloatArray], dt: float) -> tuple[FloatArray, FloatArray]:
-    """Peaks and zero-crossing periods of the deviations of several records."""
-    peaks, periods = [np.empty(0)], [np.empty(0)]
+def _law(moved: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
+    """Statistics of the deviations of several records of a state; peaks largest first."""
+    every, between = [np.empty(0)], [np.empty(0)]  # peaks and zero-crossing periods
     for x in moved:
         if not np.all(np.isfinite(x)):
             continue  # a free run that was lost
-        try:
+        with suppress(SeakeepError):  # a record without waves has no peaks
             crossings = zero_up_crossings(x, dt)
-        except SeakeepError:  # a record without waves has no peaks
-            continue
-        if crossings.size > 1:
-            peaks.append(peaks_between(x, crossings / dt))
-            periods.append(np.diff(crossings))
-    return np.concatenate(peaks), np.concatenate(periods)
-
-
-def _law(moved: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
-    """Statistics of the deviations of several records of a state; peaks largest first."""
-    peaks, periods = _peaks(moved, dt)
+            if crossings.size > 1:
+                every.append(peaks_between(x, crossings / dt))
+                between.append(np.diff(crossings))
+    peaks, periods = np.concatenate(every), np.concatenate(between)
     rank = np.arange(1, peaks.size + 1)
     spread = np.sqrt(np.mean(np.concatenate(moved) ** 2))
     period = periods.mean() if periods.size else np.nan

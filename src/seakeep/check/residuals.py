@@ -68,16 +68,44 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
     known = free_runs(model, runs, free)
     period = mean_period(runs, model.inputs) * model.dt
     lags = round(period / model.dt)
+
+    def one_step(name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Errors of one step over the test part, inputs and measured states at its instants."""
+        run = runs[name]
+        first, last = window_of(model, run)
+        forecasts = free_windows(model, run, run["time"].values[first:last], 1)[:, 0]
+        after = slice(first + 1, last + 1)
+        measured = channel_matrix(run, model.states, name, after)
+        inputs = channel_matrix(run, model.inputs, name, after)
+        sound = np.isfinite(forecasts).all(axis=1) & np.isfinite(measured).all(axis=1)
+        if sound.sum() < 2:
+            raise DataError("the model diverges, or nothing is measured.")
+        return (forecasts - measured)[sound], inputs[sound], measured[sound]
+
     stepped = gathered(
         known,
-        lambda name: _one_step(model, runs[name], name),
+        one_step,
         "no run can be judged. One-step errors of",
         "left out: one-step errors of",
     )
+
+    def aged(name: str) -> FloatArray:
+        """Squared errors over the time since each of several starts, (window, steps, N)."""
+        run = runs[name]
+        first, last = window_of(model, run)
+        count = min(AGES * lags, last - first)
+        starts = np.arange(first, last - count + 1, lags)
+        forecasts = free_windows(model, run, run["time"].values[starts], count)
+        measured = channel_matrix(run, model.states, name)
+        rows = starts[:, None] + np.arange(1, count + 1)
+        squares = np.full((len(starts), AGES * lags, len(model.states)), np.nan)
+        squares[:, :count] = (forecasts - measured[rows]) ** 2
+        return squares
+
     every, inputs, measured = zip(*stepped.values(), strict=True)
-    squares = np.concatenate([_aged(model, runs[name], name, lags) for name in stepped])
+    squares = np.concatenate([aged(name) for name in stepped])
     counted = np.isfinite(squares).sum(axis=0)
-    aged = ratio(np.nan_to_num(squares, nan=0.0, posinf=0.0).sum(axis=0), counted)
+    by_age = ratio(np.nan_to_num(squares, nan=0.0, posinf=0.0).sum(axis=0), counted)
     count = sum(map(len, every))
     if count <= 2 * lags:
         raise DataError(
@@ -95,7 +123,7 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         "probability": ("state", probability),
         "one_step": ("state", ratio(np.sqrt(np.mean(whole**2, axis=0)), spread)),
         **_of_free_runs(model, known, period),
-        "age_nrmse": (("state", "age"), ratio(np.sqrt(aged), spread + 0 * aged).T),
+        "age_nrmse": (("state", "age"), ratio(np.sqrt(by_age), spread + 0 * by_age).T),
     }
     if model.inputs:
         past, limit = input_correlation([*zip(every, inputs, strict=True)], lags)
@@ -113,35 +141,6 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         },
         attrs={"instants": count, "encounter_period": period, "of": of},
     )
-
-
-def _one_step(
-    model: Model, run: xr.Dataset, name: str
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Errors of one step over the test part, inputs and measured states at the same instants."""
-    first, last = window_of(model, run)
-    forecasts = free_windows(model, run, run["time"].values[first:last], 1)[:, 0]
-    after = slice(first + 1, last + 1)
-    measured = channel_matrix(run, model.states, name, after)
-    inputs = channel_matrix(run, model.inputs, name, after)
-    sound = np.isfinite(forecasts).all(axis=1) & np.isfinite(measured).all(axis=1)
-    if sound.sum() < 2:
-        raise DataError("the model diverges, or nothing is measured.")
-    return (forecasts - measured)[sound], inputs[sound], measured[sound]
-
-
-def _aged(model: Model, run: xr.Dataset, name: str, lags: int) -> FloatArray:
-    """Squared errors over the time since each of several starts, (window, steps, N)."""
-    first, last = window_of(model, run)
-    time = run["time"].values
-    count = min(AGES * lags, last - first)
-    starts = np.arange(first, last - count + 1, lags)
-    forecasts = free_windows(model, run, time[starts], count)
-    measured = channel_matrix(run, model.states, name)
-    rows = starts[:, None] + np.arange(1, count + 1)
-    squares = np.full((len(starts), AGES * lags, len(model.states)), np.nan)
-    squares[:, :count] = (forecasts - measured[rows]) ** 2
-    return squares
 
 
 def _of_free_runs(model: Model, free: Mapping[str, FreeRun], period: float) -> dict[str, object]:

@@ -26,7 +26,7 @@ from seakeep.check.parts import (
 )
 from seakeep.core.harmonics import dominant_frequency, estimate, harmonic_fits
 from seakeep.core.response import frequency_response
-from seakeep.core.spectra import Spectra, cross_spectra, segment_length
+from seakeep.core.spectra import cross_spectra, segment_length
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Model, is_ensemble
 from seakeep.models.engine import Dynamics
@@ -93,7 +93,12 @@ def response(
     """
     if not model.inputs:
         raise RequestError("the model has no input: it answers no wave. Check its modes instead.")
-    coverage, dynamics = _matrices(model)
+    if is_ensemble(model):
+        coverage, members = model.coverage, range(model.n_members)
+        dynamics = [model.dynamics(member) for member in members]
+    else:
+        single = single_model(model)
+        coverage, dynamics = single.coverage, [single.dynamics]
     wanted = _default_frequencies(coverage, model.dt) if frequencies is None else frequencies
     frequency = np.atleast_1d(as_real(wanted, "frequencies"))
     if frequency.size == 0:
@@ -160,13 +165,6 @@ def transfer(model: Model, dynamics: Dynamics, frequency: FloatArray) -> Complex
     early = np.exp(2j * np.pi * frequency * model.dt * lead)
     early = np.where(np.arange(scale.size) < len(model.inputs), early[:, None], 1.0)
     return gain * own.state_scale.std[:, None] / scale * early[:, None]
-
-
-def _matrices(model: Model) -> tuple[Coverage, list[Dynamics]]:
-    if is_ensemble(model):
-        return model.coverage, [model.dynamics(member) for member in range(model.n_members)]
-    single = single_model(model)
-    return single.coverage, [single.dynamics]
 
 
 def _default_frequencies(coverage: Coverage, dt: float) -> FloatArray:
@@ -262,39 +260,30 @@ def _regular_point(model: Model, name: str, part: Part, reference: int) -> xr.Da
 def _irregular_points(model: Model, parts: list[Part], reference: int, period: float) -> xr.Dataset:
     pieces = [(part.inputs[:, [reference]], part.states) for part in parts]
     segment = segment_length(sum(len(part.time) for part in parts), AVERAGES, period, LONGEST)
-    spectra, gain, radius = _gain(pieces, model.dt, segment)
+    spectra, halves = (cross_spectra(pieces, model.dt, each) for each in (segment, segment // 2))
+    gain, radius = spectra.gain()
+    # Leakage shrinks with longer segments: the change from segments half as long, which is what it
+    # moves a point at most, is added to the radius by chance, as a root of squares.
+    other = interp1d(halves.frequency, halves.gain()[0], axis=0, fill_value="extrapolate")
+    radius = np.hypot(radius, np.abs(gain - other(spectra.frequency)))
     power = spectra.input_power[:, 0]
     if not power.max() > 0:
         raise no_energy(model.inputs[reference])
-    name = ", ".join(str(part.run.attrs.get("run", "run")) for part in parts)
     at = np.flatnonzero((power >= POWER * power.max()) & (spectra.frequency > 0))
-    amplitude, half = np.abs(gain[at]), radius[at]
+    gain, half = gain[at, 0], radius[at, 0]
+    amplitude = np.abs(gain)
     with undefined():
         turn = np.where(half < amplitude, np.arcsin(np.minimum(half / amplitude, 1)), np.pi)
-    names = {"run": name, "kind": "irregular"}
+    name = ", ".join(str(part.run.attrs.get("run", "run")) for part in parts)
+    frequency = spectra.frequency[at]
     return _points(
         model,
-        {**names, "frequency": spectra.frequency[at], "wave_amplitude": np.nan},
-        gain[at],
+        {"run": name, "kind": "irregular", "frequency": frequency, "wave_amplitude": np.nan},
+        gain,
         half,
         turn,
         coherence=spectra.ordinary()[at, 0],
     )
-
-
-def _gain(
-    pieces: list[tuple[FloatArray, FloatArray]], dt: float, segment: int
-) -> tuple[Spectra, ComplexArray, FloatArray]:
-    """Spectra, transfer functions (frequency, output) from the only input, and their uncertainty.
-
-    Leakage shrinks with longer segments: the change from segments half as long, which is what it
-    moves a point at most, is added to the radius by chance, as a root of squares.
-    """
-    whole, halves = (cross_spectra(pieces, dt, each) for each in (segment, segment // 2))
-    gain, radius = whole.gain()
-    other = interp1d(halves.frequency, halves.gain()[0], axis=0, fill_value="extrapolate")
-    moved = np.abs(gain - other(whole.frequency))
-    return whole, gain[:, 0], np.hypot(radius, moved)[:, 0]
 
 
 def _points(

@@ -7,7 +7,6 @@ import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
-    FreeRun,
     Known,
     beside,
     free_runs,
@@ -128,6 +127,12 @@ def worth(
     errors = of_runs["anrmse"].isel(model=0, state=slice(1, None))
     out["run_nrmse"] = errors.rename(state="channel")
     order = [r for names in of_kind.values() for r in names]
+    reasons = [
+        f"{label}: not all runs can be forecast" for label in baselines or () if label not in every
+    ]
+    for label, free_of in [*every.items()][1:]:
+        if bad := [r for r, each in free_of.items() if not np.isfinite(each.forecast).all()]:
+            reasons.append(f"{label}: its forecast of {', '.join(bad)} diverges")
     input_map = model.signature.input_map
     ahead = [input_map.look_ahead(runs[r], model.dt) - model.dt for r in order]
     aligned = input_map.alignment
@@ -141,20 +146,8 @@ def worth(
     ).assign_attrs(
         of=of,
         conditional_on=reads,
-        lost="; ".join(_lost(every, baselines or {})),
+        lost="; ".join(reasons),
     )
-
-
-def _lost(every: Mapping[str, Mapping[str, FreeRun]], baselines: Mapping[str, Model]) -> list[str]:
-    """Baselines that do not count in all runs, each with the reason."""
-    reasons = [
-        f"{label}: not all runs can be forecast" for label in baselines if label not in every
-    ]
-    for label, free in every.items():
-        bad = [r for r, each in free.items() if not np.isfinite(each.forecast).all()]
-        if bad and label != "model":
-            reasons.append(f"{label}: its forecast of {', '.join(bad)} diverges")
-    return reasons
 
 
 def validity(model: Model, runs: Datasets) -> xr.Dataset:

@@ -26,7 +26,7 @@ from seakeep.cli.console import (
     show,
 )
 from seakeep.errors import RequestError
-from seakeep.files import check_output, check_place, replacing, write_text
+from seakeep.files import check_output, check_place, write_text
 
 if TYPE_CHECKING:
     from seakeep.models import Model
@@ -62,7 +62,7 @@ def tune(
     """
     from seakeep.campaign import read_campaign
     from seakeep.models import HankelDMDc, Select, labelled
-    from seakeep.report.comparison import plain_cells
+    from seakeep.report.tables import write_frame
     from seakeep.study.fit import read_training
     from seakeep.study.resolve import counts_in_periods, preset_of
     from seakeep.tuning import tune as search
@@ -116,9 +116,7 @@ def tune(
     say(f"Wrote {target}. Fit it with: seakeep fit {target} -o model.nc")
     if not search_result.table.sizes["trial"]:
         return
-    with replacing(tried) as place:
-        plain_cells(search_result.table.to_dataframe()).to_csv(place, index=False)
-    say(f"Wrote {tried}: all that was tried.")
+    say(f"Wrote {write_frame(search_result.table.to_dataframe(), tried)}: all that was tried.")
     if find_spec("matplotlib"):
         from seakeep.report.style import save_figure
 

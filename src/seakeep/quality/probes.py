@@ -78,7 +78,9 @@ def odd_probes(runs: Datasets) -> Findings:
     90 with a gain of 1.3 or another sign in one run, that run was named in all.
     """
     moving = in_waves(runs)
-    first, *others = _probes(moving) or [""]
+    every = [run.data_vars for run in moving.values()]
+    probes = filter(is_elevation, map(str, every[0] if every else ()))
+    first, *others = [name for name in probes if all(name in each for each in every)] or [""]
     odd: dict[str, dict[str, FloatArray]] = {name: {} for name in moving}
     for probe in others:
         seen = _seen(moving, first, probe)
@@ -113,12 +115,6 @@ def judge_probes(runs: Datasets) -> list[str]:
             changed.append(name)
     warn_of(found, set())
     return changed
-
-
-def _probes(runs: Datasets) -> list[str]:
-    """Wave probes that all runs have."""
-    common = set.intersection(*(set(run.data_vars) for run in runs.values())) if runs else set()
-    return [str(n) for n in next(iter(runs.values()), ()) if n in common and is_elevation(str(n))]
 
 
 def _seen(runs: Datasets, first: str, second: str) -> dict[str, _Seen]:

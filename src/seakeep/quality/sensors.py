@@ -282,16 +282,26 @@ def compare_sensors(
     if gain == 0 or not np.isfinite(gain) or x.size * dt < length + period:
         return nothing
     stuck = np.zeros(x.size, bool) if stuck_samples is None else np.asarray(stuck_samples, bool)
-    windows, motion, gain = _windows(x, y, dt, length, period, stuck)
-    if not windows.lag.size:
+
+    def moving(length: float) -> tuple[Lags, list[slice]]:
+        """Lags in windows with enough motion, and the samples of these."""
+        lags = windowed_lags(x, y, dt, length, 0.5 * period)
+        edges = np.stack([lags.centre - 0.5 * length, lags.centre + 0.5 * length], axis=1) / dt
+        spans = [slice(*each) for each in edges.round().astype(int).clip(0)]
+        motion = np.array([y[span].std() for span in spans])
+        free = np.array([not stuck[span].any() for span in spans])
+        moves = (motion > 0.3 * motion.max()) & np.isfinite(lags.lag)
+        # A sensor that sticks all the time is judged all the same.
+        moves &= free | ~np.any(moves & free)
+        clear = Lags(lags.centre[moves], lags.lag[moves], lags.correlation[moves])
+        return clear, [spans[k] for k in np.flatnonzero(moves)]
+
+    windows, spans = moving(length)
+    if not spans:
         return nothing
-    spans = [
-        slice(max(round((c - 0.5 * length) / dt), 0), round((c + 0.5 * length) / dt))
-        for c in windows.centre
-    ]
-    error, moved = ([np.std(z[span]) ** 2 for span in spans] for z in (x - y, y))
-    lags = windows.lag[_together(windows)]
-    short = _windows(x, y, dt, 0.5 * length, period, stuck)[0]
+    error, moved, own = (np.array([z[span].std() for span in spans]) for z in (x - y, y, x))
+    motion, lags = float(np.sqrt(np.mean(moved**2))), windows.lag[_together(windows)]
+    short, _ = moving(0.5 * length)
     straight = np.unwrap(short.lag[_together(short)], period=period)
     middle = float(np.median(lags))
     return Agreement(
@@ -302,33 +312,11 @@ def compare_sensors(
         lag_spread=float(1.4826 * np.median(np.abs(lags - middle))),
         growth=float(straight[-2:].mean() - straight[:2].mean()) if straight.size > 3 else 0.0,
         correlation=float(np.median(windows.correlation)),
-        nrmse=float(np.sqrt(np.mean(error) / np.mean(moved))),
-        gain=gain,
+        nrmse=float(np.sqrt(np.mean(error**2))) / motion,
+        gain=float(np.median(own / moved)),
         centre=windows.centre,
         lags=windows.lag,
     )
-
-
-def _windows(
-    x: FloatArray, y: FloatArray, dt: float, length: float, period: float, stuck: BoolArray
-) -> tuple[Lags, float, float]:
-    """Lags in windows with enough motion; the trusted SD and the gain in them."""
-    lags = windowed_lags(x, y, dt, length, 0.5 * period)
-    begin = np.clip(((lags.centre - 0.5 * length) / dt).astype(int), 0, None)
-    end = ((lags.centre + 0.5 * length) / dt).astype(int)
-    motion, own = (
-        np.array([z[i:j].std() for i, j in zip(begin, end, strict=True)]) for z in (y, x)
-    )
-    free = np.array([not stuck[i : j + 1].any() for i, j in zip(begin, end, strict=True)])
-    moving = (motion > 0.3 * motion.max()) & np.isfinite(lags.lag)
-    moving &= free | ~np.any(
-        moving & free
-    )  # a sensor that sticks all the time is judged all the same
-    clear = Lags(lags.centre[moving], lags.lag[moving], lags.correlation[moving])
-    if not moving.any():
-        return clear, np.nan, np.nan
-    mean = float(np.sqrt(np.mean(motion[moving] ** 2)))
-    return clear, mean, float(np.median(own[moving] / motion[moving]))
 
 
 def _together(lags: Lags) -> BoolArray:

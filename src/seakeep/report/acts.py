@@ -1,6 +1,6 @@
 """The page over the acts of ``seakeep reproduce``: side by side, and against the paper's claims."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain, pairwise
@@ -19,22 +19,22 @@ from seakeep.report.sections.data import finished, wave_tables
 from seakeep.report.sections.results import conditional, divergence_table
 from seakeep.report.style import HEADING, model_words
 from seakeep.report.tables import WORDS, Interval, Number, Table, number, numbers, ratio_of, table
-from seakeep.statistics import two_way_interval
 from seakeep.study import StudyResult
 from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import (
+    Statistic,
     average_of,
     band_of,
     blocks_of,
     median_of,
     phase_leads,
     training_order,
+    with_bounds,
 )
 from seakeep.study.plan import random_stream
 from seakeep.study.reproduce import ACTS, NOTE, SLOW, Act
 
 Results = Mapping[str, StudyResult]
-Statistic = Callable[..., FloatArray]
 Judged = tuple[str, bool | None]
 """Our number, and whether the claim holds: None where the study cannot tell."""
 
@@ -54,11 +54,11 @@ SINGLE, ENSEMBLE = "deterministic", "bayesian"
 def claims_table(results: Results) -> Table:
     """Each claim, our figure, and whether it holds, in the first act."""
     verdicts = {True: "holds", False: "does not", None: "cannot tell"}
-    limits = {"useful": USEFUL, "aged": 100 * AGED, "almost": 100 * ALMOST}
     acts, rows = Claims(results["paper"], Evidence(results["raw"])), []
     for key, (claim, how) in WORDS["claims"].items():
         figure, holds = acts.judge(key)
-        rows.append((claim, figure, verdicts[holds], how.format(**limits)))
+        judged = how.format(useful=USEFUL, aged=100 * AGED, almost=100 * ALMOST)
+        rows.append((claim, figure, verdicts[holds], judged))
     return table("claims", rows)
 
 
@@ -125,9 +125,8 @@ class Evidence:
         of_tests = [self.result.tests[test] for test in tests]
         blocks = blocks_of(of_tests, self.result.groups["training"])
         rng = random_stream(int(self.result.attrs["seed"]), "claims")
-        bounds = two_way_interval(statistic, *cells, rng=rng, blocks=blocks, signed=signed)
-        value = statistic(*(each[None] for each in cells))
-        return Interval(*map(float, (*value, *bounds)))
+        numbers = with_bounds(statistic, *cells, rng=rng, blocks=blocks, signed=signed)
+        return Interval(*map(float, numbers))
 
     def error(self, tests: Sequence[str] = SEA, *of: Any, **named: str) -> Interval:
         """Median of the errors of :meth:`cells`, averaged over the channels."""
@@ -136,8 +135,7 @@ class Evidence:
     def variants(self, key: str) -> dict[str, FloatArray]:
         """A number of the models with λ, without, and truncated, over (training, 1)."""
         data = self.result.groups[f"regularisation/{SINGLE}"][key].transpose("variant", "training")
-        names = map(str, data["variant"].values)
-        return dict(zip(names, data.values[:, self.order, None], strict=True))
+        return {each["variant"].item(): each.values[self.order, None] for each in data}
 
 
 def _flat(drawn: FloatArray) -> FloatArray:
@@ -186,12 +184,14 @@ def _against_single(
     act: Evidence, tests: Sequence[str] = SEA, statistic: Statistic = _median
 ) -> dict[str, Interval]:
     """A statistic of the ensemble over that of the single model, in both measures."""
-    both = {
-        words: [act.cells(tests, (), key, m) for m in (ENSEMBLE, SINGLE)]
+    return {
+        words: act.interval(
+            _ratio(statistic),
+            *(act.cells(tests, (), key, model) for model in (ENSEMBLE, SINGLE)),
+            tests=tests,
+        )
         for key, words in HEADING.items()
     }
-    ratio = _ratio(statistic)
-    return {words: act.interval(ratio, *each, tests=tests) for words, each in both.items()}
 
 
 def _changes(ratios: Mapping[str, Interval]) -> str:
@@ -207,8 +207,10 @@ def _band(act: Evidence, channels: Sequence[str]) -> list[Interval]:
     inside = ((measured >= lower) & (measured <= upper)).mean(axis=2)
     width = (upper - lower).mean(axis=2) / measured.std(axis=1, ddof=1)
     judged = test["judged"].values[act.order][..., None]
-    cells = (np.where(judged, values, np.nan) for values in (inside, width))
-    return [act.interval(lambda drawn: average_of(_flat(drawn)), each) for each in cells]
+    return [
+        act.interval(lambda drawn: average_of(_flat(drawn)), np.where(judged, each, np.nan))
+        for each in (inside, width)
+    ]
 
 
 def _slack(act: Evidence, test: str, line: str) -> Interval:
@@ -319,12 +321,9 @@ class Claims(Evidence):
             for values in (test["measured"].values, forecasts)
         )
         errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
-        of_lines = [self.raw.interval(_median, errors[..., [k]]) for k in range(len(LOADS))]
-        words = ", ".join(
-            f"{name.removeprefix('mooring_')} {each.text()}"
-            for name, each in zip(LOADS, of_lines, strict=True)
-        )
-        return f"act (b): {words}", all_of(each.below(1.0) for each in of_lines)
+        of = {line: self.raw.interval(_median, errors[..., [k]]) for k, line in enumerate(LOADS)}
+        words = [f"{line.removeprefix('mooring_')} {each.text()}" for line, each in of.items()]
+        return f"act (b): {', '.join(words)}", all_of(each.below(1.0) for each in of.values())
 
     def _peaks(self) -> Judged:
         loads = self.error(SEA, LOADS, "nammae")
@@ -370,10 +369,9 @@ class Claims(Evidence):
         errors = [self.error((test,), (line,)) for test in REGULAR]
         slack = [_slack(self.raw, test, line) for test in REGULAR]
         falls = [
-            errors[longer].below_other(errors[shorter])
-            for shorter, longer in pairwise(range(len(REGULAR)))
-            if slack[longer].upper + SLACKER < slack[shorter].lower
-            and np.isfinite([errors[longer].value, errors[shorter].value]).all()
+            longer.below_other(shorter)
+            for (shorter, wet), (longer, dry) in pairwise(zip(errors, slack, strict=True))
+            if dry.upper + SLACKER < wet.lower and np.isfinite([longer.value, shorter.value]).all()
         ]
         listed = ", ".join(e.text() if np.isfinite(e.value) else "only noise" for e in errors)
         parts = ", ".join(each.part() for each in slack)
@@ -427,31 +425,9 @@ def write_reproduction(folder: Path, results: Results, progress: Progress | None
         "seed": last.attrs["seed"],
         "finished": finished(last),
     }
-    sections = [_summary(results)]
-    if {"paper", "raw"} <= set(results):
-        sections.append(section("claims", claims_table(results)))
-    divergence = divergence_table(first, "bayesian", "paper")
-    links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
-    sections += [
-        section("channels", acts_table(results)),
-        Section(
-            "densities", "Divergence of the densities, beside the paper's", tables=(divergence,)
-        ),
-        section("waves", *wave_tables(first)),
-        section("studies", links=links),
-    ]
-    return write_page(folder, "The paper's study on the virtual tank", stamp, sections, progress)
-
-
-def _played(results: Results) -> list[Act]:
-    return [act for act in ACTS if act.name in results]
-
-
-def _summary(results: Results) -> Section:
-    """What the acts found: one sentence, one figure, one short table."""
     short = short_table(results)
-    repeats = [result.groups.get("repeats") for result in results.values()]
-    return section(
+    repeats = [result.groups.get("repeats") for result in every]
+    summary = section(
         "summary",
         drawing("acts", acts_figure, results),
         replace(short, note=f"{short.note} {still_water(results)}"),
@@ -460,6 +436,23 @@ def _summary(results: Results) -> Section:
         # Once what several studies warn of.
         notices=list(dict.fromkeys(words_of_repeats(each) for each in repeats if each)),
     )
+    sections = [summary]
+    if {"paper", "raw"} <= set(results):
+        sections.append(section("claims", claims_table(results)))
+    divergence = divergence_table(first, "bayesian", "paper")
+    title = "Divergence of the densities, beside the paper's"
+    links = [(f"{act.name}/report.html", act.title) for act in _played(results)]
+    sections += [
+        section("channels", acts_table(results)),
+        Section("densities", title, tables=(divergence,)),
+        section("waves", *wave_tables(first)),
+        section("studies", links=links),
+    ]
+    return write_page(folder, "The paper's study on the virtual tank", stamp, sections, progress)
+
+
+def _played(results: Results) -> list[Act]:
+    return [act for act in ACTS if act.name in results]
 
 
 def short_table(results: Results) -> Table:
@@ -477,13 +470,13 @@ def short_table(results: Results) -> Table:
     """
     last = list(results)[-1]
     rows = [
-        (said, *(" / ".join(pair) for pair in _pairs(results[act], model)))
+        (said, *(Number(" / ".join(pair)) for pair in _pairs(results[act], model)))
         for act, model, said in (*WORDS["rows"], (last, "hold_last", "last measured state"))
         if act in results
     ]
     first = results[last]
     seas = [*map(first.sea_of, first.tests)]
-    return table("short", rows, columns=("model", *seas), numeric=range(1, 1 + len(seas)))
+    return table("short", rows, columns=("model", *seas))
 
 
 def finding(results: Results) -> str:

@@ -3,7 +3,9 @@
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -47,14 +49,13 @@ USES = {
 
 def worth_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return the error over the tests beside that of baselines, the look-ahead and the verdict."""
-    points = [*_verdicts(result, checked.repeats)]
-    if (ahead := float(result["look_ahead"].max())) > 0:
-        points.append(
-            f"Look-ahead: the model reads the waves up to {ahead:.3g} s after the instant that it "
-            "forecasts. They must be measured up-wave, or predicted."
+    ahead = "none. No wave after the instant of the forecast is read."
+    if (seconds := float(result["look_ahead"].max())) > 0:
+        ahead = (
+            f"the model reads the waves up to {seconds:.3g} s after the instant that it forecasts. "
+            "They must be measured up-wave, or predicted."
         )
-    else:
-        points.append("Look-ahead: none. No wave after the instant of the forecast is read.")
+    points = [*_verdicts(result, checked.repeats), f"Look-ahead: {ahead}"]
     if state := result.attrs["conditional_on"]:
         points.append(
             f"All errors are conditional on measured {state}, which is read after the start."
@@ -65,12 +66,19 @@ def worth_section(result: xr.Dataset, checked: Checked) -> Section:
         points += [
             f"{run}: outside what trained the model ({why})." for run, why in _outside(validity)
         ]
+    verdicts = []
+    for own in entries(result.isel(state=slice(1, None)), "waves", "state"):
+        beside = (MISSING, MISSING, MISSING)
+        if best := own["best"].item():
+            beside = (best, number(own["nrmse"].sel(model=best)), _change(own, best))
+        use = USES.get(float(own["limit"]), "not judged").partition(" (")[0]
+        verdicts.append((*row(own, "state", "waves"), *_cells(own, "nrmse")[:2], *beside, use))
     one, runs = result.attrs["of"].removesuffix("s"), result["run"].values
     errors = [(each["channel"].item(), *numbers(each)) for each in result["run_nrmse"]]
     return section(
         "worth",
         _by_run(result, one),
-        _by_state(result),
+        table("verdicts", verdicts),
         table("worth_of_runs", errors, columns=("state", *runs)),
         one=one,
         runs=runs.size,
@@ -149,22 +157,9 @@ def _cells(at: xr.Dataset, key: str) -> list[Number]:
     return [first, interval(at.sel(model="model"), key), *others]
 
 
-def _by_state(result: xr.Dataset) -> Table:
-    """Mean error of each state, the best baseline, and the verdict."""
-    rows = []
-    for one in entries(result.isel(state=slice(1, None)), "waves", "state"):
-        beside = (MISSING, MISSING, MISSING)
-        if best := one["best"].item():
-            beside = (best, number(one["nrmse"].sel(model=best)), _change(one, best))
-        use = USES.get(float(one["limit"]), "not judged").partition(" (")[0]
-        rows.append((*row(one, "state", "waves"), *_cells(one, "nrmse")[:2], *beside, use))
-    return table("verdicts", rows)
-
-
-def _outside(validity: xr.Dataset) -> list[tuple[str, str]]:
+def _outside(validity: xr.Dataset) -> list[tuple[Any, str]]:
     """Tests outside the training, and why."""
-    pairs = zip(validity["run"].values, validity["outside"].values, strict=True)
-    return [(run, why) for run, why in pairs if why]
+    return [(run, why) for run, why in validity["outside"].to_series().items() if why]
 
 
 def response_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -172,20 +167,32 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
     measured, reference = checked.results.get("measured_response"), result.attrs["reference"]
     if "validation" in checked.refused:  # points beside the answer to something else
         measured = None
-    per, words, kinds, tables = reference, [], set(), []
+    per, words, tables = reference, [], []
     if "wave" in result["input"]:
         per = f"a wave that passes all probes, counted from {reference}"
     unknown = result["amplitude"].isnull().all(["input", "frequency"])
     if read := ", ".join(map(str, result["state"].values[unknown])):
         words.append(f"{read}: read off other states, so that no linear response stands for it.")
     if measured:
-        kinds = {*measured["kind"].values}
-        tables.append(table("measured_response", _points(measured, result)))
-    if "irregular" in kinds:
-        words.append(
-            "Points of irregular waves are of all runs, training included. Their bars hold chance, "
-            "and the change from segments half as long, by which leakage is judged."
-        )
+        # Those of irregular waves stand in the figure.
+        at = measured.sel(point=measured["kind"] == "regular")
+        at = at.assign_coords(units=("state", result["units"].isel(input=-1).values))
+        points = [
+            (
+                *row(own, "run", frequency=3, wave_amplitude=4),
+                *row(own, "shown"),
+                *(uncertain(own[k], own[f"{k}_uncertainty"]) for k in ("amplitude", "phase")),
+            )
+            for own in entries(
+                _as_shown(at, "amplitude", "amplitude_uncertainty"), "point", "state"
+            )
+        ]
+        tables.append(table("measured_response", points))
+        if "irregular" in measured["kind"]:
+            words.append(
+                "Points of irregular waves are of all runs, training included. Their bars hold "
+                "chance, and the change from segments half as long, by which leakage is judged."
+            )
     if "validation" in checked.results:
         tables.append(_validation_table(checked.results["validation"]))
     figure = drawing("response", checks.response, result, measured)
@@ -195,27 +202,12 @@ def response_section(result: xr.Dataset, checked: Checked) -> Section:
 def _as_shown(result: xr.Dataset, *keys: str) -> xr.Dataset:
     """Some variables in the units that are shown, and ``shown``: each state with its unit."""
     factors, units = zip(*map(displayed, result["units"].values), strict=True)
-    factor = xr.DataArray(list(factors), dims="state")
     names = [
         f"{state} [{shown_unit(unit)}]"
         for state, unit in zip(result["state"].values, units, strict=True)
     ]
-    scaled = {key: result[key] * factor for key in keys}
+    scaled = result[[*keys]] * xr.DataArray([*factors], dims="state")
     return result.assign(scaled).assign_coords(shown=("state", names))
-
-
-def _points(measured: xr.Dataset, result: xr.Dataset) -> list[tuple[str, ...]]:
-    """Measured response in regular waves; irregular ones stand in the figure."""
-    at = measured.sel(point=measured["kind"] == "regular")
-    at = at.assign_coords(units=("state", result["units"].isel(input=-1).values))
-    return [
-        (
-            *row(own, "run", frequency=3, wave_amplitude=4),
-            *row(own, "shown"),
-            *(uncertain(own[key], own[f"{key}_uncertainty"]) for key in ("amplitude", "phase")),
-        )
-        for own in entries(_as_shown(at, "amplitude", "amplitude_uncertainty"), "point", "state")
-    ]
 
 
 def _validation_table(result: xr.Dataset) -> Table:
@@ -238,8 +230,7 @@ def _validation_table(result: xr.Dataset) -> Table:
 def possible_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return coherence, and the least error of a linear map beside the model's."""
     rows, trained = [], checked.results.get("training_coherence")
-    advice = defaultdict(list)
-    unjudged = defaultdict(list)
+    advice, unjudged = defaultdict(list), defaultdict(list)
     worth, segment = checked.results.get("worth"), result.attrs["segment"]
     ahead = worth is not None and bool((worth["look_ahead"] > 0).any())
     for state in result["state"].values:
@@ -309,17 +300,22 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
     words, points = [], []
     parts: list[Drawing | Table] = []
     if result := checked.results.get("decay"):
-        parts = [
-            drawing("decay", checks.decay, result),
-            _decay_table(result, checked.results.get("measured_decay")),
+        cells = partial(row, period=3, damping_ratio=3, p=3)
+        rows = [
+            (*cells(own, "motion", q=0), "model") for own in entries(result.assign(q=0), "motion")
         ]
-        most = np.abs(result["displacement"].values).max(axis=1)
+        if measured := checked.results.get("measured_decay"):
+            rows += [
+                (*cells(at, "motion", q=3), *row(at, "run")) for at in entries(measured, "run")
+            ]
+        parts = [drawing("decay", checks.decay, result), table("decay", rows)]
+        most = abs(result["displacement"]).max("time", skipna=False)
         # None swings farther than it was moved in still water.
         points = [
             f"{motion}: after its release the model swings to {reach:.2g} times the offset, where "
             "a vessel in still water swings back by less than it was moved. Read no period and no "
             "damping off it: the state of this model follows the waves, or its delays fit noise."
-            for motion, reach in zip(result["motion"].values, most, strict=True)
+            for motion, reach in most.to_series().items()
             if reach > OVERSHOOT
         ]
         words.append(
@@ -327,29 +323,14 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
             "with fewer than three extremes has neither period nor damping: it creeps back, or its "
             "forecast leans on the waves and forgets the state."
         )
-    figure = drawing("modes", checks.modes, modes) if modes.sizes["state"] > 1 else None
-    return section("modes", *parts, figure, _modes_table(modes), more=words, points=points)
-
-
-def _decay_table(result: xr.Dataset, measured: xr.Dataset | None) -> Table:
-    """Period and damping of each motion of the model, and of each measured decay."""
-    cases = [(own, "model") for own in entries(result.assign(q=0), "motion")]
-    if measured:
-        cases += [(own, own["run"].item()) for own in entries(measured, "run")]
-    rows = [
-        (*row(own, "motion", period=3, damping_ratio=3, p=3, q=0 if of == "model" else 3), of)
-        for own, of in cases
-    ]
-    return table("decay", rows)
-
-
-def _modes_table(result: xr.Dataset) -> Table:
     rows = []
-    for own in entries(result, "mode"):
-        parts = own["participation"].to_series().sort_values(ascending=False, kind="stable")[:2]
-        taking = ", ".join(f"{state} {part:.2f}" for state, part in parts.items())
+    for own in entries(modes, "mode"):
+        shares = own["participation"].to_series().sort_values(ascending=False, kind="stable")[:2]
+        taking = ", ".join(f"{state} {part:.2f}" for state, part in shares.items())
         rows.append((*row(own, period=4, damping_ratio=4, decay_time=4, modulus=4), taking))
-    return table("modes", rows, modes=len(rows))
+    figure = drawing("modes", checks.modes, modes) if modes.sizes["state"] > 1 else None
+    listed = table("modes", rows, modes=len(rows))
+    return section("modes", *parts, figure, listed, more=words, points=points)
 
 
 def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -426,10 +407,8 @@ def drift_section(result: xr.Dataset, checked: Checked) -> Section:
     rows = []
     if "offset" in result:
         shown = _as_shown(result, "slow_response", "offset", "offset_uncertainty")
-        for own in entries(shown, "state"):
+        for own in entries(shown.dropna("state", how="all", subset=["slow_response"]), "state"):
             mean, points = own["slow_response"][0], own["point_frequency"].values
-            if not np.isfinite(own["slow_response"]).any():
-                continue
             modelled = np.interp(points, mean["frequency"], mean, left=np.nan, right=np.nan)
             for value, at in zip(modelled, entries(own, "point"), strict=True):
                 offset = uncertain(at["offset"], at["offset_uncertainty"])

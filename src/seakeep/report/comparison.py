@@ -16,7 +16,7 @@ import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
 from seakeep.conventions import displayed
-from seakeep.files import MARK, replacing, write_netcdf, write_text
+from seakeep.files import MARK, write_netcdf, write_text
 from seakeep.models import HankelEnsemble
 from seakeep.models.forecasts import counted
 from seakeep.report.tables import (
@@ -33,6 +33,7 @@ from seakeep.report.tables import (
     ratio_of,
     row,
     short,
+    write_frame,
 )
 
 UNTIL = "waves read until [s]"
@@ -186,40 +187,30 @@ def write_differences(table: xr.Dataset, path: Path) -> Path:
     every = table[[*of_all]].rename(of_all).expand_dims(run=[""])
     each = table[[*of_all.values(), "wave_period"]]
     both = [part.to_dataframe().reset_index() for part in (each, every)]
-    return _write(pd.concat(both), ["run", "wave_period", "model"], path)
+    return _write(both, ["run", "wave_period", "model"], path)
 
 
 def write_comparison(tables: Datasets, path: Path) -> Path:
     """Write comparison tables as CSV, a row per run and channel, full precision."""
-    frames = [
-        table.transpose("run", "channel").to_dataframe().reset_index().assign(model=name)
-        for name, table in tables.items()
-    ]
-    front = ["run", "channel", "channel_units", "model"]
-    return _write(pd.concat(frames, ignore_index=True), front, path)
+    ordered = {name: table.transpose("run", "channel") for name, table in tables.items()}
+    return _write(_frames(ordered), ["run", "channel", "channel_units", "model"], path)
 
 
 def write_nowcasts(nowcasts: Datasets, path: Path) -> Path:
     """Write all errors as CSV, a row per model, run, channel and lead, full precision."""
     keys = HEADER.split(",")
-    frames = [
-        of_model[keys[4:]].to_dataframe().reset_index().assign(model=model)
-        for model, of_model in nowcasts.items()
-    ]
-    return _write(pd.concat(frames)[keys], keys, path)
+    return _write(_frames({name: each[keys[4:]] for name, each in nowcasts.items()}), keys, path)
 
 
-def _write(table: pd.DataFrame, front: Sequence[str], path: Path) -> Path:
-    """Write a table as CSV, some of its columns first."""
-    table = table[[*front, *(name for name in table.columns if name not in front)]]
-    with replacing(path) as temporary:
-        plain_cells(table).to_csv(temporary, index=False)
-    return path
+def _frames(tables: Datasets) -> list[pd.DataFrame]:
+    """Tables of several models, a column says which."""
+    return [each.to_dataframe().reset_index().assign(model=name) for name, each in tables.items()]
 
 
-def plain_cells(table: pd.DataFrame) -> pd.DataFrame:
-    """A table in which no text is a formula."""
-    return table.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell)
+def _write(parts: Sequence[pd.DataFrame], front: list[str], path: Path) -> Path:
+    """Write tables below each other as CSV, some of their columns first."""
+    table = pd.concat(parts)
+    return write_frame(table[[*front, *table.columns.difference(front, sort=False)]], path)
 
 
 def nowcast_blocks(nowcasts: Datasets) -> Iterator[Table]:
@@ -330,31 +321,28 @@ def margins_table(ensemble: HankelEnsemble) -> Table:
     calibration = ensemble.calibration
     assert calibration is not None
     margin, windows, floor = calibration.conformal, calibration.windows, calibration.floor
-    cells = {
+    what = {
         "constant": "Margin",
         "spread": "Factor k and floor f, ±k·√(σ² + f²),",
         "learnt": "Factor k of a learnt scale and its floor f",
     }[calibration.scale]
     width = margin.margin if floor is None else floor
     title = (
-        f"{cells} of the {100 * margin.level:g} % band, from "
+        f"{what} of the {100 * margin.level:g} % band, from "
         f"{counted(sum(windows.values()), 'window')} of {calibration.steps} instants "
         f"({', '.join(windows)})"
     )
     rows = []
     for k, label in enumerate(ensemble.state_labels):
         factor, shown = displayed(label.units)
-        rows.append(
-            (
-                label.name,
-                shown,
-                *([] if floor is None else [f"{margin.margin[k]:.2f}"]),
-                f"{factor * width[k]:.4g}",
-                f"{width[k] / ensemble.state_spread[k]:.3f}",
-                f"{margin.blocks[k]:.0f}",
-                f"{math.floor(1e4 * margin.warranted[k] + 1e-6) / 100:g}",
-            )
+        cells = (
+            *([] if floor is None else [f"{margin.margin[k]:.2f}"]),
+            f"{factor * width[k]:.4g}",
+            f"{width[k] / ensemble.state_spread[k]:.3f}",
+            f"{margin.blocks[k]:.0f}",
+            f"{math.floor(1e4 * margin.warranted[k] + 1e-6) / 100:g}",
         )
+        rows.append((label.name, shown, *map(Number, cells)))
     names = ("margin",) if floor is None else ("k", "f")
     columns = ("channel", "unit", *names, "in SD", "blocks", "warranted %")
-    return Table("margins", title, columns, rows, numeric=range(2, len(columns)))
+    return Table("margins", title, columns, rows)

@@ -66,7 +66,7 @@ class Section:
     terms : sequence of (str, str)
         Words and what they mean.
     histories : dict, optional
-        Data of an interactive plot, from :func:`seakeep.report.sections.histories.history_data`.
+        Data of an interactive plot, from :func:`seakeep.report.sections.histories.explorer`.
     figures : sequence of Drawing
         Figures.
     tables : sequence of Table
@@ -196,6 +196,8 @@ def inline_picture(png: bytes, words: str) -> Markup:
 
 def _drawn(drawing: Drawing, folder: Path) -> Markup:
     """Draw a figure, write its files, and return it as an element of the page."""
+    import matplotlib as mpl
+
     figure = drawing.draw()
     engine = figure.get_layout_engine()
     if engine:  # laid out once, not again for each file
@@ -203,26 +205,15 @@ def _drawn(drawing: Drawing, folder: Path) -> Markup:
         # Without any engine; "none" stands for one, for which each file would be drawn twice.
         figure.set_layout_engine(None)
     save_figure(figure, folder / f"{drawing.name}.png")
-    text = _svg_text(figure, drawing.name)
-    write_text(folder / f"{drawing.name}.svg", text)
-    return _inline_svg(text, drawing)
-
-
-def _svg_text(figure: Figure, name: str) -> str:
-    """SVG of a figure, letters as shapes, so that it looks the same wherever it is opened."""
-    import matplotlib as mpl
-
-    buffer = io.StringIO()
+    name, label, buffer = drawing.name, f"title-{drawing.name}", io.StringIO()
+    # Letters are shapes, so that it looks the same wherever it is opened.
     with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     # A tenth of a point is all that can be seen, and half of the file.
     shorten = re.compile(r"(\.\d)\d+")
-    return re.sub(r' d="[^"]*"', lambda path: shorten.sub(r"\1", path[0]), buffer.getvalue())
-
-
-def _inline_svg(text: str, drawing: Drawing) -> Markup:
-    """Turn an SVG file into an element that may stand inside a page beside others."""
-    name, label = drawing.name, f"title-{drawing.name}"
+    text = re.sub(r' d="[^"]*"', lambda path: shorten.sub(r"\1", path[0]), buffer.getvalue())
+    write_text(folder / f"{name}.svg", text)
+    # Inside a page it stands beside others.
     text = re.sub(r"<(metadata|title)>.*?</\1>", "", text[text.index("<svg") :], flags=re.S)
     text = re.sub(r'(\bid="|href="#|url\(#)', rf"\1{name}-", text)
     words = f'<title id="{label}">{escape(drawing.caption)}</title>'

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from seakeep.arrays import Datasets
@@ -31,11 +32,7 @@ def channel_rows(run: xr.Dataset) -> list[tuple[str, ...]]:
     findings, rows = findings_of(run), []
     for name, channel in run.data_vars.items():
         factor, unit = displayed(channel.attrs.get("units", ""))
-        x = factor * channel.values
-        known = x[np.isfinite(x)]
-        numbers = (np.nan,) * 4
-        if known.size:
-            numbers = (known.min(), known.max(), known.mean(), known.std(ddof=1))
+        numbers = pd.Series(factor * channel.values).agg(["min", "max", "mean", "std"])
         flags = run.coords.get(f"{name}_flags", xr.zeros_like(channel)).values.astype(int)
         flagged = ", ".join(
             f"{word} {100 * np.mean((flags & bit) > 0):.2g} %"
@@ -91,16 +88,16 @@ def write_quality_sheet(
     rows = [(*row, kinds or "nothing found") for *row, kinds in map(run_row, runs, runs.values())]
     rows += [(n, Number("not prepared"), MISSING, why) for n, why in unread.items()]
     marked = [k for k, row in enumerate(rows) if row[2] != "0"]
-    every = section("runs", table("runs", rows, marked=marked))
-    sections = [every, *map(_section, runs, runs.values())]
+    sections = [section("runs", table("runs", rows, marked=marked))]
+    sections += map(_section, runs, runs.values())
     drawn = {
         path.stem: inline_picture(path.read_bytes(), f"channels of {name}")
         for name, path in pictures.items()
     }
     page = folder / "quality.html"
-    content = {"stamp": {}, "sections": sections, "drawn": drawn, "files": False}
     title = f"Data quality: {title}"
-    write_text(page, rendered("report.html", kind=SHEET, title=title, **content))
+    content = {"title": title, "stamp": {}, "sections": sections, "drawn": drawn, "files": False}
+    write_text(page, rendered("report.html", kind=SHEET, **content))
     return [page, *pictures.values()]
 
 

@@ -200,8 +200,14 @@ def axis_label(name: str, units: str, long_name: str | None = None) -> str:
     """
     channel = canonical_channel(name)
     symbol = f"${channel.symbol}$ " if channel else ""
-    lines = "\n".join(_balanced(plain_text(long_name_of(name, long_name))))
-    return f"{lines}\n{symbol}[{shown_unit(units) or '?'}]"
+    words = plain_text(long_name_of(name, long_name))
+    wraps = [
+        textwrap.wrap(words, width, break_long_words=width == WIDEST, break_on_hyphens=False)
+        for width in range(1, WIDEST + 1)
+    ]
+    # As few lines as fit, of lengths as equal as they can be.
+    lines = min((each for each in wraps if max(map(len, each)) <= WIDEST), key=len)
+    return "\n".join([*lines, f"{symbol}[{shown_unit(units) or '?'}]"])
 
 
 def short_label(channel: str) -> str:
@@ -251,12 +257,3 @@ def shown_unit(unit: str) -> str:
     ('m/s²', 'N·m')
     """
     return unit.replace("^2", "²").replace("^3", "³").replace("*", "·")
-
-
-def _balanced(words: str) -> list[str]:
-    """Wrap into as few lines as fit, of lengths as equal as they can be."""
-    wraps = [
-        textwrap.wrap(words, width, break_long_words=width == WIDEST, break_on_hyphens=False)
-        for width in range(1, WIDEST + 1)
-    ]
-    return min((each for each in wraps if max(map(len, each)) <= WIDEST), key=len)

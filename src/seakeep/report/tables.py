@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, SupportsFloat
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import xarray as xr
 
 from seakeep.files import replacing, write_text
@@ -49,8 +49,7 @@ class Table:
         Cells.
     note : str
         What a reader must know about it.
-    numeric : sequence of int, optional
-        Columns of numbers; by default those whose cells are :class:`Number`.
+
     elsewhere : sequence of int
         Columns that come from another data set.
     averages : sequence of int
@@ -69,7 +68,7 @@ class Table:
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
-    numeric: Sequence[int] | None = None
+
     elsewhere: Sequence[int] = ()
     averages: Sequence[int] = ()
     marked: Sequence[int] = ()
@@ -78,15 +77,9 @@ class Table:
 
     @cached_property
     def numbers(self) -> frozenset[int]:
-        """Columns that hold numbers."""
-        if self.numeric is not None:
-            return frozenset(self.numeric)
-        columns = ([each for each in column if each] for column in zip(*self.rows, strict=True))
-        return frozenset(
-            k
-            for k, cells in enumerate(columns)
-            if cells and all(isinstance(each, Number) for each in cells)
-        )
+        """Columns that hold numbers: those whose cells are :class:`Number`."""
+        columns = enumerate(zip(*self.rows, strict=True))
+        return frozenset(k for k, cells in columns if {*map(type, filter(None, cells))} == {Number})
 
 
 WORDS = packaged("report/templates/words.toml")
@@ -407,10 +400,15 @@ def plain_cell(text: str) -> str:
 
 
 def write_csv(table: Table, path: Path) -> Path:
-    """Write a table as CSV (UTF-8)."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerows([*map(plain_cell, row)] for row in (table.columns, *table.rows))
+    """Write a table as :func:`write_frame` does."""
+    return write_frame(pd.DataFrame([*table.rows], columns=[*table.columns]), path)
+
+
+def write_frame(frame: pd.DataFrame, path: Path) -> Path:
+    """Write a table as CSV (UTF-8), in which no cell is a formula."""
+    plain = frame.map(lambda cell: plain_cell(cell) if isinstance(cell, str) else cell)
+    with replacing(path) as temporary:
+        plain.rename(columns=plain_cell).to_csv(temporary, index=False, lineterminator="\n")
     return path
 
 
@@ -488,13 +486,27 @@ def latex_text(text: str) -> str:
 
 def write_latex(table: Table, path: Path) -> Path:
     r"""Write a table as LaTeX with booktabs rules; longer than a page it is a longtable."""
+    columns = list(zip(table.columns, *table.rows, strict=True))
+    whole = [max(map(len, column)) for column in columns]
+    words = [max(map(len, " ".join(column).split()), default=0) for column in columns]
+
+    def widths(level: int) -> list[int]:
+        """Each column as wide as its longest word, and as a level that it may need less than."""
+        return [min(a, max(b, level)) for a, b in zip(whole, words, strict=True)]
+
+    fitting = (k for k in range(LINE, 8, -1) if sum(widths(k)) + 2 * len(columns) <= LINE)
+    # Numbers to the right, text to the left, what does not fit in lines that break.
+    form = "".join(
+        rf"p{{{width / LINE:.2f}\linewidth}}" if width < whole[k] else "lr"[k in table.numbers]
+        for k, width in enumerate(widths(next(fitting, 8)))
+    )
     rows = [
         "\\midrule\n" * (k in table.averages) + _latex_line(row) for k, row in enumerate(table.rows)
     ]
     text = (_LONG if len(table.rows) > PAGE else _SHORT).format(
         name=table.name,
         caption=latex_text(f"{table.title}. {table.note}".strip()),
-        form=_latex_columns(table),
+        form=form,
         head=f"\\toprule\n{_latex_line(table.columns)}\n\\midrule",
         body="\n".join(rows),
     )
@@ -529,20 +541,3 @@ _LONG = r"""\begingroup\small\tabcolsep=4pt
 
 def _latex_line(cells: Iterable[str]) -> str:
     return " & ".join(map(latex_text, cells)) + r" \\"
-
-
-def _latex_columns(table: Table) -> str:
-    """Columns of numbers to the right, of text to the left, of what does not fit in lines."""
-    columns = list(zip(table.columns, *table.rows, strict=True))
-    whole = [max(map(len, column)) for column in columns]
-    words = [max(map(len, " ".join(column).split()), default=0) for column in columns]
-
-    def widths(level: int) -> list[int]:
-        """Each column as wide as its longest word, and as a level that it may need less than."""
-        return [min(a, max(b, level)) for a, b in zip(whole, words, strict=True)]
-
-    fitting = (k for k in range(LINE, 8, -1) if sum(widths(k)) + 2 * len(columns) <= LINE)
-    return "".join(
-        rf"p{{{width / LINE:.2f}\linewidth}}" if width < whole[k] else "lr"[k in table.numbers]
-        for k, width in enumerate(widths(next(fitting, 8)))
-    )

@@ -582,8 +582,16 @@ def to_full_scale(run: xr.Dataset, scale: float, density_ratio: float = 1.0) -> 
         by, value = clock if key in TIMES else scale, run.attrs[key]
         pair = isinstance(value, tuple | list)
         out.attrs[key] = tuple(by * float(v) for v in value) if pair else by * float(value)
-    if "status" in run.attrs:
-        _state_again(out)
+    if "status" in run.attrs:  # it names instants, and so does that of each member
+        dt = float(np.diff(out["time"].values[:2]).sum())
+        out.attrs["status"] = status_text(out.attrs, dt)
+        if "status" in out:
+            shared = {key: out.attrs[key] for key in out.attrs.keys() & {"input_predicted_from"}}
+            words = [
+                status_text(shared if np.isnan(at) else shared | {"diverged_at": at}, dt)
+                for at in out["diverged_at"].values
+            ]
+            out["status"] = out["status"].copy(data=words)
     return out
 
 
@@ -600,19 +608,6 @@ def _scaled(run: xr.Dataset, factor_of: Callable[[str], tuple[float, str]]) -> x
             channel.attrs | spreads | ({"units": factor_of(unit)[1]} if unit else {})
         )
     return out
-
-
-def _state_again(forecast: xr.Dataset) -> None:
-    """Write the status of a forecast, and of its members, anew: it names instants."""
-    dt, facts = float(np.diff(forecast["time"].values[:2]).sum()), forecast.attrs
-    facts["status"] = status_text(facts, dt)
-    if "status" in forecast:
-        shared = {key: facts[key] for key in facts.keys() & {"input_predicted_from"}}
-        words = [
-            status_text(shared if np.isnan(at) else shared | {"diverged_at": at}, dt)
-            for at in forecast["diverged_at"].values
-        ]
-        forecast["status"] = forecast["status"].copy(data=words)
 
 
 def calibration_parts(
@@ -767,32 +762,33 @@ def nowcast(model: Servable, run: xr.Dataset, steps: int, *, level: float = 0.95
             f"{name} has {time.size} samples, and a forecast of {steps} steps takes "
             f"{signature.history_samples} of history before. Give fewer steps, or another run."
         )
-    starts = set(np.linspace(first, last, min(STARTS, last - first + 1)).astype(int).tolist())
+    starts = np.unique(np.linspace(first, last, min(STARTS, last - first + 1)).astype(int))
     u = channel_matrix(run, signature.inputs, name)
     y = channel_matrix(run, signature.states, name)
     spread = signature.state_scale.spread
     live = model.live(like=run)
-    squares, claimed, inside, judged = np.zeros((4, steps, len(spread)))
+    forecasts = []
     for at in range(last + 1):
         live.step(u[at], y[at])
         if at in starts:
             forecast = live.forecast(steps, level=level)
-            statistics = np.stack([forecast[each].values for each in signature.states], axis=-1)
-            mean, std, lower, upper = statistics
-            truth = y[at + 1 : at + steps + 1]
-            known = np.isfinite(truth)
-            squares += np.where(known, ((mean - truth) / spread) ** 2, 0.0)
-            claimed += np.where(known, (std / spread) ** 2, 0.0)
-            inside += (lower <= truth) & (truth <= upper)
-            judged += known
-    judged[judged == 0] = np.nan
-    error = np.sqrt(squares / judged)
+            forecasts.append([forecast[each].values for each in signature.states])
+    # Each over (start, lead, channel).
+    mean, std, lower, upper = np.transpose(forecasts, (2, 0, 3, 1))
+    truth = np.stack([y[at + 1 : at + steps + 1] for at in starts])
+    known = np.isfinite(truth)
+    judged = np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    error, claimed = (
+        np.sqrt(np.where(known, (each / spread) ** 2, 0.0).sum(axis=0) / judged)
+        for each in (mean - truth, std)
+    )
+    inside = ((lower <= truth) & (truth <= upper)).sum(axis=0)
     over, sd = ("lead", "channel"), {"units": "training SD"}
     leads = signature.dt * np.arange(1, steps + 1)
     return xr.Dataset(
         {
             "error": (over, error, sd),
-            "claimed": (over, np.sqrt(claimed / judged), sd),
+            "claimed": (over, claimed, sd),
             "coverage": (over, 100.0 * inside / judged, {"units": "%"}),
             "lead_time": ("channel", signature.dt * held_samples(error <= SHARE), {"units": "s"}),
         },

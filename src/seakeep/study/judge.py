@@ -8,7 +8,7 @@ the block length of Politis and White.
 
 import warnings
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from itertools import product
 from typing import Any
@@ -39,6 +39,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 SHOWN = 5
 """Lost forecasts that a warning names."""
+Statistic = Callable[..., FloatArray]
 DIFFERENCES = 500
 """Redrawn tables of cells for the interval of a difference between models."""
 
@@ -136,7 +137,7 @@ def lost_forecasts(groups: Datasets, tests: Iterable[str]) -> xr.Dataset | None:
     for name in tests:
         test = groups[f"tests/{name}"]
         gone = test["mean"].isnull().any(("time", "channel")) & test["judged"]
-        for model, training, window in zip(*np.nonzero(gone.values), strict=True):
+        for model, training, window in np.argwhere(gone.values):
             at = test.isel(model=model, training=training, window=window)
             cell = {key: at[key].item() for key in ("model", "training", "window", "run", "start")}
             rows.append(cell | {"test": name})
@@ -200,18 +201,26 @@ def difference_table(
         with undefined():
             return middle[:, :, None] / middle[:, None]
 
-    bounds = statistics.two_way_interval(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES)
     coords = {
         "model": test["model"].values,
         "other": test["model"].values,
         "measure": test["measure"].values,
         "channel": _names(test),
     }
-    values = np.stack([ratio(cells[None])[0], *bounds]) - 1.0
+    values = with_bounds(ratio, cells, rng=rng, blocks=blocks, n_series=DIFFERENCES) - 1.0
     out = numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
     for key, words in {"change": "", "lower": ", lower bound", "upper": ", upper bound"}.items():
         out[key].attrs["long_name"] = f"median error of model over that of other, minus one{words}"
     return out
+
+
+def with_bounds(statistic: Statistic, *cells: FloatArray, **how: Any) -> FloatArray:
+    """A statistic of crossed cells and its bounds, shape (3, …).
+
+    Arguments are those of :func:`seakeep.statistics.two_way_interval`.
+    """
+    bounds = statistics.two_way_interval(statistic, *cells, **how)
+    return np.stack([statistic(*(each[None] for each in cells))[0], *bounds])
 
 
 def _names(test: xr.Dataset) -> list[str]:
@@ -313,30 +322,26 @@ def band_tables(test: xr.Dataset, calibration: xr.Dataset | None, level: float) 
     known = "wave_height" in test and np.isfinite(test["wave_height"]).all()
     waves = cells("wave_height") if known else None
     bands = {"members": None} | ({} if calibration is None else {"calibrated": calibration})
-    shares, parts = [], {}
+    over = {"against": list(against), "channel": _names(test)}
+    tables: dict[str, list[xr.Dataset]] = defaultdict(list)
     for model, band in product(ensembles, bands):
+        place = {"model": [model], "band": [band]}
         lower, upper = (bound[judged] for bound in band_of(test, model, bands[band]))
-        shares += [_coverage_row(lower, upper, each) for each in against.values()]
+        shares = [_coverage_row(lower, upper, each) for each in against.values()]
+        held = numbered(shares, ("against", "number", "channel"), COVERAGE, over)
+        tables["coverage"].append(held.expand_dims(place))
         if not np.isnan(lower).any(axis=1).all():  # lost, or nothing to calibrate on
-            parts[model, band] = statistics.coverage_table(
-                lower, upper, against["measured"], level, waves
-            )
-    over = {"model": ensembles, "band": list(bands)}
-    shape = len(ensembles), len(bands)
-    grid = np.reshape(shares, (*shape, len(against), len(COVERAGE), -1))
-    coords = {**over, "against": list(against), "channel": _names(test)}
-    out = {"coverage": numbered(grid, (*over, "against", "number", "channel"), COVERAGE, coords)}
-    if parts:
-        first = next(iter(parts.values()))
-        nothing = np.full((len(PARTS), len(first.parts), test.sizes["channel"]), np.nan)
-        scores = [
-            [getattr(parts[at], key) for key in PARTS] if at in parts else nothing
-            for at in product(ensembles, bands)
-        ]
-        grid = np.reshape(scores, (*shape, *nothing.shape))
-        coords = {**over, "part": list(first.parts), "channel": test["channel"]}
-        out["bands"] = numbered(grid, (*over, "number", "part", "channel"), PARTS, coords)
-    return out
+            scores = statistics.coverage_table(lower, upper, against["measured"], level, waves)
+            within = {"part": list(scores.parts), "channel": test["channel"]}
+            values = [getattr(scores, key) for key in PARTS]
+            each = numbered(values, ("number", *within), PARTS, within)
+            tables["bands"].append(each.expand_dims(place))
+    return {
+        key: xr.merge(of, join="outer", compat="no_conflicts").reindex(
+            model=ensembles, band=list(bands)
+        )
+        for key, of in tables.items()
+    }
 
 
 def _coverage_row(lower: FloatArray, upper: FloatArray, against: FloatArray) -> FloatArray:
@@ -400,10 +405,10 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
             return np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
 
     blocks = blocks_of([test], training)[1], 1
-    bounds = statistics.two_way_interval(
-        change, level, growth, rng=rng, blocks=blocks, n_series=DIFFERENCES, signed=True
-    )
-    values = np.stack([change(level.values[None], growth.values[None])[0], *bounds])
+    values = with_bounds(
+        change, level.values, growth.values, rng=rng, blocks=blocks, n_series=DIFFERENCES,
+        signed=True,
+    )  # fmt: skip
     growths = numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
     lines = numbered(series, (*coords, "number", "time"), TREND_LINES, {**coords, "time": time})
     return xr.merge([growths, lines])
@@ -568,14 +573,11 @@ def _responses(groups: Datasets, test: str) -> tuple[FloatArray, ComplexArray]:
     time, measured, mean = (data[key].values for key in ("time", "measured", "mean"))
     turn = 2 * np.pi * _frequencies(groups, test)[:, None] * time
     basis = np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=-1)
-    orthonormal, triangle = np.linalg.qr(basis)  # of each window
-    onto = orthonormal.swapaxes(1, 2)
-    inside = (onto @ (mean - measured)) ** 2
-    parts = inside[..., 0, :], inside[..., 1:, :].sum(axis=-2)
-    total = np.sum((mean - measured) ** 2, axis=-2)
-    squares = np.stack([*parts, total - sum(parts)]) / (time.size * measured.var(axis=1, ddof=1))
-    # The first of an orthonormal basis of (1, cos, sin) is the mean; amplitudes need (1, …).
-    own, known = (np.linalg.solve(triangle, onto @ x) for x in (mean, measured))
+    own, known = (np.linalg.pinv(basis) @ x for x in (mean, measured))
+    error = mean - measured
+    total, fitted = (np.mean(x**2, axis=-2) for x in (error, basis @ (own - known)))
+    offset = error.mean(axis=-2) ** 2
+    squares = np.stack([offset, fitted - offset, total - fitted]) / measured.var(axis=1, ddof=1)
     amplitudes = (each[..., 1, :] - 1j * each[..., 2, :] for each in (own, known))
     answer = np.divide(*amplitudes)
     slack = np.isnan(data["error"].sel(measure="nrmse").values)

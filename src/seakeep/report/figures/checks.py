@@ -63,12 +63,6 @@ def _end(spectrum: xr.DataArray) -> float:
     return float(spectrum["frequency"][np.flatnonzero(energy > 1e-3 * energy.max())[-1]])
 
 
-def _answering(values: xr.DataArray) -> list[str]:
-    """States that have a response."""
-    others = [dim for dim in values.dims if dim != "state"]
-    return values["state"].values[values.notnull().any(others)].tolist()
-
-
 def response(
     result: xr.Dataset, measured: xr.Dataset | None = None, *, axes: Places = None
 ) -> Figure:
@@ -87,7 +81,6 @@ def response(
     -------
     Figure
     """
-    states = _answering(result["amplitude"])
 
     def draw(own: xr.Dataset, gain: Any, turn: Any) -> None:
         factor, units, label = _shown(own)
@@ -120,9 +113,10 @@ def response(
         gain.set_ylabel(f"{label} [{units}]")
         turn.set(ylabel=f"phase of {label} [°]", ylim=(-190, 190), yticks=range(-180, 181, 90))
 
-    most = 2 + 2 * (len(states) % 2 == 0)
     entry = "wave" if "wave" in result["input"] else result.attrs["reference"]
-    return by_state(result.sel(input=entry, state=states), axes, (2.9, 1.75), draw, 2, most)
+    answering = result.dropna("state", how="all", subset=["amplitude"]).sel(input=entry)
+    most = 2 + 2 * (answering.sizes["state"] % 2 == 0)
+    return by_state(answering, axes, (2.9, 1.75), draw, 2, most)
 
 
 def coherence(result: xr.Dataset, *, axes: Places = None) -> Figure:
@@ -174,7 +168,7 @@ def modes(result: xr.Dataset, *, most: int = 12, axes: Places = None) -> Figure:
     -------
     Figure
     """
-    at = result.isel(mode=slice(0, most))
+    at = result.head(mode=most)
     states, shares = at["state"].values.tolist(), at["participation"].values
     words = [
         f"{period:.3g} s, {ratio:.3f}" if np.isfinite(period) else f"decays in {time:.3g} s"
@@ -398,5 +392,5 @@ def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
             place.errorbar(own["point_frequency"], *offsets, **style)
         place.set(xlabel="frequency [Hz]", ylabel=f"{label} [{unit}]")
 
-    shown = result.sel(state=_answering(result["slow_response"]))
-    return by_state(shown, axes, (3.0, 2.0), draw)
+    answering = result.dropna("state", how="all", subset=["slow_response"])
+    return by_state(answering, axes, (3.0, 2.0), draw)

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray
@@ -47,40 +46,6 @@ BAND_WORDS = {"all": "all frequencies", "low": "low frequencies", "wave": "wave 
 """Bands of ε(t)."""
 LOWEST = 0.8
 """Modulus at which the axis ends; what lies below dies out within a few samples."""
-
-
-def draw_box_violin(
-    axes: Any,
-    values: npt.ArrayLike,
-    place: float,
-    width: float,
-    colour: str,
-    hatch: str,
-    label: str | None,
-) -> float:
-    """Draw one box-violin and return its upper whisker; the hatch sets models apart in grey print.
-
-    A logarithmic axis shows no violin, and no values that are not positive.
-    """
-    logarithmic = axes.get_yscale() == "log"
-    x = np.asarray(values, dtype=float).ravel()
-    x = x[np.isfinite(x) & (not logarithmic or x > 0)]
-    if x.size == 0:
-        return 0.0
-    sideways = place + 0.16 * width * np.resize(JITTER, x.size)
-    axes.scatter(sideways, x, s=7, color=colour, alpha=0.5, linewidths=0, rasterized=True, zorder=2)
-    if x.size >= FEWEST and np.ptp(x) > 0 and not logarithmic:
-        violin = axes.violinplot([x], [place], widths=width, showextrema=False, points=120)
-        for body in violin["bodies"]:
-            body.set(facecolor=colour, edgecolor=colour, alpha=0.18, linewidth=0.6)
-    line = {"color": colour, "linewidth": 0.9}
-    box = {"facecolor": "white", "edgecolor": colour, "hatch": hatch, "alpha": 0.75, "label": label}
-    drawn = axes.boxplot(
-        [x], positions=[place], widths=0.26 * width, capwidths=0.16 * width, showfliers=False,
-        patch_artist=True, manage_ticks=False, zorder=3, boxprops=box, whiskerprops=line,
-        capprops=line, medianprops={"color": colour, "linewidth": 1.8, "solid_capstyle": "butt"},
-    )  # fmt: skip
-    return drawn["whiskers"][1].get_ydata()[1]
 
 
 @figure_style()
@@ -129,22 +94,45 @@ def _draw_boxes(
     labels: Sequence[str],
     heading: str,
 ) -> None:
-    """Draw the box-violins of models beside each other at each label."""
+    """Draw the box-violins of models beside each other at each label.
+
+    Hatches set models apart in grey print. A logarithmic axis shows no violin, and no values that
+    are not positive.
+    """
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    width, tallest = 0.84 / len(columns), 0.0
+    logarithmic, tallest, whole = axes.get_yscale() == "log", 0.0, 0.84 / len(columns)
+    width = 0.92 * whole
     for number, (model, of_model) in enumerate(columns.items()):
-        first = width * (number - 0.5 * (len(columns) - 1))
-        look = line_of(result, model)["color"], HATCHES[number % len(HATCHES)]
-        for place, values in enumerate(of_model):
-            label = None if place else model_words(model)
-            whisker = draw_box_violin(axes, values, first + place, 0.92 * width, *look, label)
-            tallest = max(tallest, whisker)
+        colour = line_of(result, model)["color"]
+        line = {"color": colour, "linewidth": 0.9}
+        box = {"facecolor": "white", "edgecolor": colour, "alpha": 0.75}
+        box |= {"hatch": HATCHES[number % len(HATCHES)], "label": model_words(model)}
+        for column, values in enumerate(of_model):
+            place = column + whole * (number - 0.5 * (len(columns) - 1))
+            x = values[np.isfinite(values) & (not logarithmic or values > 0)]
+            if x.size == 0:
+                continue
+            sideways = place + 0.16 * width * np.resize(JITTER, x.size)
+            axes.scatter(
+                sideways, x, s=7, color=colour, alpha=0.5, linewidths=0, rasterized=True, zorder=2
+            )
+            if x.size >= FEWEST and np.ptp(x) > 0 and not logarithmic:
+                violin = axes.violinplot([x], [place], widths=width, showextrema=False, points=120)
+                for body in violin["bodies"]:
+                    body.set(facecolor=colour, edgecolor=colour, alpha=0.18, linewidth=0.6)
+            drawn = axes.boxplot(
+                [x], positions=[place], widths=0.26 * width, capwidths=0.16 * width,
+                showfliers=False, patch_artist=True, manage_ticks=False, zorder=3, boxprops=box,
+                whiskerprops=line, capprops=line,
+                medianprops={"color": colour, "linewidth": 1.8, "solid_capstyle": "butt"},
+            )  # fmt: skip
+            tallest = max(tallest, drawn["whiskers"][1].get_ydata()[1])
     axes.set_xticks(range(len(labels)), labels)
     axes.set_xlim(-0.6, len(labels) - 0.4)
     axes.set_ylabel(f"{heading} [measured SD]")
     axes.grid(axis="x", visible=False)
-    if axes.get_yscale() == "log":
+    if logarithmic:
         every = np.concatenate([each for of_model in columns.values() for each in of_model])
         low, high = 0.8 * every[every > 0].min(), 1.25 * np.nanmax(every)
         axes.set_ylim(low, high)
@@ -292,8 +280,8 @@ def error_figure(table: xr.Dataset) -> Figure:
     """
     table = table.sortby("wave_period")
     labels = [
-        plain_text(run) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
-        for run, period in zip(table["run"].values, table["wave_period"].values, strict=True)
+        plain_text(str(run)) + (f"\n{period:.3g} s" if np.isfinite(period) else "")
+        for run, period in table["wave_period"].to_series().items()
     ]
     figure = new_figure(max(4.5, 1.5 + 0.8 * len(labels)), 3.2)
     axes = figure.subplots()

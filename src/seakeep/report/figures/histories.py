@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,25 +96,23 @@ def draw_history(
     axes: Any, time: Any, measured: Values, curves: Sequence[Curve], period: float | None = None
 ) -> None:
     """Draw bands, the measurement and forecasts over time; as envelopes where a period is given."""
+    envelope = partial(_envelope, axes, time, period=period)
     if period is not None:
-        pale = {"color": PALETTE["pale"], "linewidth": 0, "label": "measured, envelope"}
-        _envelope(axes, time, (measured, measured), period, fill=True, **pale)
+        pale = {"color": PALETTE["pale"], "linewidth": 0}
+        envelope(measured, fill=True, label="measured, envelope", **pale)
     alpha = 0.3 if len(curves) == 1 else 0.2
-    for each in curves:
-        if not each.band:
-            continue
-        edge = {"color": each.line["color"], "linewidth": 0.6, "label": each.words}
+    banded = [each for each in curves if each.band]
+    for each in banded:
+        edge = {"color": each.line["color"], "linewidth": 0.6}
         if period is None:
-            axes.fill_between(time, *each.band, alpha=alpha, **edge)
+            axes.fill_between(time, *each.band, alpha=alpha, label=each.words, **edge)
         else:
-            _envelope(axes, time, each.band, period, alpha=2 * alpha, **edge | {"label": None})
+            envelope(*each.band, alpha=2 * alpha, **edge)
     if period is None:
-        banded = any(each.band for each in curves)
         axes.plot(time, measured, label="measured", **(THIN if banded else LINES["measured"]))
     for each in curves:
         if period is not None:
-            edge = {"color": each.line["color"], "linewidth": 0.8}
-            _envelope(axes, time, (each.values, each.values), period, **edge)
+            envelope(each.values, color=each.line["color"], linewidth=0.8)
             continue
         for bound, label in zip(each.calibrated, ("calibrated", None), strict=False):
             style = {**each.line, "linewidth": 0.7, "linestyle": DOTTED}
@@ -121,15 +120,18 @@ def draw_history(
         axes.plot(time, each.values, label=each.label, **each.line)
 
 
-def _envelope(axes: Any, time: Any, bounds: Sequence[Values], period: float, **style: Any) -> None:
+def _envelope(
+    axes: Any, time: Any, low: Values, high: Values | None = None, *, period: Any, **style: Any
+) -> None:
     """Draw the least and the greatest value in steps of a period, or of several."""
+    highest = low if high is None else high
     instants = np.asarray(time)
     steps = min(int((instants[-1] - instants[0]) / period), MOST_STEPS)
     edges = np.linspace(instants[0], instants[-1], steps + 1)
     first = np.searchsorted(instants, edges[:-1])
-    low = np.minimum.reduceat(np.asarray(bounds[0]), first)
-    high = np.maximum.reduceat(np.asarray(bounds[1]), first)
-    axes.stairs(high, edges, baseline=low, **style)
+    bottom = np.minimum.reduceat(np.asarray(low), first)
+    top = np.maximum.reduceat(np.asarray(highest), first)
+    axes.stairs(top, edges, baseline=bottom, **style)
 
 
 @figure_style()
@@ -145,10 +147,11 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
     groups = defaultdict(list)
     for name, each in first.inputs.data_vars.items():
         groups[each.attrs.get("units", "")].append(str(name))
-    period = _period_if_long(first)
-    spans = [None] if period is None else [period, None]
+    period = wave_period(first.inputs, first.measured[states[0]])
+    is_long = (time[-1] - time[0]) / period >= LONG
+    spans = [period, None] if is_long else [None]
     rows = len(states) + len(groups)
-    figure = new_figure(7.5 if len(spans) == 1 else 11.0, 1.0 + 1.45 * rows)
+    figure = new_figure(11.0 if is_long else 7.5, 1.0 + 1.45 * rows)
     axes = figure.subplots(rows, len(spans), squeeze=False, sharex="col", sharey="row")
     for each in axes.flat:
         each.use_sticky_edges = False  # an envelope would lie on the frame
@@ -164,10 +167,14 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
         row[0].set_ylabel(axis_label(name, units, attrs.get("long_name")), fontsize=LABEL)
         judged = _judgement([table.sel(channel=name) for table in tables])
         row[0].set_title(judged, loc="right", fontsize=8, pad=2)
-    for row, names in zip(axes[len(states) :], groups.values(), strict=True):
+    for row, (units, names) in zip(axes[len(states) :], groups.items(), strict=True):
         for place, span in zip(row, spans, strict=True):
             _draw_inputs(place, first.inputs[names], span)
-        row[0].set_ylabel(_input_label(first.inputs[names]), fontsize=LABEL)
+        waves = "wave elevations" if all(map(is_elevation, names)) else "inputs"
+        label = f"{waves}\n[{shown_unit(units) or '?'}]"
+        if len(names) == 1:
+            label = axis_label(names[0], units, first.inputs[names[0]].attrs.get("long_name"))
+        row[0].set_ylabel(label, fontsize=LABEL)
         handles, labels = row[-1].get_legend_handles_labels()
         columns = max(1, min(4, len(labels), ACROSS // (6 + max(map(len, labels)))))
         above = {"loc": "lower left", "bbox_to_anchor": (0.0, 0.98), "borderaxespad": 0.0}
@@ -175,7 +182,7 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
     figure.align_ylabels(axes[:, 0])
     for each in axes[-1]:
         each.set_xlabel("time [s]")
-    if period is not None:
+    if is_long:
         axes[0, 0].set_title("whole forecast, envelopes", fontsize=10)
         axes[0, 1].set_xlim(time[-1] - ENLARGED * period, time[-1])
         axes[0, 1].set_title(f"last {ENLARGED} periods", fontsize=10)
@@ -223,35 +230,17 @@ def _title(comparisons: Sequence[Comparison]) -> str:
     return plain_text(" · ".join(filter(None, parts)))
 
 
-def _period_if_long(comparison: Comparison) -> float | None:
-    """Mean period of a record that is too long for lines, s; of its first state without waves."""
-    first = next(iter(comparison.measured.data_vars.values()))
-    period, time = wave_period(comparison.inputs, first), first["time"].values
-    return period if (time[-1] - time[0]) / period >= LONG else None
-
-
 def _draw_inputs(axes: Any, inputs: xr.Dataset, period: float | None) -> None:
     """Inputs of one unit; beyond the first, colours and dashes set them apart."""
     time = inputs["time"].values
     for number, (name, each) in enumerate(inputs.data_vars.items()):
-        line = {**LINES["input"], "label": plain_text(str(each.attrs.get("long_name", name)))}
+        line = dict(LINES["input"])
         if number:
             other = SERIES[(number + 1) % len(SERIES)]
-            line |= {"color": other["color"], "linestyle": other["linestyle"]}
-        if period is None:
-            axes.plot(time, each, **line)
-        else:
-            _envelope(axes, time, (each, each), period, **line)
+            line |= {key: other[key] for key in ("color", "linestyle")}
+        draw: Any = axes.plot if period is None else partial(_envelope, axes, period=period)
+        draw(time, each, **line, label=plain_text(str(each.attrs.get("long_name", name))))
     axes.axhline(0.0, color=COLOURS["input"], linewidth=0.4)
-
-
-def _input_label(inputs: xr.Dataset) -> str:
-    first, *others = inputs.data_vars.values()
-    units = first.attrs.get("units", "")
-    if not others:
-        return axis_label(str(first.name), units, first.attrs.get("long_name"))
-    waves = all(is_elevation(str(name)) for name in inputs.data_vars)
-    return f"{'wave elevations' if waves else 'inputs'}\n[{shown_unit(units) or '?'}]"
 
 
 def overlay(forecast: xr.Dataset, measured: xr.Dataset, *, axes: Places = None) -> Figure:
@@ -361,8 +350,7 @@ def history_figure(
     figure = new_figure(7.5, 0.9 + (0.95 if len(names) > 1 else 1.4) * len(names))
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     cell = result.tests[test].isel(training=[training], window=[window])
-    calibration = result.groups.get("calibration")
-    if calibration:
+    if calibration := result.groups.get("calibration"):
         calibration = calibration.isel(training=[training])
     for each, name in zip(axes, names, strict=True):
         _draw_channel(each, result, cell, name, calibration)
@@ -394,10 +382,9 @@ def _draw_channel(
             continue
         band = [_standard(at, at[side].sel(ensemble=model)) for side in ("lower", "upper")]
         wider = []
-        if calibration is not None:
-            edges = (each[0, 0, :, result.channels.index(name)]
-                     for each in band_of(cell, model, calibration))  # fmt: skip
-            wider = [_standard(at, each) for each in edges]
+        if calibration:
+            bounds = band_of(cell, model, calibration)
+            wider = [_standard(at, each[0, 0, :, result.channels.index(name)]) for each in bounds]
             wider = wider if np.isfinite(wider).all() else []
         title = f"{words} mean"
         curves.append(Curve(title, line, _standard(at, mean), band, f"{level:g} % band", wider))
@@ -458,15 +445,21 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
             at.set_facecolor(PALETTE["blush"])
         at.plot(time, x, color=COLOURS["measured"], linewidth=0.6)
         at.set_ylabel(label, fontsize=8)
-        if f"{name}_flags" in run.coords:
-            _mark(at, time, x, run[f"{name}_flags"].values)
+        if f"{name}_flags" in run.coords and (flags := run[f"{name}_flags"].values).any():
+            filled = over_gaps(x)  # a sample that is not there stands between its neighbours
+            for word, bit in FLAGS.items():
+                if (hit := (flags & bit) > 0).any():
+                    style = {**FLAGGED[word], "markersize": 3.5, "linestyle": "none"}
+                    at.plot(time[hit], filled[hit], label=word, zorder=3, **style)
+            place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
+            at.legend(**place, fontsize=7, ncols=6, borderpad=0.1)
         known = x[np.isfinite(x)]
         if known.size and np.ptp(known) <= 1e-9 * max(np.abs(known).max(), 1e-300):
             value = known[0]  # an axis that shows no rounding
             reach = 0.1 * abs(value) or 1.0
             at.set_ylim(value - reach, value + reach)
-            place = {"xy": (0.5, 0.8), "xycoords": "axes fraction", "ha": "center"}
-            at.annotate(f"constant: {value:.4g}", **place, fontsize=8)
+            words = f"constant: {value:.4g}"
+            at.text(0.5, 0.8, words, transform=at.transAxes, ha="center", fontsize=8)
     for at, (name, each) in zip(axes[len(names) :], lagging.items(), strict=True):
         limit = LATE * each.period
         at.axhspan(-limit, limit, color=PALETTE["green"], alpha=0.12)
@@ -488,18 +481,6 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
     left_out = len(run.data_vars) - len(names)
     axes[-1].set_xlabel("time [s]" + f" ({left_out} more channels)" * bool(left_out))
     return figure
-
-
-def _mark(at: Any, time: Any, x: Any, flags: Any) -> None:
-    filled = over_gaps(x)  # a sample that is not there stands between its neighbours
-    for word, bit in FLAGS.items():
-        hit = (flags & bit) > 0
-        if hit.any():
-            style = {**FLAGGED[word], "markersize": 3.5, "linestyle": "none", "zorder": 3}
-            at.plot(time[hit], filled[hit], label=word, **style)
-    if flags.any():
-        place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
-        at.legend(**place, fontsize=7, ncols=6, borderpad=0.1)
 
 
 @figure_style()

@@ -31,7 +31,7 @@ def waves(result: StudyResult) -> Section:
 
 
 def wave_tables(result: StudyResult) -> list[Table]:
-    """Waves of each run as they were measured, and where, as far as known."""
+    """Waves of each run as they were measured, what they are used for, and where, if known."""
     run, channels = next(iter(result.prepared.values())), result.groups["channels"]
     places = [
         (
@@ -45,32 +45,23 @@ def wave_tables(result: StudyResult) -> list[Table]:
     ]
     frame = channels.attrs.get("frame", "")
     spectra = result.groups.get("spectra", xr.Dataset())
-    rows = [_wave_row(result, name) for name in result.prepared if spectra]
+    rows = []
+    for at in entries(result.groups["runs"], "run") if spectra else ():
+        (name,), sea = row(at, "run"), at["sea_state"].item() or at["waves"].item()
+        frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
+        known = np.isfinite(frequency + depth)
+        speed = phase_speed(2 * np.pi * frequency, depth) if known else np.nan
+        # A sine has a height of 2√2 standard deviations, a sea one of 4.
+        factor = np.sqrt(0.5) if np.isfinite(frequency) else 1.0
+        height = number(factor * spectra["significant_height"].sel(run=name))
+        spans = ", ".join(
+            f"{use} {float(at[f'{use}_begin']):.0f} to {float(at[f'{use}_end']):.0f} s"
+            for use in ("train", "test")
+            if np.isfinite(at[f"{use}_begin"])
+        )
+        facts = (height, number(frequency), number(speed / frequency, 2), number(speed, 2))
+        rows.append((name, sea, *facts, spans or "test"))
     return [table("waves", rows, **spectra.attrs), table("positions", places, frame=frame)]
-
-
-def _wave_row(result: StudyResult, name: str) -> tuple[str, ...]:
-    """Waves of a run: height, frequency, length and speed, and what they are used for."""
-    at = result.groups["runs"].sel(run=name)
-    frequency, depth = float(at["wave_frequency"]), float(at["water_depth"])
-    known = np.isfinite(frequency + depth)
-    speed = phase_speed(2 * np.pi * frequency, depth) if known else np.nan
-    # A sine has a height of 2√2 standard deviations, a sea one of 4.
-    factor = np.sqrt(0.5) if np.isfinite(frequency) else 1.0
-    spans = ", ".join(
-        f"{use} {float(at[f'{use}_begin']):.0f} to {float(at[f'{use}_end']):.0f} s"
-        for use in ("train", "test")
-        if np.isfinite(at[f"{use}_begin"])
-    )
-    return (
-        name,
-        at["sea_state"].item() or at["waves"].item(),
-        number(factor * result.groups["spectra"]["significant_height"].sel(run=name)),
-        number(frequency),
-        number(speed / frequency, 2),
-        number(speed, 2),
-        spans or "test",
-    )
 
 
 def data(result: StudyResult) -> Section:
@@ -102,24 +93,35 @@ UNITS = WORDS["units"]
 
 
 def settings(result: StudyResult) -> Section:
-    """Return settings, training sets and test windows."""
+    """Return settings, defaults included, training sets and test windows."""
     note = result.attrs.get("waves_note")
     waves = f"Waves of the virtual tank: {note}." if note else ""
     models = [
-        (
-            model_words(model),
-            key.replace("_", " "),
-            setting_text(key, each["value"]),
-            each["source"],
-        )
-        for model, stated in result.model_settings.items()
+        (model_words(m), key.replace("_", " "), setting_text(key, each["value"]), each["source"])
+        for m, stated in result.model_settings.items()
         for key, each in stated["settings"].items()
     ]
+    every = {key: value for key, value in result.settings.items() if key != "models"}
+    every["statistics"] = {**every["statistics"], "calibrate": result.is_calibrated}
+    stated = [(key, setting_text(key, value)) for key, value in _leaves("", every)]
+    windows, training = [], result.groups["training"]
+    for each, spans in zip(entries(training, "training"), training_spans(result), strict=True):
+        words = ", ".join(f"{run}, {begin:.2f} to {end:.2f} s" for run, begin, end in spans)
+        name, left_out = row(each, "training", "left_out")
+        windows.append(("training", name, words, left_out))
+    windows += [
+        ("test", result.label_of(test), f"{run}, {begin:.2f} to {end:.2f} s", "")
+        for test in result.tests
+        for run, begin, end in window_spans(result.tests[test])
+    ]
+    readers = listed(whole_readers(result))
+    whole = f" (all of it: {readers})" if readers else ""
+    reads = result.attrs["longest_training"]
     return section(
         "settings",
         table("models", models),
-        table("settings", [*_data_settings(result), *_stated_settings(result)]),
-        _windows_table(result),
+        table("settings", [*_data_settings(result), *stated]),
+        table("windows", windows, reads=reads, whole=whole),
         more=(waves, training_overlap(result)[1], test_overlap(result)),
     )
 
@@ -184,32 +186,6 @@ def _data_settings(result: StudyResult) -> Iterator[tuple[str, str]]:
     yield "mean encounter period T̂", f"{period:.4f} s, {origin}"
     yield "time step", f"{dt:.4g} s, {period / dt:.4g} samples per period"
     yield "filter before resampling", " and ".join(filters) or "none"
-
-
-def _stated_settings(result: StudyResult) -> Iterator[tuple[str, str]]:
-    """Settings of the study, defaults included."""
-    every = {key: value for key, value in result.settings.items() if key != "models"}
-    every["statistics"] = {**every["statistics"], "calibrate": result.is_calibrated}
-    for key, value in _leaves("", every):
-        yield key, setting_text(key, value)
-
-
-def _windows_table(result: StudyResult) -> Table:
-    """Training sets and test windows."""
-    training = result.groups["training"]
-    every = listed(whole_readers(result))
-    rows = []
-    for each, spans in zip(entries(training, "training"), training_spans(result), strict=True):
-        words = ", ".join(f"{run}, {begin:.2f} to {end:.2f} s" for run, begin, end in spans)
-        name, left_out = row(each, "training", "left_out")
-        rows.append(("training", name, words, left_out))
-    rows += [
-        ("test", result.label_of(test), f"{run}, {begin:.2f} to {end:.2f} s", "")
-        for test in result.tests
-        for run, begin, end in window_spans(result.tests[test])
-    ]
-    whole = f" (all of it: {every})" if every else ""
-    return table("windows", rows, reads=result.attrs["longest_training"], whole=whole)
 
 
 Spans = list[tuple[str, float, float]]
@@ -330,12 +306,10 @@ def test_overlap(result: StudyResult) -> str:
         for test, share in shares.items()
         if share >= APART
     ]
-    if not said:
-        return ""
     return (
         f"Test windows overlap; the mean share of one that others cover too: {', '.join(said)}. "
         "Errors over them are not independent."
-    )
+    ) * bool(said)
 
 
 def finished(result: StudyResult) -> str:

@@ -2,14 +2,12 @@
 
 import base64
 import json
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
-from seakeep.arrays import FloatArray
 from seakeep.conventions import displayed, is_elevation
 from seakeep.files import write_text
 from seakeep.report.figures.histories import history_figure, shown_cells
@@ -18,11 +16,6 @@ from seakeep.report.style import judged_models, line_of, model_words, shown_unit
 from seakeep.study import StudyResult
 
 MISSING = 65535
-
-
-def explorer(result: StudyResult) -> Section:
-    """Return the interactive plot: all windows and training sets."""
-    return section("explore", histories=history_data(result))
 
 
 def histories(result: StudyResult) -> Section:
@@ -56,15 +49,15 @@ def pack(values: npt.ArrayLike) -> dict[str, Any]:
     return {"low": low, "high": high, "data": base64.b64encode(codes.tobytes()).decode()}
 
 
-def history_data(result: StudyResult) -> dict[str, Any] | None:
-    """What there is to choose from, and the cell that the plot opens with; None if there are none.
+def explorer(result: StudyResult) -> Section:
+    """Return the interactive plot: what there is to choose from, and the cell that it opens with.
 
     All other cells lie in files of :func:`write_histories`, which the page loads when they are
     chosen.
     """
     cells = shown_cells(result)
     if not cells:
-        return None
+        return section("explore")
     test, training, window = cells[0]
     units = _shown(result)
     channels, waves = (
@@ -99,7 +92,7 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
         }
         for name, data in result.tests.items()
     ]
-    return {
+    data = {
         "step": result.dt,
         "channels": channels,
         "waves": waves,
@@ -110,9 +103,10 @@ def history_data(result: StudyResult) -> dict[str, Any] | None:
             "training": training,
             "window": window,
             "channel": result.channels.index("heave") if "heave" in result.channels else 0,
-            "cell": _cell(result, test, _series(result, test), training, window),
+            "cell": _cells(result, test)(training, window),
         },
     }
+    return section("explore", histories=data)
 
 
 def write_histories(result: StudyResult) -> None:
@@ -120,10 +114,9 @@ def write_histories(result: StudyResult) -> None:
     folder = result.folder / "histories"
     folder.mkdir(exist_ok=True)
     for test, data in result.tests.items():
-        series = _series(result, test)
+        cell = _cells(result, test)
         for training, judged in enumerate(data["judged"].values):
-            windows = np.flatnonzero(judged).tolist()
-            cells = {window: _cell(result, test, series, training, window) for window in windows}
+            cells = {window: cell(training, window) for window in np.flatnonzero(judged).tolist()}
             text = json.dumps(cells, separators=(",", ":"))
             name = f"{test}-{training}"
             write_text(folder / f"{name}.js", f'seakeepCells["{name}"]={text};\n')
@@ -140,46 +133,34 @@ def _shown(result: StudyResult) -> dict[str, tuple[float, str]]:
     return dict(zip(units["name"].values, map(displayed, units.values), strict=True))
 
 
-def _series(result: StudyResult, test: str) -> dict[str, dict[str, FloatArray]]:
-    """Forecasts, bands and errors of each model over (training, window, …)."""
+def _cells(result: StudyResult, test: str) -> Callable[[int, int], dict[str, Any]]:
+    """Packs a cell of a test set, by training set and window: waves, motions, bands, errors."""
+    data, elevations, units = result.tests[test], _elevations(result), _shown(result)
+    factors = [units[name][0] for name in result.channels]
     series = {}
     for model in judged_models(result):
-        one, keys = result.tests[test].sel(model=model, measure="nrmse"), ["error", "mean"]
+        one, keys = data.sel(model=model, measure="nrmse"), ["error", "mean"]
         if model in result.ensembles:
             one, keys = one.sel(ensemble=model), [*keys, "lower", "upper"]
         series[model] = {key: one[key].values for key in keys}
-    return series
-
-
-def _cell(
-    result: StudyResult,
-    test: str,
-    series: Mapping[str, Mapping[str, FloatArray]],
-    training: int,
-    window: int,
-) -> dict[str, Any]:
-    """Waves, measurement, forecasts and errors of a cell, packed."""
-    data, models = result.tests[test], {}
-    factors = [_shown(result)[name][0] for name in result.channels]
 
     def packed(values: npt.NDArray[Any]) -> list[dict[str, Any]]:
         """Values (…, channel) in the units that are shown, packed channel by channel."""
         return [pack(factor * values[..., k]) for k, factor in enumerate(factors)]
 
-    for model, own in series.items():
-        errors, *parts = ((key, values[training, window]) for key, values in own.items())
-        nrmse = [round(float(e), 3) if e == e else None for e in errors[1]]
-        models[model] = {**{key: packed(values) for key, values in parts}, "nrmse": nrmse}
-    return {
-        "measured": packed(data["measured"].values[window]),
-        "waves": _waves(result, data, window),
-        "models": models,
-    }
+    def cell(training: int, window: int) -> dict[str, Any]:
+        models = {}
+        for model, own in series.items():
+            errors, *parts = ((key, values[training, window]) for key, values in own.items())
+            nrmse = [round(float(e), 3) if e == e else None for e in errors[1]]
+            models[model] = {**{key: packed(values) for key, values in parts}, "nrmse": nrmse}
+        run = result.prepared[data["run"].values[window]]
+        at = np.argmin(np.abs(run["time"].values - data["start"].values[window])) + 1
+        part = slice(at, at + data.sizes["time"])
+        return {
+            "measured": packed(data["measured"].values[window]),
+            "waves": [pack(run[name].values[part]) for name in elevations],
+            "models": models,
+        }
 
-
-def _waves(result: StudyResult, data: xr.Dataset, window: int) -> list[dict[str, Any]]:
-    """Measured elevations at the instants of a window."""
-    run = result.prepared[data["run"].values[window]]
-    at = np.argmin(np.abs(run["time"].values - data["start"].values[window])) + 1
-    part = slice(at, at + data.sizes["time"])
-    return [pack(run[name].values[part]) for name in _elevations(result)]
+    return cell

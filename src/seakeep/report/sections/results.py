@@ -2,7 +2,7 @@
 
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import chain
 from typing import Any
@@ -221,7 +221,20 @@ def findings(result: StudyResult) -> list[str]:
         )
     for model in ensembles:
         said += _coverage_findings(result, model)
-    said += [*_fewer_windows(result), not_chosen(result), _few_cells(result)]
+    # Of which windows, placed without overlap, fewer fit than were asked for.
+    settings, places = result.settings, []
+    if settings["training"]["scheme"] == "halves":
+        used = result.groups["training"].sizes["training"]
+        places.append(("training windows", settings["training"]["windows"], used))
+    for name, data in result.tests.items():
+        asked = settings["tests"][name]["windows"]
+        places.append((f"test windows of {result.label_of(name)}", asked, data.sizes["window"]))
+    said += [
+        f"{used} {what} were used of the {asked} asked for: no more fit without overlap."
+        for what, asked, used in places
+        if asked is not None and used < asked
+    ]
+    said += [not_chosen(result), _few_cells(result)]
     return list(filter(None, said))
 
 
@@ -265,32 +278,17 @@ def infinite_bands(result: StudyResult, model: str) -> str:
     )
 
 
-def _fewer_windows(result: StudyResult) -> list[str]:
-    """Say of which windows, placed without overlap, fewer fit than were asked for."""
-    settings, places = result.settings, []
-    if settings["training"]["scheme"] == "halves":
-        used = result.groups["training"].sizes["training"]
-        places.append(("training windows", settings["training"]["windows"], used))
-    for name, data in result.tests.items():
-        asked = settings["tests"][name]["windows"]
-        places.append((f"test windows of {result.label_of(name)}", asked, data.sizes["window"]))
-    return [
-        f"{used} {what} were used of the {asked} asked for: no more fit without overlap."
-        for what, asked, used in places
-        if used < (asked or 0)
-    ]
-
-
 def _few_cells(result: StudyResult) -> str:
     """Sentence where a test set has too few cells for its statistics; else empty."""
-    counts = {test: int(data["judged"].sum()) for test, data in result.tests.items()}
-    small = [f"{result.label_of(test)}: n = {n}" for test, n in counts.items() if n < FEWEST]
-    if not small:
-        return ""
+    small = [
+        f"{result.label_of(test)}: n = {count}"
+        for test, data in result.tests.items()
+        if (count := int(data["judged"].sum())) < FEWEST
+    ]
     return (
         f"Few cells ({'; '.join(small)}): medians, quartiles and differences between models say "
         f"little below about {FEWEST}. Ask for more training or test windows before a conclusion."
-    )
+    ) * bool(small)
 
 
 _ACCENTS = {"dot": "\N{COMBINING DOT ABOVE}", "ddot": "\N{COMBINING DIAERESIS}"}
@@ -317,23 +315,20 @@ def glossary(result: StudyResult) -> Section:
     """Return terms and symbols with what they mean."""
     symbols = {name: (plain_symbol(name), result.words_of(name)) for name in result.channels}
     explained = "; ".join(" ".join(dict.fromkeys(each)) for each in symbols.values())
-    loads = any(name.startswith("mooring_") for name in result.channels)
     regular = "statistics/response" in result.groups
     same = (
         " It is that of the irregular sea and counts lengths in regular waves too: 5 T̂ may hold "
         "more or fewer than five regular waves."
     )
+    if any(name.startswith("mooring_") for name in result.channels):
+        explained += ". M is a mooring load, a force in N."
+    period, same = result.encounter_period, same * regular
     slap = any("truth" in data for data in result.tests.values())
-    left_out = {"λ/L": not regular, "slap": not slap}
-    values = {
-        "period": result.encounter_period,
-        "same": same * regular,
-        "symbols": explained + ". M is a mooring load, a force in N." * loads,
-    }
+    known = {"λ/L": regular, "slap": slap}
     terms = [
-        (term, meaning.format(**values))
+        (term, meaning.format(period=period, same=same, symbols=explained))
         for term, meaning in WORDS["terms"].items()
-        if not left_out.get(term)
+        if known.get(term, True)
     ]
     return section("words", terms=terms)
 
@@ -421,19 +416,11 @@ def _scales_table(result: StudyResult, test: str) -> Table:
 
 
 def regular(result: StudyResult) -> Section:
-    """Return the errors in regular waves, taken apart."""
+    """Return the errors in regular waves, taken apart, and the lines that lose their load."""
     if (response := result.groups.get("statistics/response")) is None:
         return section("regular")
-    tests = response["test"].values.tolist()
-    more = [_slack_words(result, tests)]
-    return section("regular", _response_table(result, tests), more=more)
-
-
-def _response_table(result: StudyResult, tests: list[str]) -> Table:
-    """Amplitude ratio, phase lead and offset of each channel, test set by test set."""
-    rows, columns, response = [], ["channel", "model"], result.groups["statistics/response"]
-    for test in tests:
-        sea = result.sea_of(test)
+    rows, columns, tests = [], ["channel", "model"], response["test"].values.tolist()
+    for sea in map(result.sea_of, tests):
         columns += [f"{sea}: {key}" for key in ("amplitude", "phase [°]", "offset [SD]", "share")]
     judged = response.sel(channel=result.channels, model=judged_models(result))
     for of_model in entries(judged, "channel", "model"):
@@ -444,72 +431,60 @@ def _response_table(result: StudyResult, tests: list[str]) -> Table:
             share = Number(f"{percent(offset**2 / total)} %") if total > 0 else MISSING
             cells += [*row(at, amplitude_ratio=2, phase_lead=signed, error_offset=2), share]
         rows.append(tuple(cells))
-    return table("response", rows, columns=columns, more=of_judged(result))
-
-
-def _slack_words(result: StudyResult, tests: list[str]) -> str:
-    """Name the lines that lose their load, run by run."""
     runs = dict.fromkeys(run for test in tests for run in result.tests[test]["run"].values)
     slack = result.groups["runs"]["slack"].sel(run=list(runs), name=result.channels)
-    listed = [
-        f"{result.words_of(line['name'].item())} in {percent(line)} % of {run}"
-        for run in runs
-        for line in slack.sel(run=run)
+    lines = [
+        f"{result.words_of(line['name'].item())} in {percent(line)} % of {line['run'].item()}"
+        for of_run in slack
+        for line in of_run
         if line >= SELDOM
     ]
-    if not listed:
-        return ""
-    return (
-        f"Slack line (a load within the SD of its noise): {', '.join(listed)}. A slack line does "
+    words = (
+        f"Slack line (a load within the SD of its noise): {', '.join(lines)}. A slack line does "
         "not respond linearly; where it is slack throughout, only noise is left to be forecast."
-    )
+    ) * bool(lines)
+    shown = table("response", rows, columns=columns, more=of_judged(result))
+    return section("regular", shown, more=(words,))
 
 
 def bands(result: StudyResult) -> Section:
     """Return coverage and scores of bands by wave height, horizon and channel."""
     groups, tables = result.groups.get("statistics/bands", xr.Dataset()), []
-    level = short(100 * result.level)
-    for model in result.ensembles if groups else ():
-        for at in entries(groups.sel(model=model), "band"):
-            at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
-            band = at["band"].item()
-            kind = "calibrated " * (band == "calibrated")
-            title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
-            more = (infinite_bands(result, model) if kind else "") + conditional(result, [model])
-            given = {"more": more, "band": title, "name": f"bands_{band}_{model}"}
-            tables += [_by_part(result, at, given), _of_all(result, at, given)]
-    return section("bands", *tables)
-
-
-def _by_part(result: StudyResult, at: xr.Dataset, given: Mapping[str, str]) -> Table:
-    """Averages over the channels, a row per test set and part."""
-    scale = at["relative_width"] / at["width"]  # one over the measured SD
-    at, rows = at.assign(at[["winkler", "crps"]] * scale), []
-    for one in entries(at, "test", "part"):
-        inside = one["inside"]
-        if inside.isnull().all():
-            continue
-        least = inside[np.nanargmin(inside.values)]
-        named = result.words_of(least["channel"].item())
-        means = row(one.mean("channel"), relative_width=2, winkler=2, crps=2)
-        covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
-        rows.append((result.label_of(one["test"].item()), *row(one, "part"), *covered, *means))
-    return table("bands", rows, **given)
-
-
-def _of_all(result: StudyResult, at: xr.Dataset, given: Mapping[str, str]) -> Table:
-    """All instants, a row per test set and channel."""
     units, three = result.groups["channels"]["units"], partial(short, digits=3)
-    rows = [
-        (
-            result.label_of(one["test"].item()),
-            f"{result.words_of(channel)} [{units.sel(name=channel).item()}]",
-            *row(one, inside=2, relative_width=2, winkler=three, crps=three),
-        )
-        for one in entries(at.sel(part="all"), "test", "channel")
-        for channel in row(one, "channel")
-    ]
-    return table("bands_by_channel", rows, **{**given, "name": f"{given['name']}_channels"})
+    level = short(100 * result.level)
+    for at in entries(groups.sel(model=result.ensembles), "model", "band") if groups else ():
+        at = at.sel(test=at["inside"].notnull().any(["part", "channel"]))
+        model, band = row(at, "model", "band")
+        kind = "calibrated " * (band == "calibrated")
+        title = f"{kind}{level} % band of the {model_words(model)} model".capitalize()
+        name = f"bands_{band}_{model}"
+        more = (infinite_bands(result, model) if kind else "") + conditional(result, [model])
+        of_parts = []
+        scale = at["relative_width"] / at["width"]  # one over the measured SD
+        for one in entries(at.assign(at[["winkler", "crps"]] * scale), "test", "part"):
+            inside = one["inside"]
+            if inside.isnull().all():
+                continue
+            least = inside[np.nanargmin(inside.values)]
+            named = result.words_of(least["channel"].item())
+            cells = row(one.mean("channel"), relative_width=2, winkler=2, crps=2)
+            covered = (number(inside.mean(), 2), f"{number(least, 2)} ({named})")
+            of_parts.append(
+                (result.label_of(*row(one, "test")), *row(one, "part"), *covered, *cells)
+            )
+        of_channels = [
+            (
+                result.label_of(test),
+                f"{result.words_of(channel)} [{units.sel(name=channel).item()}]",
+                *row(one, inside=2, relative_width=2, winkler=three, crps=three),
+            )
+            for one in entries(at.sel(part="all"), "test", "channel")
+            for test, channel in [row(one, "test", "channel")]
+        ]
+        tables.append(table("bands", of_parts, more, name=name, band=title))
+        name = f"{name}_channels"
+        tables.append(table("bands_by_channel", of_channels, more, name=name, band=title))
+    return section("bands", *tables)
 
 
 def age(result: StudyResult) -> Section:
