@@ -6,11 +6,11 @@ Every import counts: at the top of a module, inside a function, and for the type
 import ast
 import graphlib
 import sys
-from pathlib import Path
 
 import pytest
+from places import ROOT
 
-SOURCE = Path(__file__).parents[1] / "src" / "seakeep"
+SOURCE = ROOT / "src/seakeep"
 
 FLOORS = (
     ("errors",),

@@ -2,10 +2,10 @@
 
 import re
 import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 from records import record
 from tutorial_study import put_tutorial
 
@@ -15,7 +15,6 @@ from seakeep.errors import DataError, SeakeepWarning
 from seakeep.quality import Record, findings_of, warn_of
 from seakeep.quality.findings import as_json
 
-ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 DOORS = dict(re.findall(r"^### Add (.*)\n(?:(?!#).*\n)*?```python\n((?:.*\n)*?)```$", PAGE, re.M))
 

@@ -18,9 +18,14 @@ def test_a_file_appears_when_it_is_whole_and_a_failure_leaves_the_old_one_and_no
     with replacing(path) as temporary:
         temporary.write_text("old")
         assert not path.exists()
-    with pytest.raises(KeyError), replacing(path) as temporary:
-        temporary.write_text("half")
-        raise KeyError
+
+    def fail():
+        with replacing(path) as temporary:
+            temporary.write_text("half")
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        fail()
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 

@@ -1,17 +1,16 @@
 """Raw samples in service: the chain on a window that moves gives what it gives offline."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import two_loggers
 import xarray as xr
+from places import ROOT
 
 import seakeep
 from seakeep import RequestError
 from seakeep.formats import read_columns
 
-TUTORIAL = Path(__file__).parents[2] / "docs/tutorial"
+TUTORIAL = ROOT / "docs/tutorial"
 
 
 @pytest.fixture(scope="module")

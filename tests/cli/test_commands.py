@@ -4,20 +4,18 @@ import importlib.util
 import re
 import shlex
 import shutil
-from pathlib import Path
 from unittest.mock import ANY
 
 import numpy as np
 import pytest
 import xarray as xr
+from places import ROOT
 from tables import rows_of
 from tutorial_study import edit
 
 import seakeep
 from seakeep import cli
 
-ROOT = Path(__file__).parents[2]
-TUTORIAL = ROOT / "docs" / "tutorial"
 VERBS = ("tank", "init", "prepare", "fit", "calibrate", "forecast", "compare", "export", "datasets",
          "info")  # fmt: skip
 
@@ -28,7 +26,9 @@ def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("place")
     (folder / "docs").mkdir()
     shutil.copytree(
-        TUTORIAL, folder / "docs" / "tutorial", ignore=shutil.ignore_patterns("prepared", "*.md")
+        ROOT / "docs/tutorial",
+        folder / "docs/tutorial",
+        ignore=shutil.ignore_patterns("prepared", "*.md"),
     )
     campaign = folder / "docs/tutorial/campaign.toml"
     # The commands are the same with fewer members, and faster.

@@ -2,10 +2,10 @@
 
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 from tutorial_study import edit
 
 import seakeep
@@ -19,7 +19,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::seakeep.errors.SeakeepWarning"),
 ]
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = ROOT / "examples"
 SPAN = (0.0, 3065.0)  # s, the first 30 % of Data02
 
 

@@ -1,7 +1,6 @@
 """The ROS 2 example: which samples become which step, and the node under a stand-in of rclpy."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from loaded import loaded
+from places import ROOT
 from scipy.spatial.transform import Rotation
 
 from seakeep import HankelDMDc
 
-EXAMPLE = Path(__file__).parents[2] / "examples/ros2_node"
+EXAMPLE = ROOT / "examples/ros2_node"
 DT = 0.05
 CLOCK = 1.7e9  # seconds since 1970, as ROS counts them
 COUNT = 60

@@ -6,6 +6,8 @@ import re
 import shlex
 import warnings
 
+from places import ROOT
+
 from seakeep.cli import main
 from seakeep.errors import SeakeepWarning
 
@@ -56,7 +58,12 @@ def run_console(block):
     return out.getvalue()
 
 
-def play(page, name):
+def page(name):
+    """Text of a page of the documentation."""
+    return (ROOT / "docs" / name).read_text("utf-8")
+
+
+def play(page):
     """Run the console and Python blocks of a page; a text block after one must show its output."""
     printed, names = "", {}
     for kind, content in blocks_of(page):
@@ -66,7 +73,7 @@ def play(page, name):
             out = io.StringIO()
             with contextlib.redirect_stdout(out), warnings.catch_warnings():
                 warnings.simplefilter("ignore", SeakeepWarning)  # of an unstable model
-                exec(compile(content, name, "exec"), names)  # the page is ours
+                exec(content, names)  # the page is ours
             printed = out.getvalue()
         elif printed:
             check(content, printed)

@@ -1,10 +1,10 @@
 """What the presets choose, row by row of the paper map, through each door that takes one."""
 
 import re
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from pages import page
 
 from seakeep import Uniform
 from seakeep.campaign import read_campaign
@@ -17,10 +17,9 @@ from seakeep.study.resolve import can_align, resolve_model
 pytest.importorskip("numba", reason="the campaign is the virtual tank's")
 
 PERIOD, DT, ENSEMBLE = 1.64, 1.64 / 32, "bayesian_hankel_dmdc"
-MAP = (Path(__file__).parents[2] / "docs/paper_map.md").read_text("utf-8")
 ROWS = {
     int(cells[1]): (cells[3].strip(), cells[4].strip())
-    for line in MAP.splitlines()
+    for line in page("paper_map.md").splitlines()
     if (cells := line.split("|"))[1:] and re.fullmatch(r" \d+ ", cells[1])
 }
 OF_JUDGEMENT = {16, 19, 21, 22, 25, 26}
