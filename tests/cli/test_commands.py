@@ -9,9 +9,8 @@ from unittest.mock import ANY
 import numpy as np
 import pytest
 import xarray as xr
-from places import ROOT
 from tables import rows_of
-from tutorial_study import edit
+from tutorial_study import edit, put_tutorial
 
 import seakeep
 from seakeep import cli
@@ -24,15 +23,11 @@ VERBS = ("tank", "init", "prepare", "fit", "calibrate", "forecast", "compare", "
 def place(tmp_path_factory):
     """A folder with the tutorial where its examples expect it, and a model."""
     folder = tmp_path_factory.mktemp("place")
-    (folder / "docs").mkdir()
-    shutil.copytree(
-        ROOT / "docs/tutorial",
-        folder / "docs/tutorial",
-        ignore=shutil.ignore_patterns("prepared", "*.md"),
-    )
-    campaign = folder / "docs/tutorial/campaign.toml"
+    tutorial = folder / "docs/tutorial"
+    tutorial.mkdir(parents=True)
+    put_tutorial(tutorial)
     # The commands are the same with fewer members, and faster.
-    fit = ["fit", str(edit(campaign, ("n_members = 40", "n_members = 8"))), "-o"]
+    fit = ["fit", str(edit(tutorial / "campaign.toml", ("n_members = 40", "n_members = 8"))), "-o"]
     assert cli.main([*fit, str(folder / "model.nc")]) == 0
     assert cli.main([*fit, str(folder / "ensemble.nc"), "--model", "ensemble"]) == 0
     return folder
@@ -129,11 +124,6 @@ def test_the_margin_of_a_calibrated_band_is_that_of_the_ensemble(run, place):
     np.testing.assert_array_equal(stored, band + margin[0])
 
 
-def judged_rows(folder):
-    """Rows of a comparison's CSV by their channel."""
-    return {row["channel"]: row for row in rows_of(folder / "comparison.csv")}
-
-
 def test_compare_judges_models_in_service_against_lead_time(run, place):
     pytest.importorskip("matplotlib")
     out, err = run(f"compare model.nc {CAMPAIGN} --nowcast --steps '1 T' -o served")
@@ -155,10 +145,11 @@ def test_several_models_are_judged_over_the_same_instants(run, place):
     assert len({row["start"] for row in rows}) == 1
     alone = [row for row in rows if row["model"] == "ensemble"]
     run(f"compare ensemble.nc {CAMPAIGN} -o alone --steps 200 --start {rows[0]['start']}")
-    single = judged_rows(place / "alone")
-    assert {row["channel"]: row["nrmse"] for row in alone} == {
-        name: row["nrmse"] for name, row in single.items()
-    }
+    first, second = (
+        {row["channel"]: row["nrmse"] for row in each}
+        for each in (alone, rows_of(place / "alone/comparison.csv"))
+    )
+    assert first == second
     drawn = importlib.util.find_spec("matplotlib") is not None
     for name in ("unseen", "errors_by_run"):
         assert (place / f"both/{name}.svg").exists() == drawn

@@ -58,16 +58,13 @@ def test_matlab(tmp_path, content, save):
     check(run.assign_coords(time=T))
 
 
-def dataset():
-    return xr.Dataset(
+@pytest.mark.parametrize("engine", ["h5netcdf", "scipy"])
+def test_netcdf(tmp_path, engine):
+    run = xr.Dataset(
         {"heave": ("time", HEAVE, {"units": "mm"}), "wave": ("time", WAVE), "depth": ((), 3.6)},
         {"time": ("time", T, {"units": "s"})},
     )
-
-
-@pytest.mark.parametrize("engine", ["h5netcdf", "scipy"])
-def test_netcdf(tmp_path, engine):
-    dataset().to_netcdf(tmp_path / "run.nc", engine=engine)
+    run.to_netcdf(tmp_path / "run.nc", engine=engine)
     check(read_table(tmp_path / "run.nc"))
 
 

@@ -20,8 +20,9 @@ def message(kind):
             return message(content)() if given is None else given
         if node.name == "BASE":
             return zeros.get(content[0], 0) if given is None else given
-        is_float = content[0][1][0] == "float64"
-        return np.array(given or [], dtype=float) if is_float else list(given or [])
+        element, size = content
+        is_float = element[1][0] == "float64"
+        return np.array(given or [0.0] * size) if is_float else list(given or [])
 
     def made(**given):
         fields = STORE.fielddefs[kind][1]
@@ -38,6 +39,9 @@ def instant(kind):
         return SimpleNamespace(to_msg=lambda: message(kind)(sec=sec, nanosec=nanosec))
 
     return of
+
+
+TIME = instant("builtin_interfaces/msg/Time")
 
 
 class Node:
@@ -102,7 +106,7 @@ def install(monkeypatch):
         "rclpy.duration": {"Duration": instant("builtin_interfaces/msg/Duration")},
         "rclpy.node": {"Node": Node},
         "rclpy.qos": {"qos_profile_sensor_data": None},
-        "rclpy.time": {"Time": instant("builtin_interfaces/msg/Time")},
+        "rclpy.time": {"Time": TIME},
         "rosidl_runtime_py": {},
         "rosidl_runtime_py.utilities": {"get_message": lambda kind: kind},
         "sensor_msgs": {},

@@ -3,19 +3,16 @@
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import DEPTH, INPUTS, POSITIONS, STATES
+from drifting import DEPTH, FOLLOWED, INPUTS, POSITIONS, SQUARES, STATES
 from ensembles import few
 from records import table
 
-import seakeep
 from seakeep import HankelDMDc, RequestError
 from seakeep.models.engine import Windows
 from seakeep.models.growth import LeadErrors, weigh_members, weighed
 from seakeep.models.interface import Scale
 from seakeep.signals.prediction import foresee
 
-PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
-SQUARES = seakeep.SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
 START, STEPS, LEAD = 20.0, 40, 6
 
 
@@ -28,10 +25,18 @@ def model_of(drifts, **settings):
 def model(request, drifts):
     settings = {
         "plain": {},
-        "aligned": {"alignment": PREDICTED},
-        "observed": {"alignment": PREDICTED, "observables": (SQUARES,)},
+        "aligned": {"alignment": FOLLOWED},
+        "observed": {"alignment": FOLLOWED, "observables": (SQUARES,)},
     }
     return model_of(drifts, **settings[request.param])
+
+
+def unplaced(run):
+    """A run that does not say where its probes stand, as arrays do not."""
+    run = run.copy()
+    for name in INPUTS:
+        del run[name].attrs["x_position"]
+    return run
 
 
 def reads_until(model, run):
@@ -90,9 +95,7 @@ def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift
 def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
     ensemble = few(n_members=3, lead=LEAD).fit(drifts, STATES, INPUTS)
     last = reads_until(ensemble, drift) - 4
-    short = drift.isel(time=slice(0, last + 1)).copy()
-    for name in INPUTS:  # arrays do not say where their probes stand
-        del short[name].attrs["x_position"]
+    short = unplaced(drift.isel(time=slice(0, last + 1)))
     members = ensemble.forecast(short, START, STEPS, ahead="predict")
     words = members.attrs["status"]
     assert words == f"ok, input predicted from t = {members.attrs['input_predicted_from']:g} s"
@@ -121,9 +124,7 @@ def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
 @pytest.mark.parametrize("positions", [True, False])
 def test_no_lead_errs_more_than_the_mean(drifts, drift, positions):
     model, steps = model_of(drifts), 150
-    run = drift.copy(deep=True)
-    for name in INPUTS * (not positions):
-        del run[name].attrs["x_position"]
+    run = drift if positions else unplaced(drift)
     squares, mean = np.zeros((2, steps)), model.state_scale.centre[1]
     for at in range(300, 1300, 25):
         start, true = float(run.time[at]), run.heave.values[at + 1 : at + 1 + steps]
@@ -184,9 +185,7 @@ def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, 
     model, at, steps = model_of(drifts), 400, 250
     # Waves are known for longer than a forecast without them is trusted.
     start, last = float(drift.time[at]), at + 100
-    short = drift.isel(time=slice(0, last + 1)).copy()
-    for name in INPUTS:  # arrays do not say where their probes stand
-        del short[name].attrs["x_position"]
+    short = unplaced(drift.isel(time=slice(0, last + 1)))
     x, u = table(short, STATES), table(short, INPUTS)
     found = model.forecast_arrays(x[: at + 1], u[: at + 1], u[at + 1 :], steps, ahead="predict")
     known = table(model.forecast(drift, start, steps), STATES)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import INPUTS, POSITIONS, STATES, drifting_run, heave_error
+from drifting import FOLLOWED, INPUTS, POSITIONS, STATES, drifting_run, heave_error
 from ensembles import few
 from records import table
 
@@ -23,7 +23,7 @@ def models(drifts):
         "rest": ProbeAlignment(mode="dispersion", surge="none"),
         "dispersion": ProbeAlignment(mode="dispersion", surge="measured"),
         "effective": ProbeAlignment(mode="effective", surge="measured"),
-        "predicted": ProbeAlignment(mode="dispersion", surge="predicted"),
+        "predicted": FOLLOWED,
     }
     return {key: spec(each).fit(drifts, STATES, INPUTS) for key, each in settings.items()}
 

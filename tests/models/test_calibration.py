@@ -40,6 +40,10 @@ def bands(ensemble, run):
     return {scale: ensemble.calibrate(part, steps=40, scale=scale) for scale in SCALES}
 
 
+def wide_of(ensemble, run):
+    return ensemble.forecast_summary(run, 120.0, 30, band="calibrated")
+
+
 @pytest.mark.parametrize("scale", SCALES)
 def test_the_calibrated_band_covers_unseen_windows_as_it_says(bands, run, scale):
     inside = {"members": [], "calibrated": []}
@@ -57,7 +61,7 @@ def test_the_calibrated_band_covers_unseen_windows_as_it_says(bands, run, scale)
 def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run):
     calibrated = bands["spread"]
     plain = ensemble.forecast_summary(run, 120.0, 30)
-    wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
+    wide = wide_of(calibrated, run)
     found = calibrated.calibration
     mean, std, *_ = table(plain, STATES)
     assert np.all(4 * found.floor > 1.5)  # the noise alone
@@ -70,7 +74,7 @@ def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run
 def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(bands, ensemble, run):
     calibrated = bands["constant"]
     plain = ensemble.forecast_summary(run, 120.0, 30)
-    wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
+    wide = wide_of(calibrated, run)
     margin = calibrated.calibration.conformal.margin
     assert (margin > 0).all()
     sides = np.array([0, 0, -1, 1])[:, None, None] + np.zeros((30, 1))
@@ -108,7 +112,7 @@ def test_no_window_touches_what_a_member_has_read(ensemble, bands, run):
 
 def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(bands, run):
     learnt = bands["learnt"]
-    one = learnt.forecast_summary(run, 120.0, 30, band="calibrated")
+    one = wide_of(learnt, run)
     several = learnt.summarize_windows(run, [115.0, 120.0], 30, band="calibrated")
     x, u = table(run, STATES), table(run, INPUTS)
     arrays = learnt.hold().forecast_arrays(x[:1201], u[:1201], u[1201:1230], 30, band="calibrated")
@@ -124,10 +128,7 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(band
 @pytest.mark.parametrize("scale", SCALES)
 def test_a_file_keeps_the_calibration(bands, run, tmp_path, scale):
     kept = seakeep.load_model(bands[scale].save(tmp_path / "ensemble.nc"))
-    one, other = (
-        each.forecast_summary(run, 120.0, 30, band="calibrated") for each in (kept, bands[scale])
-    )
-    xr.testing.assert_identical(one, other)
+    xr.testing.assert_identical(wide_of(kept, run), wide_of(bands[scale], run))
     assert kept.calibration.windows == bands[scale].calibration.windows
 
 

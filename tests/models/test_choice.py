@@ -15,6 +15,10 @@ OPEN = Select(True, True, True, True, period=T, horizon=10)
 SPEC = replace(HankelDMDc.recommended(T, DT), select=OPEN)
 
 
+def without_drift():
+    return {name: run.drop_vars("drift") for name, run in runs().items()}
+
+
 def trial(*by_group):
     """Two windows of each group, at a worse λ and at the better one."""
     scores = np.repeat(by_group, 2) + np.tile([-0.05, 0.05], len(by_group))
@@ -98,7 +102,7 @@ def test_the_ridges_about_the_best_are_tried(means, left):
 
 def test_the_ridges_about_the_best_of_what_is_taken_are_tried(monkeypatch):
     monkeypatch.setattr(selection, "NEAR", 0.0)
-    given = {name: run.drop_vars("drift") for name, run in runs().items()}
+    given = without_drift()
     found = select(replace(SPEC, select=None), given, ["heave"], INPUTS, opened=("observables",))
     assert found.settings.observables == ()
     levels = {}
@@ -137,7 +141,7 @@ def test_squares_are_tried_with_the_look_ahead_of_each_candidate():
 
 
 def test_what_brings_nothing_is_not_recommended():
-    given = {name: run.drop_vars("drift") for name, run in runs().items()}
+    given = without_drift()
     model = SPEC.fit(given, ["heave"], INPUTS)
     settings = model.settings
     assert (settings.alignment, settings.observables, settings.memory) == (None, (), 0)
@@ -148,7 +152,7 @@ def test_what_brings_nothing_is_not_recommended():
 
 
 def test_a_start_is_left_only_for_what_is_better_beyond_the_noise():
-    given = {name: run.drop_vars("drift") for name, run in runs().items()}
+    given = without_drift()
     start = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot")
     found = select(start, given, ["heave"], INPUTS, vary=("observables",), horizon=(10.0,))
     assert replace(found.settings, ridge=start.ridge) == start

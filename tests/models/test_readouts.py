@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import DT, INPUTS, LINE, LOAD_NOISE, drifting_run
+from drifting import DT, FOLLOWED, INPUTS, LINE, LOAD_NOISE, drifting_run
 from drifting import STATES as MOTIONS
 from ensembles import few
 from moored import FLOOR, NOISE, moored_run, moored_runs
@@ -13,13 +13,12 @@ from moored import INPUTS as ETA
 from moored import STATES as MOORED
 from records import table
 
-from seakeep import HankelDMDc, ProbeAlignment, RequestError
+from seakeep import HankelDMDc, RequestError
 from seakeep.models import ensemble as ensembles
 from seakeep.models.selection import select
 
 STATES = [*MOTIONS, "mooring_bow"]
 START, STEPS, PERIOD = 60.0, 300, 1.5
-FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
 SPEC = HankelDMDc(
     10, 40, 1e-3, delay_rows="exact", ridge_scale="per_snapshot", alignment=FOLLOWED, lead=12
 )

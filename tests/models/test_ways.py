@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import DT, INPUTS, drifting_run
+from drifting import DT, FOLLOWED, INPUTS, drifting_run
 from records import table
 
 from seakeep import (
@@ -22,7 +22,6 @@ from seakeep import (
 )
 
 STATES, START, STEPS = ["surge", "heave", "mooring_bow"], 600, 80
-FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
 OBSERVABLES = (SlowSquares("eta_cog", cutoff=1.0, lead=0.75, lags=(0, 1)), Powers("eta_fwd"))
 VARIANTS = {
     "regressed rows": {"delay_rows": "ridge"},

@@ -180,6 +180,14 @@ def browser():
     started.quit()
 
 
+def told_at(browser, element):
+    """Words beside the time histories, with the mouse on an element."""
+    from selenium.webdriver import ActionChains
+
+    ActionChains(browser).move_to_element(element).perform()
+    return browser.find_element("id", "history-readout").text
+
+
 def state(browser, key):
     return browser.execute_script(f"return document.getElementById('history').dataset.{key}")
 
@@ -213,14 +221,12 @@ def test_the_time_histories_zoom_and_choose(browser, page):
     for place in ("pick-training", "pick-window"):
         Select(browser.find_element("id", place)).select_by_index(0)
     assert state(browser, "cell") == opening
-    ActionChains(browser).move_to_element(browser.find_element("tag name", "h1")).perform()
-    told = browser.find_element("id", "history-readout").text
+    told = told_at(browser, browser.find_element("tag name", "h1"))
     assert re.search(r"NRMSE of pitch in this window: deterministic \d\.\d{3}, Bayesian mean", told)
     assert state(browser, "legend").split(", ") == [
         "Bayesian band", "measured", "deterministic", "Bayesian mean"
     ]  # fmt: skip
-    ActionChains(browser).move_to_element(canvas).perform()
-    told = browser.find_element("id", "history-readout").text
+    told = told_at(browser, canvas)
     assert re.search(r"measured -?[\d.e-]+ deg", told)
     assert re.search(r"wave elevation.* m\b", told)
     assert browser.get_log("browser") == []

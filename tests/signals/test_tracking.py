@@ -16,6 +16,7 @@ pytest.importorskip("numba", reason="the renderer belongs to the virtual tank")
 
 from seakeep.tank import delivery as tank_video  # noqa: E402
 
+cv2.setNumThreads(1)
 RATE, FRAMES = 30.0, 60
 COG = 0.03  # m above still water
 OCCLUDED = range(12, 16)
@@ -31,20 +32,19 @@ def motion(t):
     return surge, 0.05 * np.sin(phase + 1), np.deg2rad(5) * np.sin(phase + 2)
 
 
-def lit_frame(t, lamp=0.0, light=None):
-    place = np.linspace(-1.0, 2.2, 41)
-    surface = 0.05 * np.sin(3 * place - 2 * np.pi * 0.6 * t)
-    frame = tank_video.frame_of(cv2, motion(t), surface, lamp, COG)
-    return cv2.multiply(frame.astype(np.float32), tank_video._light() if light is None else light)
+def writer_of(path):
+    return cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), RATE, (1280, 720))
 
 
 def render(path, hook=None, frames=FRAMES):
     """Write a video with noise; return the panel's place in pixels, frame by frame."""
-    rng = np.random.default_rng(1)
+    rng, place = np.random.default_rng(1), np.linspace(-1.0, 2.2, 41)
     light, stock = tank_video._light(), tank_video._noise(cv2, rng)
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), RATE, (1280, 720))
+    writer = writer_of(path)
     for i in range(frames):
-        lit = lit_frame(i / RATE, float(20 <= i < 30), light)
+        surface = 0.05 * np.sin(3 * place - 2 * np.pi * 0.6 * i / RATE)
+        frame = tank_video.frame_of(cv2, motion(i / RATE), surface, float(20 <= i < 30), COG)
+        lit = cv2.multiply(frame.astype(np.float32), light)
         lit = hook(i, lit) if hook else lit
         lit += np.roll(stock[i % len(stock)], rng.integers(1280), axis=1)[:, :, None]
         writer.write(np.clip(lit, 0, 255).astype(np.uint8))
@@ -54,11 +54,6 @@ def render(path, hook=None, frames=FRAMES):
         surge + tank_video.PANEL_HEIGHT * np.sin(pitch),
         heave + COG + tank_video.PANEL_HEIGHT * np.cos(pitch),
     )
-
-
-@pytest.fixture(scope="module", autouse=True)
-def one_thread():
-    cv2.setNumThreads(1)
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +161,7 @@ def test_a_hidden_corner_is_flagged_before_it_spoils_the_pitch(tmp_path):
 def test_a_camera_on_the_other_side(plain, tmp_path, tracked):
     """Mirrored, with downstream to the left, a video shows the same motion."""
     path = tmp_path / "mirrored.mp4"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), RATE, (1280, 720))
+    writer = writer_of(path)
     capture = cv2.VideoCapture(str(plain[0]))
     while (read := capture.read())[0]:
         writer.write(cv2.flip(read[1], 1))

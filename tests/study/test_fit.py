@@ -98,23 +98,21 @@ def test_a_model_of_other_channels_and_one_that_nothing_drives_are_said(halves):
         fit_campaign(seakeep.read_campaign(halves / "campaign.toml"))
 
 
-ENSEMBLE = """
+WINDOWED = """
 kind = "bayesian_hankel_dmdc"
 n_members = 4
 seed = 7
+state_delays = "0.2 T"
+input_delays = { uniform = ["1 T", "3 T"] }
+ridge = 1e-9
+window = { uniform = ["4 T", "8 T"] }
 """
-
-
-WINDOWED = (
-    ENSEMBLE + "state_delays = '0.2 T'\ninput_delays = { uniform = ['1 T', '3 T'] }\nridge = 1e-9"
-)
 LATE = '[runs.all]\nfile = "run.csv"\ntrain = [100.0, 150.0]\ntest = [150.0, 200.0]\n'
 
 
 @pytest.mark.parametrize("train_on", ["all", "runs", "windows"])
 def test_an_ensemble_learns_inside_the_training_span(halves, train_on):
-    model = f"{WINDOWED}\nwindow = {{ uniform = ['4 T', '8 T'] }}\ntrain_on = '{train_on}'"
-    ensemble = fit_campaign(campaign(halves, model, LATE))
+    ensemble = fit_campaign(campaign(halves, f"{WINDOWED}train_on = '{train_on}'", LATE))
     assert ensemble.n_members == 4
     first, stop = ensemble.training_spans["all"]
     longest = 0.1 * (int(ensemble.draws.window_samples.max()) - 1)
