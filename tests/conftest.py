@@ -84,6 +84,19 @@ def empty_sheet(monkeypatch):
 
 
 @pytest.fixture
+def command(capfd):
+    """Run a command to the status that is expected: what it printed, and what it said beside it."""
+    from seakeep.cli import main
+
+    def run(*words, status=0):
+        ended, told = main(list(map(str, words))), capfd.readouterr()
+        assert ended == status, told.err
+        return told.out, told.err
+
+    return run
+
+
+@pytest.fixture
 def ctrl_c():
     """SIGINT as at a terminal, where the tests may have been started with it ignored.
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from small_tank import tank_columns, write_csv
 
-from seakeep import cli
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
@@ -230,18 +229,18 @@ def test_the_draft_of_regular_waves_holds_out_what_the_others_surround(tmp_path)
     assert "# guessed: no waves lie within those of the others; the nearest run tests" in text
 
 
-def test_init_takes_what_the_message_asks_for(tmp_path, capsys):
+def test_init_takes_what_the_message_asks_for(tmp_path, command):
     """A title with blanks, a blank line, tabs, decimal commas, a row of units."""
     path = tmp_path / "de.txt"
     rows = [f"{i / 50:.4f}\t{np.sin(i / 9):.4f}".replace(".", ",") for i in range(200)]
     head = ["Messung Schlepptank BM-7", "", "Zeit\tWelle_1", "s\tcm"]
     path.write_text("\n".join([*head, *rows, ""]), "utf-8")
-    assert cli.main(["init", str(path)]) == 1
-    assert "give --skip-rows 2 to seakeep init" in " ".join(capsys.readouterr().err.split())
+    _, told = command("init", path, status=1)
+    assert "give --skip-rows 2 to seakeep init" in " ".join(told.split())
     out = tmp_path / "campaign.toml"
     options = ["--skip-rows", "2", "--delimiter", "tab", "--decimal", ","]
     for status, more in ((0, []), (2, []), (0, ["--force"])):  # then it is there
-        assert cli.main(["init", str(path), *options, "-o", str(out), *more]) == status
+        command("init", path, *options, "-o", out, *more, status=status)
     files = read_campaign(out).settings.files
     assert (files.skip_rows, files.delimiter, files.decimal) == (2, "\t", ",")
     run = read_campaign(out).read_run("de")

@@ -34,15 +34,9 @@ def place(tmp_path_factory):
 
 
 @pytest.fixture
-def run(place, monkeypatch, capsys):
+def run(place, monkeypatch, command):
     monkeypatch.chdir(place)
-
-    def call(text, status=0):
-        ended, told = cli.main(shlex.split(text)), capsys.readouterr()
-        assert ended == status, told.err
-        return told.out, told.err
-
-    return call
+    return lambda text, status=0: command(*shlex.split(text), status=status)
 
 
 CAMPAIGN = "docs/tutorial/campaign.toml"

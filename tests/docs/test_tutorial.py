@@ -3,8 +3,6 @@
 import pytest
 from pages import page, play
 
-from seakeep.cli import main
-
 PAGE = page("tutorial/tutorial.md")
 
 
@@ -16,16 +14,15 @@ def test_the_tutorial_runs_and_prints_what_it_shows(tutorial):
     assert (tutorial / "rom.mat").exists()
 
 
-def test_the_page_shows_the_files_and_their_draft_can_be_fitted_and_judged(tutorial, capsys):
+def test_the_page_shows_the_files_and_their_draft_can_be_fitted_and_judged(tutorial, command):
     pytest.importorskip("matplotlib", reason="seakeep compare draws a figure")
     assert (tutorial / "run1.csv").read_text("utf-8").splitlines()[0] in PAGE
-    assert main(["init", "run1.csv", "run2.csv", "run3.csv", "-o", "draft.toml"]) == 0
+    command("init", "run1.csv", "run2.csv", "run3.csv", "-o", "draft.toml")
     draft = (tutorial / "draft.toml").read_text("utf-8").splitlines()
     for line in PAGE.partition("```toml\n")[2].partition("```")[0].splitlines():
         assert line in draft
-    assert main(["fit", "draft.toml", "-o", "draft.nc"]) == 0
-    assert main(["compare", "draft.nc", "draft.toml"]) == 0
-    printed = capsys.readouterr().out
+    fitted, _ = command("fit", "draft.toml", "-o", "draft.nc")
+    printed = fitted + command("compare", "draft.nc", "draft.toml")[0]
     for kinds in ("none", "slow_squares", "powers", "slow_squares, powers"):
         assert f"observables {kinds}, lead" in printed
     assert printed.count("(chosen)") == 1

@@ -59,6 +59,11 @@ def started(model, run, stop=START):
     return live
 
 
+def driven(live, run):
+    """Forecast under the waves that were measured."""
+    return live.forecast(STEPS, table(run, INPUTS)[START:])
+
+
 def mean(forecast, statistic="mean"):
     return table(forecast.sel(statistic=statistic), STATES)
 
@@ -71,7 +76,7 @@ def std(forecast):
 def test_fed_with_everything_it_is_the_forecast(models, drift, key):
     model = models[key]
     live = started(model, drift)
-    found = live.forecast(STEPS, table(drift, INPUTS)[START:])
+    found = driven(live, drift)
     expected = model.forecast(drift, start=float(drift.time[START - 1]), steps=STEPS)
     # The same numbers go through the same products; an instant differs by the rounding of its sum.
     np.testing.assert_array_equal(mean(found), table(expected, STATES))
@@ -85,7 +90,7 @@ def test_fed_with_everything_it_is_the_forecast(models, drift, key):
 
 def test_members_that_are_held_give_the_mean_of_the_ensemble(ensemble, drift):
     live = started(ensemble.hold(), drift)
-    found = live.forecast(STEPS, table(drift, INPUTS)[START:])
+    found = driven(live, drift)
     expected = ensemble.forecast_summary(drift, float(drift.time[START - 1]), STEPS)
     np.testing.assert_array_equal(mean(found), mean(expected))
     both = np.hypot(std(expected), live.errors.at(np.arange(1, STEPS + 1)))
@@ -218,7 +223,7 @@ def test_outside_the_training_the_band_widens_and_says_why(models, drift, monkey
     stds = []
     for each in (drift, higher):
         live = started(model, each)
-        made = live.forecast(STEPS, table(each, INPUTS)[START:])
+        made = driven(live, each)
         stds.append(std(made))
     assert Validity.HEIGHT in live.conditions.validity
     assert "a height of" in repr(live.conditions)
@@ -238,7 +243,7 @@ def test_outside_the_training_the_band_widens_and_says_why(models, drift, monkey
     assert started(model, drift).forecast(1).attrs["validity"] == "inside"
     # Without errors of late, the height alone.
     monkeypatch.setattr(type(live), "consistency_by_state", np.ones((2, len(STATES))))
-    made = live.forecast(STEPS, table(higher, INPUTS)[START:])
+    made = driven(live, higher)
     expected = ratio * model.errors.at(np.arange(STEPS) + 1)
     np.testing.assert_allclose(std(made), expected, rtol=1e-12)
 
@@ -257,7 +262,7 @@ def test_a_spike_is_forgotten_by_the_consistency(models, drift, value):
 def test_waves_that_are_not_known_widen_the_band(models, drift):
     model = models["lead"]
     live = started(model, drift)
-    known, unknown = live.forecast(STEPS, table(drift, INPUTS)[START:]), live.forecast(STEPS)
+    known, unknown = driven(live, drift), live.forecast(STEPS)
     part = live.forecast(STEPS, table(drift, INPUTS)[START : START + 20])
     assert (known.attrs["known_input"], part.attrs["known_input"]) == (STEPS + 5, 20)
     assert unknown.attrs["known_input"] == 0

@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 from small_tank import write_csv
 
-from seakeep import cli
 from seakeep.campaign import read_table
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import TrackingSettings, compare_motion, contact_sheet, track_video
@@ -240,14 +239,12 @@ def test_a_contact_sheet_shows_bad_frames_too(disturbed, flagged, tmp_path):
         contact_sheet(tmp_path / "short.mp4", flagged)
 
 
-def test_the_command_writes_what_a_campaign_reads(plain, tracked, monkeypatch, capsys):
+def test_the_command_writes_what_a_campaign_reads(plain, tracked, monkeypatch, command):
     """The example of its help, on a video of that name."""
     monkeypatch.chdir(plain[0].parent)
-    assert cli.main(["track", "--help"]) == 0
-    example = " ".join(capsys.readouterr().out.partition("Example: seakeep ")[2].split()[:6])
-    assert example == "track side_view.mp4 -o track.csv --contact-sheet sheet.png"
-    assert cli.main(example.split()) == 0
-    err = capsys.readouterr().err
+    example = command("track", "--help")[0].partition("Example: seakeep ")[2].split()[:6]
+    assert " ".join(example) == "track side_view.mp4 -o track.csv --contact-sheet sheet.png"
+    _, err = command(*example)
     assert "Tracking 60/60: frames" in err
     assert "60 frames at 30 Hz; flagged: none (0 bridged); 2.49" in err
     table = read_table(plain[0].parent / "track.csv")
@@ -259,15 +256,14 @@ def test_the_command_writes_what_a_campaign_reads(plain, tracked, monkeypatch, c
     assert cv2.imread("sheet.png").shape[1] == 1440
 
 
-def test_the_command_compares_bridges_short_gaps_and_writes_netcdf(disturbed, tmp_path, capsys):
+def test_the_command_compares_bridges_short_gaps_and_writes_netcdf(disturbed, tmp_path, command):
     time = np.arange(0, 5, 0.02) - 0.5
     _, heave, pitch = motion(time)
     columns = {"time [s]": time, "heave [m]": heave, "pitch [deg]": np.rad2deg(pitch)}
     mru = write_csv(tmp_path / "mru.csv", columns)
     out = tmp_path / "track.nc"
-    words = ["track", disturbed[0], "-o", out, "--bridge", 0.2, "--mru", mru, "--max-lag", 0.4]
-    assert cli.main(list(map(str, words))) == 0
-    err = capsys.readouterr().err
+    words = ["-o", out, "--bridge", 0.2, "--mru", mru, "--max-lag", 0.4]
+    _, err = command("track", disturbed[0], *words)
     assert "flagged: 10 lost, 4 occluded, 6 overexposed (10 bridged)" in err
     assert "pitch against the MRU: correlation 1.0" in err
     assert "Note: pitch: the lags searched (within 0.4 s) do not reach a wave period (1." in err

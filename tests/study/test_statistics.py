@@ -1,6 +1,5 @@
 """Tables of a study: what they take of its cells, and that they are the named statistics."""
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -42,6 +41,7 @@ def found(tmp_path_factory):
     return run_study(read_study(folder / "study.toml"), folder / "out")
 
 
+@pytest.mark.filterwarnings("ignore::seakeep.SeakeepWarning")
 @pytest.mark.parametrize(
     ("variant", "block", "bandwidth", "crosses"),
     [("paper", "carlstein", "paper", True), ("recommended", "politis_white", "silverman", False)],
@@ -52,17 +52,15 @@ def test_divergences_are_those_of_the_joined_windows(found, variant, block, band
     for model in found.models:
         predicted, measured, _ = joined(test, model)
         for c, channel in enumerate(found.channels):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", SeakeepWarning)
-                alone = statistics.jsd_interval(
-                    predicted[..., c],
-                    measured[:, c],
-                    block_length=block,
-                    bandwidth=bandwidth,
-                    segments=None if crosses else [test.sizes["time"]] * test.sizes["window"],
-                    n_series=8,
-                    rng=random_stream(3, f"jsd.unseen.{variant}.{channel}"),
-                )
+            alone = statistics.jsd_interval(
+                predicted[..., c],
+                measured[:, c],
+                block_length=block,
+                bandwidth=bandwidth,
+                segments=None if crosses else [test.sizes["time"]] * test.sizes["window"],
+                n_series=8,
+                rng=random_stream(3, f"jsd.unseen.{variant}.{channel}"),
+            )
             row = table.sel(model=model, variant=variant, channel=channel)
             for key in ("mean", "lower", "upper", "uncertainty", "noise_floor", "block_length"):
                 assert row[key] == getattr(alone, key)
