@@ -76,7 +76,7 @@ def study_folder(tmp_path):
 @pytest.fixture
 def empty_sheet(monkeypatch):
     """Sheets with empty pictures: tests/report looks at these, and each takes a second or two."""
-    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
+    pytest.importorskip("matplotlib")
     from seakeep.report import quality_sheet as sheet
     from seakeep.report.style import new_figure
 
@@ -84,12 +84,12 @@ def empty_sheet(monkeypatch):
 
 
 @pytest.fixture
-def command(capfd):
+def command(capsys):
     """Run a command to the status that is expected: what it printed, and what it said beside it."""
     from seakeep.cli import main
 
     def run(*words, status=0):
-        ended, told = main(list(map(str, words))), capfd.readouterr()
+        ended, told = main(list(map(str, words))), capsys.readouterr()
         assert ended == status, told.err
         return told.out, told.err
 

@@ -102,7 +102,7 @@ CHANGES = {
     ],
     "core/coverage.py": [
         ("2.0 * density - 1.0 / np.sqrt(np.pi)", "density - 1.0 / np.sqrt(np.pi)", "statistics/test_coverage.py::test_the_crps_is_the_integral_that_defines_it"),
-        ('2.0 / (1.0 - fraction(level, "level")) * outside', '1.0 / (1.0 - fraction(level, "level")) * outside', "statistics/test_coverage.py::test_scores_of_the_true_band_are_those_of_the_normal_distribution"),
+        ('2.0 / (1.0 - fraction(level, "level")) * outside', '1.0 / (1.0 - fraction(level, "level")) * outside', "statistics/test_coverage.py::test_the_score_of_the_true_band_is_that_of_the_normal_distribution"),
         ("below, above = (m < low).mean(axis=time), (m > high).mean(axis=time)", "below, above = (m > high).mean(axis=time), (m < low).mean(axis=time)", "statistics/test_coverage.py::test_each_channel_and_window_is_judged_alone"),
     ],
     "core/density.py": [

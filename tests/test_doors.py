@@ -122,7 +122,7 @@ def test_an_observable(add, tmp_path):
 
 
 def test_a_model_a_figure_and_a_section_in_the_report_of_a_study(add, run, tmp_path):
-    pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+    pytest.importorskip("matplotlib")
     from seakeep.report.sections import SECTIONS, write_report
     from seakeep.study import read_result, read_study, run_study
 

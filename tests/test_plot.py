@@ -9,7 +9,7 @@ import seakeep
 from seakeep import HankelDMDc
 from seakeep.errors import RequestError
 
-pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+pytest.importorskip("matplotlib")
 
 from matplotlib.figure import Figure
 

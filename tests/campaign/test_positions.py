@@ -67,8 +67,8 @@ def test_a_probe_in_another_unit_is_kept_until_its_file_is_repaired(campaign, tm
     text = path.read_text("utf-8")
 
     def kept():
-        with xr.open_dataset(seakeep.campaign.write_prepared(sound)["two"]) as run:
-            return [each.channel for each in findings_of(run)]
+        run = xr.load_dataset(seakeep.campaign.write_prepared(sound)["two"])
+        return [each.channel for each in findings_of(run)]
 
     path.write_text(text.replace("cog [m]", "cog [cm]"), "utf-8")
     with pytest.warns(

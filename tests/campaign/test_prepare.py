@@ -350,8 +350,7 @@ def test_interrupted_half_way_a_second_call_continues(campaign, tank):
 @pytest.mark.parametrize("change", ["settings", "file", "version", "name"])
 def test_stale_files_are_not_used(campaign, tank, changed, change, monkeypatch):
     path = write_prepared(campaign)["second"]
-    with xr.open_dataset(path) as opened:
-        run = opened.load()
+    run = xr.load_dataset(path)
     run["heave"][:] = 0.0  # to be seen if it were used
     write_netcdf(path, run)
     assert load_prepared(campaign)["second"]["heave"].std() == 0.0

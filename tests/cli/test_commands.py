@@ -220,15 +220,15 @@ MISTAKES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("command", "message"), MISTAKES.items())
-def test_a_mistake_gets_one_message_and_no_traceback(command, message, run):
-    out, err = run(command, 2)
+@pytest.mark.parametrize(("line", "message"), MISTAKES.items())
+def test_a_mistake_gets_one_message_and_no_traceback(line, message, run):
+    out, err = run(line, 2)
     assert re.search(message, err)
     assert "Traceback" not in out + err
 
 
 @pytest.mark.parametrize(
-    ("command", "kept"),
+    ("line", "kept"),
     {
         f"fit {CAMPAIGN} -o docs/tutorial/raw.nc": "docs/tutorial/raw.nc",
         f"calibrate ensemble.nc {CAMPAIGN} --run unseen --steps 200 -o ensemble.nc": "ensemble.nc",
@@ -244,8 +244,8 @@ def test_a_mistake_gets_one_message_and_no_traceback(command, message, run):
         f"compare model.nc {CAMPAIGN} -o drawn": "drawn/unseen.png",
     }.items(),
 )
-def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, place, monkeypatch):
-    if "drawn" in command:
+def test_no_output_replaces_an_input_or_a_file_of_others(line, kept, run, place, monkeypatch):
+    if "drawn" in line:
         pytest.importorskip("matplotlib")
     for name, text in {
         "docs/tutorial/raw.nc": "CDF\x01",
@@ -262,7 +262,7 @@ def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, pla
         (place / name).write_text(text, newline="")
     monkeypatch.setattr("seakeep.campaign.prepare.Campaign.prepare", None)  # no work is done
     before = (place / kept).read_bytes()
-    assert "Choose another " in run(command, 2)[1]
+    assert "Choose another " in run(line, 2)[1]
     assert (place / kept).read_bytes() == before
 
 

@@ -11,7 +11,7 @@ from tutorial_study import edit
 
 from seakeep import executor
 
-pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+pytest.importorskip("matplotlib")
 
 
 def test_a_study_ends_with_its_table_and_the_way_to_its_report(study_folder, command, monkeypatch):
@@ -31,7 +31,7 @@ def test_a_study_ends_with_its_table_and_the_way_to_its_report(study_folder, com
 def test_a_scheduler_that_does_not_answer_is_told_before_any_work(
     verb, study_folder, monkeypatch, command
 ):
-    pytest.importorskip("distributed", reason="a Dask cluster needs distributed")
+    pytest.importorskip("distributed")
     monkeypatch.setattr(executor, "PATIENCE", 0.3)
     out = study_folder / "out"
     words = [study_folder / "study.toml"] if verb == "study" else []
@@ -70,7 +70,7 @@ def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(study_folder, ctrl_c):
     }.items(),
 )
 def test_reproduce_replaces_no_file_of_the_user(name, words, tmp_path, command):
-    pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
+    pytest.importorskip("seakeep.tank.play")
     own = tmp_path / name
     own.parent.mkdir(exist_ok=True)
     own.write_text("mine")

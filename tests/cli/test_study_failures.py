@@ -10,7 +10,7 @@ from tutorial_study import edit
 from seakeep.study import read_study, run_study
 from seakeep.study.store import UnitFolder
 
-pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+pytest.importorskip("matplotlib")
 
 
 @pytest.fixture

@@ -95,7 +95,7 @@ def test_an_input_that_tells_its_own_future_needs_a_ridge_and_forecasts_with_it(
 
 
 def test_another_package_finds_the_same_system():
-    pytest.importorskip("nfoursid", reason="dependency group bench")
+    pytest.importorskip("nfoursid")
     import pandas as pd
     from nfoursid.nfoursid import NFourSID
 

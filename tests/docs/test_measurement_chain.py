@@ -8,7 +8,7 @@ from pages import page, play
 
 @pytest.mark.usefixtures("empty_sheet")
 def test_the_page_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
-    pytest.importorskip("numba", reason="the page plays the tank")
+    pytest.importorskip("numba")
     monkeypatch.chdir(tmp_path)
     play(page("measurement_chain.md"))
     sheet = (tmp_path / "virtual/prepared/quality.html").read_text("utf-8")

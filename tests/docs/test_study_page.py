@@ -7,7 +7,7 @@ PAGE = page("study.md")
 
 
 def test_the_page_runs_and_prints_what_it_shows(tutorial, monkeypatch):
-    pytest.importorskip("matplotlib", reason="the report draws figures")
+    pytest.importorskip("matplotlib")
     # Figures of reports are looked at in tests/report/test_page.py, of such a study.
     monkeypatch.setattr("seakeep.report.page._drawn", lambda drawing, folder: None)
     # One process: the small study is done before another has started.

@@ -7,15 +7,15 @@ PAGE = page("tutorial/tutorial.md")
 
 
 def test_the_tutorial_runs_and_prints_what_it_shows(tutorial):
-    pytest.importorskip("matplotlib", reason="seakeep compare draws a figure")
-    pytest.importorskip("control", reason="the page exports to python-control")
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("control")
     play(PAGE)
     assert (tutorial / "comparison/unseen.png").stat().st_size > 10_000
     assert (tutorial / "rom.mat").exists()
 
 
 def test_the_page_shows_the_files_and_their_draft_can_be_fitted_and_judged(tutorial, command):
-    pytest.importorskip("matplotlib", reason="seakeep compare draws a figure")
+    pytest.importorskip("matplotlib")
     assert (tutorial / "run1.csv").read_text("utf-8").splitlines()[0] in PAGE
     command("init", "run1.csv", "run2.csv", "run3.csv", "-o", "draft.toml")
     draft = (tutorial / "draft.toml").read_text("utf-8").splitlines()

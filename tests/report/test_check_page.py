@@ -14,7 +14,7 @@ from seakeep.check import Checked, check_model
 from seakeep.cli import main
 from seakeep.errors import RequestError
 
-pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+pytest.importorskip("matplotlib")
 
 
 from seakeep.report.check_page import check_sections

@@ -16,7 +16,7 @@ from seakeep.report.sections.results import coverage_table, divergence_table, su
 from seakeep.report.tables import WORDS
 from seakeep.study import read_result, read_study, run_study
 
-pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+pytest.importorskip("matplotlib")
 
 
 from seakeep.report.figures.histories import history_figure, shown_cells
@@ -159,9 +159,7 @@ def test_a_report_that_was_interrupted_is_written_again(tmp_path):
 @pytest.fixture(scope="module")
 def browser():
     """A Chromium of the system, without a window, that logs all it complains of."""
-    webdriver = pytest.importorskip(
-        "selenium.webdriver", reason="selenium is not installed (group 'test')"
-    )
+    webdriver = pytest.importorskip("selenium.webdriver")
     chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
     driver = shutil.which("chromedriver")
     if chromium is None or driver is None:

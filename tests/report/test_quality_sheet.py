@@ -10,7 +10,7 @@ from seakeep.campaign import read_campaign
 from seakeep.quality import Finding, as_json, findings_of
 from seakeep.quality.samples import SamplesKind
 
-pytest.importorskip("matplotlib", reason="needs the extra figures")
+pytest.importorskip("matplotlib")
 
 RUNS = "3101_3 3101_4 3102_1 3102_2 3111_2 3041_2 3061_2 3102_3 3012_1 3102_4 3061_1 3142_1 3031_2"
 CAMPAIGN = """

@@ -11,7 +11,7 @@ from seakeep.signals import TrackingSettings, compare_motion, contact_sheet, tra
 from seakeep.signals.tracking import FLAGS
 
 cv2 = pytest.importorskip("cv2")
-pytest.importorskip("numba", reason="the renderer belongs to the virtual tank")
+pytest.importorskip("numba")
 
 from seakeep.tank import delivery as tank_video  # noqa: E402
 

@@ -14,7 +14,7 @@ from seakeep.study import judge, read_study
 from seakeep.study.reproduce import ACTS, Size, study_text
 from seakeep.study.resolve import can_align, resolve_model
 
-pytest.importorskip("numba", reason="the campaign is the virtual tank's")
+pytest.importorskip("numba")
 
 PERIOD, DT, ENSEMBLE = 1.64, 1.64 / 32, "bayesian_hankel_dmdc"
 ROWS = {
@@ -95,7 +95,6 @@ def paper(found):
 @pytest.mark.parametrize("door", ["fit", "study", "reproduce"])
 def test_the_papers_column_is_taken_in_every_row(tmp_path, door):
     taken = found(tmp_path, "paper", door)
-    assert sorted(ROWS) == list(range(1, 32))
     checked = paper(taken)
     assert checked == dict.fromkeys(checked, True)
     same = {row for row, (theirs, ours) in ROWS.items() if ours.startswith(("the same", theirs))}

@@ -2,7 +2,7 @@
 
 import pytest
 
-pytest.importorskip("numba", reason="needs the extra tank")
+pytest.importorskip("numba")
 
 
 def test_one_logger_and_the_truth(tmp_path, command):

@@ -10,7 +10,7 @@ from seakeep.errors import RequestError
 from seakeep.tank.play import check_settings, play, truth
 from seakeep.tank.settings import SpectrumSettings
 
-pytest.importorskip("numba", reason="needs the extra tank")
+pytest.importorskip("numba")
 
 
 def digests(folder):

@@ -11,7 +11,7 @@ from seakeep import HankelDMDc, ProbeAlignment, SeakeepWarning
 from seakeep.metrics import anrmse
 from seakeep.study import fit_campaign
 
-pytest.importorskip("numba", reason="needs the extra tank")
+pytest.importorskip("numba")
 
 STATES, INPUTS = ["surge", "heave", "pitch", "mooring_bow"], ["eta_fwd", "eta_cog"]
 PERIODS = 15.0
