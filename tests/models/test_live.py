@@ -31,6 +31,9 @@ SETTINGS = {
 }
 
 
+in_place_and_carried = pytest.mark.parametrize("key", ["plain", "aligned"])
+
+
 @pytest.fixture(scope="module")
 def models(drifts):
     return {
@@ -202,7 +205,7 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     assert ended[1][0][0] == pytest.approx(1.0, abs=0.3)
 
 
-@pytest.mark.parametrize("key", ["plain", "aligned"])
+@in_place_and_carried
 def test_what_samples_tell_does_not_depend_on_when_it_is_read(models, drift, key):
     late, often = (started(models[key], drift, START - 60) for _ in range(2))
     for at in range(START - 60, START):
@@ -327,7 +330,7 @@ def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(models
     assert filled[1][1] < 0.5 * filled[0][1]
 
 
-@pytest.mark.parametrize("key", ["plain", "aligned"])
+@in_place_and_carried
 def test_in_the_dark_a_forecast_is_that_of_the_last_sample(models, drift, tmp_path, key):
     """Mean and band go on; in the light again, the service says that waves are lost."""
     live, count = started(models[key], drift), 30
@@ -445,7 +448,7 @@ def test_a_step_and_a_forecast_run_on_one_thread(models, drift):
         assert all(each == {1} for each in seen)
 
 
-@pytest.mark.parametrize("key", ["plain", "aligned"])
+@in_place_and_carried
 def test_a_restarted_process_goes_on_bit_for_bit(models, drift, tmp_path, key):
     live = started(models[key], drift)
     path = tmp_path / "state.nc"
@@ -544,10 +547,11 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
         {str(seed): made(seed) for seed in (1, 2)}, ["surge"], ["eta", "thrust"]
     )
     run = made(3)
-    live = model.live(roles={"thrust": "known"})
+    live, constant = (model.live(roles={"thrust": role}) for role in ("known", "constant"))
     u, y = table(run, ["eta", "thrust"]), table(run, ["surge"])
     for at in range(300):
         live.step(u[at], y[at])
+        constant.step(u[at], y[at])
     for at in range(300, 320):
         live.step([np.nan, u[at, 1]], y[at])  # the probe is dead; the thrust is known
         assert live._known_inputs()[-1, 1] == u[at, 1]
@@ -566,9 +570,6 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     with pytest.raises(RequestError, match="roles names 'eat', which the model does not know"):
         model.live(roles={"eat": "known"})
     # A constant stays; waves that are given count though the other column is not.
-    constant = model.live(roles={"thrust": "constant"})
-    for at in range(300):
-        constant.step(u[at], y[at])
     known = u[300:340].copy()
     known[:, 1] = u[299, 1]
     expected = model.forecast_arrays(y[:300], u[:300], known, steps)
