@@ -16,6 +16,11 @@ def drafted(folder, files):
     return text, read_campaign(path)
 
 
+def drafted_of(folder, columns):
+    """Draft of a single file."""
+    return drafted(folder, [write_csv(folder / "run.csv", columns)])
+
+
 GUESSES = {
     "": {
         ("HEAVE_CoG", "mm"): "heave",
@@ -74,7 +79,7 @@ def test_a_draft_asks_whether_slow_files_count_milliseconds(tmp_path):
     for rate, asks in ((50, False), (0.05, True)):
         t = np.arange(600) / rate
         wave = {"t": t, "WP fwd [mm]": np.sin(2 * np.pi * np.arange(600) / 30)}
-        text, _ = drafted(tmp_path, [write_csv(tmp_path / "a.csv", wave)])
+        text, _ = drafted_of(tmp_path, wave)
         assert f"# the files have {rate} samples per second" in text
         assert ("time_unit = 'ms'" in text) is asks
 
@@ -90,15 +95,15 @@ def test_motions_are_the_states_and_loads_are_named_beside_them(tmp_path):
     columns = tank_columns()
     columns["Tension_SB [N]"] = columns["Heave [mm]"]
     columns["Acc z [g]"] = columns.pop("acc [g]")
-    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    text, campaign = drafted_of(tmp_path, columns)
     assert campaign.model().states == ("heave", "pitch")
     assert campaign.model().preset == "recommended"
     assert "# Loads (mooring_starboard) may be added to the states" in text
     only = {k: v for k, v in columns.items() if k.split()[0] in ("Time", "WP", "Acc", "Tension_SB")}
-    _, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", only)])
+    _, campaign = drafted_of(tmp_path, only)
     assert campaign.model().states == ("heave_acceleration",)
     only.pop("Acc z [g]")
-    _, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", only)])
+    _, campaign = drafted_of(tmp_path, only)
     assert campaign.model().states == ("mooring_starboard",)
 
 
@@ -151,7 +156,7 @@ def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
     columns = tank_columns() | {"WP 2 [mm]": tank_columns()["WP fwd [mm]"]}
     for name in ("Heave [mm]", "WP 2 [mm]"):
         columns[name] = np.where(np.arange(1001) // lost == 3, np.nan, columns[name])
-    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    text, campaign = drafted_of(tmp_path, columns)
     assert (campaign.model().states, campaign.model().inputs) == (("pitch",), ("eta_fwd",))
     if lost == 200:
         assert "# column 'Heave [mm]' left out: has gaps in run.csv" in text
@@ -162,7 +167,7 @@ def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
 
 
 def test_columns_without_a_known_name_are_marked(tmp_path):
-    text, _ = drafted(tmp_path, [write_csv(tmp_path / "a.csv", tank_columns(0, 60.0))])
+    text, _ = drafted_of(tmp_path, tank_columns(0, 60.0))
     assert 'column = "acc" # NOT RECOGNISED: rename the channel if it is a motion or load' in text
     assert text.count("NOT RECOGNISED") == 1
 

@@ -130,7 +130,7 @@ def node(monkeypatch):
 
 def quaternion(angles):
     """Of yaw, pitch and roll."""
-    from stand_in_ros import message
+    from bags import message
 
     turned = Rotation.from_euler("ZYX", angles).as_quat().tolist()
     return message("geometry_msgs/msg/Quaternion")(**dict(zip("xyzw", turned, strict=True)))
@@ -138,8 +138,8 @@ def quaternion(angles):
 
 def recorded(path, run, samples, lost):
     """Record a run as a vessel would: odometry, and two probes, messages out of order."""
-    from bags import write_bag
-    from stand_in_ros import TIME, message
+    from bags import message, write_bag
+    from stand_in_ros import TIME
 
     def point(channel, at):
         return message("geometry_msgs/msg/Point")(z=float(run[channel].values[at]))

@@ -10,7 +10,7 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 
 pytest.importorskip("rosbags")
 
-from bags import STORE, write_bag
+from bags import STORE, message, write_bag
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import get_types_from_msg
 
@@ -20,7 +20,6 @@ STORE.register(
         "tank_msgs/msg/Rig",
     )
 )
-TYPES = STORE.types
 BEGIN = 1_700_000_000_000_000_000  # ns
 STEP = 20_000_000  # ns
 COUNT = 100
@@ -29,25 +28,22 @@ RATE = np.sin(T)
 
 
 def header(instant):
-    stamp = TYPES["builtin_interfaces/msg/Time"](*divmod(instant, 1_000_000_000))
-    return TYPES["std_msgs/msg/Header"](stamp=stamp, frame_id="cog")
+    stamp = STORE.types["builtin_interfaces/msg/Time"](*divmod(instant, 1_000_000_000))
+    return message("std_msgs/msg/Header")(stamp=stamp)
 
 
 def imu(i, stamped=True):
-    vector, covariance = TYPES["geometry_msgs/msg/Vector3"], np.zeros(9)
-    return TYPES["sensor_msgs/msg/Imu"](
+    vector, turn = (message(f"geometry_msgs/msg/{kind}") for kind in ("Vector3", "Quaternion"))
+    return message("sensor_msgs/msg/Imu")(
         header=header(BEGIN + i * STEP if stamped else 0),
-        orientation=TYPES["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
-        orientation_covariance=covariance,
-        angular_velocity=vector(x=0.0, y=RATE[i], z=0.0),
-        angular_velocity_covariance=covariance,
-        linear_acceleration=vector(x=0.1, y=0.0, z=9.81),
-        linear_acceleration_covariance=covariance,
+        orientation=turn(w=1.0),
+        angular_velocity=vector(y=RATE[i]),
+        linear_acceleration=vector(x=0.1, z=9.81),
     )
 
 
 def rig(i, stamped=True):
-    return TYPES["tank_msgs/msg/Rig"](
+    return STORE.types["tank_msgs/msg/Rig"](
         header=header(BEGIN + i * STEP if stamped else 0),
         surge=float(i),
         loads=np.array([i, -i], dtype=np.float32),
@@ -57,11 +53,11 @@ def rig(i, stamped=True):
 
 
 def number(i):
-    return TYPES["std_msgs/msg/Float64"](data=float(i))
+    return message("std_msgs/msg/Float64")(data=float(i))
 
 
 def text(i):
-    return TYPES["std_msgs/msg/String"](data="x")
+    return message("std_msgs/msg/String")(data="x")
 
 
 def save(path, plugin=StoragePlugin.MCAP, **topics):

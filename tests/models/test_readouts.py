@@ -39,6 +39,10 @@ def chosen(runs):
     return bow("auto").fit(runs, STATES, INPUTS)
 
 
+def kinds(model):
+    return [each.kind for each in model.signature.readouts]
+
+
 def error(model, run):
     found = model.forecast(run, START, STEPS)
     return float(np.sqrt(np.mean((found - run.sel(time=found["time"]))["mooring_bow"] ** 2)))
@@ -90,7 +94,7 @@ def test_auto_leaves_a_linear_load_as_it_is(runs, drift):
         noise = np.random.default_rng(seed).standard_normal(run.sizes["time"])
         dry[name] = run.assign(mooring_bow=(load + LOAD_NOISE * noise).assign_attrs(units="N"))
     model = replace(SPEC, readouts="auto").fit(dry, STATES, INPUTS)
-    assert [each.kind for each in model.signature.readouts] == ["none"]
+    assert kinds(model) == ["none"]
     xr.testing.assert_identical(
         model.forecast(drift, START, STEPS),
         SPEC.fit(dry, STATES, INPUTS).forecast(drift, START, STEPS),
@@ -160,10 +164,10 @@ def test_nothing_after_the_stop_of_training_is_read(runs, drift):
 
 def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all(runs):
     one = bow("auto").fit(runs["run1"], STATES, INPUTS)
-    assert [each.kind for each in one.signature.readouts] == ["wave"]
+    assert kinds(one) == ["wave"]
     short = runs["run1"].isel(time=slice(0, 300))
     model = bow("auto").fit(short, STATES, INPUTS)
-    assert [each.kind for each in model.signature.readouts] == ["none"]
+    assert kinds(model) == ["none"]
     assert "(not judged: no waves are carried, or" in model.summary()
 
 
