@@ -60,20 +60,20 @@ def text(i):
     return message("std_msgs/msg/String")(data="x")
 
 
-def save(path, plugin=StoragePlugin.MCAP, **topics):
+def save(folder, plugin=StoragePlugin.MCAP, **topics):
     """Write topics, each a maker of messages; received 3 ms after they are stamped."""
     sent = (
         (BEGIN + i * STEP + 3_000_000, f"/{topic}", make(i))
         for topic, make in topics.items()
         for i in range(COUNT)
     )
-    return write_bag(path, sent, plugin)
+    return write_bag(folder / "bag", sent, plugin)
 
 
 @pytest.mark.parametrize("plugin", list(StoragePlugin), ids=lambda plugin: plugin.name)
 @pytest.mark.parametrize("what", ["folder", "file"])
 def test_a_standard_message(tmp_path, plugin, what):
-    path = save(tmp_path / "bag", plugin, mru=imu, note=text)
+    path = save(tmp_path, plugin, mru=imu, note=text)
     if what == "file":
         path = next(each for each in path.iterdir() if each.suffix in (".mcap", ".db3"))
     run = read_table(path)
@@ -89,14 +89,14 @@ def test_a_standard_message(tmp_path, plugin, what):
 
 
 def test_the_times_of_reception_on_request(tmp_path):
-    run = read_table(save(tmp_path / "bag", mru=imu), FileSettings(time="receive_time"))
+    run = read_table(save(tmp_path, mru=imu), FileSettings(time="receive_time"))
     np.testing.assert_allclose(run["time"], T, atol=1e-12)
     with pytest.raises(RequestError, match="the column 'time' cannot be a channel"):
         read_table(tmp_path / "bag", FileSettings(time="receive_time"), columns=["time"])
 
 
 def test_a_message_of_ones_own(tmp_path):
-    run = read_table(save(tmp_path / "bag", rig=rig))
+    run = read_table(save(tmp_path, rig=rig))
     np.testing.assert_array_equal(run["surge"], np.arange(COUNT))
     np.testing.assert_array_equal(run["loads[1]"], -np.arange(COUNT))
     assert "units" not in run["surge"].attrs
@@ -104,7 +104,7 @@ def test_a_message_of_ones_own(tmp_path):
 
 
 def test_topics(tmp_path):
-    path = save(tmp_path / "bag", mru=imu, load=number, note=text)
+    path = save(tmp_path, mru=imu, load=number, note=text)
     with pytest.raises(
         RequestError,
         match=r"several topics, each with times of its own: '/load' \(std_msgs/msg/Float64, 100 "
@@ -120,14 +120,14 @@ def test_topics(tmp_path):
 
 def test_topics_count_from_one_instant(tmp_path):
     """The recording's first message, so that channels of two topics fit together."""
-    path = save(tmp_path / "bag", early=number, mru=imu)
+    path = save(tmp_path, early=number, mru=imu)
     first = read_table(path, FileSettings(group="/early"))["time"]
     second = read_table(path, FileSettings(group="/mru"))["receive_time"]
     np.testing.assert_array_equal(first, second)
 
 
 def test_headers_that_are_not_stamped(tmp_path):
-    path = save(tmp_path / "bag", mru=lambda i: imu(i, stamped=False))
+    path = save(tmp_path, mru=lambda i: imu(i, stamped=False))
     with pytest.warns(SeakeepWarning, match="the headers of the topic '/mru' are not stamped"):
         run = read_table(path)
     np.testing.assert_allclose(run["time"], T, atol=1e-12)
@@ -137,7 +137,7 @@ def test_headers_that_are_not_stamped(tmp_path):
 
 
 def test_the_checksum_of_a_bag_follows_its_files(tmp_path):
-    path = save(tmp_path / "bag", mru=imu)
+    path = save(tmp_path, mru=imu)
     before = checksum(path)
     assert checksum(path) == before
     file = next(path.glob("*.mcap"))

@@ -13,6 +13,8 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 
 PLAIN = "Time [s],Heave [mm],Pitch (deg),WP 1\n0,1.5,2,3\n0.1,-1.5,2e-3,4\n0.2,.5,+2,5\n"
 
+ROWS = PLAIN.split("\n", 1)[1]
+
 
 def write(folder, text, name="run.csv", encoding="utf-8"):
     path = folder / name
@@ -49,10 +51,10 @@ def with_comma(text):
         "# a remark\n# another, with a comma\n" + PLAIN,
         "% MATLAB's mark\n\n" + PLAIN + "\n\n",
         PLAIN.replace("\n", ",\n"),
-        '"Time [s]","Heave [mm]","Pitch (deg)","WP 1"\n' + PLAIN.split("\n", 1)[1],
-        "Time,Heave,Pitch,WP 1\ns,mm,deg,\n" + PLAIN.split("\n", 1)[1],
-        "Time,Heave,Pitch,WP 1\n[s],[mm],[deg],\n" + PLAIN.split("\n", 1)[1],
-        "Time;Heave;Pitch;WP 1\ns;mm;deg;\n" + with_comma(PLAIN).split("\n", 1)[1],
+        '"Time [s]","Heave [mm]","Pitch (deg)","WP 1"\n' + ROWS,
+        "Time,Heave,Pitch,WP 1\ns,mm,deg,\n" + ROWS,
+        "Time,Heave,Pitch,WP 1\n[s],[mm],[deg],\n" + ROWS,
+        "Time;Heave;Pitch;WP 1\ns;mm;deg;\n" + with_comma(ROWS),
     ],
 )
 def test_dialects(tmp_path, text):
@@ -255,7 +257,7 @@ HEADS = {
 
 @pytest.mark.parametrize("head", HEADS.values(), ids=HEADS)
 def test_heads_of_loggers(tmp_path, head):
-    run = read_table(write(tmp_path, head + PLAIN.split("\n", 1)[1]))
+    run = read_table(write(tmp_path, head + ROWS))
     assert run["Heave"].attrs["units"] == "mm"
     assert run["Pitch"].attrs["units"] == "deg"
     np.testing.assert_array_equal(run["WP 1"], [3, 4, 5])
