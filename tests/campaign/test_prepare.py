@@ -382,10 +382,10 @@ def test_a_measurement_is_never_overwritten(tank, changed):
 def test_a_byte_that_was_altered_is_noticed(campaign):
     path = write_prepared(campaign, names=["second"])["second"]
     content = path.read_bytes()
-    expected = load_prepared(campaign, names=["second"])["second"]
+    (expected,) = load_prepared(campaign, names=["second"]).values()
     path.write_bytes(content[:900] + bytes([content[900] ^ 1]) + content[901:])
     with pytest.warns(SeakeepWarning, match=r"second\.nc was cut off, altered"):
-        run = load_prepared(campaign, names=["second"])["second"]
+        (run,) = load_prepared(campaign, names=["second"]).values()
     xr.testing.assert_identical(run, expected)
 
 

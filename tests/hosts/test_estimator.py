@@ -78,6 +78,10 @@ class Estimator:
         return self.state, live.step(u, y)
 
     @property
+    def validity(self):
+        return self.calls["validity"](self.memory)
+
+    @property
     def deviations(self):
         return np.array([self.calls["deviation"](self.memory, each) for each in (0, 1)])
 
@@ -85,6 +89,11 @@ class Estimator:
         mean, std = out = np.empty((2, steps, self.count))
         known = None if future is None else pointer(future)
         return self.calls["forecast"](self.memory, steps, known, pointer(mean), pointer(std)), out
+
+
+def beside_a_constant(model, folder):
+    """Estimators in C and in Python, of a wave beside an input that is none."""
+    return Estimator(built(model, folder, roles=ROLES), "rom"), model.live(roles=ROLES)
 
 
 def moments(forecast, states):
@@ -122,7 +131,7 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
             np.testing.assert_allclose(found.deviations, expected, rtol=1e-9, atol=1e-12)
         if at in (190, 305, 317, 640):
             lost = live.validity & Validity.LOST
-            assert found.calls["validity"](found.memory) & Validity.LOST == lost
+            assert found.validity & Validity.LOST == lost
             assert bool(lost) == (lost_inputs and at in (305, 317))
         if at in (5, 190, 290, 309, 317, 320, 325, 640):
             status, forecast = found.forecast(30, u[at + 1 : at + 30])
@@ -149,7 +158,7 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
 def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
     model, make_run, tmp_path
 ):
-    found, live = Estimator(built(model, tmp_path, roles=ROLES), "rom"), model.live(roles=ROLES)
+    found, live = beside_a_constant(model, tmp_path)
     u, y = measured(make_run(COUNT, 5), model)
     for at in range(325):  # u[315:320] is lost
         found.beside(live, u[at], y[at])
@@ -161,12 +170,12 @@ def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
 
 def test_an_input_that_is_no_wave_is_not_judged(library, model, make_run, tmp_path):
     wave = (Estimator(library, "exact"), model.live())
-    constant = (Estimator(built(model, tmp_path, roles=ROLES), "rom"), model.live(roles=ROLES))
+    constant = beside_a_constant(model, tmp_path)
     u, y = measured(make_run(COUNT, 5), model, False)
     for at in range(300):
         for found, live in (wave, constant):
             found.beside(live, u[at] * [1, 3], y[at])
-    outside = [found.calls["validity"](found.memory) for found, _ in (wave, constant)]
+    outside = [found.validity for found, _ in (wave, constant)]
     assert outside == [live.conditions.validity for _, live in (wave, constant)]
     assert outside[0] & Validity.HEIGHT
     assert outside[1] == 0
@@ -241,7 +250,7 @@ def test_what_lies_outside_the_training_is_that_of_the_live_model(cases, tmp_pat
             place = y[at] + away * (np.array(model.states) == "surge")
             found.beside(live, factor * u[at], place)
         validity = live.conditions.validity
-        assert found.calls["validity"](found.memory) == validity
+        assert found.validity == validity
         assert bool(validity) == ((factor, slow, away) != (1, False, 0))
 
 

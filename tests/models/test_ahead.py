@@ -31,6 +31,11 @@ def model(request, drifts):
     return model_of(drifts, **settings[request.param])
 
 
+def up_to(run, last):
+    """Samples up to the last one that is named."""
+    return run.isel(time=slice(0, last + 1))
+
+
 def unplaced(run):
     """A run that does not say where its probes stand, as arrays do not."""
     run = run.copy()
@@ -47,13 +52,13 @@ def reads_until(model, run):
 
 def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
     last = reads_until(model, drift) - 10
-    short = drift.isel(time=slice(0, last + 1))
+    short = up_to(drift, last)
     with pytest.raises(RequestError, match="ahead = 'predict' continues the input"):
         model.forecast(short, START, STEPS)
     found = model.forecast(short, START, STEPS, ahead="predict")
     assert found.sizes["time"] == STEPS
     # By hand: the probes continued, everything after the start but waves thrown away.
-    long = drift.isel(time=slice(0, last + 11)).copy(deep=True)
+    long = up_to(drift, last + 10).copy(deep=True)
     waves = foresee(
         table(short, INPUTS),
         10,
@@ -80,7 +85,7 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
 def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift):
     model = model_of(drifts)
     last = reads_until(model, drift) - 10
-    short = drift.isel(time=slice(0, last + 1))
+    short = up_to(drift, last)
     found = model.forecast(short, START, STEPS, ahead="predict")
     whole = model.forecast(drift, START, STEPS, ahead="predict")
     xr.testing.assert_identical(whole, model.forecast(drift, START, STEPS))  # nothing is missing
@@ -95,7 +100,7 @@ def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift
 def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
     ensemble = few(n_members=3, lead=LEAD).fit(drifts, STATES, INPUTS)
     last = reads_until(ensemble, drift) - 4
-    short = unplaced(drift.isel(time=slice(0, last + 1)))
+    short = unplaced(up_to(drift, last))
     members = ensemble.forecast(short, START, STEPS, ahead="predict")
     words = members.attrs["status"]
     assert words == f"ok, input predicted from t = {members.attrs['input_predicted_from']:g} s"
@@ -128,7 +133,7 @@ def test_no_lead_errs_more_than_the_mean(drifts, drift, positions):
     squares, mean = np.zeros((2, steps)), model.state_scale.centre[1]
     for at in range(300, 1300, 25):
         start, true = float(run.time[at]), run.heave.values[at + 1 : at + 1 + steps]
-        found = model.forecast(run.isel(time=slice(0, at + 1)), start, steps, ahead="predict")
+        found = model.forecast(up_to(run, at), start, steps, ahead="predict")
         squares += (found.heave.values - true) ** 2, (mean - true) ** 2
     ratio = np.sqrt(squares[0] / squares[1])
     # Unweighted, it is 1.4 and stays so.
@@ -185,7 +190,7 @@ def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, 
     model, at, steps = model_of(drifts), 400, 250
     # Waves are known for longer than a forecast without them is trusted.
     start, last = float(drift.time[at]), at + 100
-    short = unplaced(drift.isel(time=slice(0, last + 1)))
+    short = unplaced(up_to(drift, last))
     x, u = table(short, STATES), table(short, INPUTS)
     found = model.forecast_arrays(x[: at + 1], u[: at + 1], u[at + 1 :], steps, ahead="predict")
     known = table(model.forecast(drift, start, steps), STATES)

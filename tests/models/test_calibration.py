@@ -44,6 +44,13 @@ def wide_of(ensemble, run):
     return ensemble.forecast_summary(run, 120.0, 30, band="calibrated")
 
 
+def assert_kept(kept, ensemble, members):
+    """Members of an ensemble are what is left, and forecast as they did."""
+    run = sea(3, 300, "other")
+    found, every = (table(each.forecast(run, 10.0, 40), STATES) for each in (kept, ensemble))
+    np.testing.assert_array_equal(found, every[members])
+
+
 @pytest.mark.parametrize("scale", SCALES)
 def test_the_calibrated_band_covers_unseen_windows_as_it_says(bands, run, scale):
     inside = {"members": [], "calibrated": []}
@@ -176,9 +183,7 @@ def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
     assert without.arrays.names == ("b",)
     kept = [number for number, draw in enumerate(ensemble.members) if draw.run == 1]
     assert 0 < without.n_members == len(kept) < 6
-    run = sea(3, 300, "other")
-    found, every = (table(each.forecast(run, 10.0, 40), STATES) for each in (without, ensemble))
-    np.testing.assert_array_equal(found, every[kept])
+    assert_kept(without, ensemble, kept)
 
 
 def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
@@ -202,6 +207,4 @@ def test_members_whose_windows_reach_into_a_third_do_not_forecast_it():
     spans = [(d.first(0, 900, ensemble.signature.input_map), d.last) for d in ensemble.members]
     free = [number for number, (first, last) in enumerate(spans) if last < 300 or first >= 600]
     assert 0 < len(free) < 6
-    other = sea(3, 300, "other")
-    found, every = (table(each.forecast(other, 10.0, 40), STATES) for each in (kept, ensemble))
-    np.testing.assert_array_equal(found, every[free])
+    assert_kept(kept, ensemble, free)

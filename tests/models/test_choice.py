@@ -13,6 +13,7 @@ from seakeep.models.selection import Trial, groups_of, select, simplest
 T = PERIOD * DT
 OPEN = Select(True, True, True, True, period=T, horizon=10)
 SPEC = replace(HankelDMDc.recommended(T, DT), select=OPEN)
+REMEMBERS, PLAIN = replace(SPEC, memory=9), replace(SPEC, memory=0)
 
 
 def without_drift():
@@ -53,18 +54,16 @@ def test_the_noise_is_a_standard_error_over_what_is_held_out(other, is_as_good):
     ],
 )
 def test_what_is_simpler_errs_little_more(best, other, is_taken):
-    remembers, plain = replace(SPEC, memory=9), replace(SPEC, memory=0)
-    trials = {remembers: trial(*best), plain: trial(*other)}
-    assert (simplest(trials, remembers, 0.0) == plain) == is_taken
+    trials = {REMEMBERS: trial(*best), PLAIN: trial(*other)}
+    assert (simplest(trials, REMEMBERS, 0.0) == PLAIN) == is_taken
 
 
 @pytest.mark.parametrize(("alike", "is_taken"), [(0.0, True), (0.03, False)])
 def test_what_is_simpler_counts_with_the_ridge_that_it_would_be_given(alike, is_taken):
-    remembers, plain = replace(SPEC, memory=9), replace(SPEC, memory=0)
     scores = np.array([[0.104, 0.104], [0.107, 0.107]])  # 4 % and 7 % worse than the best
     other = Trial((1e-3, 1e-2), scores, np.array([0.5, 0.5]), np.array([0, 1]))
-    trials = {remembers: trial(0.1, 0.1), plain: other}
-    assert (simplest(trials, remembers, alike) == plain) == is_taken
+    trials = {REMEMBERS: trial(0.1, 0.1), PLAIN: other}
+    assert (simplest(trials, REMEMBERS, alike) == PLAIN) == is_taken
 
 
 @pytest.mark.parametrize(("surge", "lead"), [("predicted", 9), ("measured", 0)])

@@ -152,6 +152,9 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path):
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
 
 
+TRAINING = xr.Dataset({"begin": ("training", np.zeros(10))})
+
+
 def crossed(rng, levels):
     """Errors of models in 100 cells that share training sets and windows."""
     rows, columns = 0.1 * rng.standard_normal((10, 1)), 0.1 * rng.standard_normal(10)
@@ -168,8 +171,7 @@ def test_differences_between_models_have_intervals_and_verdicts():
     test = crossed(rng, {"good": 0.8, "same": 1.0, "noisy": 1.0})
     noise = 1 + 0.3 * rng.standard_normal((10, 10, 1))
     test["error"].loc[{"model": "noisy", "measure": "nrmse"}] *= noise
-    training = xr.Dataset({"begin": ("training", np.zeros(10))})
-    found = difference_table(test, training, rng).sel(measure="nrmse")
+    found = difference_table(test, TRAINING, rng).sel(measure="nrmse")
     # The same cells but for a factor: no draw can tell another change than the factor's.
     for key in ("change", "lower", "upper"):
         np.testing.assert_allclose(found[key].sel(model="good", other="same"), -0.2, rtol=1e-12)
@@ -200,8 +202,7 @@ def test_growth_is_pooled_over_cells_and_its_interval_holds_it():
             growth=(dims, grows),
             error_over_time=((*dims[:-1], "time"), np.ones((1, 1, 10, 10, 2))),
         ).assign_coords(band=["all"])
-        training = xr.Dataset({"begin": ("training", np.zeros(10))})
-        at = trend_table(test, training, rng).sel(model="m", band="all")
+        at = trend_table(test, TRAINING, rng).sel(model="m", band="all")
         inside += at["lower"] <= growth <= at["upper"]
         changes.append(float(at["change"]))
     assert np.mean(changes) == pytest.approx(growth, abs=0.03)  # a standard error of 0.01
