@@ -25,10 +25,9 @@ def write(folder, text, name="run.csv", encoding="utf-8"):
 def check_plain(run):
     assert list(run.data_vars) == ["Heave", "Pitch", "WP 1"]
     assert run["Heave"].dims == ("time",)
-    np.testing.assert_array_equal(run["time"], [0.0, 0.1, 0.2])
-    np.testing.assert_array_equal(run["Heave"], [1.5, -1.5, 0.5])
-    np.testing.assert_array_equal(run["Pitch"], [2, 2e-3, 2])
-    np.testing.assert_array_equal(run["WP 1"], [3, 4, 5])
+    values = {"time": [0.0, 0.1, 0.2], "Heave": [1.5, -1.5, 0.5], "Pitch": [2, 2e-3, 2]}
+    for name, expected in (values | {"WP 1": [3, 4, 5]}).items():
+        np.testing.assert_array_equal(run[name], expected)
     units = {str(name): each.attrs.get("units") for name, each in run.items()}
     assert units == {"Heave": "mm", "Pitch": "deg", "WP 1": None}
 

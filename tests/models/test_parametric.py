@@ -33,10 +33,14 @@ def vessel(draught, seed, samples=400, noise=0.0):
     return record(DT, attrs, heave=heave, eta=eta)
 
 
+def vessels(draughts, seed, *more):
+    return [vessel(draught, seed + n, *more) for n, draught in enumerate(draughts)]
+
+
 @pytest.fixture(scope="module")
 def family():
     """Noisy runs at four draughts."""
-    return [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
+    return vessels((0.0, 0.3, 0.6, 1.0), 30, 800, 0.05)
 
 
 def error(model):
@@ -47,7 +51,7 @@ def error(model):
 
 @pytest.fixture(scope="module")
 def model():
-    return SPEC.fit([vessel(p, 10 + n) for n, p in enumerate((0.0, 0.4, 1.0))], *CHANNELS)
+    return SPEC.fit(vessels((0.0, 0.4, 1.0), 10), *CHANNELS)
 
 
 def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
@@ -72,8 +76,7 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
 
 def test_where_waves_are_predicted_the_forecast_is_that_of_its_file(tmp_path):
     spec = replace(SPEC, ridge=1.0, standardize=True)
-    runs = [vessel(p, 40 + n, 800, 0.5) for n, p in enumerate((0.0, 1.0))]
-    model = spec.fit(runs, *CHANNELS)
+    model = spec.fit(vessels((0.0, 1.0), 40, 800, 0.5), *CHANNELS)
     again = load_model(model.save(tmp_path / "model.nc"))
     run = vessel(0.4, 3).isel(time=slice(0, 60))
     forecast = model.forecast(run, start=5.9, steps=50, ahead="predict")
@@ -115,8 +118,8 @@ def test_free_runs_choose_between_the_parameter_and_one_pooled_model(family):
     pooled, nearest = (fixed.fit(runs, *CHANNELS) for runs in (family, family[1]))
     assert error(varying) < 0.5 * min(error(pooled), error(nearest))
     alike = [
-        vessel(0.5, 50 + n, 800, 0.05).assign_attrs(rig=run.attrs["rig"])
-        for n, run in enumerate(family)
+        same.assign_attrs(rig=run.attrs["rig"])
+        for same, run in zip(vessels([0.5] * 4, 50, 800, 0.05), family, strict=True)
     ]
     same = CHOSEN.fit(alike, *CHANNELS)
     assert same.settings.parameter == ""

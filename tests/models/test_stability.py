@@ -38,11 +38,14 @@ def test_modes_are_natural_frequency_and_damping_of_the_oscillator():
     assert identified.modes().sizes["mode"] == 1
     radius = np.exp(-vessel.dt / decay)
     assert identified.spectral_radius == pytest.approx(radius, rel=1e-9)
-    assert float(mode.natural_frequency) == pytest.approx(natural, rel=1e-9)
-    assert float(mode.damping_ratio) == pytest.approx(vessel.ratio, rel=1e-9)
-    assert float(mode.frequency) == pytest.approx(damped, rel=1e-9)
-    assert float(mode.period) == pytest.approx(1 / damped, rel=1e-9)
-    assert float(mode.decay_time) == pytest.approx(decay, rel=1e-9)
+    expected = {
+        "natural_frequency": natural,
+        "damping_ratio": vessel.ratio,
+        "frequency": damped,
+        "period": 1 / damped,
+        "decay_time": decay,
+    }
+    assert {key: float(mode[key]) for key in expected} == pytest.approx(expected, rel=1e-9)
     assert mode.natural_frequency.attrs["units"] == "Hz"
 
 
