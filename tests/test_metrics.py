@@ -192,8 +192,7 @@ def test_a_forecast_that_ends_in_nan_has_no_interval():
 
 def test_errors_that_models_share_cancel_in_their_difference():
     rng = np.random.default_rng(0)
-    measured = [labelled(rng.normal(size=(300, 2))) for _ in range(2)]
-    errors = [labelled(rng.normal(size=(300, 2))) for _ in measured]
+    measured, errors = ([labelled(rng.normal(size=(300, 2))) for _ in range(2)] for _ in range(2))
     first, half, equal = (
         [m + scale * e for m, e in zip(measured, errors, strict=True)] for scale in (0.2, 0.1, 0.2)
     )

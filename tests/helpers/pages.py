@@ -14,11 +14,6 @@ from seakeep.errors import SeakeepWarning
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
-def blocks_of(page):
-    """Console, Python and text blocks of a page, in its order."""
-    return re.findall(r"^```(console|python|text)\n(.*?)^```$", page, flags=re.M | re.S)
-
-
 def shown(text):
     """Lines with single blanks, without rules and empty lines."""
     lines = (" ".join(re.sub("[─━]", "", line).split()) for line in text.splitlines())
@@ -66,7 +61,7 @@ def page(name):
 def play(page):
     """Run the console and Python blocks of a page; a text block after one must show its output."""
     printed, names = "", {}
-    for kind, content in blocks_of(page):
+    for kind, content in re.findall(r"^```(\w+)\n(.*?)^```$", page, flags=re.M | re.S):
         if kind == "console":
             printed = run_console(content)
         elif kind == "python":
@@ -75,6 +70,6 @@ def play(page):
                 warnings.simplefilter("ignore", SeakeepWarning)  # of an unstable model
                 exec(content, names)  # the page is ours
             printed = out.getvalue()
-        elif printed:
+        elif printed and kind == "text":
             check(content, printed)
             printed = ""

@@ -64,7 +64,7 @@ def plain(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def disturbed(tmp_path_factory):
-    """Path of a video with a pole before the panel, floods of light, and darkness."""
+    """A video with a pole before the panel, floods of light, and darkness; the place, the track."""
 
     def hook(i, lit):
         if i in OCCLUDED:
@@ -76,7 +76,7 @@ def disturbed(tmp_path_factory):
         return lit * (0.2 if i in DARK else 1.0)
 
     path = tmp_path_factory.mktemp("video") / "disturbed.mp4"
-    return path, render(path, hook)
+    return path, render(path, hook), track_video(path)
 
 
 @pytest.fixture(scope="module")
@@ -171,13 +171,8 @@ def test_a_camera_on_the_other_side(plain, tmp_path, tracked):
         assert rms(out[name] - tracked[name]) < 5e-4, name
 
 
-@pytest.fixture(scope="module")
-def flagged(disturbed):
-    return track_video(disturbed[0])
-
-
-def test_flags_of_bad_frames(disturbed, flagged):
-    out, place = flagged, disturbed[1]
+def test_flags_of_bad_frames(disturbed):
+    _, place, out = disturbed
     expected = np.full(FRAMES, FLAGS["good"])
     expected[OCCLUDED] = FLAGS["occluded"]
     expected[BURNT] = FLAGS["overexposed"]
@@ -227,8 +222,9 @@ def test_a_lag_one_wave_period_off_is_told():
     assert found([1.0], 1.0, max_lag=0.5).at_limit
 
 
-def test_a_contact_sheet_shows_bad_frames_too(disturbed, flagged, tmp_path):
-    sheet = contact_sheet(disturbed[0], flagged)
+def test_a_contact_sheet_shows_bad_frames_too(disturbed, tmp_path):
+    path, _, flagged = disturbed
+    sheet = contact_sheet(path, flagged)
     picture = cv2.imdecode(np.frombuffer(sheet, np.uint8), cv2.IMREAD_COLOR)
     assert picture.shape == (4 * 270, 3 * 480, 3)
     # Four of the twelve are the worst ones; frames spread evenly may be bad too.
