@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 import two_loggers
 import xarray as xr
-from places import ROOT
+from tutorial_study import TUTORIAL
 
 import seakeep
 from seakeep import RequestError
 from seakeep.formats import read_columns
-
-TUTORIAL = ROOT / "docs/tutorial"
 
 
 @pytest.fixture(scope="module")

@@ -32,6 +32,7 @@ def ensemble(run):
 
 
 SCALES = ["spread", "constant", "learnt"]
+of_each_scale = pytest.mark.parametrize("scale", SCALES)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def assert_kept(kept, ensemble, members):
     np.testing.assert_array_equal(found, every[members])
 
 
-@pytest.mark.parametrize("scale", SCALES)
+@of_each_scale
 def test_the_calibrated_band_covers_unseen_windows_as_it_says(bands, run, scale):
     inside = {"members": [], "calibrated": []}
     for start in np.arange(112.0, 155.0, 4.0):
@@ -132,7 +133,7 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(band
     assert "times a learnt scale and a floor of" in learnt.summary()
 
 
-@pytest.mark.parametrize("scale", SCALES)
+@of_each_scale
 def test_a_file_keeps_the_calibration(bands, run, tmp_path, scale):
     kept = seakeep.load_model(bands[scale].save(tmp_path / "ensemble.nc"))
     xr.testing.assert_identical(wide_of(kept, run), wide_of(bands[scale], run))

@@ -148,11 +148,9 @@ def test_leaving_out_a_run_leaves_out_those_that_repeat_its_waves():
         waves = np.sin(2 * np.pi * (run["time"].values - late) / period)
         wind = ("time", np.ones(400), {"units": "m/s"})
         runs[name] = run.assign(wind=wind, eta=("time", waves, {"units": "m"}))
-    inputs = ["wind", "eta"]
-    found = training(runs=runs, inputs=inputs, scheme="leave_out")
-    assert left_out(found) == [("a", "a_2"), ("b",)]
-    found = training(runs=runs, inputs=inputs, scheme="leave_out", leave_out="run")
-    assert left_out(found) == [("a",), ("b",), ("a_2",)]
+    given = {"runs": runs, "inputs": ["wind", "eta"], "scheme": "leave_out"}
+    assert left_out(training(**given)) == [("a", "a_2"), ("b",)]
+    assert left_out(training(**given, leave_out="run")) == [("a",), ("b",), ("a_2",)]
     del runs["b"]
     with pytest.raises(RequestError, match="a run with its repetitions of a, a_2 leaves no run"):
-        training(runs=runs, inputs=inputs, scheme="leave_out")
+        training(**given)
