@@ -10,10 +10,13 @@ from records import record
 from tutorial_study import put_tutorial
 
 import seakeep
-from seakeep import formats, models, quality
-from seakeep.errors import DataError, SeakeepWarning
+from seakeep import cli, formats, models, quality
+from seakeep.baselines import FIR
+from seakeep.core import Solution
+from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.quality import Record, findings_of, warn_of
 from seakeep.quality.findings import as_json
+from seakeep.study import fit_baselines, read_study, run_study
 
 PAGE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 DOORS = dict(re.findall(r"^### Add (.*)\n(?:(?!#).*\n)*?```python\n((?:.*\n)*?)```$", PAGE, re.M))
@@ -121,10 +124,48 @@ def test_an_observable(add, tmp_path):
     np.testing.assert_allclose(forecast.heave, run.heave.sel(time=forecast.time), atol=5e-3)
 
 
+OWN = (ROOT / "docs/howto/own_method.md").read_text("utf-8").split("```python\n")[1].split("```")[0]
+
+
+def test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it(add, run, tmp_path):
+    pytest.importorskip("sklearn", reason="the page's method is scikit-learn's")
+    DOORS["own"] = OWN
+    Own = add("own", models.KINDS)["Own"]
+    del DOORS["own"]
+    states = ["heave", "pitch"]
+    own = Own(0, 8, ridge=2.0, lead=2).fit(run, states, ["eta_cog"])
+    fir = FIR(8, ridge=2.0, ridge_scale="absolute", lead=2).fit(run, states, ["eta_cog"])
+    # Normal equations of another order.
+    np.testing.assert_allclose(own.coefficients, fir.coefficients, rtol=0, atol=1e-9)
+    put_tutorial(
+        tmp_path,
+        STUDY.replace(
+            'kind = "fading"', 'kind = "own"\ninput_delays = 8\nridge = 1.0\nstate_delays = 0'
+        ),
+    )
+    campaign = seakeep.read_campaign(tmp_path / "campaign.toml")
+    with pytest.warns(SeakeepWarning, match="'subspace' is left out"):
+        assert "own" not in fit_baselines(campaign, states, ["eta_fwd"])
+
+    for wrong in (np.zeros((1, 2)), np.full((2, 11), np.nan)):
+        Own.solve = lambda self, data, given=wrong: Solution(given, "own", 0.0, 1)
+        with pytest.raises(RequestError, match=r"'own' .*; finite ones of shape \(2, 11\) are"):
+            Own(0, 8, 1.0).fit(run, states, ["eta_cog"])
+
+    def failing(self, data):
+        raise ValueError("it does not converge")
+
+    Own.solve = failing
+    with pytest.raises(ValueError, match="it does not converge") as caught:
+        run_study(read_study(tmp_path / "study.toml"), tmp_path / "out")
+    assert "model 'fading'" in caught.value.__notes__[0]
+    assert cli._unforeseen(caught.value).startswith(f"{caught.value.__notes__[0]}: ValueError: it")
+
+
 def test_a_model_a_figure_and_a_section_in_the_report_of_a_study(add, run, tmp_path):
     pytest.importorskip("matplotlib")
     from seakeep.report.sections import SECTIONS, write_report
-    from seakeep.study import read_result, read_study, run_study
+    from seakeep.study import read_result
 
     fading = add("a model or a baseline", models.KINDS)["Fading"]
     model = fading().fit(run, ["heave", "pitch"])

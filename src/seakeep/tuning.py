@@ -137,7 +137,7 @@ def tune(
         Channels of the model.
     vary : sequence of str, optional
         Out of "ridge" (always chosen: every fourth λ of a path, and those about the best, unless a
-        candidate errs half as much again as another), "observables" (none, slow squares, powers,
+        candidate errs a fifth more than another), "observables" (none, slow squares, powers,
         both; or those of the spec), "lead", "input_delays", "state_delays", "memory" (none, or
         eight periods), "alignment" (none, dispersion or one celerity, to the surge that is
         predicted or to the place at rest: what the runs allow), "readouts" (none or by the wave at

@@ -145,6 +145,7 @@ def test_files_of_several_loggers(tmp_path, pattern, runs):
     assert campaign.settings.preparation.gaps == "bridge"
     assert campaign.settings.instruments.reference == "wave_probes"
     assert ('waves = "regular" # guessed' in text) is ("regular_3" in runs)
+    assert ("guessed: loggers of one run" in text) is (len(runs) == 1)
     prepared = campaign.prepare()
     assert list(prepared) == list(runs)
     # Half of a sample: the pulses' edges lie between samples.

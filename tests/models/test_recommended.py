@@ -32,8 +32,8 @@ def test_columns_and_ridge_are_chosen_and_the_model_says_from_what(tmp_path):
     assert isinstance(settings.ridge, float)
     assert settings.select is None
     first, *rest = model.selection.splitlines()
-    # Seven λ of each set of observables, and three of none, which errs half as much again.
-    assert first.startswith(f"ridge {settings.ridge:g} per snapshot pair: out of 24 settings")
+    # Six λ of both observables, and three of each and of none, which err a fifth more.
+    assert first.startswith(f"ridge {settings.ridge:g} per snapshot pair: out of 15 settings")
     assert first.endswith("not aligned to the surge: 'surge' is not among the states")
     tried = ["none", "slow_squares", "powers", "slow_squares, powers"]
     for line, names in zip(rest, tried, strict=True):

@@ -15,7 +15,8 @@ from squared import DT, INPUTS, PERIOD, STATES, runs
 
 from seakeep import DataError, HankelDMDc, ProbeAlignment
 from seakeep.models.labelled import mean_period
-from seakeep.models.selection import RIDGES, default_observables, groups_of, select
+from seakeep.models.selection import RIDGES, Problem, default_observables, groups_of, select
+from seakeep.models.settings import Select
 
 SPEC = HankelDMDc(6, 12, "rollout", delay_rows="exact")
 
@@ -40,6 +41,54 @@ def test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forec
     near = [ridge for ridge, score in scores.items() if score <= 1.03 * min(scores.values())]
     assert [row["ridge"] for row in found.rows if row["chosen"]] == [max(near)]
     assert found.settings.ridge == max(near)
+
+
+def test_each_delay_is_scored_as_by_a_fit_and_forecasts_of_its_own():
+    given = runs()
+    found = select(
+        SPEC, given, STATES, INPUTS, vary=["input_delays", "state_delays"], horizon=(15,)
+    )
+    least = [row for row in found.rows if row["ridge"] == RIDGES[0]]  # scales hardly matter there
+    tried = {(row["state_delays"], row["input_delays"]): row["score"] for row in least}
+    assert {z for _, z in tried} >= {12, 20, 30, 50}
+    assert len({s for s, _ in tried}) > 2
+    for (s, z), score in tried.items():
+        scores = []
+        for held, run in given.items():
+            # The same pairs as with the longest delays.
+            rest = [
+                each.isel(time=slice(50 - max(s, z), None))
+                for n, each in given.items()
+                if n != held
+            ]
+            spec = replace(SPEC, state_delays=s, input_delays=z, ridge=RIDGES[0])
+            model = replace(spec, ridge_scale="per_snapshot").fit(rest, STATES, INPUTS)
+            scores.append(loop_score(model, run, STATES, 150, 50))
+        # Moments of the cut runs, and of the whole ones.
+        assert score == pytest.approx(np.mean(scores), rel=1e-2)
+
+
+def test_free_runs_side_by_side_score_as_one_after_the_other(monkeypatch):
+    judge, batches = Problem.judge, []
+
+    def both(problem, tried, fold):
+        found = judge(problem, tried, fold)
+        for one, (scores, weights) in zip(tried, found, strict=True):
+            ((alone, own),) = judge(problem, [one], fold)
+            # Products of matrices are summed in another order.
+            np.testing.assert_allclose(scores, alone, rtol=0, atol=1e-9)
+            np.testing.assert_array_equal(weights, own)
+        batches.append(len(tried))
+        return found
+
+    monkeypatch.setattr(Problem, "judge", both)
+    given = {f"run{seed}": drifting_run(seed, 900) for seed in (1, 2)}
+    spec = HankelDMDc(
+        4, 12, "rollout", delay_rows="exact", lead=6, select=Select(observables=True),
+        alignment=ProbeAlignment(mode="dispersion", surge="predicted"),
+    )  # fmt: skip
+    spec.fit(given.values(), DRIFTING, PROBES)
+    assert max(batches) == 4  # none, either, and both observables
 
 
 def test_periods_are_counted_in_the_first_elevation():

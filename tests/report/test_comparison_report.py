@@ -145,6 +145,14 @@ def test_several_models_are_compared_by_wave_period_and_over_all_runs(tmp_path):
     unsure = turned.assign(all_upper=abs(turned["all_upper"]))
     told = winner(unsure, {"ours": "fir"})
     assert told.endswith("from theirs: no model is surely better. Keep theirs.")
+    third = unsure.isel(model=[0, 0, 1]).assign_coords(model=["theirs", "arx", "ours"])
+    third["all_anrmse"].values[1] = 0.15
+    for key, value in (("change", -0.25), ("lower", -0.3), ("upper", -0.2)):
+        third[f"all_{key}"].values[1] = value
+    assert winner(third, {"arx": "arx"}).startswith(
+        "Least error: ours, ANRMSE 0.100, −50 % [−50 to +50 %] from theirs; surely better: arx, "
+        "−25 % [−30 to −20 %] from theirs. To use it, give the campaign file a table [models.arx]"
+    )
     rows = rows_of(write_differences(table, tmp_path / "d.csv"))
     assert [row["run"] for row in rows] == [*runs, *runs, "", ""]
     (only,) = difference_blocks(difference_table({k: each[:1] for k, each in found.items()}))

@@ -10,6 +10,7 @@ from tutorial_study import STUDY, put_tutorial
 
 from seakeep import statistics
 from seakeep.core import embed
+from seakeep.core.density import density_grid
 from seakeep.errors import SeakeepWarning
 from seakeep.metrics import nrmse
 from seakeep.models.training import gather
@@ -49,14 +50,17 @@ def found(tmp_path_factory):
 def test_divergences_are_those_of_the_joined_windows(found, variant, block, bandwidth, crosses):
     table = found.groups["statistics/divergence"]
     test = found.tests["unseen"]
-    for model in found.models:
-        predicted, measured, _ = joined(test, model)
+    forecasts = {model: joined(test, model)[0] for model in found.models}
+    measured = joined(test, found.models[0])[1]
+    for model, predicted in forecasts.items():
         for c, channel in enumerate(found.channels):
+            every = [each[..., c] for each in forecasts.values()]
             alone = statistics.jsd_interval(
                 predicted[..., c],
                 measured[:, c],
                 block_length=block,
                 bandwidth=bandwidth,
+                grid=density_grid(*every, measured[:, c], bandwidth=bandwidth),
                 segments=None if crosses else [test.sizes["time"]] * test.sizes["window"],
                 n_series=8,
                 rng=random_stream(3, f"jsd.unseen.{variant}.{channel}"),

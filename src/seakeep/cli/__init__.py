@@ -108,9 +108,11 @@ def _unforeseen(error: Exception) -> str:
             f"{place}{error.strerror or error}. Correct the path, or check its permissions and the "
             "disk."
         )
+    place = "".join(f"{note}: " for note in getattr(error, "__notes__", ()))
     return (
-        f"{type(error).__name__}: {error}. This is a fault of seakeep; run the command again with "
-        "--debug and report what it prints together with `seakeep info`."
+        f"{place}{type(error).__name__}: {error}. This is a fault of seakeep, or of a model of "
+        "your own. Run the command again with --debug, and report a fault of seakeep with what it "
+        "prints and `seakeep info`."
     )
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -427,36 +427,60 @@ def jsd_interval(
     one that a record of this length cannot distinguish from none. It is not a lower bound, because
     paired draws share their sampling error and the floor's do not.
     """
+    bundle = as_bundle(predicted, "predicted")
+    how: dict[str, Any] = {"n_series": n_series, "bandwidth": bandwidth}
+    how |= {"block_length": block_length, "rng": rng, "segments": segments}
+    return jsd_intervals([bundle], measured, grid=grid, **how)[0]
+
+
+def jsd_intervals(
+    predictions: Sequence[FloatArray],
+    measured: npt.ArrayLike,
+    *,
+    block_length: int | BlockRule,
+    rng: np.random.Generator,
+    n_series: int,
+    bandwidth: Bandwidth,
+    grid: npt.ArrayLike | None = None,
+    segments: Sequence[int] | None = None,
+) -> list[JsdInterval]:
+    """Divergences of several predictions, (series, time), from a measurement that is redrawn once.
+
+    All stand on one grid; arguments as for :func:`jsd_interval`.
+    """
     m = as_series(measured, "measured")
-    p = as_bundle(predicted, "predicted")
-    if p.shape[1] != m.size:
-        raise RequestError(
-            f"predicted has {p.shape[1]} samples and measured {m.size}; the same block starts "
-            "need the same length. Judge where both exist, on one time axis."
-        )
-    points = checked_grid(grid, [p, m], bandwidth)
+    for p in predictions:
+        if p.shape[1] != m.size:
+            raise RequestError(
+                f"predicted has {p.shape[1]} samples and measured {m.size}; the same block starts "
+                "need the same length. Judge where both exist, on one time axis."
+            )
+    points = checked_grid(grid, [*predictions, m], bandwidth)
     block = resolve_block_length(m, block_length, segments)
     positions, others = (bootstrap_indices(m.size, n_series, block, rng, segments) for _ in "ab")
     truth = bootstrapped_densities(m, positions, points, bandwidth)
-    again = bootstrapped_densities(m, others, points, bandwidth)
-    drawn = np.stack([bootstrapped_densities(x, positions, points, bandwidth) for x in p])
-    draws = jensen_shannon(drawn, np.broadcast_to(truth, drawn.shape))
-    own = jensen_shannon(kernel_density(p, points, bandwidth), kernel_density(m, points, bandwidth))
-    noise = jensen_shannon(truth, again)
-    low, high = np.quantile(draws, [0.025, 0.975])
+    noise = jensen_shannon(truth, bootstrapped_densities(m, others, points, bandwidth))
     floor_low, floor_high = np.quantile(noise, [0.025, 0.975])
-    return JsdInterval(
-        mean=float(draws.mean()),
-        lower=float(low),
-        upper=float(high),
-        of_series=float(np.mean(own)),
-        noise_floor=float(noise.mean()),
-        noise_floor_lower=float(floor_low),
-        noise_floor_upper=float(floor_high),
-        draws=draws,
-        noise=noise,
-        block_length=block,
-        grid=points,
-        predicted=drawn,
-        measured=truth,
-    )
+    once = kernel_density(m, points, bandwidth)
+    intervals = []
+    for p in predictions:
+        drawn = np.stack([bootstrapped_densities(x, positions, points, bandwidth) for x in p])
+        draws = jensen_shannon(drawn, np.broadcast_to(truth, drawn.shape))
+        low, high = np.quantile(draws, [0.025, 0.975])
+        interval = JsdInterval(
+            mean=float(draws.mean()),
+            lower=float(low),
+            upper=float(high),
+            of_series=float(np.mean(jensen_shannon(kernel_density(p, points, bandwidth), once))),
+            noise_floor=float(noise.mean()),
+            noise_floor_lower=float(floor_low),
+            noise_floor_upper=float(floor_high),
+            draws=draws,
+            noise=noise,
+            block_length=block,
+            grid=points,
+            predicted=drawn,
+            measured=truth,
+        )
+        intervals.append(interval)
+    return intervals

@@ -167,7 +167,19 @@ class LinearSpec(LinearKind, Plain):
         spec = self.resolved_in(named, inputs)
         if self.ridge != "rollout":
             data = gather(named, states, inputs, stop, spec)
-            return HankelDMDcModel.fitted(spec, data, spec.solve(data), named)
+            solution = spec.solve(data)
+            given, widths = (
+                solution.coefficients,
+                (data.delayed[0].shape[1], data.direct[0].shape[1]),
+            )
+            count = len(states) * (spec.state_reach + 1) + widths[0] * (spec.input_delays + 1)
+            needed = len(states), count + widths[1]
+            if given.shape != needed or not np.isfinite(given).all():
+                raise RequestError(
+                    f"solve of '{self.kind}' returned coefficients of shape {given.shape}; finite "
+                    f"ones of shape {needed} are needed. Correct it."
+                )
+            return HankelDMDcModel.fitted(spec, data, solution, named)
         read = named = until(named, stop)
         if spec.window is not None:  # what the model reads, and no more
             dt = common_step(named)
@@ -214,6 +226,7 @@ class ARX(LinearSpec):
     """
 
     kind: ClassVar[str] = "arx"
+    role: ClassVar[Role] = "reference"
     title: ClassVar[str] = "ARX: least squares on past states and inputs"
     ridge: float | Literal["rollout"] = 0.0
 
@@ -253,6 +266,7 @@ class FIR(LinearSpec):
     """
 
     kind: ClassVar[str] = "fir"
+    role: ClassVar[Role] = "reference"
     title: ClassVar[str] = "FIR: a filter of the inputs, without states"
     is_filter: ClassVar[bool] = True
     opened: ClassVar[tuple[str, ...]] = ("input_delays",)
@@ -307,6 +321,7 @@ class Subspace(Plain):
     """
 
     kind: ClassVar[str] = "subspace"
+    role: ClassVar[Role] = "reference"
     has_path: ClassVar[bool] = False
     ridge: float = 1e-3
     ridge_scale: RidgeScale = field(default="per_snapshot", init=False, repr=False)

@@ -66,14 +66,20 @@ Columns = tuple[ProbeAlignment | None, int | None, bool]
 """An alignment, the look-ahead in samples where it is part of that, and whether there is any."""
 Step = Callable[[Any], list[Any]]
 """Candidates that differ from one in a setting; it is among them."""
+Tried = Sequence[tuple[HankelSettings, Sequence[float]]]
+"""Candidates of equal columns and look-ahead, each with its λ."""
+Unit = tuple[Any, int, tuple[float, ...]]
+"""A candidate, what is held out, and the λ that are tried."""
 Scores = tuple[FloatArray, FloatArray]
 """Scores, shape (level, window), and weights of the windows, which sum to one in a fold."""
 Known = MutableMapping[str, list[list[Any]]]
 """Scores and weights by candidate, fold and λ, as JSON values."""
 COARSE = 4
 """Every so-many-th λ is tried first."""
-NEAR = 1.5
-"""Error, in parts of the best, above which the other λ of a candidate are left."""
+NEAR = 1.2
+"""Error, in parts of the best, above which the other λ of a candidate are left.
+
+On the virtual tank they lower that of a candidate by 7 % at most."""
 LAST = 3
 """Runs whose windows each problem keeps in memory: the next round begins with them."""
 ALIKE = 0.03
@@ -268,53 +274,61 @@ class Problem:
     def models(
         self, candidate: HankelSettings, levels: Sequence[float], runs: Sequence[int]
     ) -> list[Dynamics]:
-        """Models of some runs, one per level."""
+        """Models of some runs, one per level; regressors that a candidate lacks count nothing."""
         data, (delayed, direct) = self.data, self.parts(candidate)
-        count, blocks = len(data.signature.states), candidate.blocks
-        scales, system = self._system(candidate, runs)
-        own = 0 if candidate.is_filter else count * (candidate.state_delays + 1)
-        later = np.tile(delayed, candidate.input_delays + 1)
-        means = np.ones(count * len(blocks), bool)
-        kept = np.concatenate([np.ones(own, bool), later, direct, means])
+        count, s, z = len(data.signature.states), candidate.state_delays, candidate.input_delays
+        wide, scales, system = self._system(candidate, runs)
+        own, every = (0 if candidate.is_filter else count * (d + 1) for d in (s, wide.state_delays))
+        lags = np.tile(delayed, z + 1)
+        later = np.pad(lags, (0, delayed.size * (wide.input_delays - z)))
+        means = np.ones(count * len(candidate.blocks), bool)
+        kept = np.concatenate([np.arange(every) < own, later, direct, means])
         pairs = sum(data.windows[run].columns for run in runs)
         factor = pairs if candidate.ridge_scale == "per_snapshot" else 1
         gram, right = system.gram.compress(kept, 0).compress(kept, 1), system.right[:, kept]
         path = ridge_path(gram, right, [factor * level for level in levels])
-        path = spread_means(path, count, candidate.state_delays, blocks)
+        path = spread_means(path, count, s, candidate.blocks)
+        there = np.concatenate([lags, direct])
+        on_inputs = np.zeros((*path.shape[:2], there.size))
+        on_inputs[..., there] = path[..., path.shape[2] - np.count_nonzero(there) :]
+        on_states = path[..., : path.shape[2] - np.count_nonzero(there)]
         if candidate.is_filter:
-            path = np.pad(path, ((0, 0), (0, 0), (count, 0)))
-        parts = zip(scales, (slice(None), delayed, direct), strict=True)
-        x, u, w = (scale.part(part) for scale, part in parts)
-        reach = candidate.state_reach, candidate.input_delays
+            on_states = np.zeros((*path.shape[:2], count))
+        reach = candidate.state_reach, z
         follows = data.signature.input_map.follows
-        return [Dynamics(each, *reach, x, u, w, follows) for each in path]
+        both = np.concatenate([on_states, on_inputs], axis=2)
+        x, u, w = scales
+        return [Dynamics(each, *reach, x, u, w, follows) for each in both]
 
     def _system(
         self, candidate: HankelSettings, runs: Sequence[int]
-    ) -> tuple[list[Scale], PrimalSystem]:
-        """Moments and normal equations of all columns of some runs, with a candidate's delays."""
-        ahead, names = (
-            self.ahead(candidate),
-            ("state_delays", "input_delays", "memory", "is_filter"),
-        )
-        key, of = (ahead, *(getattr(candidate, each) for each in names)), tuple(runs)
+    ) -> tuple[HankelSettings, list[Scale], PrimalSystem]:
+        """Moments and normal equations of all columns of some runs, with the longest delays.
+
+        The delays are those of the settings that are returned.
+        """
+        ahead, of = self.ahead(candidate), tuple(runs)
+        longest = {"input_delays": self.widest.input_delays - ahead}
+        if not candidate.memory:  # whose blocks begin after the delays of the states
+            longest["state_delays"] = self.widest.state_delays
+        wide = candidate.having(**longest)
+        key = ahead, wide.state_delays, wide.memory, wide.is_filter
         made = self.taught.get(of)
-        if made is not None and made[0] == key:
-            return made[1:]
-        data, chain = self.data, self.data.signature.input_map
-        windows = [data.windows[run] for run in runs]
-        groups_of = data.signature.state_labels, *chain.regressors(data.signature.input_labels)
-        labels = [[label.name for label in group] for group in groups_of]
-        series = [list(group) for group in zip(*map(data.physical, runs), strict=True)]
-        scales = list(scales_of(series, windows, labels, True, chain.stretch))
-        # Later by the samples that a row looks ahead too far.
-        series[1] = [np.roll(each, ahead, axis=0) for each in series[1]]
-        groups = [
-            [scale.deviations(each) for each in group]
-            for group, scale in zip(series, scales, strict=True)
-        ]
-        made = self.taught[of] = key, scales, system_of(groups, windows, candidate)
-        return made[1:]
+        if made is None or made[0] != key:
+            data, chain = self.data, self.data.signature.input_map
+            windows = [data.windows[run] for run in runs]
+            groups_of = data.signature.state_labels, *chain.regressors(data.signature.input_labels)
+            labels = [[label.name for label in group] for group in groups_of]
+            series = [list(group) for group in zip(*map(data.physical, runs), strict=True)]
+            scales = list(scales_of(series, windows, labels, True, chain.stretch))
+            # Later by the samples that a row looks ahead too far.
+            series[1] = [np.roll(each, ahead, axis=0) for each in series[1]]
+            groups = [
+                [scale.deviations(each) for each in group]
+                for group, scale in zip(series, scales, strict=True)
+            ]
+            made = self.taught[of] = key, scales, system_of(groups, windows, wide)
+        return wide, *made[1:]
 
     def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
         """λ that are tried of a candidate."""
@@ -359,14 +373,12 @@ class Problem:
         runs = range(len(self.groups))
         return [run for run in runs if any(self.starts(run, k).size for k in self.horizons)]
 
-    def free_runs(
-        self, candidate: HankelSettings, levels: Sequence[float], run: int, horizons: Sequence[int]
-    ) -> Iterator[FreeRuns]:
-        """Free runs on a run by models of others, for each horizon that fits.
+    def free_runs(self, tried: Tried, run: int, horizons: Sequence[int]) -> Iterator[FreeRuns]:
+        """Free runs on a run by models of others, side by side, for each horizon that fits.
 
         Runs of other groups teach, if there are any.
         """
-        data = self.data
+        data, candidate = self.data, tried[0][0]
         rest = [other for other in range(len(self.groups)) if other != run]
         others = [other for other in rest if self.groups[other] != self.groups[run]]
         if not candidate.has_path:
@@ -379,8 +391,7 @@ class Problem:
                     predicted, measured = model.judged_runs(judged, name, starts, steps)
                     yield FreeRuns(predicted[None], measured, model.signature.state_scale.std)
             return
-        delayed, direct = self.parts(candidate)
-        models = self.models(candidate, levels, others or rest)
+        models = [each for one in tried for each in self.models(*one, others or rest)]
         states = data.signature.state_scale.physical(data.states[run])
         zeros: dict[int, FloatArray] = {}
         known: dict[int, FloatArray] = {}  # by start: a longer run begins with the shorter one
@@ -396,9 +407,7 @@ class Problem:
                 windows = replace(
                     windows,
                     zero=None,  # read-outs are learnt from departures
-                    delayed=windows.delayed[:, :last, delayed],
-                    direct=windows.direct[..., direct[: windows.direct.shape[2]]],
-                    table=None if windows.table is None else windows.table[..., delayed],
+                    delayed=windows.delayed[:, :last],
                 )
                 (computed,) = linear_runs(models, [windows])
                 known |= zip(new, computed.swapaxes(0, 1), strict=True)
@@ -410,18 +419,20 @@ class Problem:
                 every[steps] = FreeRuns(predicted, measured, models[0].state_scale.std)
         yield from (every[steps] for steps in horizons if steps in every)
 
-    def judge(self, candidate: HankelSettings, fold: int, levels: Sequence[float]) -> Scores:
+    def judge(self, tried: Tried, fold: int) -> list[Scores]:
         """Judge free runs on a run that is held out, over all horizons that fit."""
-        every = self.free_runs(candidate, levels, fold, self.horizons)
-        scores = [each for each in map(scores_of, every) if each.size]
-        counts = [each.shape[1] for each in scores]
-        weights = np.repeat(1.0 / np.maximum(counts, 1) / max(len(scores), 1), counts)
-        return np.concatenate([np.empty((len(levels), 0)), *scores], axis=1), weights
+        scores = list(map(scores_of, self.free_runs(tried, fold, self.horizons)))
+        counts = [each.shape[1] for each in scores if each.size]
+        weights = np.repeat(1.0 / np.maximum(counts, 1) / max(len(counts), 1), counts)
+        ends = np.cumsum([len(levels) for _, levels in tried])
+        nothing = np.empty((ends[-1], 0))
+        parts = np.split(np.concatenate([nothing, *scores], axis=1), ends[:-1])
+        return [(part, weights) for part in parts]
 
     def held_out(self, candidate: HankelSettings, level: float, steps: int) -> Iterator[Held]:
         """Free runs, end to end, on each run by the model of the others."""
         for run in range(len(self.groups)) if len(self.groups) > 1 else ():
-            for predicted, measured, _ in self.free_runs(candidate, [level], run, [steps]):
+            for predicted, measured, _ in self.free_runs([(candidate, [level])], run, [steps]):
                 yield Held(run, self.starts(run, steps), predicted[0], measured)
 
 
@@ -531,13 +542,8 @@ class _Trials:
         problem = next(iter(self.problems.values()))
         folds, firsts = problem.folds(), list(dict.fromkeys(problem.groups))
         again = sum(each in self.made for each in candidates)  # each has two parts
-        before = len(folds) * (2 * len(self.made) - again)
+        done = len(folds) * (2 * len(self.made) - again)
         after = len(folds) * (len(candidates) - again + 2 * later)
-
-        def tell(done: int, total: int, what: str) -> None:
-            if self.progress is not None:
-                self.progress(before + done, before + total + after, what)
-
         left: dict[Any, list[float]] = {}
         for each in candidates:
             levels = problem.levels(each)
@@ -549,10 +555,19 @@ class _Trials:
             for each, new in left.items()
         }
         units = [unit for unit, key in keys.items() if key not in self.known]
+        batches: dict[Any, list[Unit]] = {}
+        for unit in units:  # free runs of equal columns and look-ahead, side by side
+            alike = (_columns_of(unit[0]), unit[0].lead) if unit[0].has_path else unit[0]
+            batches.setdefault((unit[1], alike), []).append(unit)
         alone = _Trials(self.problems, {}, None, None)  # what a worker needs
-        outcomes = in_order(_unit, alone, units, self.executor, tell, "candidate and fold")
-        for unit, outcome in zip(units, outcomes, strict=True):
-            self.known[keys[unit]] = [part.tolist() for part in outcome]
+        outcomes = in_order(_judged, alone, [*batches.values()], self.executor)
+        total = done + len(units) + after
+        for batch, outcome in zip(batches.values(), outcomes, strict=True):
+            for unit, judged in zip(batch, outcome, strict=True):
+                self.known[keys[unit]] = [part.tolist() for part in judged]
+            done += len(batch)
+            if self.progress is not None:
+                self.progress(done, total, f"candidate and fold {done}")
         for each, new in left.items():
             levels = problem.levels(each)
             parts = [map(np.array, self.known[keys[each, fold, tuple(new)]]) for fold in folds]
@@ -591,10 +606,11 @@ class _Trials:
         )
 
 
-def _unit(trials: _Trials, item: tuple[HankelSettings, int, Sequence[float]]) -> Scores:
-    problem = trials.problem(item[0])
+def _judged(trials: _Trials, batch: Sequence[Unit]) -> list[Scores]:
+    first, fold, _ = batch[0]
+    problem = trials.problem(first)
     assert problem is not None
-    return problem.judge(*item)
+    return problem.judge([(each, levels) for each, _, levels in batch], fold)
 
 
 @dataclass(frozen=True, eq=False)
@@ -715,7 +731,7 @@ def select(
     """Choose settings by free runs on training runs that are held out in turn.
 
     One setting after the other is chosen, each candidate with every fourth λ, and those about its
-    best unless it errs half as much again as the best of all: first what the settings leave open,
+    best unless it errs a fifth more than the best of all: first what the settings leave open,
     of which the simplest is taken that is as good as the best but for the noise; then what is
     varied from there, which is left for what is better by more than the noise.
     Of the λ the largest is taken that is as good as the best. Where that model grows, it is the

@@ -212,7 +212,7 @@ class HankelSettings:
 
     kind: ClassVar[str]
     title: ClassVar[str] = ""
-    role: ClassVar[Role] = "reference"
+    role: ClassVar[Role] = "model"
     is_ensemble: ClassVar[bool] = False
     may_choose: ClassVar[bool] = False
     is_filter: ClassVar[bool] = False

@@ -23,7 +23,7 @@ from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members, 
 from seakeep.models.engine import parameter_of
 from seakeep.models.ensemble import PARTS, HankelEnsemble, spectral_radius
 from seakeep.models.forecasts import Spec
-from seakeep.models.interface import Needs, Role, Signature
+from seakeep.models.interface import Needs, Signature
 from seakeep.models.labelled import Runs, Stop, as_runs
 from seakeep.models.linear import HankelDMDcModel, LinearKind
 from seakeep.models.parametric import regress_varying
@@ -79,7 +79,6 @@ Fitted = TypeVar("Fitted", HankelDMDcModel, HankelEnsemble)
 class Choosing(HankelSettings, Generic[Fitted]):
     """Settings of which free runs choose what is left open."""
 
-    role: ClassVar[Role] = "model"
     may_choose: ClassVar[bool] = True
     select: Select | None = None
 

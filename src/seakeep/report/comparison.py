@@ -164,14 +164,23 @@ def winner(table: xr.Dataset, baselines: Mapping[str, str]) -> str:
     """
     if not np.isfinite(table["all_anrmse"]).any():
         return "No model could be judged."
-    best = table.isel(model=table["all_anrmse"].fillna(np.inf).argmin("model"))
-    name, first = (each["model"].item() for each in (best, table.isel(model=0)))
-    said = f"Least error: {name}, ANRMSE {number(best['all_anrmse'])}"
+    first, ratios = table["model"].values[0], {}
+    for at in entries(table.sortby("all_anrmse"), "model"):  # what cannot be judged comes last
+        ratios[at["model"].item()] = ratio_of(at, "all_")
+    name = next(iter(ratios))
+    said = f"Least error: {name}, ANRMSE {number(table['all_anrmse'].min())}"
     if name != first:
-        value, low, high = ratio_of(best, "all_")
-        said += f", {change(value)} [{change(low, high)}] from {first}"
-        if verdict(low - 1, high - 1) != "better":
+        sure = (
+            key for key, (_, low, high) in ratios.items() if verdict(low - 1, high - 1) == "better"
+        )
+        better = next(sure, None)
+        for key in dict.fromkeys((name, better or name)):
+            value, *bounds = ratios[key]
+            said += f"; surely better: {key}" if key != name else ""
+            said += f", {change(value)} [{change(*bounds)}] from {first}"
+        if better is None:
             return f"{said}: no model is surely better. Keep {first}."
+        name = better
     if kind := baselines.get(name):
         said += (
             f". To use it, give the campaign file a table [models.{kind}] with kind = '{kind}' and "

@@ -20,6 +20,7 @@ import xarray as xr
 from seakeep import metrics, statistics
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray, undefined
 from seakeep.core.calibration import band_scale, calibrated_bounds
+from seakeep.core.density import jsd_intervals
 from seakeep.core.metrics import over_channels, paired, root_mean_square
 from seakeep.core.spectra import split_bands
 from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
@@ -32,7 +33,7 @@ BANDS = ("all", "low", "wave")
 MEASURES = ("nrmse", "nammae", "training_nrmse")
 """Errors of a cell: both of the paper, in SD of the window, and the first in SD of the training."""
 
-VARIANTS = {
+VARIANTS: dict[str, dict[str, Any]] = {
     "paper": {"block_length": "carlstein", "bandwidth": "paper", "joins": True},
     "recommended": {"block_length": "politis_white", "bandwidth": "silverman", "joins": False},
 }
@@ -452,31 +453,35 @@ def density_tables(
 ) -> Groups:
     """Divergences of forecasts from the measurement, and the densities, per model and channel."""
     windows, steps = test.sizes["window"], test.sizes["time"]
-    items, diverged = {}, []
+    moving: list[dict[int, FloatArray]] = [{} for _ in channels]  # forecasts by model
+    diverged = []
     for m, model in enumerate(settings.models):
         predicted, measured, lost = joined(test, model)
         diverged.append(lost)
-        for c, channel in enumerate(channels if len(predicted) else ()):
-            # Contiguous, as they are in a worker: sums are then the same to the last bit.
-            forecasts, truth = predicted[:, :, c].copy("C"), measured[:, c].copy()
+        for c, forecasts in enumerate(np.moveaxis(predicted, 2, 0) if len(predicted) else ()):
             moves = np.ptp(forecasts.reshape(-1, windows, steps), axis=2).max(axis=1) > 0
-            if moves.all() and np.ptp(truth) > 0:  # what stands still has no density
-                items[m, c] = channel, forecasts, truth
+            if moves.all() and np.ptp(measured[:, c]) > 0:  # what stands still has no density
+                moving[c][m] = forecasts
     coords = {"model": list(settings.models), "channel": list(channels)}
     shape = len(diverged), len(channels)
     table = np.full((*shape, len(VARIANTS), len(DIVERGENCE)), np.nan)
     curves = np.full((*shape, len(CURVES), 512), np.nan)
     data = settings, name, [steps] * windows
+    # Contiguous, as they are in a worker: sums are then the same to the last bit.
+    items = {
+        c: (channels[c], [each.copy("C") for each in of.values()], measured[:, c].copy())
+        for c, of in enumerate(moving)
+        if of
+    }
     rows = in_order(_channel_densities, data, list(items.values()), executor)
-    for (m, c), each in zip(items, rows, strict=True):
+    for c, each in zip(items, rows, strict=True):
         if isinstance(each, str):
             warn(
-                f"the densities of {channels[c]} as forecast by '{coords['model'][m]}' and as "
-                f"measured, over the windows of '{name}', cannot be compared and are left out: "
-                f"{each}"
+                f"the densities of {channels[c]} as forecast and as measured, over the windows of "
+                f"'{name}', cannot be compared and are left out: {each}"
             )
         else:
-            table[m, c], curves[m, c] = each
+            table[list(moving[c]), c], curves[list(moving[c]), c] = each
     both = {**coords, "variant": list(VARIANTS)}
     divergence = numbered(table, (*both, "number"), DIVERGENCE, both)
     divergence["diverged_series"] = ("model", diverged)
@@ -488,20 +493,20 @@ def density_tables(
 
 
 def _channel_densities(
-    data: tuple[StudySettings, str, Sequence[int]], item: tuple[str, FloatArray, FloatArray]
+    data: tuple[StudySettings, str, Sequence[int]], item: tuple[str, list[FloatArray], FloatArray]
 ) -> tuple[FloatArray, FloatArray] | str:
-    """Divergences and densities of one channel of one model, or why there are none."""
+    """Divergences and densities of one channel by model, or why there are none."""
     settings, name, segments = data
-    channel, p, m = item
+    channel, forecasts, measured = item
     variants = {}
     try:
         with warnings.catch_warnings():
             # Caps of the block length and coarse grids: the table prints the length.
             warnings.simplefilter("ignore", SeakeepWarning)
             for variant, choice in VARIANTS.items():
-                variants[variant] = statistics.jsd_interval(
-                    p,
-                    m,
+                variants[variant] = jsd_intervals(
+                    forecasts,
+                    measured,
                     block_length=choice["block_length"],
                     bandwidth=choice["bandwidth"],
                     segments=None if choice["joins"] else segments,
@@ -510,12 +515,17 @@ def _channel_densities(
                 )
     except (DataError, RequestError) as error:
         return str(error)
-    paper, beyond = variants["paper"], (1 - settings.statistics.level) / 2
-    curves = [paper.grid]
-    for drawn in (paper.measured, paper.predicted.reshape(-1, paper.grid.size)):
-        curves += [drawn.mean(axis=0), *np.quantile(drawn, [beyond, 1 - beyond], axis=0)]
-    table = [[getattr(each, number) for number in DIVERGENCE] for each in variants.values()]
-    return np.array(table), np.stack(curves)
+    tables = [
+        [[getattr(each, number) for number in DIVERGENCE] for each in of_model]
+        for of_model in zip(*variants.values(), strict=True)
+    ]
+    beyond, curves = (1 - settings.statistics.level) / 2, []
+    for paper in variants["paper"]:
+        lines = [paper.grid]
+        for drawn in (paper.measured, paper.predicted.reshape(-1, paper.grid.size)):
+            lines += [drawn.mean(axis=0), *np.quantile(drawn, [beyond, 1 - beyond], axis=0)]
+        curves.append(np.stack(lines))
+    return np.array(tables), np.stack(curves)
 
 
 def is_regular(groups: Datasets, test: str) -> bool:

@@ -25,7 +25,7 @@ from seakeep.conventions import is_elevation
 from seakeep.core import embed, metrics
 from seakeep.errors import DataError, SeakeepError, warn
 from seakeep.executor import WorkerLostError, as_finished, versions
-from seakeep.formats.netcdf import opened_netcdf
+from seakeep.formats.columns import decoding
 from seakeep.models.calibration import envelope_of, held_out, learn_margin
 from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.ensemble import spectral_radius
@@ -276,9 +276,12 @@ def compute_task(data: tuple[Plan, Groups], units: Sequence[Unit]) -> list[Group
             if selected is None and spec is not None:
                 selected = spec.central(plan.dt).settled(*plan.taught(training.spans))
             out.append(compute(plan, facts, unit, selected))
-        except SeakeepError as error:
+        except Exception as error:
             place = f"training set '{training.name}', model '{unit.model}'"
-            raise DataError(f"{place}: {error}") from error
+            if isinstance(error, SeakeepError):
+                raise DataError(f"{place}: {error}") from error
+            error.add_note(place)  # a model of somebody's own
+            raise
     return out
 
 
@@ -578,6 +581,13 @@ def _truth(folder: Path, plan: Plan, run: str) -> FloatArray:
             f"the study names the folder {folder} of true channels, and {path.name} is not in "
             "it. Play the tank again, or leave study.truth out."
         )
-    true, time = opened_netcdf(path), plan.runs[run]["time"].values
-    values, known = _columns(plan, true), true["time"].values
-    return np.stack([np.interp(time, known, each) for each in values.T], axis=-1)
+    import h5py
+
+    time, nothing = plan.runs[run]["time"].values, np.full(plan.runs[run].sizes["time"], np.nan)
+    with decoding(path, "true channels", "Play the tank again."), h5py.File(path) as file:
+        known = file["time"][:]
+        columns = [
+            np.interp(time, known, file[name][:]) if name in file else nothing
+            for name in plan.states
+        ]
+    return np.stack(columns, axis=-1)

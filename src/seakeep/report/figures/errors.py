@@ -210,9 +210,12 @@ def density_figure(result: StudyResult, model: str) -> Figure:
         weight = weight / weight.sum()
         centre = (x * weight).sum()
         spread = np.sqrt((weight * (x - centre) ** 2).sum())
+        z = (x - centre) / spread
+        highest = np.fmax(curves["measured_upper"].values, curves["predicted_upper"].values)
+        seen = z[highest > 1e-3 * highest.max()]  # of all models, one may have run away
+        axes.set_xlim(seen[0], seen[-1])
         for key, words, tint, dash in sides:
             lower, mean, upper = (spread * curves[f"{key}_{k}"] for k in ("lower", "mean", "upper"))
-            z = (x - centre) / spread
             axes.fill_between(z, lower, upper, color=tint, alpha=0.22, linewidth=0)
             axes.plot(z, mean, color=tint, linestyle=dash, linewidth=1.3, label=words)
         axes.set_title(short_label(name), fontsize=10, pad=2)
