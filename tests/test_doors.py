@@ -5,6 +5,7 @@ import runpy
 
 import numpy as np
 import pytest
+from pages import page
 from places import ROOT
 from records import record
 from tutorial_study import put_tutorial
@@ -124,11 +125,11 @@ def test_an_observable(add, tmp_path):
     np.testing.assert_allclose(forecast.heave, run.heave.sel(time=forecast.time), atol=5e-3)
 
 
-OWN = (ROOT / "docs/howto/own_method.md").read_text("utf-8").split("```python\n")[1].split("```")[0]
+OWN = page("howto/own_method.md").partition("```python\n")[2].partition("```")[0]
 
 
 def test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it(add, run, tmp_path):
-    pytest.importorskip("sklearn", reason="the page's method is scikit-learn's")
+    pytest.importorskip("sklearn")
     DOORS["own"] = OWN
     Own = add("own", models.KINDS)["Own"]
     del DOORS["own"]
