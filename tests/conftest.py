@@ -76,11 +76,24 @@ def study_folder(tmp_path):
 @pytest.fixture
 def empty_sheet(monkeypatch):
     """Sheets with empty pictures: tests/report looks at these, and each takes a second or two."""
-    pytest.importorskip("matplotlib", reason="the data-quality sheet has figures")
+    pytest.importorskip("matplotlib")
     from seakeep.report import quality_sheet as sheet
     from seakeep.report.style import new_figure
 
     monkeypatch.setattr(sheet, "quality_figure", lambda run, agreements: new_figure(1, 1))
+
+
+@pytest.fixture
+def command(capsys):
+    """Run a command to the status that is expected: what it printed, and what it said beside it."""
+    from seakeep.cli import main
+
+    def run(*words, status=0):
+        ended, told = main(list(map(str, words))), capsys.readouterr()
+        assert ended == status, told.err
+        return told.out, told.err
+
+    return run
 
 
 @pytest.fixture

@@ -6,11 +6,11 @@ Every import counts: at the top of a module, inside a function, and for the type
 import ast
 import graphlib
 import sys
-from pathlib import Path
 
 import pytest
+from places import ROOT
 
-SOURCE = Path(__file__).parents[1] / "src" / "seakeep"
+SOURCE = ROOT / "src/seakeep"
 
 FLOORS = (
     ("errors",),
@@ -39,16 +39,7 @@ FLOORS = (
 )
 """From the ground up. A room imports those below it, and none on its own floor."""
 
-STRANGERS = {("models", "campaign"), ("models", "tank")}
-"""Rooms that do not know each other although one lies above the other."""
-
-ARRAYS_ONLY = {"core", "signals"}
-LABELS = {"xarray", "pandas"}
-DRAWING = {"matplotlib"}
-DRAW = {"report", "plot"}
 CORE_MAY_USE = {"numpy", "scipy", "seakeep"} | set(sys.stdlib_module_names)
-
-FILES = sorted(SOURCE.rglob("*.py"))
 
 
 def module_name(path):
@@ -56,7 +47,7 @@ def module_name(path):
     return ".".join(parts).removesuffix(".__init__")
 
 
-MODULES = {module_name(path): path for path in FILES}
+MODULES = {module_name(path): path for path in sorted(SOURCE.rglob("*.py"))}
 ROOMS = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 
 
@@ -86,15 +77,15 @@ def broken_rule(module, target):
     """The rule that an import breaks, if any."""
     here, there = room_of(module), room_of(target)
     if target.split(".")[0] != "seakeep":
-        if target in DRAWING and here not in DRAW:
+        if target == "matplotlib" and here not in ("report", "plot"):
             return f"{target} belongs in report/"
-        if here in ARRAYS_ONLY and target in LABELS:
+        if here in ("core", "signals") and target in ("xarray", "pandas"):
             return f"{here}/ knows arrays only"
         if here == "core" and target not in CORE_MAY_USE:
             return "core/ uses numpy and scipy only"
     elif here != there and ROOMS[there] >= ROOMS[here]:
         return f"{here} lies below {there}, or beside it"
-    elif (here, there) in STRANGERS:
+    elif here == "models" and there in ("campaign", "tank"):  # although it lies above them
         return f"{here} and {there} do not know each other"
     return None
 

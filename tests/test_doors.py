@@ -2,10 +2,11 @@
 
 import re
 import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import page
+from places import ROOT
 from records import record
 from tutorial_study import put_tutorial
 
@@ -18,7 +19,6 @@ from seakeep.quality import Record, findings_of, warn_of
 from seakeep.quality.findings import as_json
 from seakeep.study import fit_baselines, read_study, run_study
 
-ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 DOORS = dict(re.findall(r"^### Add (.*)\n(?:(?!#).*\n)*?```python\n((?:.*\n)*?)```$", PAGE, re.M))
 
@@ -125,11 +125,11 @@ def test_an_observable(add, tmp_path):
     np.testing.assert_allclose(forecast.heave, run.heave.sel(time=forecast.time), atol=5e-3)
 
 
-OWN = (ROOT / "docs/howto/own_method.md").read_text("utf-8").split("```python\n")[1].split("```")[0]
+OWN = page("howto/own_method.md").partition("```python\n")[2].partition("```")[0]
 
 
 def test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it(add, run, tmp_path):
-    pytest.importorskip("sklearn", reason="the page's method is scikit-learn's")
+    pytest.importorskip("sklearn")
     DOORS["own"] = OWN
     Own = add("own", models.KINDS)["Own"]
     del DOORS["own"]
@@ -164,7 +164,7 @@ def test_a_method_of_your_own_is_the_filter_that_it_says_and_errors_name_it(add,
 
 
 def test_a_model_a_figure_and_a_section_in_the_report_of_a_study(add, run, tmp_path):
-    pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+    pytest.importorskip("matplotlib")
     from seakeep.report.sections import SECTIONS, write_report
     from seakeep.study import read_result
 

@@ -6,13 +6,13 @@ import shutil
 import tomllib
 import zipfile
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 import tomlkit
 import two_loggers
 import xarray as xr
+from places import ROOT
 
 from seakeep import SeakeepError, load_model, read_campaign
 from seakeep.campaign import load_prepared, write_prepared
@@ -21,7 +21,6 @@ from seakeep.hosts import write_c, write_fmu, write_onnx
 from seakeep.models import KINDS, load_live
 from seakeep.study import compare, comparison_table, fit_campaign
 
-ROOT = Path(__file__).parents[1]
 STEPS = 12
 MADE = [("own", ""), *((kind, each) for kind, spec in KINDS.items()
         for each in ("paper", "recommended", "") if not each or hasattr(spec, each)

@@ -12,6 +12,9 @@ PREDICTED = np.array([[1.0, 10.0], [2.0, 20.0], [3.0, 20.0], [2.0, 50.0]])
 # SD with ddof = 1: √(8/3) and √(500/3). Squared errors: 1, 0, 1, 0 and 0, 100, 0, 100.
 SD = np.sqrt(np.array([8.0, 500.0]) / 3)
 
+OF_CHANNELS = metrics.nrmse, metrics.normalised_extremes_error, metrics.fit_percent
+AVERAGES = metrics.anrmse, metrics.nammae
+
 
 def labelled(values, dims=("time",), **attrs):
     return xr.Dataset(
@@ -61,11 +64,11 @@ def test_a_slack_channel_is_nan_and_left_out_of_averages(part):
     slack[:, 1] = 7.0 + part * (MEASURED[:, 1] - 25) / SD[1]
     arguments = both(PREDICTED, slack) | {"training_std": training}
     alone = both(PREDICTED[:, :1], slack[:, :1])
-    for measure in (metrics.nrmse, metrics.normalised_extremes_error, metrics.fit_percent):
+    for measure in OF_CHANNELS:
         values = measure(**arguments)
         assert np.isnan(values[1])
         assert values[0] == measure(**alone)[0]
-    for average in (metrics.anrmse, metrics.nammae):
+    for average in AVERAGES:
         assert average(**arguments) == average(**alone)
     np.testing.assert_array_equal(
         metrics.error_over_time(**arguments), metrics.error_over_time(**alone)
@@ -80,23 +83,20 @@ def test_a_constant_measurement_cannot_be_judged(value):
     each = metrics.nrmse(**both(predicted, measured))
     assert np.isnan(each[1])
     assert metrics.anrmse(**both(predicted, measured)) == each[0]
-    for average in (metrics.anrmse, metrics.nammae):  # without any channel to judge
+    for average in AVERAGES:  # without any channel to judge
         assert np.isnan(average(**both(predicted[:, 1:], measured[:, 1:])))
 
 
 def test_a_diverged_forecast_and_a_gap_are_nan_and_not_left_out():
-    gap = MEASURED.copy()
-    gap[2, 1] = np.nan
-    for average in (metrics.anrmse, metrics.nammae):
-        assert np.isnan(average(**both(PREDICTED, gap)))
-    diverged = PREDICTED.copy()
-    diverged[2:, 1] = np.nan
-    for measure in (metrics.nrmse, metrics.normalised_extremes_error, metrics.fit_percent):
+    gap, diverged = MEASURED.copy(), PREDICTED.copy()
+    gap[2, 1] = diverged[2:, 1] = np.nan
+    for average in AVERAGES:
+        for pair in (both(PREDICTED, gap), both(diverged)):
+            assert np.isnan(average(**pair))
+    for measure in OF_CHANNELS:
         values = measure(**both(diverged))
         assert np.isfinite(values[0])
         assert np.isnan(values[1])
-    assert np.isnan(metrics.anrmse(**both(diverged)))
-    assert np.isnan(metrics.nammae(**both(diverged)))
     over_time = metrics.error_over_time(**both(diverged))
     np.testing.assert_array_equal(np.isnan(over_time), [False, False, True, True])
 
@@ -106,14 +106,14 @@ def test_a_diverged_forecast_and_a_gap_are_nan_and_not_left_out():
 
 def test_datasets_give_what_arrays_give():
     datasets = both(labelled(PREDICTED), labelled(MEASURED))
-    for measure in (metrics.nrmse, metrics.normalised_extremes_error, metrics.fit_percent):
+    for measure in OF_CHANNELS:
         result = measure(**datasets)
         assert list(result.data_vars) == ["heave", "mooring_bow"]
         np.testing.assert_array_equal(
             [float(result.heave), float(result.mooring_bow)], measure(**both())
         )
-    assert metrics.anrmse(**datasets) == metrics.anrmse(**both())
-    assert metrics.nammae(**datasets) == metrics.nammae(**both())
+    for average in AVERAGES:
+        assert average(**datasets) == average(**both())
     over_time = metrics.error_over_time(**datasets)
     np.testing.assert_array_equal(over_time, metrics.error_over_time(**both()))
     np.testing.assert_array_equal(over_time.time, datasets["predicted"].time)
@@ -192,8 +192,7 @@ def test_a_forecast_that_ends_in_nan_has_no_interval():
 
 def test_errors_that_models_share_cancel_in_their_difference():
     rng = np.random.default_rng(0)
-    measured = [labelled(rng.normal(size=(300, 2))) for _ in range(2)]
-    errors = [labelled(rng.normal(size=(300, 2))) for _ in measured]
+    measured, errors = ([labelled(rng.normal(size=(300, 2))) for _ in range(2)] for _ in range(2))
     first, half, equal = (
         [m + scale * e for m, e in zip(measured, errors, strict=True)] for scale in (0.2, 0.1, 0.2)
     )

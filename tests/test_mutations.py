@@ -2,22 +2,21 @@
 
 import ast
 import runpy
-from pathlib import Path
 
-HERE = Path(__file__).parent
+from places import ROOT
 
 
 def test_lines_and_tests_of_all_changes_exist():
-    changes = runpy.run_path(str(HERE / "mutations.py"))["CHANGES"]
+    changes = runpy.run_path(str(ROOT / "tests/mutations.py"))["CHANGES"]
     stale, names = [], {}
     every = [(file, *row) for file, rows in changes.items() for row in rows]
     for file, old, _, tests in every:
-        path = HERE.parent / "src/seakeep" / file
+        path = ROOT / "src/seakeep" / file
         if not path.exists() or path.read_text("utf-8").count(old) != 1:
             stale.append((file, old))
         for place, name in (test.split("::") for test in tests.split()):
             if place not in names:
-                body = ast.parse((HERE / place).read_text("utf-8")).body
+                body = ast.parse((ROOT / "tests" / place).read_text("utf-8")).body
                 names[place] = {
                     each.name for each in body if isinstance(each, ast.FunctionDef | ast.ClassDef)
                 }

@@ -24,11 +24,18 @@ VERBS = (
 )  # fmt: skip
 
 
+def printed(*words, **environment):
+    """What a fresh interpreter prints."""
+    command, environment = [sys.executable, *words], os.environ | environment
+    return subprocess.run(
+        command, capture_output=True, text=True, check=True, env=environment
+    ).stdout
+
+
 def imported_by(code):
     """Which of the heavy packages a fresh interpreter holds after running the code."""
     asked = f"{code}\nimport sys\nprint([m for m in {HEAVY!r} if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
-    return done.stdout.splitlines()[-1]
+    return printed("-c", asked).splitlines()[-1]
 
 
 def test_help_version_and_wrong_requests_start_without_heavy_packages():
@@ -56,13 +63,7 @@ def test_an_unknown_name_is_refused():
 
 
 def test_no_summary_in_the_help_is_cut_at_eighty_columns():
-    done = subprocess.run(
-        [sys.executable, "-m", "seakeep", "--help"],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "COLUMNS": "80"},
-    )
-    listed = done.stdout.partition("Commands:")[2].split("\n")
+    shown = printed("-m", "seakeep", "--help", COLUMNS="80")
+    listed = shown.partition("Commands:")[2].split("\n")
     assert {line.split()[0] for line in listed if line.strip()} == set(VERBS)
     assert not [line for line in listed if "..." in line or "…" in line or len(line) > 80]

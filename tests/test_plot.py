@@ -9,11 +9,11 @@ import seakeep
 from seakeep import HankelDMDc
 from seakeep.errors import RequestError
 
-pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+pytest.importorskip("matplotlib")
 
 from matplotlib.figure import Figure
 
-STATES = ["surge", "heave", "pitch"]
+STATES, WHEN = ["surge", "heave", "pitch"], {"start": 10.0, "steps": 50}
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def model(run):
 
 
 def test_overlay_draws_each_channel_with_units_on_its_axes(run, model):
-    forecast = model.forecast(run, start=10.0, steps=50)
+    forecast = model.forecast(run, **WHEN)
     figure = seakeep.plot.overlay(forecast, run)
     assert len(figure.axes) == 3
     assert "[deg]" in figure.axes[2].get_ylabel()
@@ -42,8 +42,8 @@ def test_overlay_draws_each_channel_with_units_on_its_axes(run, model):
 
 def test_band_takes_members_or_their_statistics(run, model):
     ensemble = few().fit(run, ["heave"], ["eta"])
-    members = ensemble.forecast(run, start=10.0, steps=50)
-    for forecast in (members, ensemble.forecast_summary(run, start=10.0, steps=50)):
+    members = ensemble.forecast(run, **WHEN)
+    for forecast in (members, ensemble.forecast_summary(run, **WHEN)):
         figure = seakeep.plot.band(forecast, run)
         assert len(figure.axes[0].collections) == 1
     with pytest.raises(RequestError, match=r"Channels: none\. .*with seakeep\.plot\.band"):
@@ -51,4 +51,4 @@ def test_band_takes_members_or_their_statistics(run, model):
     with pytest.raises(RequestError, match=r"measured has no channel .* in a coordinate 'time'"):
         seakeep.plot.band(members, run.drop_vars("time"))
     with pytest.raises(RequestError, match=r"it has no band\. Draw it with seakeep\.plot\.overlay"):
-        seakeep.plot.band(model.forecast(run, start=10.0, steps=50), run)
+        seakeep.plot.band(model.forecast(run, **WHEN), run)

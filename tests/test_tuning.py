@@ -12,7 +12,6 @@ from squared import INPUTS, PERIOD, STATES, runs
 
 import seakeep
 from seakeep import HankelDMDc, RequestError
-from seakeep.cli import main
 from seakeep.study.resolve import resolve_model
 from seakeep.tuning import tuned_campaign
 
@@ -58,14 +57,12 @@ def test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts(folds, words, ce
 
 
 def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(
-    study_folder, capsys, monkeypatch
+    study_folder, command, monkeypatch
 ):
     monkeypatch.chdir(study_folder)
     campaign, written = study_folder / "campaign.toml", study_folder / "campaign_tuned.toml"
     before = campaign.read_text()
-    words = ["tune", "campaign.toml", "--vary", "lead", "--vary", "readouts"]
-    assert main(words) == 0, capsys.readouterr().err
-    told = capsys.readouterr().out
+    told, _ = command("tune", "campaign.toml", "--vary", "lead", "--vary", "readouts")
     assert "held out in turn" in told
     assert "read-out      mooring_bow: none, floor -0.0" in told
     assert campaign.read_text() == before
@@ -82,10 +79,13 @@ def test_the_command_writes_the_choice_into_a_copy_of_the_campaign(
     changed = ("state_delays", "input_delays", "ridge", "lead")
     kept = [line for line in before.splitlines() if line.strip() and not line.startswith(changed)]
     assert all(line in text for line in kept)
-    assert main(["tune", "campaign.toml", "-o", "../x.toml"]) == 2
-    assert "lies in another folder" in capsys.readouterr().err
-    assert main(["tune", "campaign.toml", "-o", "tuned"]) == 2
-    assert "Name it tuned.toml" in capsys.readouterr().err
+    for name, words in {"../x.toml": "lies in another folder", "tuned": "Name it tuned.t"}.items():
+        assert words in command("tune", "campaign.toml", "-o", name, status=2)[1]
+
+
+def tuned(before, spec, varied, period=None):
+    """Text of a file after a search; with a period, one that goes with a preset."""
+    return tuned_campaign(before, None, spec, varied, period and "recommended", period)
 
 
 def test_a_tuned_file_holds_the_read_outs_and_is_else_as_it_was():
@@ -103,7 +103,7 @@ old = "auto"
 [models.other]
 states = ["a"]  # kept
 """
-    text = tuned_campaign(before, None, spec, ["readouts"], None, None)
+    text = tuned(before, spec, ["readouts"])
     middle = """
 [model.readouts]
 bow = "wave"
@@ -116,12 +116,11 @@ states = ["a"]  # kept
     assert text.endswith(middle)
     assert "# of the model\nstate_delays = 6\n" in text
     assert "old" not in text
-    assert tuned_campaign(text, None, spec, ["readouts"], None, None) == text
-    without = replace(spec, readouts=())
-    none = tuned_campaign(text, None, without, ["readouts"], None, None)
+    assert tuned(text, spec, ["readouts"]) == text
+    none = tuned(text, replace(spec, readouts=()), ["readouts"])
     assert tomllib.loads(none)["model"]["readouts"] == {}
     assert none.endswith('\n# of the next table\n[models.other]\nstates = ["a"]  # kept\n')
-    kept = tuned_campaign(before, None, spec, [], None, None)
+    kept = tuned(before, spec, [])
     assert kept.endswith(before[before.index("[model.readouts]") :])
     assert "# as it was" not in kept  # it spoke of the λ before
     assert "ridge = 0.001 # chosen by seakeep tune" in kept
@@ -142,17 +141,17 @@ celerity = 2.0
     slow = seakeep.SlowSquares("eta", lead=1.0)
     spec = replace(SPEC, ridge=0.1, memory=64, alignment=aligned, observables=[slow])
     varied = ["memory", "alignment", "observables"]
-    read = tomllib.loads(tuned_campaign(before, None, spec, varied, "recommended", 20.0))
+    read = tomllib.loads(tuned(before, spec, varied, 20.0))
     assert read["model"]["observables"] == [{"kind": "slow_squares", "of": ["eta"], "lead": 1.0}]
     assert read["model"]["alignment"] == {"mode": "dispersion", "surge": "predicted"}
     assert (read["model"]["memory"], read["model"]["ridge"]) == ("3.2 T", 0.1)
     assert "next" in read
     spec = replace(SPEC, ridge=1e-3)
-    read = tomllib.loads(tuned_campaign(before, None, spec, varied, "recommended", 20.0))
-    assert not {"rank", "alignment", "preset"} & set(read["model"])
-    assert read["model"]["memory"] == "0 T"
-    text = tuned_campaign(before, None, spec, ["ridge"], "recommended", 20.0)
-    kept = tomllib.loads(text)["model"]
+    read, kept = (
+        tomllib.loads(tuned(before, spec, each, 20.0))["model"] for each in (varied, ["ridge"])
+    )
+    assert not {"rank", "alignment", "preset"} & set(read)
+    assert read["memory"] == "0 T"
     assert kept["alignment"] == {"mode": "effective", "celerity": 2.0}
 
 
@@ -199,7 +198,7 @@ mooring_bow = "wave"
 def test_a_tuned_file_states_what_was_varied_in_periods_and_the_preset_it_goes_with():
     spec = replace(SPEC, ridge=1e-3, lead=15, ridge_scale="per_snapshot")
     before = '[model]\nstates = ["a"]\nselect = { horizon = [5] }\nlead = "1 T"  # one period\n'
-    text = tuned_campaign(before, None, spec, ["lead", "observables"], "recommended", 20.0)
+    text = tuned(before, spec, ["lead", "observables"], 20.0)
     assert tomllib.loads(text)["model"] == {
         "states": ["a"],
         "lead": "0.75 T",
@@ -211,10 +210,14 @@ def test_a_tuned_file_states_what_was_varied_in_periods_and_the_preset_it_goes_w
     assert "one period" not in text
     # A length in periods is as exact as the samples that it stands for; samples stay samples.
     odd = replace(spec, input_delays=1234)
-    text = tuned_campaign(before, None, odd, ["input_delays"], "recommended", 31.37)
+    text = tuned(before, odd, ["input_delays"], 31.37)
     assert round(float(tomllib.loads(text)["model"]["input_delays"].split()[0]) * 31.37) == 1234
     text = tuned_campaign(before.replace('"1 T"', "3"), None, spec, ["lead"], None, 20.0)
     assert tomllib.loads(text)["model"]["lead"] == 15
+
+
+def search(given, **more):
+    return seakeep.tune(SPEC, given, STATES, INPUTS, vary=["ridge"], horizon=(15,), **more)
 
 
 def test_a_search_that_was_interrupted_goes_on(tmp_path):
@@ -226,24 +229,20 @@ def test_a_search_that_was_interrupted_goes_on(tmp_path):
         if number == 2:
             raise KeyboardInterrupt
 
-    more = {"vary": ["ridge"], "horizon": (15,), "resume": kept}
+    more = {"resume": kept}
     with pytest.raises(KeyboardInterrupt):
-        seakeep.tune(SPEC, runs(), STATES, INPUTS, progress=stop, **more)
+        search(runs(), progress=stop, **more)
     assert len(json.loads(kept.read_text())["scores"]) == 2
     counted = []
-    again = seakeep.tune(
-        SPEC, runs(), STATES, INPUTS, progress=lambda *each: counted.append(each), **more
-    )
+    again = search(runs(), progress=lambda *each: counted.append(each), **more)
     assert len(counted) == 1 + 3  # of three folds, and the rest of λ in all
-    whole = seakeep.tune(SPEC, runs(), STATES, INPUTS, vary=["ridge"], horizon=(15,))
+    whole = search(runs())
     assert again.table.identical(whole.table)
-    with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
-        seakeep.tune(SPEC, runs(2), STATES, INPUTS, **more)
     shifted = {name: run.assign_coords(time=run["time"] + 1.0) for name, run in runs().items()}
     longer = {name: run.assign_attrs(encounter_period=2.0) for name, run in runs().items()}
-    for others in (shifted, longer):  # the same values
+    for others in (runs(2), shifted, longer):  # the last two hold the same values
         with pytest.raises(RequestError, match="keeps scores of other runs or settings"):
-            seakeep.tune(SPEC, others, STATES, INPUTS, **more)
+            search(others, **more)
     kept.write_text("[]")
     with pytest.raises(RequestError, match="keeps no scores of a search"):
-        seakeep.tune(SPEC, runs(), STATES, INPUTS, **more)
+        search(runs(), **more)

@@ -7,7 +7,6 @@ import pytest
 from seas import sea
 from small_tank import DT, tank_columns, write_csv
 
-from seakeep import cli
 from seakeep.campaign import load_prepared, read_campaign, write_prepared
 from seakeep.errors import DataError, RequestError, SeakeepWarning
 from seakeep.quality import findings_of
@@ -68,27 +67,23 @@ class TestPeriod:
 
 
 @pytest.mark.usefixtures("empty_sheet")
-def test_the_commands(edited, tank, capsys):
+def test_the_commands(edited, tank, command):
     """prepare keeps what it can and ends with the error; fit and forecast of others run."""
     path = edited(POOLED)
     damage(tank, "cut")
-    assert cli.main(["prepare", str(path)]) == 1
-    captured = capsys.readouterr()
-    assert "prepared/first.nc" in captured.out
-    assert "second.nc" not in captured.out
-    assert "second.csv" in captured.err.split("Error:")[1]
+    out, told = command("prepare", path, status=1)
+    assert "prepared/first.nc" in out
+    assert "second.nc" not in out
+    assert "second.csv" in told.split("Error:")[1]
     page = (tank / "prepared" / "quality.html").read_text("utf-8")
     assert re.search(r"<td>second</td><td[^>]*>not prepared</td>", page)
     assert "is left out of the encounter period" in page
-    model, out = str(tank / "model.nc"), ["-o", str(tank / "out.csv")]
+    model = tank / "model.nc"
     (tank / "prepared" / "first.nc").unlink()
-    assert cli.main(["fit", str(path), "-o", model]) == 0
-    assert "Note: run 'second' is left out" in capsys.readouterr().err
-    command = ["forecast", model, str(path), "--run", "first", "--start", "12", "--steps", "9"]
-    assert cli.main([*command, *out]) == 0
-    command[command.index("first")] = "second"
-    assert cli.main([*command, *out]) == 1
-    assert "second.csv" in capsys.readouterr().err
+    assert "Note: run 'second' is left out" in command("fit", path, "-o", model)[1]
+    words = ["forecast", model, path, "--start", 12, "--steps", 9, "-o", tank / "out.csv", "--run"]
+    command(*words, "first")
+    assert "second.csv" in command(*words, "second", status=1)[1]
 
 
 def test_every_bad_file_is_named(changed, tank):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from small_tank import tank_columns, write_csv
 
-from seakeep import cli
 from seakeep.campaign import read_campaign
 from seakeep.campaign.drafts import draft_campaign
 from seakeep.campaign.guesses import suggest_channel
@@ -15,6 +14,11 @@ def drafted(folder, files):
     path = folder / "campaign.toml"
     path.write_text(text, "utf-8")
     return text, read_campaign(path)
+
+
+def drafted_of(folder, columns):
+    """Draft of a single file."""
+    return drafted(folder, [write_csv(folder / "run.csv", columns)])
 
 
 GUESSES = {
@@ -75,7 +79,7 @@ def test_a_draft_asks_whether_slow_files_count_milliseconds(tmp_path):
     for rate, asks in ((50, False), (0.05, True)):
         t = np.arange(600) / rate
         wave = {"t": t, "WP fwd [mm]": np.sin(2 * np.pi * np.arange(600) / 30)}
-        text, _ = drafted(tmp_path, [write_csv(tmp_path / "a.csv", wave)])
+        text, _ = drafted_of(tmp_path, wave)
         assert f"# the files have {rate} samples per second" in text
         assert ("time_unit = 'ms'" in text) is asks
 
@@ -91,15 +95,15 @@ def test_motions_are_the_states_and_loads_are_named_beside_them(tmp_path):
     columns = tank_columns()
     columns["Tension_SB [N]"] = columns["Heave [mm]"]
     columns["Acc z [g]"] = columns.pop("acc [g]")
-    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    text, campaign = drafted_of(tmp_path, columns)
     assert campaign.model().states == ("heave", "pitch")
     assert campaign.model().preset == "recommended"
     assert "# Loads (mooring_starboard) may be added to the states" in text
     only = {k: v for k, v in columns.items() if k.split()[0] in ("Time", "WP", "Acc", "Tension_SB")}
-    _, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", only)])
+    _, campaign = drafted_of(tmp_path, only)
     assert campaign.model().states == ("heave_acceleration",)
     only.pop("Acc z [g]")
-    _, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", only)])
+    _, campaign = drafted_of(tmp_path, only)
     assert campaign.model().states == ("mooring_starboard",)
 
 
@@ -153,7 +157,7 @@ def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
     columns = tank_columns() | {"WP 2 [mm]": tank_columns()["WP fwd [mm]"]}
     for name in ("Heave [mm]", "WP 2 [mm]"):
         columns[name] = np.where(np.arange(1001) // lost == 3, np.nan, columns[name])
-    text, campaign = drafted(tmp_path, [write_csv(tmp_path / "run.csv", columns)])
+    text, campaign = drafted_of(tmp_path, columns)
     assert (campaign.model().states, campaign.model().inputs) == (("pitch",), ("eta_fwd",))
     if lost == 200:
         assert "# column 'Heave [mm]' left out: has gaps in run.csv" in text
@@ -164,7 +168,7 @@ def test_what_has_long_gaps_is_left_out_with_a_word(tmp_path, lost):
 
 
 def test_columns_without_a_known_name_are_marked(tmp_path):
-    text, _ = drafted(tmp_path, [write_csv(tmp_path / "a.csv", tank_columns(0, 60.0))])
+    text, _ = drafted_of(tmp_path, tank_columns(0, 60.0))
     assert 'column = "acc" # NOT RECOGNISED: rename the channel if it is a motion or load' in text
     assert text.count("NOT RECOGNISED") == 1
 
@@ -231,19 +235,18 @@ def test_the_draft_of_regular_waves_holds_out_what_the_others_surround(tmp_path)
     assert "# guessed: no waves lie within those of the others; the nearest run tests" in text
 
 
-def test_init_takes_what_the_message_asks_for(tmp_path, capsys):
+def test_init_takes_what_the_message_asks_for(tmp_path, command):
     """A title with blanks, a blank line, tabs, decimal commas, a row of units."""
     path = tmp_path / "de.txt"
     rows = [f"{i / 50:.4f}\t{np.sin(i / 9):.4f}".replace(".", ",") for i in range(200)]
     head = ["Messung Schlepptank BM-7", "", "Zeit\tWelle_1", "s\tcm"]
     path.write_text("\n".join([*head, *rows, ""]), "utf-8")
-    assert cli.main(["init", str(path)]) == 1
-    assert "give --skip-rows 2 to seakeep init" in " ".join(capsys.readouterr().err.split())
+    _, told = command("init", path, status=1)
+    assert "give --skip-rows 2 to seakeep init" in " ".join(told.split())
     out = tmp_path / "campaign.toml"
     options = ["--skip-rows", "2", "--delimiter", "tab", "--decimal", ","]
-    assert cli.main(["init", str(path), *options, "-o", str(out)]) == 0
-    assert cli.main(["init", str(path), *options, "-o", str(out)]) == 2  # it is there
-    assert cli.main(["init", str(path), *options, "-o", str(out), "--force"]) == 0
+    for status, more in ((0, []), (2, []), (0, ["--force"])):  # then it is there
+        command("init", path, *options, "-o", out, *more, status=status)
     files = read_campaign(out).settings.files
     assert (files.skip_rows, files.delimiter, files.decimal) == (2, "\t", ",")
     run = read_campaign(out).read_run("de")

@@ -1,17 +1,14 @@
 """Raw samples in service: the chain on a window that moves gives what it gives offline."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import two_loggers
 import xarray as xr
+from tutorial_study import TUTORIAL
 
 import seakeep
 from seakeep import RequestError
 from seakeep.formats import read_columns
-
-TUTORIAL = Path(__file__).parents[2] / "docs/tutorial"
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +28,10 @@ def between(rows, first, stop):
     return {name: each[part] for name, each in rows.items()}
 
 
+def chain_of(campaign, **changes):
+    return campaign.live_chain("unseen", **{"delay": "1 T", "window": "20 T"} | changes)
+
+
 def sent(chain, rows, stop=60.0, step=4.0):
     """What the chain gives of the rows up to an instant, sent a few seconds at a time."""
     given = [chain.push({"": between(rows, at, at + step)}) for at in np.arange(0, stop, step)]
@@ -40,7 +41,7 @@ def sent(chain, rows, stop=60.0, step=4.0):
 def test_it_gives_what_preparation_gives_but_for_the_ends_of_its_window(campaign, rows):
     offline, errors = campaign.prepare(["unseen"])["unseen"], {}
     for delay in ("0.1 T", "1 T"):
-        found = sent(campaign.live_chain("unseen", delay=delay, window="20 T"), rows)
+        found = sent(chain_of(campaign, delay=delay), rows)
         time = found["time"].values
         np.testing.assert_allclose(np.diff(time), float(offline.attrs["dt"]), rtol=1e-9)
         expected = offline.sel(time=time, method="nearest")
@@ -56,9 +57,8 @@ def test_it_gives_what_preparation_gives_but_for_the_ends_of_its_window(campaign
 
 
 def test_how_rows_are_cut_up_does_not_matter(campaign, rows):
-    settings = {"delay": "1 T", "window": "60 T", "every": 8}
-    small = sent(campaign.live_chain("unseen", **settings), rows, 30.0, 0.5)
-    whole = campaign.live_chain("unseen", **settings)
+    one, whole = (chain_of(campaign, window="60 T", every=8) for _ in range(2))
+    small = sent(one, rows, 30.0, 0.5)
     large = whole.push({"": between(rows, 0, 30)})
     assert small["time"].values[0] == large["time"].values[0]
     assert abs(small.sizes["time"] - large.sizes["time"]) < 8
@@ -66,8 +66,7 @@ def test_how_rows_are_cut_up_does_not_matter(campaign, rows):
 
 
 def test_a_chain_that_was_saved_goes_on_to_the_last_bit(campaign, rows, tmp_path):
-    settings = {"delay": "1 T", "window": "20 T"}
-    whole, again, late = (campaign.live_chain("unseen", **settings) for _ in range(3))
+    whole, again, late = (chain_of(campaign) for _ in range(3))
     whole.push({"": between(rows, 0, 30)})
     again.resume(whole.save(tmp_path / "chain.nc"))
     for first in (30, 34, 38):
@@ -86,9 +85,7 @@ def test_a_gap_is_masked_and_what_follows_it_is_as_if_there_were_none(campaign, 
     time = rows["t"]
     kept = (time < 20.0) | (time > 23.0)
     gapped = {name: each[kept] for name, each in rows.items()}
-    settings = {"delay": "1 T", "window": "20 T"}
-    found = sent(campaign.live_chain("unseen", **settings), gapped)
-    whole = sent(campaign.live_chain("unseen", **settings), rows)
+    found, whole = (sent(chain_of(campaign), each) for each in (gapped, rows))
     np.testing.assert_array_equal(found["time"], whole["time"])
     inside = (found["time"] > 20.1) & (found["time"] < 22.9)
     assert found["heave"].isel(time=inside).isnull().all()

@@ -1,7 +1,6 @@
 """Whole records, and values that a vessel can reach: what prepare warns of and the sheet tells."""
 
 import re
-import warnings
 from contextlib import nullcontext
 
 import numpy as np
@@ -143,25 +142,25 @@ def test_what_a_coarse_step_loses_is_told(first, chain, fate):
     assert fate is None or re.search(fate, found["eta_fwd"])
 
 
-@pytest.mark.parametrize("edges", ["[0.17, 0.33]", "[2.0, 3.0]"])
-def test_a_low_pass_that_removes_the_waves_is_named(first, edges):
-    """Waves of 0.5 to 0.9 Hz: the first filter leaves none of them, the second all."""
-    stated = ("sampling_rate = 10", f"sampling_rate = 10\nlow_pass = {edges}")
-    if edges == "[2.0, 3.0]":
-        assert not kinds(first(stated))
-        return
+def filtered(edges):
+    return "sampling_rate = 10", f"sampling_rate = 10\nlow_pass = {edges}"
+
+
+def test_a_low_pass_that_removes_the_waves_is_named(first):
+    """Waves of 0.5 to 0.9 Hz: the first filter leaves all of them, the second none."""
+    assert not kinds(first(filtered([2.0, 3.0])))
     with pytest.warns(
         SeakeepWarning,
         match=r"loses (9\d.*|100) % of the energy of its waves .* to the filter low_pass, "
         r"which halves what lies at 0\.25 Hz .*\. Raise low_pass in \[preparation\]",
     ):
-        assert "low pass" in kinds(first(stated))
+        assert "low pass" in kinds(first(filtered([0.17, 0.33])))
 
 
 def test_a_low_pass_longer_than_the_record(first):
     """60 dB over 0.1 Hz take 41.8 s by Kaiser's formula, and the record has 20 s."""
     with pytest.raises(DataError, match=r"'first': low_pass .* over 41\.8 s, .* lasts 20 s"):
-        first(("sampling_rate = 10", "sampling_rate = 10\nlow_pass = [2.0, 2.1]"))
+        first(filtered([2.0, 2.1]))
 
 
 @pytest.mark.parametrize(
@@ -182,9 +181,7 @@ def test_a_logger_that_was_cut_off_is_told(loggers, ends, words, span):
      ((0.0, 15.0), "train = [1, 8]\ntest = [8, 14]")],
 )  # fmt: skip
 def test_a_start_by_hand_and_what_the_run_does_not_use_do_no_harm(loggers, ends, spans):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert not told(loggers(*ends, spans).prepare()["first"], RECORDS)
+    assert not told(loggers(*ends, spans).prepare()["first"], RECORDS)
 
 
 @pytest.mark.parametrize("test", ["[10, 20]", "[10, inf]"])

@@ -350,8 +350,7 @@ def test_interrupted_half_way_a_second_call_continues(campaign, tank):
 @pytest.mark.parametrize("change", ["settings", "file", "version", "name"])
 def test_stale_files_are_not_used(campaign, tank, changed, change, monkeypatch):
     path = write_prepared(campaign)["second"]
-    with xr.open_dataset(path) as opened:
-        run = opened.load()
+    run = xr.load_dataset(path)
     run["heave"][:] = 0.0  # to be seen if it were used
     write_netcdf(path, run)
     assert load_prepared(campaign)["second"]["heave"].std() == 0.0
@@ -383,10 +382,10 @@ def test_a_measurement_is_never_overwritten(tank, changed):
 def test_a_byte_that_was_altered_is_noticed(campaign):
     path = write_prepared(campaign, names=["second"])["second"]
     content = path.read_bytes()
-    expected = load_prepared(campaign, names=["second"])["second"]
+    (expected,) = load_prepared(campaign, names=["second"]).values()
     path.write_bytes(content[:900] + bytes([content[900] ^ 1]) + content[901:])
     with pytest.warns(SeakeepWarning, match=r"second\.nc was cut off, altered"):
-        run = load_prepared(campaign, names=["second"])["second"]
+        (run,) = load_prepared(campaign, names=["second"]).values()
     xr.testing.assert_identical(run, expected)
 
 

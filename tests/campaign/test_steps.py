@@ -10,7 +10,7 @@ from small_tank import tank_columns, write_csv
 from seakeep.campaign import read_campaign
 from seakeep.signals import rotation_matrix
 
-G = 9.81
+AXES, G = ("surge", "sway", "heave"), 9.81
 DT = 0.01
 T = DT * np.arange(1500)
 ARM = np.array([-1.2, 0.3, -0.1])  # from the centre of gravity to the bow, in the body's axes
@@ -83,7 +83,7 @@ def gyroscope():
 def test_motions_are_transferred_to_another_point(tmp_path):
     """Positions, velocities and accelerations of the bow from those of the centre of gravity."""
     columns, text = gyroscope()
-    for axis, name in enumerate(("surge", "sway", "heave")):
+    for axis, name in enumerate(AXES):
         for order, kind, unit in ((0, "", "mm"), (1, "_rate", "m/s"), (2, "_acceleration", "g")):
             scale = {"mm": 1e3, "m/s": 1.0, "g": 1 / 9.80665}[unit]
             values = rate(lambda t: body(t)[0], order)(T)[:, axis] * scale
@@ -93,7 +93,7 @@ def test_motions_are_transferred_to_another_point(tmp_path):
                 f"step = 'transfer'\noffset = {ARM.tolist()}\n"
             )
     run = prepared(tmp_path, columns, text)
-    for axis, name in enumerate(("surge", "sway", "heave")):
+    for axis, name in enumerate(AXES):
         for order, kind in enumerate(("", "_rate", "_acceleration")):
             found = run[f"bow_{name}{kind}"]
             # Eighth-order differences of differences leave 1e-7 of accelerations of 1 m/s².
@@ -119,7 +119,7 @@ def test_gravity_is_removed_from_accelerometers(tmp_path, zeroed):
             f"zeroed = {str(zeroed).lower()}\n"
         )
     run = prepared(tmp_path, columns, text)
-    for i, name in enumerate(("surge", "sway", "heave")):
+    for i, name in enumerate(AXES):
         found = run[f"{name}_acceleration"]
         np.testing.assert_allclose(found, acceleration[:, i], atol=1e-6)
         assert found.attrs["derived_from"] == f"a_{'xyz'[i]}, gravity removed by roll, pitch, yaw"

@@ -22,6 +22,10 @@ def answer(frequency):
     return 0.8 * np.exp(0.2 * turn) + 0.4 * np.exp(0.5 * turn)
 
 
+def phasors(found):
+    return found.amplitude.values * np.exp(1j * np.radians(found.phase.values))
+
+
 def vessel_run(frequencies, seed=0, samples=3000, noise=1e-5, **attrs):
     """Waves past two probes, and a heave that answers them by :func:`answer`."""
     rng, f = np.random.default_rng(seed), np.asarray(frequencies)
@@ -57,9 +61,8 @@ def test_the_response_is_that_of_python_control(rows):
     found = check.response(model, FREQUENCIES)
     system = model.to_control()
     known = control.frequency_response(system, 2 * np.pi * FREQUENCIES).frdata
-    ours = found["amplitude"].values * np.exp(1j * np.radians(found["phase"].values))
     # The same matrices, solved in another order: rounding times the condition of the system.
-    assert np.abs(ours - known).max() < 1e-9 * np.abs(known).max()
+    assert np.abs(phasors(found) - known).max() < 1e-9 * np.abs(known).max()
 
 
 def test_the_response_is_what_a_free_run_settles_to():
@@ -71,8 +74,7 @@ def test_the_response_is_what_a_free_run_settles_to():
     forecast = model.forecast_arrays(rest, wave[:900, None], wave[900:, None], 800)
     found = check.response(model, [0.8]).isel(input=0, frequency=0)
     turn = np.exp(2j * np.pi * 0.8 * 0.1 * np.arange(800))
-    known = 1e-3 * found.amplitude.values * np.exp(1j * np.radians(found.phase.values))
-    still = forecast[-200:] - (known * turn[-200:, None]).real
+    still = forecast[-200:] - (1e-3 * phasors(found) * turn[-200:, None]).real
     # The mean of the input was not zero, so the run settles to another level: a constant is left.
     assert np.ptp(still, axis=0) == pytest.approx([0, 0], abs=1e-9)
 
@@ -82,9 +84,8 @@ def test_a_passing_wave_adds_the_probes(sea, model):
     assert list(found["input"].values) == ["eta_fwd", "eta_cog", "wave"]
     assert found.attrs["reference"] == "eta_cog"
     wave = found.sel(input="wave", state="heave")
-    ours = wave.amplitude.values * np.exp(1j * np.radians(wave.phase.values))
     # Sensor noise of 1e-5 beside waves of 0.1 m, and the ridge.
-    assert np.abs(ours - answer(FREQUENCIES[:3])).max() < 2e-3
+    assert np.abs(phasors(wave) - answer(FREQUENCIES[:3])).max() < 2e-3
     assert found.trained.sel(input="wave").values.tolist() == [True, True, True]
     assert not check.response(model, [2.5]).trained.any()
 
@@ -96,8 +97,7 @@ def test_points_of_irregular_waves_hold_the_truth_up_to_the_edges_of_the_spectru
         waves = 0.3 + 0.6 * rng.beta(2.0, 3.0, 300)
         run = vessel_run(waves, seed, noise=0.01, waves="irregular")
         at = check.measured_response(model, {"run": run}).isel(state=0)
-        found = at.amplitude.values * np.exp(1j * np.radians(at.phase.values))
-        error = np.abs(found - answer(at.frequency.values))
+        error = np.abs(phasors(at) - answer(at.frequency.values))
         inside.append(error < at.amplitude_uncertainty.values)
     # Circles of 95 %; without what leakage adds they hold 79 %.
     assert 0.9 < np.mean(np.concatenate(inside)) < 0.99

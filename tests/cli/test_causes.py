@@ -4,16 +4,14 @@ import os
 import subprocess
 import sys
 
-from seakeep.cli import main
 
-
-def test_what_the_system_refuses_is_no_fault_of_seakeep(monkeypatch, capsys):
+def test_what_the_system_refuses_is_no_fault_of_seakeep(monkeypatch, command):
     def fail(*_, **__):
         raise OSError(5, "Input/output error", "run.nc")
 
     monkeypatch.setattr("seakeep.campaign.read_campaign", fail)
-    assert main(["prepare", "campaign.toml"]) == 1
-    assert "Error: run.nc: Input/output error. Correct the path" in capsys.readouterr().err
+    _, told = command("prepare", "campaign.toml", status=1)
+    assert "Error: run.nc: Input/output error. Correct the path" in told
 
 
 def test_a_command_keeps_blas_to_one_thread_and_prints_in_any_encoding(tmp_path):

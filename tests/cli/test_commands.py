@@ -4,20 +4,17 @@ import importlib.util
 import re
 import shlex
 import shutil
-from pathlib import Path
 from unittest.mock import ANY
 
 import numpy as np
 import pytest
 import xarray as xr
 from tables import rows_of
-from tutorial_study import edit
+from tutorial_study import edit, put_tutorial
 
 import seakeep
 from seakeep import cli
 
-ROOT = Path(__file__).parents[2]
-TUTORIAL = ROOT / "docs" / "tutorial"
 VERBS = ("tank", "init", "prepare", "fit", "calibrate", "forecast", "compare", "export", "datasets",
          "info")  # fmt: skip
 
@@ -26,28 +23,20 @@ VERBS = ("tank", "init", "prepare", "fit", "calibrate", "forecast", "compare", "
 def place(tmp_path_factory):
     """A folder with the tutorial where its examples expect it, and a model."""
     folder = tmp_path_factory.mktemp("place")
-    (folder / "docs").mkdir()
-    shutil.copytree(
-        TUTORIAL, folder / "docs" / "tutorial", ignore=shutil.ignore_patterns("prepared", "*.md")
-    )
-    campaign = folder / "docs/tutorial/campaign.toml"
+    tutorial = folder / "docs/tutorial"
+    tutorial.mkdir(parents=True)
+    put_tutorial(tutorial)
     # The commands are the same with fewer members, and faster.
-    fit = ["fit", str(edit(campaign, ("n_members = 40", "n_members = 8"))), "-o"]
+    fit = ["fit", str(edit(tutorial / "campaign.toml", ("n_members = 40", "n_members = 8"))), "-o"]
     assert cli.main([*fit, str(folder / "model.nc")]) == 0
     assert cli.main([*fit, str(folder / "ensemble.nc"), "--model", "ensemble"]) == 0
     return folder
 
 
 @pytest.fixture
-def run(place, monkeypatch, capsys):
+def run(place, monkeypatch, command):
     monkeypatch.chdir(place)
-
-    def call(text, status=0):
-        ended, told = cli.main(shlex.split(text)), capsys.readouterr()
-        assert ended == status, told.err
-        return told.out, told.err
-
-    return call
+    return lambda text, status=0: command(*shlex.split(text), status=status)
 
 
 CAMPAIGN = "docs/tutorial/campaign.toml"
@@ -129,11 +118,6 @@ def test_the_margin_of_a_calibrated_band_is_that_of_the_ensemble(run, place):
     np.testing.assert_array_equal(stored, band + margin[0])
 
 
-def judged_rows(folder):
-    """Rows of a comparison's CSV by their channel."""
-    return {row["channel"]: row for row in rows_of(folder / "comparison.csv")}
-
-
 def test_compare_judges_models_in_service_against_lead_time(run, place):
     pytest.importorskip("matplotlib")
     out, err = run(f"compare model.nc {CAMPAIGN} --nowcast --steps '1 T' -o served")
@@ -155,10 +139,11 @@ def test_several_models_are_judged_over_the_same_instants(run, place):
     assert len({row["start"] for row in rows}) == 1
     alone = [row for row in rows if row["model"] == "ensemble"]
     run(f"compare ensemble.nc {CAMPAIGN} -o alone --steps 200 --start {rows[0]['start']}")
-    single = judged_rows(place / "alone")
-    assert {row["channel"]: row["nrmse"] for row in alone} == {
-        name: row["nrmse"] for name, row in single.items()
-    }
+    first, second = (
+        {row["channel"]: row["nrmse"] for row in each}
+        for each in (alone, rows_of(place / "alone/comparison.csv"))
+    )
+    assert first == second
     drawn = importlib.util.find_spec("matplotlib") is not None
     for name in ("unseen", "errors_by_run"):
         assert (place / f"both/{name}.svg").exists() == drawn
@@ -235,15 +220,15 @@ MISTAKES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("command", "message"), MISTAKES.items())
-def test_a_mistake_gets_one_message_and_no_traceback(command, message, run):
-    out, err = run(command, 2)
+@pytest.mark.parametrize(("line", "message"), MISTAKES.items())
+def test_a_mistake_gets_one_message_and_no_traceback(line, message, run):
+    out, err = run(line, 2)
     assert re.search(message, err)
     assert "Traceback" not in out + err
 
 
 @pytest.mark.parametrize(
-    ("command", "kept"),
+    ("line", "kept"),
     {
         f"fit {CAMPAIGN} -o docs/tutorial/raw.nc": "docs/tutorial/raw.nc",
         f"calibrate ensemble.nc {CAMPAIGN} --run unseen --steps 200 -o ensemble.nc": "ensemble.nc",
@@ -259,8 +244,8 @@ def test_a_mistake_gets_one_message_and_no_traceback(command, message, run):
         f"compare model.nc {CAMPAIGN} -o drawn": "drawn/unseen.png",
     }.items(),
 )
-def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, place, monkeypatch):
-    if "drawn" in command:
+def test_no_output_replaces_an_input_or_a_file_of_others(line, kept, run, place, monkeypatch):
+    if "drawn" in line:
         pytest.importorskip("matplotlib")
     for name, text in {
         "docs/tutorial/raw.nc": "CDF\x01",
@@ -277,7 +262,7 @@ def test_no_output_replaces_an_input_or_a_file_of_others(command, kept, run, pla
         (place / name).write_text(text, newline="")
     monkeypatch.setattr("seakeep.campaign.prepare.Campaign.prepare", None)  # no work is done
     before = (place / kept).read_bytes()
-    assert "Choose another " in run(command, 2)[1]
+    assert "Choose another " in run(line, 2)[1]
     assert (place / kept).read_bytes() == before
 
 

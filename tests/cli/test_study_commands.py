@@ -9,38 +9,33 @@ import pytest
 from started import started
 from tutorial_study import edit
 
-from seakeep import cli, executor
+from seakeep import executor
 
-pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+pytest.importorskip("matplotlib")
 
 
-def test_a_study_ends_with_its_table_and_the_place_of_its_report(study_folder, capfd, monkeypatch):
+def test_a_study_ends_with_its_table_and_the_way_to_its_report(study_folder, command, monkeypatch):
     # Figures of reports are looked at in tests/report/test_page.py, of such a study.
     monkeypatch.setattr("seakeep.report.page._drawn", lambda drawing, folder: None)
     out = study_folder / "out"
-    assert (
-        cli.main(["study", str(study_folder / "study.toml"), "-o", str(out), "--workers", "1"]) == 0
-    )
-    told = capfd.readouterr()
-    assert "ANRMSE median" in told.out
-    assert told.out.rstrip().endswith(f"Report: {out / 'report.html'}")
-    assert "Study 4/4" in told.err
+    told, beside = command("study", study_folder / "study.toml", "-o", out, "--workers", 1)
+    assert "ANRMSE median" in told
+    assert told.rstrip().endswith(f"Report: {out / 'report.html'}")
+    assert "Study 4/4" in beside
     (out / "report.html").unlink()
-    assert cli.main(["report", str(out)]) == 0
-    assert capfd.readouterr().out.strip() == str(out / "report.html")
+    assert command("report", out)[0].strip() == str(out / "report.html")
     assert (out / "report.html").exists()
 
 
 @pytest.mark.parametrize("verb", ["study", "reproduce"])
 def test_a_scheduler_that_does_not_answer_is_told_before_any_work(
-    verb, study_folder, monkeypatch, capfd
+    verb, study_folder, monkeypatch, command
 ):
-    pytest.importorskip("distributed", reason="a Dask cluster needs distributed")
+    pytest.importorskip("distributed")
     monkeypatch.setattr(executor, "PATIENCE", 0.3)
     out = study_folder / "out"
-    arguments = ["study", str(study_folder / "study.toml")] if verb == "study" else ["reproduce"]
-    assert cli.main([*arguments, "-o", str(out), "--scheduler", "tcp://127.0.0.1:9"]) == 2
-    told = capfd.readouterr().err
+    words = [study_folder / "study.toml"] if verb == "study" else []
+    _, told = command(verb, *words, "-o", out, "--scheduler", "tcp://127.0.0.1:9", status=2)
     assert "no Dask scheduler answers at 'tcp://127.0.0.1:9'" in told
     assert "preparing" not in told
     assert "playing" not in told
@@ -74,12 +69,11 @@ def test_ctrl_c_keeps_what_is_finished_and_ends_with_130(study_folder, ctrl_c):
         "campaign/played.txt": "exists and is not a note of a campaign played",
     }.items(),
 )
-def test_reproduce_replaces_no_file_of_the_user(name, words, tmp_path, capfd):
-    pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
+def test_reproduce_replaces_no_file_of_the_user(name, words, tmp_path, command):
+    pytest.importorskip("seakeep.tank.play")
     own = tmp_path / name
     own.parent.mkdir(exist_ok=True)
     own.write_text("mine")
-    assert cli.main(["reproduce", "--quick", "-o", str(tmp_path)]) == 2
-    assert words in capfd.readouterr().err
+    assert words in command("reproduce", "--quick", "-o", tmp_path, status=2)[1]
     assert own.read_text() == "mine"
     assert not (tmp_path / "campaign" / "raw").exists()

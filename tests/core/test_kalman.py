@@ -9,6 +9,7 @@ N, S = 2, 2
 SIZE = N * (S + 1)
 A = np.array([[0.1, 0.0, -0.4, 0.2, 1.1, 0.1], [0.0, -0.1, 0.1, -0.3, 0.05, 0.9]])
 PROCESS = np.array([[0.04, 0.01], [0.01, 0.02]])
+START = np.diag(np.arange(1.0, SIZE + 1))
 
 
 def companion():
@@ -18,16 +19,16 @@ def companion():
 @pytest.mark.oracle
 def test_it_is_the_textbook_filter_with_rows_missing():
     kalman = pytest.importorskip("filterpy.kalman")
-    noise, start = np.array([0.3, 0.1]) ** 2, np.diag(np.arange(1.0, SIZE + 1))
+    noise = np.array([0.3, 0.1]) ** 2
     textbook = kalman.KalmanFilter(dim_x=SIZE, dim_z=N)
-    textbook.x, textbook.P, textbook.F = np.zeros(SIZE), start.copy(), companion()
+    textbook.x, textbook.P, textbook.F = np.zeros(SIZE), START.copy(), companion()
     textbook.Q = np.zeros((SIZE, SIZE))
     textbook.Q[-N:, -N:] = PROCESS
     rng = np.random.default_rng(3)
     measured = rng.standard_normal((120, N))
     measured[rng.uniform(size=measured.shape) < 0.3] = np.nan
     measured[40:60] = np.nan
-    ours, state = DelayFilter(A, PROCESS, noise, start), np.zeros(SIZE)
+    ours, state = DelayFilter(A, PROCESS, noise, START.copy()), np.zeros(SIZE)
     for y in measured:
         state = np.concatenate([state[N:], A @ state])
         ours.shift()
@@ -44,16 +45,15 @@ def test_it_is_the_textbook_filter_with_rows_missing():
 
 
 def test_errors_of_today_are_carried_as_the_model_carries_them():
-    covariance = np.diag(np.arange(1.0, SIZE + 1))
-    found = DelayFilter(A, PROCESS, np.zeros(N), covariance).ahead(5)
+    found = DelayFilter(A, PROCESS, np.zeros(N), START).ahead(5)
     carried = np.linalg.matrix_power(companion(), 5)
-    expected = np.diagonal(carried @ covariance @ carried.T)[-N:]
+    expected = np.diagonal(carried @ START @ carried.T)[-N:]
     np.testing.assert_allclose(found[-1], expected, rtol=1e-12)  # rounding
 
 
 @pytest.mark.parametrize(("exactly", "factors"), [(False, [0.5, 1.0]), (True, [0.5, 2.0])])
 def test_a_limit_scales_a_state_with_its_correlations(exactly, factors):
-    covariance = np.diag(np.arange(1.0, SIZE + 1)) + 0.1
+    covariance = START + 0.1
     filter_ = DelayFilter(A, PROCESS, np.zeros(N), covariance)
     filter_.limit(np.diagonal(covariance)[-N:] * [0.25, 4.0], exactly=exactly)
     scale = np.append(np.ones(SIZE - N), factors)

@@ -3,12 +3,11 @@
 import re
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
-from pages import play
+from pages import page, play
 
-PAGE = (Path(__file__).parents[2] / "docs/howto/hosts.md").read_text("utf-8")
+PAGE = page("howto/hosts.md")
 
 
 def test_the_page_runs_and_its_c_prints_what_python_does(tutorial):
@@ -16,7 +15,7 @@ def test_the_page_runs_and_its_c_prints_what_python_does(tutorial):
         pytest.importorskip(name)
     if shutil.which("cc") is None:
         pytest.skip("there is no C compiler")
-    play(PAGE, "hosts.md")
+    play(PAGE)
     programs, shells = (
         re.findall(rf"^```{kind}\n(.*?)^```$", PAGE, re.M | re.S) for kind in ("c", "sh")
     )

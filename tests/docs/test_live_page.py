@@ -1,18 +1,14 @@
 """The page on a model in service prints what it shows, and its example plays a run."""
 
-from pathlib import Path
-
 import pytest
 from loaded import loaded
-from pages import play
-
-ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs/howto/live.md").read_text("utf-8")
+from pages import page, play
+from places import ROOT
 
 
 def test_the_page_runs_and_its_example_plays_a_run(tutorial, capsys):
     pytest.importorskip("matplotlib")
-    play(PAGE, "live.md")
+    play(page("howto/live.md"))
     example = loaded(ROOT / "examples/in_service/play.py")
     example.main("model.nc", "campaign.toml", "unseen", "heave", "played.png")
     assert (tutorial / "played.png").stat().st_size > 1e4

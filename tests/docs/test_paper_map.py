@@ -2,12 +2,12 @@
 
 import importlib
 import re
-from pathlib import Path
 
 import pytest
+from pages import page
+from places import ROOT
 
-ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs/paper_map.md").read_text("utf-8")
+PAGE = page("paper_map.md")
 ROWS = [
     [each.strip() for each in line.strip("|").split("|")]
     for line in PAGE.split("## Where the paper")[0].splitlines()

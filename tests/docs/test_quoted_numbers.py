@@ -1,14 +1,12 @@
 """Numbers that a page quotes are those of the file, or of the coefficients, that they come from."""
 
 import re
-from pathlib import Path
 
 import pytest
+from pages import page
+from places import ROOT
 
-ROOT = Path(__file__).parents[2]
-TANK, STUDY = (
-    (ROOT / "docs" / name).read_text("utf-8") for name in ("virtual_tank.md", "study.md")
-)
+TANK, STUDY = page("virtual_tank.md"), page("study.md")
 
 
 def rows(text, first):

@@ -1,11 +1,10 @@
 """The pages of the campaign file and of the study file say what the settings say."""
 
-from pathlib import Path
-
 import pytest
 from loaded import loaded
+from places import ROOT
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = ROOT / "docs"
 
 
 @pytest.fixture(scope="module")

@@ -1,34 +1,28 @@
 """Every command and every Python block of the tutorial runs and prints what the page shows."""
 
-from pathlib import Path
-
 import pytest
-from pages import play
+from pages import page, play
 
-from seakeep.cli import main
-
-PAGE = (Path(__file__).parents[2] / "docs/tutorial/tutorial.md").read_text("utf-8")
+PAGE = page("tutorial/tutorial.md")
 
 
 def test_the_tutorial_runs_and_prints_what_it_shows(tutorial):
-    pytest.importorskip("matplotlib", reason="seakeep compare draws a figure")
-    pytest.importorskip("control", reason="the page exports to python-control")
-    play(PAGE, "tutorial.md")
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("control")
+    play(PAGE)
     assert (tutorial / "comparison/unseen.png").stat().st_size > 10_000
     assert (tutorial / "rom.mat").exists()
 
 
-def test_the_page_shows_the_files_and_their_draft_can_be_fitted_and_judged(tutorial, capsys):
-    pytest.importorskip("matplotlib", reason="seakeep compare draws a figure")
+def test_the_page_shows_the_files_and_their_draft_can_be_fitted_and_judged(tutorial, command):
+    pytest.importorskip("matplotlib")
     assert (tutorial / "run1.csv").read_text("utf-8").splitlines()[0] in PAGE
-    assert main(["init", "run1.csv", "run2.csv", "run3.csv", "-o", "draft.toml"]) == 0
+    command("init", "run1.csv", "run2.csv", "run3.csv", "-o", "draft.toml")
     draft = (tutorial / "draft.toml").read_text("utf-8").splitlines()
-    first = PAGE.index("```toml\n") + len("```toml\n")
-    for line in PAGE[first : PAGE.index("```", first)].splitlines():
+    for line in PAGE.partition("```toml\n")[2].partition("```")[0].splitlines():
         assert line in draft
-    assert main(["fit", "draft.toml", "-o", "draft.nc"]) == 0
-    assert main(["compare", "draft.nc", "draft.toml"]) == 0
-    printed = capsys.readouterr().out
+    fitted, _ = command("fit", "draft.toml", "-o", "draft.nc")
+    printed = fitted + command("compare", "draft.nc", "draft.toml")[0]
     for kinds in ("none", "slow_squares", "powers", "slow_squares, powers"):
         assert f"observables {kinds}, lead" in printed
     assert printed.count("(chosen)") == 1

@@ -1,17 +1,17 @@
 """The examples in service: the C estimator on a run, and a thruster that is planned."""
 
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 from loaded import loaded
+from places import ROOT
 from records import record
 from scipy import signal
 
 import seakeep
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = ROOT / "examples"
 
 
 def test_the_c_estimator_is_python_where_a_tenth_is_lost(make_run, tmp_path):

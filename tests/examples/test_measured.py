@@ -2,10 +2,10 @@
 
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 from tutorial_study import edit
 
 import seakeep
@@ -19,7 +19,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::seakeep.errors.SeakeepWarning"),
 ]
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = ROOT / "examples"
 SPAN = (0.0, 3065.0)  # s, the first 30 % of Data02
 
 
@@ -102,11 +102,11 @@ def test_tensions_are_forecast_in_a_sea_that_was_trained(section):
 @pytest.fixture(scope="module")
 def semisubmersible():
     campaign = seakeep.read_campaign(EXAMPLES / "sjtu_semisub" / "campaign.toml")
-    return campaign, fit_campaign(campaign)
+    return campaign, fit_campaign(campaign), campaign.prepare(["Data01", "Data02"])
 
 
 def test_semisubmersible_heave_runs_freely_over_the_last_30_percent(semisubmersible):
-    campaign, model = semisubmersible
+    campaign, model, _ = semisubmersible
     (judged,) = compare(model, campaign, ["Data01"])
     # The forecast ends where the waves do that the model looks ahead to, 10 s before the record.
     share = model.training.stop[0] / float(judged.forecast["time"][-1] + 10.1)
@@ -115,8 +115,8 @@ def test_semisubmersible_heave_runs_freely_over_the_last_30_percent(semisubmersi
 
 
 def test_the_offset_of_a_probe_that_stood_elsewhere_is_estimated(semisubmersible):
-    campaign, model = semisubmersible
-    run = campaign.prepare(["Data02"])["Data02"]
+    campaign, model, runs = semisubmersible
+    run = runs["Data02"]
     (judged,) = compare(model, campaign, ["Data02"])
     found = seakeep.estimate_probe_offset(model, run, SPAN)
     # The authors' phase differences between the records read as 30 to 40 m in deep water.
@@ -133,9 +133,8 @@ def test_the_offset_of_a_probe_that_stood_elsewhere_is_estimated(semisubmersible
 
 
 def test_a_constant_time_lag_stands_beside_the_offset(semisubmersible):
-    campaign, model = semisubmersible
-    run = campaign.prepare(["Data02"])["Data02"]
-    train = campaign.prepare(["Data01"])["Data01"]
+    _, model, runs = semisubmersible
+    train, run = runs.values()
     train = train.sel(time=slice(*train.attrs["train_span"]))
     # One celerity makes of a distance one lag for all frequencies; which one does not matter.
     celerity = 25.0

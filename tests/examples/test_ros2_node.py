@@ -1,7 +1,6 @@
 """The ROS 2 example: which samples become which step, and the node under a stand-in of rclpy."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from loaded import loaded
+from places import ROOT
 from scipy.spatial.transform import Rotation
 
 from seakeep import HankelDMDc
 
-EXAMPLE = Path(__file__).parents[2] / "examples/ros2_node"
+EXAMPLE = ROOT / "examples/ros2_node"
 DT = 0.05
 CLOCK = 1.7e9  # seconds since 1970, as ROS counts them
 COUNT = 60
@@ -128,43 +128,37 @@ def node(monkeypatch):
     return loaded(EXAMPLE / "node.py")
 
 
+def quaternion(angles):
+    """Of yaw, pitch and roll."""
+    from bags import message
+
+    turned = Rotation.from_euler("ZYX", angles).as_quat().tolist()
+    return message("geometry_msgs/msg/Quaternion")(**dict(zip("xyzw", turned, strict=True)))
+
+
 def recorded(path, run, samples, lost):
     """Record a run as a vessel would: odometry, and two probes, messages out of order."""
-    from bags import write_bag
-    from stand_in_ros import message
+    from bags import message, write_bag
+    from stand_in_ros import TIME
 
-    def header(stamp):
-        sec, nanosec = divmod(stamp, 10**9)
-        time = message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
-        return message("std_msgs/msg/Header")(stamp=time, frame_id="vessel")
+    def point(channel, at):
+        return message("geometry_msgs/msg/Point")(z=float(run[channel].values[at]))
 
-    def pose(at):
-        angles = [0.3, float(run["pitch"].values[at]), 0.02]  # yaw, pitch, roll
-        turned = Rotation.from_euler("ZYX", angles).as_quat()
-        quaternion = message("geometry_msgs/msg/Quaternion")(
-            **dict(zip("xyzw", map(float, turned), strict=True))
-        )
-        point = message("geometry_msgs/msg/Point")(z=float(run["heave"].values[at]))
-        return message("geometry_msgs/msg/Pose")(position=point, orientation=quaternion)
-
-    zeros, rng = [0.0] * 36, np.random.default_rng(0)
-    sent = []
+    sent, rng = [], np.random.default_rng(0)
     for at in samples:
-        stamp = int(CLOCK) * 10**9 + round(at * DT * 1e9)
-        odometry = message("nav_msgs/msg/Odometry")(
-            header=header(stamp),
-            pose=message("geometry_msgs/msg/PoseWithCovariance")(pose=pose(at), covariance=zeros),
-            twist=message("geometry_msgs/msg/TwistWithCovariance")(covariance=zeros),
-        )
-        each = {"/vessel/odometry": odometry}
+        seconds = CLOCK + at * DT
+        head = {"header": message("std_msgs/msg/Header")(stamp=TIME(seconds).to_msg())}
+        turned = quaternion([0.3, float(run["pitch"].values[at]), 0.02])
+        pose = message("geometry_msgs/msg/Pose")(position=point("heave", at), orientation=turned)
+        odometry = message("geometry_msgs/msg/PoseWithCovariance")(pose=pose)
+        each = {"/vessel/odometry": message("nav_msgs/msg/Odometry")(**head, pose=odometry)}
         for name in ("fwd", "cog"):
-            point = message("geometry_msgs/msg/Point")(z=float(run[f"eta_{name}"].values[at]))
-            each[f"/wave_probe/{name}"] = message("geometry_msgs/msg/PointStamped")(
-                header=header(stamp), point=point
-            )
+            stamped = message("geometry_msgs/msg/PointStamped")
+            each[f"/wave_probe/{name}"] = stamped(**head, point=point(f"eta_{name}", at))
         for topic, made in each.items():
             if (topic, at) not in lost:
-                sent.append((stamp + int(rng.integers(80_000_000)), topic, made))
+                received = round(1e9 * seconds) + int(rng.integers(80_000_000))
+                sent.append((received, topic, made))
     write_bag(path, sorted(sent, key=lambda each: each[0]))
 
 
@@ -209,10 +203,7 @@ def test_the_node_follows_a_recorded_bag(node, model, run, make_run, tmp_path):
 
 @pytest.mark.parametrize("turn", [(0.4, -0.2, 0.7), (0.0, np.pi / 2, 0.0), (-3.0, 0.1, 3.1)])
 def test_angles_of_a_quaternion(node, turn):
-    from stand_in_ros import message
-
-    turned = Rotation.from_euler("ZYX", turn).as_quat()
-    found = message("geometry_msgs/msg/Quaternion")(**dict(zip("xyzw", turned, strict=True)))
-    angles = [node.read(found, name) for name in ("yaw", "pitch", "roll")]
+    angles = [node.read(quaternion(turn), name) for name in ("yaw", "pitch", "roll")]
     # asin is steep where the bow points upwards.
-    np.testing.assert_allclose(Rotation.from_euler("ZYX", angles).as_quat(), turned, atol=1e-7)
+    found, turned = Rotation.from_euler("ZYX", [angles, turn]).as_quat()
+    np.testing.assert_allclose(found, turned, atol=1e-7)

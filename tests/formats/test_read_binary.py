@@ -28,24 +28,22 @@ def check(run, unit="mm"):
 NAMES = np.array(["time", "heave", "wave"], dtype=object)
 UNITS = np.array(["s", "mm", "m"], dtype=object)
 MATRIX = np.column_stack([T, HEAVE, WAVE])
+BOTH = {"heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}}
+UNTIMED = {"data": MATRIX[:, 1:], "names": NAMES[1:], "units": UNITS[1:]}
 
 
 @pytest.mark.parametrize(
     "content",
     [
-        {"time": T, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm", "wave": "m"}},
-        {"time": T[:, None], "heave": HEAVE[None, :], "wave": WAVE, "units": {"heave": "mm"}},
-        {"run": {"time": T, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}}},
+        {"time": T, **BOTH, "units": {"heave": "mm", "wave": "m"}},
+        {"time": T[:, None], **BOTH, "heave": HEAVE[None, :]},
+        {"run": {"time": T, **BOTH}},
         {"data": MATRIX, "names": NAMES, "units": UNITS},
         {"run": {"data": MATRIX, "channels": NAMES, "units": UNITS}},
-        {"time": T, "data": MATRIX[:, 1:], "names": NAMES[1:], "units": UNITS[1:]},
-        {"Fs": 20.0, "data": MATRIX[:, 1:], "names": NAMES[1:], "units": UNITS[1:]},
-        {"dt": 0.05, "heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}, "remark": "Größe"},
-        {
-            "data": {"heave": HEAVE, "wave": WAVE, "units": {"heave": "mm"}},
-            "fs": 20.0,
-            "note": True,
-        },
+        {"time": T, **UNTIMED},
+        {"Fs": 20.0, **UNTIMED},
+        {"dt": 0.05, **BOTH, "remark": "Größe"},
+        {"data": BOTH, "fs": 20.0, "note": True},
         {"data": MATRIX, "labels": np.array(["Time [s]", "heave [mm]", "wave (m)"], dtype=object)},
     ],
 )
@@ -58,16 +56,13 @@ def test_matlab(tmp_path, content, save):
     check(run.assign_coords(time=T))
 
 
-def dataset():
-    return xr.Dataset(
+@pytest.mark.parametrize("engine", ["h5netcdf", "scipy"])
+def test_netcdf(tmp_path, engine):
+    run = xr.Dataset(
         {"heave": ("time", HEAVE, {"units": "mm"}), "wave": ("time", WAVE), "depth": ((), 3.6)},
         {"time": ("time", T, {"units": "s"})},
     )
-
-
-@pytest.mark.parametrize("engine", ["h5netcdf", "scipy"])
-def test_netcdf(tmp_path, engine):
-    dataset().to_netcdf(tmp_path / "run.nc", engine=engine)
+    run.to_netcdf(tmp_path / "run.nc", engine=engine)
     check(read_table(tmp_path / "run.nc"))
 
 

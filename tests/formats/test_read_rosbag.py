@@ -10,7 +10,7 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 
 pytest.importorskip("rosbags")
 
-from bags import STORE, write_bag
+from bags import STORE, message, write_bag
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import get_types_from_msg
 
@@ -20,7 +20,6 @@ STORE.register(
         "tank_msgs/msg/Rig",
     )
 )
-TYPES = STORE.types
 BEGIN = 1_700_000_000_000_000_000  # ns
 STEP = 20_000_000  # ns
 COUNT = 100
@@ -29,25 +28,22 @@ RATE = np.sin(T)
 
 
 def header(instant):
-    stamp = TYPES["builtin_interfaces/msg/Time"](*divmod(instant, 1_000_000_000))
-    return TYPES["std_msgs/msg/Header"](stamp=stamp, frame_id="cog")
+    stamp = STORE.types["builtin_interfaces/msg/Time"](*divmod(instant, 1_000_000_000))
+    return message("std_msgs/msg/Header")(stamp=stamp)
 
 
 def imu(i, stamped=True):
-    vector, covariance = TYPES["geometry_msgs/msg/Vector3"], np.zeros(9)
-    return TYPES["sensor_msgs/msg/Imu"](
+    vector, turn = (message(f"geometry_msgs/msg/{kind}") for kind in ("Vector3", "Quaternion"))
+    return message("sensor_msgs/msg/Imu")(
         header=header(BEGIN + i * STEP if stamped else 0),
-        orientation=TYPES["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
-        orientation_covariance=covariance,
-        angular_velocity=vector(x=0.0, y=RATE[i], z=0.0),
-        angular_velocity_covariance=covariance,
-        linear_acceleration=vector(x=0.1, y=0.0, z=9.81),
-        linear_acceleration_covariance=covariance,
+        orientation=turn(w=1.0),
+        angular_velocity=vector(y=RATE[i]),
+        linear_acceleration=vector(x=0.1, z=9.81),
     )
 
 
 def rig(i, stamped=True):
-    return TYPES["tank_msgs/msg/Rig"](
+    return STORE.types["tank_msgs/msg/Rig"](
         header=header(BEGIN + i * STEP if stamped else 0),
         surge=float(i),
         loads=np.array([i, -i], dtype=np.float32),
@@ -57,27 +53,27 @@ def rig(i, stamped=True):
 
 
 def number(i):
-    return TYPES["std_msgs/msg/Float64"](data=float(i))
+    return message("std_msgs/msg/Float64")(data=float(i))
 
 
 def text(i):
-    return TYPES["std_msgs/msg/String"](data="x")
+    return message("std_msgs/msg/String")(data="x")
 
 
-def save(path, plugin=StoragePlugin.MCAP, **topics):
+def save(folder, plugin=StoragePlugin.MCAP, **topics):
     """Write topics, each a maker of messages; received 3 ms after they are stamped."""
     sent = (
         (BEGIN + i * STEP + 3_000_000, f"/{topic}", make(i))
         for topic, make in topics.items()
         for i in range(COUNT)
     )
-    return write_bag(path, sent, plugin)
+    return write_bag(folder / "bag", sent, plugin)
 
 
 @pytest.mark.parametrize("plugin", list(StoragePlugin), ids=lambda plugin: plugin.name)
 @pytest.mark.parametrize("what", ["folder", "file"])
 def test_a_standard_message(tmp_path, plugin, what):
-    path = save(tmp_path / "bag", plugin, mru=imu, note=text)
+    path = save(tmp_path, plugin, mru=imu, note=text)
     if what == "file":
         path = next(each for each in path.iterdir() if each.suffix in (".mcap", ".db3"))
     run = read_table(path)
@@ -93,14 +89,14 @@ def test_a_standard_message(tmp_path, plugin, what):
 
 
 def test_the_times_of_reception_on_request(tmp_path):
-    run = read_table(save(tmp_path / "bag", mru=imu), FileSettings(time="receive_time"))
+    run = read_table(save(tmp_path, mru=imu), FileSettings(time="receive_time"))
     np.testing.assert_allclose(run["time"], T, atol=1e-12)
     with pytest.raises(RequestError, match="the column 'time' cannot be a channel"):
         read_table(tmp_path / "bag", FileSettings(time="receive_time"), columns=["time"])
 
 
 def test_a_message_of_ones_own(tmp_path):
-    run = read_table(save(tmp_path / "bag", rig=rig))
+    run = read_table(save(tmp_path, rig=rig))
     np.testing.assert_array_equal(run["surge"], np.arange(COUNT))
     np.testing.assert_array_equal(run["loads[1]"], -np.arange(COUNT))
     assert "units" not in run["surge"].attrs
@@ -108,7 +104,7 @@ def test_a_message_of_ones_own(tmp_path):
 
 
 def test_topics(tmp_path):
-    path = save(tmp_path / "bag", mru=imu, load=number, note=text)
+    path = save(tmp_path, mru=imu, load=number, note=text)
     with pytest.raises(
         RequestError,
         match=r"several topics, each with times of its own: '/load' \(std_msgs/msg/Float64, 100 "
@@ -124,14 +120,14 @@ def test_topics(tmp_path):
 
 def test_topics_count_from_one_instant(tmp_path):
     """The recording's first message, so that channels of two topics fit together."""
-    path = save(tmp_path / "bag", early=number, mru=imu)
+    path = save(tmp_path, early=number, mru=imu)
     first = read_table(path, FileSettings(group="/early"))["time"]
     second = read_table(path, FileSettings(group="/mru"))["receive_time"]
     np.testing.assert_array_equal(first, second)
 
 
 def test_headers_that_are_not_stamped(tmp_path):
-    path = save(tmp_path / "bag", mru=lambda i: imu(i, stamped=False))
+    path = save(tmp_path, mru=lambda i: imu(i, stamped=False))
     with pytest.warns(SeakeepWarning, match="the headers of the topic '/mru' are not stamped"):
         run = read_table(path)
     np.testing.assert_allclose(run["time"], T, atol=1e-12)
@@ -141,7 +137,7 @@ def test_headers_that_are_not_stamped(tmp_path):
 
 
 def test_the_checksum_of_a_bag_follows_its_files(tmp_path):
-    path = save(tmp_path / "bag", mru=imu)
+    path = save(tmp_path, mru=imu)
     before = checksum(path)
     assert checksum(path) == before
     file = next(path.glob("*.mcap"))

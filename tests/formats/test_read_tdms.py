@@ -19,7 +19,8 @@ def channel(name, values, group="run", **properties):
     return nptdms.ChannelObject(group, name, values, properties=properties)
 
 
-def save(path, *channels):
+def save(folder, *channels):
+    path = folder / "run.tdms"
     with nptdms.TdmsWriter(path) as writer:
         writer.write_segment([nptdms.RootObject(), *channels])
     return path
@@ -27,7 +28,7 @@ def save(path, *channels):
 
 def test_waveforms(tmp_path):
     path = save(
-        tmp_path / "run.tdms",
+        tmp_path,
         channel("heave", HEAVE, **WAVEFORM),
         channel("wave", WAVE, **{**WAVEFORM, "unit_string": "m"}),
     )
@@ -41,7 +42,7 @@ def test_waveforms(tmp_path):
 
 def test_a_time_channel_and_integers(tmp_path):
     path = save(
-        tmp_path / "run.tdms",
+        tmp_path,
         channel("Time", 1e3 * T, unit_string="ms"),
         channel("count", np.arange(200, dtype=np.int16)),
         channel("remark", ["x"] * 200),
@@ -55,7 +56,7 @@ def test_a_time_channel_and_integers(tmp_path):
 def test_time_stamps_count_from_the_first(tmp_path):
     start = np.datetime64("2024-05-06T07:08:09.000000")
     stamps = start + (1e6 * T).round().astype("timedelta64[us]")
-    path = save(tmp_path / "run.tdms", channel("Time", stamps), channel("heave", HEAVE))
+    path = save(tmp_path, channel("Time", stamps), channel("heave", HEAVE))
     # Time stamps are written in microseconds here.
     np.testing.assert_allclose(read_table(path)["time"], T, atol=1e-6)
 
@@ -70,13 +71,13 @@ def test_scaled_channels(tmp_path):
         "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF,
         "wf_increment": STEP,
     }
-    path = save(tmp_path / "run.tdms", channel("load", np.arange(200, dtype=np.int32), **scale))
+    path = save(tmp_path, channel("load", np.arange(200, dtype=np.int32), **scale))
     np.testing.assert_array_equal(read_table(path)["load"], 10 + 0.5 * np.arange(200))
 
 
 def test_groups(tmp_path):
     path = save(
-        tmp_path / "run.tdms",
+        tmp_path,
         channel("heave", HEAVE, **WAVEFORM),
         channel("load", np.arange(2000.0), "loads", wf_increment=0.005),
     )

@@ -14,6 +14,8 @@ from seakeep.errors import DataError, RequestError, SeakeepWarning
 
 PLAIN = "Time [s],Heave [mm],Pitch (deg),WP 1\n0,1.5,2,3\n0.1,-1.5,2e-3,4\n0.2,.5,+2,5\n"
 
+ROWS = PLAIN.split("\n", 1)[1]
+
 
 def write(folder, text, name="run.csv", encoding="utf-8"):
     path = folder / name
@@ -24,10 +26,9 @@ def write(folder, text, name="run.csv", encoding="utf-8"):
 def check_plain(run):
     assert list(run.data_vars) == ["Heave", "Pitch", "WP 1"]
     assert run["Heave"].dims == ("time",)
-    np.testing.assert_array_equal(run["time"], [0.0, 0.1, 0.2])
-    np.testing.assert_array_equal(run["Heave"], [1.5, -1.5, 0.5])
-    np.testing.assert_array_equal(run["Pitch"], [2, 2e-3, 2])
-    np.testing.assert_array_equal(run["WP 1"], [3, 4, 5])
+    values = {"time": [0.0, 0.1, 0.2], "Heave": [1.5, -1.5, 0.5], "Pitch": [2, 2e-3, 2]}
+    for name, expected in (values | {"WP 1": [3, 4, 5]}).items():
+        np.testing.assert_array_equal(run[name], expected)
     units = {str(name): each.attrs.get("units") for name, each in run.items()}
     assert units == {"Heave": "mm", "Pitch": "deg", "WP 1": None}
 
@@ -50,10 +51,10 @@ def with_comma(text):
         "# a remark\n# another, with a comma\n" + PLAIN,
         "% MATLAB's mark\n\n" + PLAIN + "\n\n",
         PLAIN.replace("\n", ",\n"),
-        '"Time [s]","Heave [mm]","Pitch (deg)","WP 1"\n' + PLAIN.split("\n", 1)[1],
-        "Time,Heave,Pitch,WP 1\ns,mm,deg,\n" + PLAIN.split("\n", 1)[1],
-        "Time,Heave,Pitch,WP 1\n[s],[mm],[deg],\n" + PLAIN.split("\n", 1)[1],
-        "Time;Heave;Pitch;WP 1\ns;mm;deg;\n" + with_comma(PLAIN).split("\n", 1)[1],
+        '"Time [s]","Heave [mm]","Pitch (deg)","WP 1"\n' + ROWS,
+        "Time,Heave,Pitch,WP 1\ns,mm,deg,\n" + ROWS,
+        "Time,Heave,Pitch,WP 1\n[s],[mm],[deg],\n" + ROWS,
+        "Time;Heave;Pitch;WP 1\ns;mm;deg;\n" + with_comma(ROWS),
     ],
 )
 def test_dialects(tmp_path, text):
@@ -265,7 +266,7 @@ HEADS = {
 
 @pytest.mark.parametrize("head", HEADS.values(), ids=HEADS)
 def test_heads_of_loggers(tmp_path, head):
-    run = read_table(write(tmp_path, head + PLAIN.split("\n", 1)[1]))
+    run = read_table(write(tmp_path, head + ROWS))
     assert run["Heave"].attrs["units"] == "mm"
     assert run["Pitch"].attrs["units"] == "deg"
     np.testing.assert_array_equal(run["WP 1"], [3, 4, 5])

@@ -4,10 +4,14 @@ import numpy as np
 from records import record
 from seas import Sea
 
+from seakeep import ProbeAlignment, SlowSquares
+
 DT, DEPTH = 0.1, 3.6
 POSITIONS = {"eta_fwd": 48.42, "eta_cog": 52.09}
 STATES, INPUTS = ["surge", "heave"], ["eta_fwd", "eta_cog"]
 LINE, LOAD_NOISE = -1.33, 0.5  # m from the last probe, N
+FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
+SQUARES = SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
 
 
 def drifting_run(seed=0, samples=1500, moved=0.0):

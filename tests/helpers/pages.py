@@ -6,15 +6,12 @@ import re
 import shlex
 import warnings
 
+from places import ROOT
+
 from seakeep.cli import main
 from seakeep.errors import SeakeepWarning
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-
-
-def blocks_of(page):
-    """Console, Python and text blocks of a page, in its order."""
-    return re.findall(r"^```(console|python|text)\n(.*?)^```$", page, flags=re.M | re.S)
 
 
 def shown(text):
@@ -56,18 +53,23 @@ def run_console(block):
     return out.getvalue()
 
 
-def play(page, name):
+def page(name):
+    """Text of a page of the documentation."""
+    return (ROOT / "docs" / name).read_text("utf-8")
+
+
+def play(page):
     """Run the console and Python blocks of a page; a text block after one must show its output."""
     printed, names = "", {}
-    for kind, content in blocks_of(page):
+    for kind, content in re.findall(r"^```(\w+)\n(.*?)^```$", page, flags=re.M | re.S):
         if kind == "console":
             printed = run_console(content)
         elif kind == "python":
             out = io.StringIO()
             with contextlib.redirect_stdout(out), warnings.catch_warnings():
                 warnings.simplefilter("ignore", SeakeepWarning)  # of an unstable model
-                exec(compile(content, name, "exec"), names)  # the page is ours
+                exec(content, names)  # the page is ours
             printed = out.getvalue()
-        elif printed:
+        elif printed and kind == "text":
             check(content, printed)
             printed = ""

@@ -3,31 +3,10 @@
 import sys
 from types import ModuleType, SimpleNamespace
 
-import numpy as np
-from bags import STORE
+from bags import STORE, message
 from rosbags.rosbag2 import Reader
 
 SECOND = 1_000_000_000  # ns
-
-
-def message(kind):
-    """Class of a message as ROS generates it: fields by keyword, with defaults."""
-    zeros = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}
-
-    def filled(field, given):
-        node, content = field
-        if node.name == "NAME":
-            return message(content)() if given is None else given
-        if node.name == "BASE":
-            return zeros.get(content[0], 0) if given is None else given
-        is_float = content[0][1][0] == "float64"
-        return np.array(given or [], dtype=float) if is_float else list(given or [])
-
-    def made(**given):
-        fields = STORE.fielddefs[kind][1]
-        return STORE.types[kind](**{name: filled(each, given.get(name)) for name, each in fields})
-
-    return made
 
 
 def instant(kind):
@@ -38,6 +17,9 @@ def instant(kind):
         return SimpleNamespace(to_msg=lambda: message(kind)(sec=sec, nanosec=nanosec))
 
     return of
+
+
+TIME = instant("builtin_interfaces/msg/Time")
 
 
 class Node:
@@ -102,7 +84,7 @@ def install(monkeypatch):
         "rclpy.duration": {"Duration": instant("builtin_interfaces/msg/Duration")},
         "rclpy.node": {"Node": Node},
         "rclpy.qos": {"qos_profile_sensor_data": None},
-        "rclpy.time": {"Time": instant("builtin_interfaces/msg/Time")},
+        "rclpy.time": {"Time": TIME},
         "rosidl_runtime_py": {},
         "rosidl_runtime_py.utilities": {"get_message": lambda kind: kind},
         "sensor_msgs": {},

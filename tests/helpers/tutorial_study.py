@@ -1,14 +1,14 @@
 """A study of one's own on the tutorial's campaign."""
 
 import shutil
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from places import ROOT
 
 from seakeep.models.labelled import nearest_sample
 
-TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
+TUTORIAL = ROOT / "docs/tutorial"
 STUDY = """
 [study]
 campaign = "campaign.toml"

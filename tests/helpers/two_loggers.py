@@ -1,7 +1,5 @@
 """A small campaign of two loggers, and models of it."""
 
-from __future__ import annotations
-
 import numpy as np
 from seas import sea
 from small_tank import write_csv

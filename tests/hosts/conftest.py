@@ -65,16 +65,16 @@ def case_of(model, run):
 def cases():
     runs = {f"run{seed}": sea_run(seed) for seed in range(3)}
     kept = {"delay_rows": "exact", "readouts": {"load": "auto"}}
-    full = HankelDMDc(3, 6, 1.0, lead=5, observables=OBSERVABLES).fit(runs, STATES, INPUTS)
-    short = HankelDMDc(2, 4, 1e-3, memory=21, **kept).fit(runs, STATES, INPUTS)
-    models = {
-        "full": full,
-        "short": short,
-        "arx": ARX(0, 0).fit(runs, STATES, INPUTS),
-        "powers": HankelDMDc(3, 6, 1.0, observables=POWERS).fit(runs, STATES, INPUTS),
-        "autonomous": HankelDMDc(4, 0, 1.0, delay_rows="exact").fit(runs, STATES, []),
-        "unstable": replace(short, coefficients=1.3 * short.coefficients),
+    specs = {
+        "full": HankelDMDc(3, 6, 1.0, lead=5, observables=OBSERVABLES),
+        "short": HankelDMDc(2, 4, 1e-3, memory=21, **kept),
+        "arx": ARX(0, 0),
+        "powers": HankelDMDc(3, 6, 1.0, observables=POWERS),
     }
+    models = {name: spec.fit(runs, STATES, INPUTS) for name, spec in specs.items()}
+    autonomous, short = HankelDMDc(4, 0, 1.0, delay_rows="exact"), models["short"]
+    models["autonomous"] = autonomous.fit(runs, STATES, [])
+    models["unstable"] = replace(short, coefficients=1.3 * short.coefficients)
     made = {name: case_of(model, sea_run(9)) for name, model in models.items()}
     # Of a vessel that drifts: by waves ahead, and by those that the probe up-wave has seen.
     drifting, test = [drifting_run(seed) for seed in (1, 2)], drifting_run(7)

@@ -4,71 +4,64 @@ import pytest
 from drifting import INPUTS, STATES, drifting_run
 
 import seakeep
-from seakeep import HankelDMDc, ProbeAlignment, RequestError, cli
+from seakeep import HankelDMDc, ProbeAlignment, RequestError
 from seakeep.hosts import write_estimator
 from seakeep.hosts.program import exportable, timing
 
 
 @pytest.fixture
-def run(cases, tmp_path, monkeypatch, capsys):
-    cases["full"].model.save(tmp_path / "my-model.nc")
+def run(tmp_path, monkeypatch, command):
+    """Save a model, export it, and tell what the command said."""
     monkeypatch.chdir(tmp_path)
 
-    def call(*words):
-        status = cli.main(["export", "my-model.nc", *words])
-        return status, capsys.readouterr().err
+    def call(model, words, status=0):
+        model.save("my-model.nc")
+        return command("export", "my-model.nc", *words.split(), status=status)[1]
 
     return call
 
 
-def test_sources_take_the_name_of_the_model_and_the_instants_are_told(run, tmp_path):
-    status, said = run("--c", "library")
-    assert status == 0
+def heave_model(make_run, **settings):
+    return HankelDMDc(4, 8, 1.0, **settings).fit(make_run(), ["heave"], ["eta_fwd"])
+
+
+def test_sources_take_the_name_of_the_model_and_the_instants_are_told(run, cases, tmp_path):
+    said = run(cases["full"].model, "--c library")
     assert {path.name for path in (tmp_path / "library").iterdir()} == {"my_model.c", "my_model.h"}
     lead = "A step of 0.1 s takes the inputs 16 samples (1.6 s) after the instant that it starts"
     assert lead in said
 
 
-def test_a_reduced_order_is_of_the_matrices_alone_and_states_its_error(make_run, tmp_path, capsys):
-    HankelDMDc(4, 8, 1.0, stable=True).fit(make_run(), ["heave"], ["eta_fwd"]).save(
-        tmp_path / "m.nc"
-    )
-    words = ["export", str(tmp_path / "m.nc"), "--mat", str(tmp_path / "m.mat"), "--order", "4"]
-    assert cli.main(words) == 0
-    assert "The system of order 4 errs by" in capsys.readouterr().err
-    assert cli.main([*words, "--c", str(tmp_path), "--estimator"]) == 2
-    assert "--order reduces the linear system of --mat; an estimator" in capsys.readouterr().err
+def test_a_reduced_order_is_of_the_matrices_alone_and_states_its_error(make_run, run):
+    model, words = heave_model(make_run, stable=True), "--mat m.mat --order 4"
+    assert "The system of order 4 errs by" in run(model, words)
+    said = run(model, f"{words} --c . --estimator", 2)
+    assert "--order reduces the linear system of --mat; an estimator" in said
 
 
-def test_an_estimator_knows_the_noise_and_the_roles_of_the_command(make_run, tmp_path, capsys):
-    model = HankelDMDc(4, 8, 1.0).fit(make_run(), ["heave"], ["eta_fwd"])
-    model.save(tmp_path / "m.nc")
-    words = ["export", str(tmp_path / "m.nc"), "--c", str(tmp_path / "c")]
-    service = ["--estimator", "--noise", "heave=0.25", "--role", "eta_fwd=known"]
-    assert cli.main([*words, *service]) == 0
+def test_an_estimator_knows_the_noise_and_the_roles_of_the_command(make_run, run, tmp_path):
+    model, noise = heave_model(make_run), "--c c --noise heave=0.25"
+    service = f"{noise} --estimator --role eta_fwd=known"
+    run(model, service)
     stated = {"noise": {"heave": 0.25}, "roles": {"eta_fwd": "known"}}
-    for path in write_estimator(model, tmp_path / "python", "m", **stated):
+    for path in write_estimator(model, tmp_path / "python", "my_model", **stated):
         assert path.read_text() == (tmp_path / "c" / path.name).read_text()
-    capsys.readouterr()
-    for wrong, message in (
-        (service[1:], "--noise and --role belong to --estimator"),
-        ([*service[:2], "heave"], "--noise takes STATE=SD, such as heave=0.002"),
-        ([*service, "--role", "eta_fwd"], "received heave=0.25, eta_fwd=known, eta_fwd."),
-        ([*service, "--role", "eta_fwd=plan"], "role of eta_fwd"),
-    ):
-        assert cli.main([*words, *wrong]) == 2
-        assert message in capsys.readouterr().err
+    for wrong, message in {
+        noise: "--noise and --role belong to --estimator",
+        "--c c --estimator --noise heave": "--noise takes STATE=SD, such as heave=0.002",
+        f"{service} --role eta_fwd": "received heave=0.25, eta_fwd=known, eta_fwd.",
+        f"{service} --role eta_fwd=plan": "role of eta_fwd",
+    }.items():
+        assert message in run(model, wrong, 2)
 
 
-def test_an_ensemble_is_no_estimator_nor_is_a_member(make_run, tmp_path, capsys):
+def test_an_ensemble_is_no_estimator_nor_is_a_member(make_run, run):
     ensemble = seakeep.BayesianHankelDMDc(
         window=None, state_delays=2, input_delays=4, ridge=seakeep.Uniform(1, 2), n_members=2
     ).fit(make_run(), ["heave"], ["eta_fwd"])
-    ensemble.save(tmp_path / "m.nc")
-    words = ["export", str(tmp_path / "m.nc"), "--c", str(tmp_path), "--estimator"]
-    for more in ((), ("--member", "0")):
-        assert cli.main([*words, *more]) == 2
-        assert "Fit a single model of the same runs" in capsys.readouterr().err
+    for more in ("", " --member 0"):
+        said = run(ensemble, f"--c . --estimator{more}", 2)
+        assert "Fit a single model of the same runs" in said
 
 
 def test_waves_that_no_host_can_carry_are_refused_with_the_way_out(make_run, channels):
@@ -88,9 +81,8 @@ def test_waves_that_no_host_can_carry_are_refused_with_the_way_out(make_run, cha
         model.to_state_space()
 
 
-def test_an_fmu_without_a_compiler_is_announced(run, monkeypatch, tmp_path):
+def test_an_fmu_without_a_compiler_is_announced(run, cases, monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
-    status, said = run("--fmu", "rom.fmu")
-    assert status == 0
+    said = run(cases["full"].model, "--fmu rom.fmu")
     assert "rom.fmu holds sources alone: no C compiler was found" in said

@@ -72,6 +72,15 @@ class Estimator:
     def state(self):
         return np.array(self.calls["estimated"](self.memory)[: self.count])
 
+    def beside(self, live, u, y):
+        """Estimates after a sample, in C and in Python."""
+        assert self.step(u, y) == 0
+        return self.state, live.step(u, y)
+
+    @property
+    def validity(self):
+        return self.calls["validity"](self.memory)
+
     @property
     def deviations(self):
         return np.array([self.calls["deviation"](self.memory, each) for each in (0, 1)])
@@ -80,6 +89,11 @@ class Estimator:
         mean, std = out = np.empty((2, steps, self.count))
         known = None if future is None else pointer(future)
         return self.calls["forecast"](self.memory, steps, known, pointer(mean), pointer(std)), out
+
+
+def beside_a_constant(model, folder):
+    """Estimators in C and in Python, of a wave beside an input that is none."""
+    return Estimator(built(model, folder, roles=ROLES), "rom"), model.live(roles=ROLES)
 
 
 def moments(forecast, states):
@@ -96,10 +110,8 @@ def measured(run, model, lost_inputs=True):
     lost[:8], lost[150:200, 0], lost[230:310] = True, True, True
     y[lost] = np.nan
     if lost_inputs:
-        u[[30, 160, 161, 162], 1:], u[[*range(268, 280), *range(302, 310), *range(315, 320)]] = (
-            np.nan,
-            np.nan,
-        )
+        u[[30, 160, 161, 162], 1:] = np.nan
+        u[[*range(268, 280), *range(302, 310), *range(315, 320)]] = np.nan
     return u, y
 
 
@@ -113,14 +125,13 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
     # The same sums in another order.
     close = {"rtol": 0, "atol": 1e-12}
     for at in range(COUNT - 30):
-        assert found.step(u[at], y[at]) == 0
-        np.testing.assert_allclose(found.state, live.step(u[at], y[at]), **close)
+        np.testing.assert_allclose(*found.beside(live, u[at], y[at]), **close)
         if at > 20:
             expected = np.sqrt(np.maximum(np.diagonal(live.covariance), 0.0))
             np.testing.assert_allclose(found.deviations, expected, rtol=1e-9, atol=1e-12)
         if at in (190, 305, 317, 640):
             lost = live.validity & Validity.LOST
-            assert found.calls["validity"](found.memory) & Validity.LOST == lost
+            assert found.validity & Validity.LOST == lost
             assert bool(lost) == (lost_inputs and at in (305, 317))
         if at in (5, 190, 290, 309, 317, 320, 325, 640):
             status, forecast = found.forecast(30, u[at + 1 : at + 30])
@@ -147,11 +158,10 @@ def test_each_estimate_and_forecast_is_that_of_the_live_model(
 def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
     model, make_run, tmp_path
 ):
-    found, live = Estimator(built(model, tmp_path, roles=ROLES), "rom"), model.live(roles=ROLES)
+    found, live = beside_a_constant(model, tmp_path)
     u, y = measured(make_run(COUNT, 5), model)
     for at in range(325):  # u[315:320] is lost
-        found.step(u[at], y[at])
-        live.step(u[at], y[at])
+        found.beside(live, u[at], y[at])
     plan = np.full((29, 2), np.nan)
     plan[3:, 1] = np.linspace(0, 1, 26)
     expected = moments(live.forecast(30, {"eta_cog": plan[:, 1]}), STATES)
@@ -160,13 +170,12 @@ def test_a_plan_of_a_known_input_is_followed_beside_a_wave_that_is_predicted(
 
 def test_an_input_that_is_no_wave_is_not_judged(library, model, make_run, tmp_path):
     wave = (Estimator(library, "exact"), model.live())
-    constant = (Estimator(built(model, tmp_path, roles=ROLES), "rom"), model.live(roles=ROLES))
+    constant = beside_a_constant(model, tmp_path)
     u, y = measured(make_run(COUNT, 5), model, False)
     for at in range(300):
         for found, live in (wave, constant):
-            found.step(u[at] * [1, 3], y[at])
-            live.step(u[at] * [1, 3], y[at])
-    outside = [found.calls["validity"](found.memory) for found, _ in (wave, constant)]
+            found.beside(live, u[at] * [1, 3], y[at])
+    outside = [found.validity for found, _ in (wave, constant)]
     assert outside == [live.conditions.validity for _, live in (wave, constant)]
     assert outside[0] & Validity.HEIGHT
     assert outside[1] == 0
@@ -176,10 +185,9 @@ def test_a_probe_that_stands_still_is_predicted_to(library, model):
     live, found = model.live(), Estimator(library, "exact")
     for at in range(12):
         u = np.full(2, 0.25 if at < 8 else np.nan)  # no rounding hides 0/0
-        assert found.step(u, np.full(2, 0.1 * at)) == 0
-        live.step(u, np.full(2, 0.1 * at))
-    found.step(np.zeros(2), np.full(2, np.nan))  # reads the inputs that were predicted
-    np.testing.assert_allclose(found.state, live.step(np.zeros(2)), rtol=0, atol=1e-12)
+        found.beside(live, u, np.full(2, 0.1 * at))
+    last = found.beside(live, np.zeros(2), np.full(2, np.nan))  # reads what was predicted
+    np.testing.assert_allclose(*last, rtol=0, atol=1e-12)
 
 
 def test_a_bad_sample_leaves_the_estimator_as_it_was(library):
@@ -232,18 +240,17 @@ def test_it_runs_clean_under_sanitizers_without_a_heap(sources, library, model, 
 
 def test_what_lies_outside_the_training_is_that_of_the_live_model(cases, tmp_path):
     case = cases["following"]
-    model, library, every = case.model, built(case.model, tmp_path), case.run.to_dataframe()
+    model, library = case.model, built(case.model, tmp_path)
     for factor, slow, away in ((1, False, 0), (2.5, False, 0), (1, True, 0), (1, False, 9)):
         found, live = Estimator(library, "rom"), model.live()
-        u, y = (every[names].to_numpy(copy=True) for names in (model.inputs, model.states))
+        u, y = table(case.run, model.inputs), table(case.run, model.states)
         if slow:  # a swell of 0.24 Hz
             u[:] = 0.02 * np.sin(0.15 * np.arange(len(u)))[:, None]
         for at in range(300):
-            row = factor * u[at], y[at] + away * (np.array(model.states) == "surge")
-            found.step(*row)
-            live.step(*row)
+            place = y[at] + away * (np.array(model.states) == "surge")
+            found.beside(live, factor * u[at], place)
         validity = live.conditions.validity
-        assert found.calls["validity"](found.memory) == validity
+        assert found.validity == validity
         assert bool(validity) == ((factor, slow, away) != (1, False, 0))
 
 
@@ -271,8 +278,7 @@ def test_every_model_that_is_exported_is_followed(cases, name, noise, tmp_path):
     # The same sums in another order, through gains of the order of ten.
     close = {"rtol": 0, "atol": (1e-10 if "following" in name else 1e-12) * np.nanmax(np.abs(y))}
     for at in range(340):
-        assert found.step(u[at], y[at]) == 0
-        np.testing.assert_allclose(found.state, live.step(u[at], y[at]), **close, err_msg=str(at))
+        np.testing.assert_allclose(*found.beside(live, u[at], y[at]), **close, err_msg=str(at))
         if at in (148, 190, 290, 309, 317, 339):
             given = live._known_inputs()[-40:]  # of 40 samples before
             for known in (None, given) if model.inputs else (None,):

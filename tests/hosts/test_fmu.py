@@ -44,6 +44,14 @@ def start_values(case):
     return found
 
 
+WAVES = ("eta", "'wave probe'")
+
+
+def given(rows, names):
+    """Inputs of a simulation, as fmpy takes them."""
+    return np.array(rows, dtype=[(name, float) for name in ("time", *names)])
+
+
 @pytest.fixture
 def slave(fmu, unpacked, cases):
     """The FMU past its initialization."""
@@ -82,13 +90,12 @@ def test_fmpy_finds_no_fault(fmu):
 def test_fmpy_simulates_what_forecast_arrays_forecasts(fmu, cases):
     case = cases["full"]
     steps, dt = len(case.expected), case.model.dt
-    fields = [("time", float), *((name, float) for name in ("eta", "'wave probe'"))]
     rows = [(step * dt, *u) for step, u in enumerate(case.u[case.rows :])]
     result = fmpy.simulate_fmu(
         str(fmu),
         stop_time=steps * dt,
         start_values=start_values(case),
-        input=np.array(rows, dtype=fields),
+        input=given(rows, WAVES),
     )
     found = np.stack([result[name] for name in case.model.states], axis=1)
     np.testing.assert_array_equal(found[0], case.x_history[-1])
@@ -184,13 +191,13 @@ def test_a_unit_that_follows_estimates_and_forecasts_as_the_live_model_with_samp
     u, y = (0.1 * rng.standard_normal((count, size)) for size in (2, 2))
     for each in (u, y):  # a tenth is lost
         each[rng.random(each.shape) < 0.1] = np.nan
-    names = ["eta", "'wave probe'", *(f"measured.{state}" for state in model.states)]
+    names = [*WAVES, *(f"measured.{state}" for state in model.states)]
     rows = [(at * dt, *u[at], *y[at]) for at in range(count)]
     coming = [f"{k}.{x}[{n}]" for k in ("ahead", "std") for n in (1, 2, 3) for x in model.states]
     result = fmpy.simulate_fmu(
         str(unit),
         stop_time=count * dt,
-        input=np.array(rows, dtype=[("time", float), *((name, float) for name in names)]),
+        input=given(rows, names),
         output=[*model.states, *coming],
     )
     live = model.live()

@@ -3,19 +3,16 @@
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import DEPTH, INPUTS, POSITIONS, STATES
+from drifting import DEPTH, FOLLOWED, INPUTS, POSITIONS, SQUARES, STATES
 from ensembles import few
 from records import table
 
-import seakeep
 from seakeep import HankelDMDc, RequestError
 from seakeep.models.engine import Windows
 from seakeep.models.growth import LeadErrors, weigh_members, weighed
 from seakeep.models.inputs import Scale
 from seakeep.signals.prediction import foresee
 
-PREDICTED = seakeep.ProbeAlignment(mode="dispersion", surge="predicted")
-SQUARES = seakeep.SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
 START, STEPS, LEAD = 20.0, 40, 6
 
 
@@ -28,10 +25,23 @@ def model_of(drifts, **settings):
 def model(request, drifts):
     settings = {
         "plain": {},
-        "aligned": {"alignment": PREDICTED},
-        "observed": {"alignment": PREDICTED, "observables": (SQUARES,)},
+        "aligned": {"alignment": FOLLOWED},
+        "observed": {"alignment": FOLLOWED, "observables": (SQUARES,)},
     }
     return model_of(drifts, **settings[request.param])
+
+
+def up_to(run, last):
+    """Samples up to the last one that is named."""
+    return run.isel(time=slice(0, last + 1))
+
+
+def unplaced(run):
+    """A run that does not say where its probes stand, as arrays do not."""
+    run = run.copy()
+    for name in INPUTS:
+        del run[name].attrs["x_position"]
+    return run
 
 
 def reads_until(model, run):
@@ -42,13 +52,13 @@ def reads_until(model, run):
 
 def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
     last = reads_until(model, drift) - 10
-    short = drift.isel(time=slice(0, last + 1))
+    short = up_to(drift, last)
     with pytest.raises(RequestError, match="ahead = 'predict' continues the input"):
         model.forecast(short, START, STEPS)
     found = model.forecast(short, START, STEPS, ahead="predict")
     assert found.sizes["time"] == STEPS
     # By hand: the probes continued, everything after the start but waves thrown away.
-    long = drift.isel(time=slice(0, last + 11)).copy(deep=True)
+    long = up_to(drift, last + 10).copy(deep=True)
     waves = foresee(
         table(short, INPUTS),
         10,
@@ -75,7 +85,7 @@ def test_missing_waves_are_those_of_a_record_that_was_continued(model, drift):
 def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift):
     model = model_of(drifts)
     last = reads_until(model, drift) - 10
-    short = drift.isel(time=slice(0, last + 1))
+    short = up_to(drift, last)
     found = model.forecast(short, START, STEPS, ahead="predict")
     whole = model.forecast(drift, START, STEPS, ahead="predict")
     xr.testing.assert_identical(whole, model.forecast(drift, START, STEPS))  # nothing is missing
@@ -90,9 +100,7 @@ def test_the_status_says_from_when_and_before_that_nothing_changes(drifts, drift
 def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
     ensemble = few(n_members=3, lead=LEAD).fit(drifts, STATES, INPUTS)
     last = reads_until(ensemble, drift) - 4
-    short = drift.isel(time=slice(0, last + 1)).copy()
-    for name in INPUTS:  # arrays do not say where their probes stand
-        del short[name].attrs["x_position"]
+    short = unplaced(up_to(drift, last))
     members = ensemble.forecast(short, START, STEPS, ahead="predict")
     words = members.attrs["status"]
     assert words == f"ok, input predicted from t = {members.attrs['input_predicted_from']:g} s"
@@ -121,13 +129,11 @@ def test_ensembles_windows_and_arrays_predict_alike(drifts, drift):
 @pytest.mark.parametrize("positions", [True, False])
 def test_no_lead_errs_more_than_the_mean(drifts, drift, positions):
     model, steps = model_of(drifts), 150
-    run = drift.copy(deep=True)
-    for name in INPUTS * (not positions):
-        del run[name].attrs["x_position"]
+    run = drift if positions else unplaced(drift)
     squares, mean = np.zeros((2, steps)), model.state_scale.centre[1]
     for at in range(300, 1300, 25):
         start, true = float(run.time[at]), run.heave.values[at + 1 : at + 1 + steps]
-        found = model.forecast(run.isel(time=slice(0, at + 1)), start, steps, ahead="predict")
+        found = model.forecast(up_to(run, at), start, steps, ahead="predict")
         squares += (found.heave.values - true) ** 2, (mean - true) ** 2
     ratio = np.sqrt(squares[0] / squares[1])
     # Unweighted, it is 1.4 and stays so.
@@ -184,9 +190,7 @@ def test_arrays_and_windows_are_weighed_where_waves_are_predicted_alone(drifts, 
     model, at, steps = model_of(drifts), 400, 250
     # Waves are known for longer than a forecast without them is trusted.
     start, last = float(drift.time[at]), at + 100
-    short = drift.isel(time=slice(0, last + 1)).copy()
-    for name in INPUTS:  # arrays do not say where their probes stand
-        del short[name].attrs["x_position"]
+    short = unplaced(up_to(drift, last))
     x, u = table(short, STATES), table(short, INPUTS)
     found = model.forecast_arrays(x[: at + 1], u[: at + 1], u[at + 1 :], steps, ahead="predict")
     known = table(model.forecast(drift, start, steps), STATES)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import INPUTS, POSITIONS, STATES, drifting_run, heave_error
+from drifting import FOLLOWED, INPUTS, POSITIONS, STATES, drifting_run, heave_error
 from ensembles import few
 from records import table
 
@@ -23,7 +23,7 @@ def models(drifts):
         "rest": ProbeAlignment(mode="dispersion", surge="none"),
         "dispersion": ProbeAlignment(mode="dispersion", surge="measured"),
         "effective": ProbeAlignment(mode="effective", surge="measured"),
-        "predicted": ProbeAlignment(mode="dispersion", surge="predicted"),
+        "predicted": FOLLOWED,
     }
     return {key: spec(each).fit(drifts, STATES, INPUTS) for key, each in settings.items()}
 
@@ -53,8 +53,10 @@ def test_a_linear_system_takes_what_the_model_aligned(models, drift):
 def test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for(drifts):
     own = [run.assign_attrs(celerity=c) for run, c in zip(drifts, (2.5, 3.0), strict=True)]
     slow = drifting_run(7).assign_attrs(celerity=2.0)
-    model = spec(ProbeAlignment(mode="effective")).fit(own, STATES, INPUTS)
-    common = spec(ProbeAlignment(mode="effective", celerity="common")).fit(own, STATES, INPUTS)
+    model, common, stated = (
+        spec(ProbeAlignment(mode="effective", **each)).fit(own, STATES, INPUTS)
+        for each in ({}, {"celerity": "common"}, {"celerity": 2.0})
+    )
     # The mean slowness of the training runs is that of no run.
     mean = 2 / (1 / 2.5 + 1 / 3.0)
     for found, expected in ((model, 2.0), (common, mean)):
@@ -62,7 +64,6 @@ def test_each_run_is_carried_at_its_own_celerity_unless_one_is_asked_for(drifts)
         assert found.alignment.celerity_of(slow) == pytest.approx(expected)
         attrs = found.forecast(slow, start=60.0, steps=10).attrs
         assert attrs["alignment_celerity"] == pytest.approx(expected)
-    stated = spec(ProbeAlignment(mode="effective", celerity=2.0)).fit(own, STATES, INPUTS)
     xr.testing.assert_allclose(model.aligned_inputs(slow), stated.aligned_inputs(slow))
     assert model.alignment.celerity_of(drifting_run(8)) == pytest.approx(mean)
 

@@ -32,6 +32,7 @@ def ensemble(run):
 
 
 SCALES = ["spread", "constant", "learnt"]
+of_each_scale = pytest.mark.parametrize("scale", SCALES)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,18 @@ def bands(ensemble, run):
     return {scale: ensemble.calibrate(part, steps=40, scale=scale) for scale in SCALES}
 
 
-@pytest.mark.parametrize("scale", SCALES)
+def wide_of(ensemble, run):
+    return ensemble.forecast_summary(run, 120.0, 30, band="calibrated")
+
+
+def assert_kept(kept, ensemble, members):
+    """Members of an ensemble are what is left, and forecast as they did."""
+    run = sea(3, 300, "other")
+    found, every = (table(each.forecast(run, 10.0, 40), STATES) for each in (kept, ensemble))
+    np.testing.assert_array_equal(found, every[members])
+
+
+@of_each_scale
 def test_the_calibrated_band_covers_unseen_windows_as_it_says(bands, run, scale):
     inside = {"members": [], "calibrated": []}
     for start in np.arange(112.0, 155.0, 4.0):
@@ -57,7 +69,7 @@ def test_the_calibrated_band_covers_unseen_windows_as_it_says(bands, run, scale)
 def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run):
     calibrated = bands["spread"]
     plain = ensemble.forecast_summary(run, 120.0, 30)
-    wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
+    wide = wide_of(calibrated, run)
     found = calibrated.calibration
     mean, std, *_ = table(plain, STATES)
     assert np.all(4 * found.floor > 1.5)  # the noise alone
@@ -70,7 +82,7 @@ def test_the_band_is_a_factor_times_the_spread_with_a_floor(bands, ensemble, run
 def test_bounds_are_moved_by_a_constant_margin_and_nothing_else(bands, ensemble, run):
     calibrated = bands["constant"]
     plain = ensemble.forecast_summary(run, 120.0, 30)
-    wide = calibrated.forecast_summary(run, 120.0, 30, band="calibrated")
+    wide = wide_of(calibrated, run)
     margin = calibrated.calibration.conformal.margin
     assert (margin > 0).all()
     sides = np.array([0, 0, -1, 1])[:, None, None] + np.zeros((30, 1))
@@ -108,7 +120,7 @@ def test_no_window_touches_what_a_member_has_read(ensemble, bands, run):
 
 def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(bands, run):
     learnt = bands["learnt"]
-    one = learnt.forecast_summary(run, 120.0, 30, band="calibrated")
+    one = wide_of(learnt, run)
     several = learnt.summarize_windows(run, [115.0, 120.0], 30, band="calibrated")
     x, u = table(run, STATES), table(run, INPUTS)
     arrays = learnt.hold().forecast_arrays(x[:1201], u[:1201], u[1201:1230], 30, band="calibrated")
@@ -121,13 +133,10 @@ def test_a_learnt_band_is_the_same_of_windows_of_held_members_and_of_arrays(band
     assert "times a learnt scale and a floor of" in learnt.summary()
 
 
-@pytest.mark.parametrize("scale", SCALES)
+@of_each_scale
 def test_a_file_keeps_the_calibration(bands, run, tmp_path, scale):
     kept = seakeep.load_model(bands[scale].save(tmp_path / "ensemble.nc"))
-    one, other = (
-        each.forecast_summary(run, 120.0, 30, band="calibrated") for each in (kept, bands[scale])
-    )
-    xr.testing.assert_identical(one, other)
+    xr.testing.assert_identical(wide_of(kept, run), wide_of(bands[scale], run))
     assert kept.calibration.windows == bands[scale].calibration.windows
 
 
@@ -175,9 +184,7 @@ def test_members_that_learn_from_the_run_alone_do_not_forecast_it():
     assert without.arrays.names == ("b",)
     kept = [number for number, draw in enumerate(ensemble.members) if draw.run == 1]
     assert 0 < without.n_members == len(kept) < 6
-    run = sea(3, 300, "other")
-    found, every = (table(each.forecast(run, 10.0, 40), STATES) for each in (without, ensemble))
-    np.testing.assert_array_equal(found, every[kept])
+    assert_kept(without, ensemble, kept)
 
 
 def test_a_single_run_is_forecast_in_thirds_by_what_the_rest_of_it_teaches():
@@ -201,6 +208,4 @@ def test_members_whose_windows_reach_into_a_third_do_not_forecast_it():
     spans = [(d.first(0, 900, ensemble.signature.input_map), d.last) for d in ensemble.members]
     free = [number for number, (first, last) in enumerate(spans) if last < 300 or first >= 600]
     assert 0 < len(free) < 6
-    other = sea(3, 300, "other")
-    found, every = (table(each.forecast(other, 10.0, 40), STATES) for each in (kept, ensemble))
-    np.testing.assert_array_equal(found, every[free])
+    assert_kept(kept, ensemble, free)

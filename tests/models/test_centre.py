@@ -75,7 +75,6 @@ def test_the_system_is_recovered_from_runs_whose_zeros_differ():
         BayesianHankelDMDc(2, Uniform(2, 6), 1e-3, window=500, n_members=3, delay_rows="exact",
                            centre="run", centred=True),
     ],
-    ids=["lead", "squares", "rollout", "arx", "subspace", "ensemble"],
 )  # fmt: skip
 def test_a_zero_moves_the_forecast_and_changes_nothing_else(spec):
     def moved(run, offset):

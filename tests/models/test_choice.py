@@ -13,6 +13,11 @@ from seakeep.models.selection import Trial, groups_of, select, simplest
 T = PERIOD * DT
 OPEN = Select(True, True, True, True, period=T, horizon=10)
 SPEC = replace(HankelDMDc.recommended(T, DT), select=OPEN)
+REMEMBERS, PLAIN = replace(SPEC, memory=9), replace(SPEC, memory=0)
+
+
+def without_drift():
+    return {name: run.drop_vars("drift") for name, run in runs().items()}
 
 
 def trial(*by_group):
@@ -49,18 +54,16 @@ def test_the_noise_is_a_standard_error_over_what_is_held_out(other, is_as_good):
     ],
 )
 def test_what_is_simpler_errs_little_more(best, other, is_taken):
-    remembers, plain = replace(SPEC, memory=9), replace(SPEC, memory=0)
-    trials = {remembers: trial(*best), plain: trial(*other)}
-    assert (simplest(trials, remembers, 0.0) == plain) == is_taken
+    trials = {REMEMBERS: trial(*best), PLAIN: trial(*other)}
+    assert (simplest(trials, REMEMBERS, 0.0) == PLAIN) == is_taken
 
 
 @pytest.mark.parametrize(("alike", "is_taken"), [(0.0, True), (0.03, False)])
 def test_what_is_simpler_counts_with_the_ridge_that_it_would_be_given(alike, is_taken):
-    remembers, plain = replace(SPEC, memory=9), replace(SPEC, memory=0)
     scores = np.array([[0.104, 0.104], [0.107, 0.107]])  # 4 % and 7 % worse than the best
     other = Trial((1e-3, 1e-2), scores, np.array([0.5, 0.5]), np.array([0, 1]))
-    trials = {remembers: trial(0.1, 0.1), plain: other}
-    assert (simplest(trials, remembers, alike) == plain) == is_taken
+    trials = {REMEMBERS: trial(0.1, 0.1), PLAIN: other}
+    assert (simplest(trials, REMEMBERS, alike) == PLAIN) == is_taken
 
 
 @pytest.mark.parametrize(("surge", "lead"), [("predicted", 9), ("measured", 0)])
@@ -98,7 +101,7 @@ def test_the_ridges_about_the_best_are_tried(means, left):
 
 def test_the_ridges_about_the_best_of_what_is_taken_are_tried(monkeypatch):
     monkeypatch.setattr(selection, "NEAR", 0.0)
-    given = {name: run.drop_vars("drift") for name, run in runs().items()}
+    given = without_drift()
     found = select(replace(SPEC, select=None), given, ["heave"], INPUTS, opened=("observables",))
     assert found.settings.observables == ()
     levels = {}
@@ -137,7 +140,7 @@ def test_squares_are_tried_with_the_look_ahead_of_each_candidate():
 
 
 def test_what_brings_nothing_is_not_recommended():
-    given = {name: run.drop_vars("drift") for name, run in runs().items()}
+    given = without_drift()
     model = SPEC.fit(given, ["heave"], INPUTS)
     settings = model.settings
     assert (settings.alignment, settings.observables, settings.memory) == (None, (), 0)
@@ -148,7 +151,7 @@ def test_what_brings_nothing_is_not_recommended():
 
 
 def test_a_start_is_left_only_for_what_is_better_beyond_the_noise():
-    given = {name: run.drop_vars("drift") for name, run in runs().items()}
+    given = without_drift()
     start = HankelDMDc(6, 12, 1e-3, delay_rows="exact", ridge_scale="per_snapshot")
     found = select(start, given, ["heave"], INPUTS, vary=("observables",), horizon=(10.0,))
     assert replace(found.settings, ridge=start.ridge) == start

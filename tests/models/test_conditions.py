@@ -11,7 +11,7 @@ from scipy import signal
 from seakeep import HankelDMDc
 from seakeep.models.conditions import disagreements
 
-DT = 0.1
+DT, CHANNELS = 0.1, (["heave", "pitch"], ["eta"])
 SPEC = HankelDMDc(6, 20, 1e-2, delay_rows="exact", ridge_scale="per_snapshot")
 
 
@@ -32,7 +32,7 @@ def vessel(seed, stiffness=0.16, factor=1.0, offset=0.0, samples=1200):
 def found(last, spec=SPEC, **attrs):
     runs = {"a": vessel(1), "b": vessel(2), "c": vessel(3), "odd": vessel(4, **last)}
     runs = {name: run.assign_attrs(attrs) for name, run in runs.items()}
-    return disagreements(spec, runs, ["heave", "pitch"], ["eta"])
+    return disagreements(spec, runs, *CHANNELS)
 
 
 def test_runs_of_one_condition_agree_and_one_alone_has_nothing_to_disagree_with():
@@ -67,14 +67,14 @@ def test_another_unit_of_a_load_moves_its_mean_too():
     mean = float(vessel(4)["heave"].std())
     runs = {name: vessel(seed, offset=mean) for seed, name in enumerate(["a", "b", "c", "odd"], 1)}
     runs["odd"] = runs["odd"].assign(heave=(runs["odd"]["heave"] / 9.81).assign_attrs(units="m"))
-    (each,) = disagreements(SPEC, runs, ["heave", "pitch"], ["eta"])
+    (each,) = disagreements(SPEC, runs, *CHANNELS)
     assert (each.run, each.reason, each.channel) == ("odd", "scale", "heave")
     np.testing.assert_allclose(each.value, 1 / 9.81, rtol=0.1)
 
 
 def test_of_two_runs_either_may_be_wrong():
     runs = {"p1": vessel(1), "p2": vessel(4, offset=0.5)}
-    (each,) = disagreements(SPEC, runs, ["heave", "pitch"], ["eta"])
+    (each,) = disagreements(SPEC, runs, *CHANNELS)
     text = "p1 and p2 disagree; which one is wrong, these data do not say"
     assert sorted((each.run, each.rival)) == ["p1", "p2"]
     assert text in each.describe() or text.replace("p1 and p2", "p2 and p1") in each.describe()

@@ -18,7 +18,7 @@ from seakeep.models import KINDS, alignment, load_model, outside_training
 from seakeep.models.alignment import carry_by_dispersion
 from seakeep.models.draws import Draw
 
-DT = 0.1
+DT, HEAVE = 0.1, (["heave"], ["eta"])
 
 
 def sea(seed=0, ahead=0):
@@ -34,7 +34,7 @@ def sea(seed=0, ahead=0):
 
 def test_a_known_lead_is_learnt_and_forecast():
     run, test = sea(ahead=4), sea(seed=1, ahead=4)
-    model = HankelDMDc(0, 8, 1e-9, delay_rows="exact", lead=5).fit(run, ["heave"], ["eta"])
+    model = HankelDMDc(0, 8, 1e-9, delay_rows="exact", lead=5).fit(run, *HEAVE)
     found = model.forecast(test, start=10.0, steps=300)
     # A linear law without noise, to the ridge.
     assert np.abs(found.heave - test.heave.sel(time=found.time)).max() < 1e-6
@@ -106,7 +106,7 @@ def regular(*periods):
     {2.0: None, 2.8: "between .*, with none between", 8.0: "outside .* to "}.items(),
 )
 def test_a_period_outside_and_in_a_gap(period, words, tmp_path):
-    model = HankelDMDc(2, 8, 1.0).fit(regular(2.0, 4.0), ["heave"], ["eta"])
+    model = HankelDMDc(2, 8, 1.0).fit(regular(2.0, 4.0), *HEAVE)
     model = load_model(model.save(tmp_path / "m.nc"))
     found = outside_training(model, regular(period), 20.0, 600)
     told = [each for each in found if "period" in each]
@@ -156,14 +156,14 @@ def test_runs_in_other_units_are_never_pooled():
     del plain["heave"].attrs["units"]
     centimetres["heave"].attrs["units"] = "cm"
     with pytest.raises(DataError, match=r"'heave' is in 'cm' in run 2 and in 'm' in run 3"):
-        HankelDMDc(1, 4, 1.0).fit([plain, centimetres, sea()], ["heave"], ["eta"])
+        HankelDMDc(1, 4, 1.0).fit([plain, centimetres, sea()], *HEAVE)
 
 
 def test_a_run_that_states_no_unit_is_taken_with_a_warning():
     plain = sea(seed=1)
     del plain["heave"].attrs["units"]
     with pytest.warns(SeakeepWarning, match=r"'heave' of run 1 states no unit.*in 'm', as in"):
-        model = HankelDMDc(1, 4, 1.0).fit([plain, sea()], ["heave"], ["eta"])
+        model = HankelDMDc(1, 4, 1.0).fit([plain, sea()], *HEAVE)
     assert model.state_labels[0].units == "m"
     with pytest.warns(SeakeepWarning, match=r"'heave' of the run states no unit.*model's 'm'"):
         model.forecast(plain, start=5.0, steps=5)
@@ -174,7 +174,7 @@ def test_an_observable_that_overflows_is_refused():
     run["eta"].values[7] = 1e60
     spec = HankelDMDc(1, 4, 1.0, observables=[seakeep.Powers(("eta",), (3,))])
     with pytest.raises(DataError, match=r"has a standard deviation that is not finite"):
-        spec.fit(run, ["heave"], ["eta"])
+        spec.fit(run, *HEAVE)
 
 
 def test_a_history_inside_the_window_is_not_counted_twice():

@@ -267,10 +267,8 @@ def test_draws_are_quantiles_of_any_distribution_of_scipy(run):
         assert float(draws.ridge[member]) == stats.gamma(2.0).ppf(quantiles[3])
 
 
-def test_the_presets():
-    paper = BayesianHankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32)
-    assert (paper.window, paper.ridge) == (Uniform("10 T", "30 T"), Uniform(50, 150))
-    assert (paper.delay_rows, paper.ridge_scale, paper.n_members) == ("ridge", "absolute", 100)
+def test_the_recommended_preset():
+    """That of the paper: `tests/study/test_presets.py`."""
     ours = BayesianHankelDMDc.recommended(encounter_period=1.64, n_members=5)
     assert (ours.window, ours.delay_rows) == (None, "exact")
     assert (ours.ridge, ours.lead, ours.alignment.surge) == ("rollout", Length(0.75), "predicted")

@@ -150,48 +150,42 @@ def _ends(pid):
     return False
 
 
-class TestCluster:
-    """A real Dask cluster: a scheduler and workers, each a process on loopback."""
+def lose(processes, executor):
+    """Kill processes at work, which is neither waited for then nor begun again."""
+    work = in_order(side_work.square, 1, range(4000), executor)
+    next(work)
+    for process in processes:
+        process.kill()
+        process.wait()
+    begin = time.monotonic()
+    for left in (work, in_order(side_work.square, 1, range(4), executor)):
+        with pytest.raises(WorkerLostError, match=r"no workers that answer|was lost"):
+            list(left)
+    assert time.monotonic() - begin < 240
 
-    pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 
-    def test_it_gives_the_same_members_and_is_not_waited_for_once_lost(
-        self, tmp_path, ensemble_and_run, monkeypatch
-    ):
-        distributed = pytest.importorskip("distributed", reason="needs the extra 'cluster'")
-        from dask_processes import Cluster
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
+def test_a_dask_cluster_gives_the_same_members_and_is_not_waited_for_once_lost(
+    tmp_path, ensemble_and_run, monkeypatch
+):
+    distributed = pytest.importorskip("distributed")
+    from dask_processes import Cluster
 
-        ensemble, run = ensemble_and_run
-        monkeypatch.setattr(executors, "PATIENCE", 300.0)  # a busy machine answers in minutes
-        with contextlib.closing(Cluster(tmp_path, workers=2)) as cluster:
-            with executors.cluster(cluster.address) as executor:
-                found = ensemble.forecast_summary(run, start=31.0, steps=30, executor=executor)
-                for _, threads in in_order(side_work.blas_threads, None, range(8), executor):
-                    assert set(threads) == {1}
-                with pytest.raises(ValueError, match="item 0"):
-                    list(in_order(side_work.refuse, None, range(3), executor))
-            expected = ensemble.forecast_summary(run, start=31.0, steps=30)
-            xr.testing.assert_identical(found, expected)
-            monkeypatch.setattr(executors, "PATIENCE", 1.0)
-            scheduler, *workers = cluster.processes
-            for lost in (workers, [scheduler]):
-                with distributed.Client(
-                    cluster.address, set_as_default=False, timeout=15
-                ) as client:
-                    self.lose(lost, client.get_executor(pure=False))
-                if lost is workers:
-                    cluster.add_workers(1)
-
-    @staticmethod
-    def lose(processes, executor):
-        """Kill processes at work, which is neither waited for then nor begun again."""
-        work = in_order(side_work.square, 1, range(4000), executor)
-        next(work)
-        for process in processes:
-            process.kill()
-            process.wait()
-        begin = time.monotonic()
-        for left in (work, in_order(side_work.square, 1, range(4), executor)):
-            with pytest.raises(WorkerLostError, match=r"no workers that answer|was lost"):
-                list(left)
-        assert time.monotonic() - begin < 240
+    ensemble, run = ensemble_and_run
+    monkeypatch.setattr(executors, "PATIENCE", 300.0)  # a busy machine answers in minutes
+    with contextlib.closing(Cluster(tmp_path, workers=2)) as cluster:
+        with executors.cluster(cluster.address) as executor:
+            found = ensemble.forecast_summary(run, start=31.0, steps=30, executor=executor)
+            for _, threads in in_order(side_work.blas_threads, None, range(8), executor):
+                assert set(threads) == {1}
+            with pytest.raises(ValueError, match="item 0"):
+                list(in_order(side_work.refuse, None, range(3), executor))
+        expected = ensemble.forecast_summary(run, start=31.0, steps=30)
+        xr.testing.assert_identical(found, expected)
+        monkeypatch.setattr(executors, "PATIENCE", 1.0)
+        scheduler, *workers = cluster.processes
+        for lost in (workers, [scheduler]):
+            with distributed.Client(cluster.address, set_as_default=False, timeout=15) as client:
+                lose(lost, client.get_executor(pure=False))
+            if lost is workers:
+                cluster.add_workers(1)

@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drifting import INPUTS, STATES, heave_error
+from drifting import FOLLOWED, INPUTS, STATES, heave_error
 from records import table
 
-from seakeep import HankelDMDc, Powers, ProbeAlignment, SlowSquares
+from seakeep import HankelDMDc, Powers, SlowSquares
 from seakeep.core.recursion import Place, Recursion, recursion
 from seakeep.models.calibration import envelope_of
 from seakeep.models.labelled import Span
 
-FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
 OBSERVABLES = (
     SlowSquares("eta_cog", cutoff=1.0, lead=0.75, lags=(0, 1)),
     Powers(("eta_fwd", "eta_cog")),
@@ -79,12 +78,18 @@ def test_a_step_is_the_equation():
     place = Place(np.full(P, 1 / P), -1.0, 0.25, places, 0.1)
     a, b, d = (0.1 * rng.standard_normal((3, N, each)) for each in (N * (s + 1), n * (z + 1), 1))
     gain, offset = np.array([0.7, 0.6, 0.5]), np.array([0.2, 0.1, -0.1])
-    models = Recursion(a, b, d[..., 0], gain, offset, 1)
     # So wide that the vessel leaves the grid at both ends.
     histories, delayed = 9 * rng.standard_normal((3, 2, 6, N)), rng.standard_normal((2, z, n))
     table, starts = rng.standard_normal((60, places, n)), np.array([0, 25])
     forcing = rng.standard_normal((3, 2, steps, N))
-    found, used = recursion(models, place, histories, delayed, table, starts, forcing)
+
+    def run(of, at, forcing):
+        """States and inputs of some models from some windows on."""
+        models = Recursion(a[of], b[of], d[of, :, 0], gain[of], offset[of], 1)
+        given = histories[of, at], delayed[at], table, starts[at], forcing[of, at]
+        return recursion(models, place, *given)
+
+    found, used = run(slice(3), slice(2), forcing)
     for model in range(3):
         for window in range(2):
             x, u = list(histories[model, window]), list(delayed[window])
@@ -103,21 +108,14 @@ def test_a_step_is_the_equation():
                     + forcing[model, window, step]
                 )
                 x.append(following)
-            np.testing.assert_allclose(found[model, window], x[6:], rtol=1e-10, atol=1e-12)
-            np.testing.assert_allclose(used[model, window], u[z:], rtol=1e-10, atol=1e-12)
             # One window of one model runs by numbers, not by arrays.
-            of, at = slice(model, model + 1), slice(window, window + 1)
-            alone = Recursion(a[of], b[of], d[of, :, 0], gain[of], offset[of], 1)
-            (one,), (driven,) = recursion(
-                alone, place, histories[of, at], delayed[at], table, starts[at], forcing[of, at]
-            )
-            np.testing.assert_allclose(one[0], x[6:], rtol=1e-10, atol=1e-12)
-            np.testing.assert_allclose(driven[0], u[z:], rtol=1e-10, atol=1e-12)
+            alone = run(slice(model, model + 1), slice(window, window + 1), forcing)
+            one = [each[0, 0] for each in alone]
+            for states, inputs in ((found[model, window], used[model, window]), one):
+                np.testing.assert_allclose(states, x[6:], rtol=1e-10, atol=1e-12)
+                np.testing.assert_allclose(inputs, u[z:], rtol=1e-10, atol=1e-12)
     lost = np.where(np.arange(steps)[:, None] < 20, forcing, np.nan)
     for of in (slice(1), slice(3)):  # a run that is lost stays so, and keeps a place
-        alone = Recursion(a[of], b[of], d[of, :, 0], gain[of], offset[of], 1)
-        one, driven = recursion(
-            alone, place, histories[of, :1], delayed[:1], table, starts[:1], lost[of, :1]
-        )
+        one, driven = run(of, slice(1), lost)
         np.testing.assert_array_equal(np.isnan(one), np.isnan(lost[of, :1]))
         assert np.isfinite(driven).all()

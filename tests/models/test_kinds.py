@@ -48,7 +48,7 @@ def test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts():
             found.append(loop_score(model, run, STATES, steps, 12))
         # Windows side by side are summed in another order than one by one.
         assert float(row["score"]) == pytest.approx(np.mean(found), abs=1e-9)
-    pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+    pytest.importorskip("matplotlib")
     legend = result.figure().axes[0].get_legend().get_texts()
     drawn = [each.get_text().split(",")[0] for each in legend[:-1]]
     assert set(drawn) == {f"kind {kind}" for kind in ("hankel_dmdc", *kinds)}

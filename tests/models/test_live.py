@@ -4,14 +4,13 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from drifting import INPUTS, STATES
+from drifting import FOLLOWED, INPUTS, SQUARES, STATES
 from ensembles import few
 from records import record, table
 from scipy import signal, stats
 from threadpoolctl import threadpool_info, threadpool_limits
 
-import seakeep
-from seakeep import HankelDMDc, ProbeAlignment, RequestError, load_live
+from seakeep import HankelDMDc, Powers, RequestError, load_live
 from seakeep.models.live import LEAST_RECORD
 from seakeep.models.validity import Validity
 from seakeep.signals import predict_waves
@@ -20,17 +19,19 @@ from seakeep.study.comparison import nowcast
 from seakeep.waves import group_speed
 
 START, STEPS = 500, 60  # the record that is kept holds all samples up to there
-SQUARES = seakeep.SlowSquares("eta_fwd", orders=(0,), lags=(0, 1))
 SETTINGS = {
     "plain": {},
     "lead": {"lead": 6},
     "aligned": {
         "lead": 6,
         "memory": 40,
-        "alignment": ProbeAlignment(mode="dispersion", surge="predicted"),
-        "observables": (SQUARES, seakeep.Powers("eta_fwd")),
+        "alignment": FOLLOWED,
+        "observables": (SQUARES, Powers("eta_fwd")),
     },
 }
+
+
+in_place_and_carried = pytest.mark.parametrize("key", ["plain", "aligned"])
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +62,11 @@ def started(model, run, stop=START):
     return live
 
 
+def driven(live, run):
+    """Forecast under the waves that were measured."""
+    return live.forecast(STEPS, table(run, INPUTS)[START:])
+
+
 def mean(forecast, statistic="mean"):
     return table(forecast.sel(statistic=statistic), STATES)
 
@@ -73,7 +79,7 @@ def std(forecast):
 def test_fed_with_everything_it_is_the_forecast(models, drift, key):
     model = models[key]
     live = started(model, drift)
-    found = live.forecast(STEPS, table(drift, INPUTS)[START:])
+    found = driven(live, drift)
     expected = model.forecast(drift, start=float(drift.time[START - 1]), steps=STEPS)
     # The same numbers go through the same products; an instant differs by the rounding of its sum.
     np.testing.assert_array_equal(mean(found), table(expected, STATES))
@@ -87,7 +93,7 @@ def test_fed_with_everything_it_is_the_forecast(models, drift, key):
 
 def test_members_that_are_held_give_the_mean_of_the_ensemble(ensemble, drift):
     live = started(ensemble.hold(), drift)
-    found = live.forecast(STEPS, table(drift, INPUTS)[START:])
+    found = driven(live, drift)
     expected = ensemble.forecast_summary(drift, float(drift.time[START - 1]), STEPS)
     np.testing.assert_array_equal(mean(found), mean(expected))
     both = np.hypot(std(expected), live.errors.at(np.arange(1, STEPS + 1)))
@@ -199,7 +205,7 @@ def test_consistency_names_the_state_and_shows_in_free_runs_what_one_step_hides(
     assert ended[1][0][0] == pytest.approx(1.0, abs=0.3)
 
 
-@pytest.mark.parametrize("key", ["plain", "aligned"])
+@in_place_and_carried
 def test_what_samples_tell_does_not_depend_on_when_it_is_read(models, drift, key):
     late, often = (started(models[key], drift, START - 60) for _ in range(2))
     for at in range(START - 60, START):
@@ -220,7 +226,7 @@ def test_outside_the_training_the_band_widens_and_says_why(models, drift, monkey
     stds = []
     for each in (drift, higher):
         live = started(model, each)
-        made = live.forecast(STEPS, table(each, INPUTS)[START:])
+        made = driven(live, each)
         stds.append(std(made))
     assert Validity.HEIGHT in live.conditions.validity
     assert "a height of" in repr(live.conditions)
@@ -240,7 +246,7 @@ def test_outside_the_training_the_band_widens_and_says_why(models, drift, monkey
     assert started(model, drift).forecast(1).attrs["validity"] == "inside"
     # Without errors of late, the height alone.
     monkeypatch.setattr(type(live), "consistency_by_state", np.ones((2, len(STATES))))
-    made = live.forecast(STEPS, table(higher, INPUTS)[START:])
+    made = driven(live, higher)
     expected = ratio * model.errors.at(np.arange(STEPS) + 1)
     np.testing.assert_allclose(std(made), expected, rtol=1e-12)
 
@@ -259,7 +265,7 @@ def test_a_spike_is_forgotten_by_the_consistency(models, drift, value):
 def test_waves_that_are_not_known_widen_the_band(models, drift):
     model = models["lead"]
     live = started(model, drift)
-    known, unknown = live.forecast(STEPS, table(drift, INPUTS)[START:]), live.forecast(STEPS)
+    known, unknown = driven(live, drift), live.forecast(STEPS)
     part = live.forecast(STEPS, table(drift, INPUTS)[START : START + 20])
     assert (known.attrs["known_input"], part.attrs["known_input"]) == (STEPS + 5, 20)
     assert unknown.attrs["known_input"] == 0
@@ -324,7 +330,7 @@ def test_what_the_probe_up_wave_has_seen_is_foreseen_and_filled_down_wave(models
     assert filled[1][1] < 0.5 * filled[0][1]
 
 
-@pytest.mark.parametrize("key", ["plain", "aligned"])
+@in_place_and_carried
 def test_in_the_dark_a_forecast_is_that_of_the_last_sample(models, drift, tmp_path, key):
     """Mean and band go on; in the light again, the service says that waves are lost."""
     live, count = started(models[key], drift), 30
@@ -411,17 +417,11 @@ def test_skill_against_lead_time_is_that_of_forecasts_by_hand(models, drift):
 
 
 def test_of_a_sample_what_is_missing_is_predicted_and_what_is_there_taken(models, drift):
-    measured = table(drift, INPUTS)
-    part, filled = models["plain"].live(), models["plain"].live()
-    for live in (part, filled):
-        play(live, drift, 0, START)
-    expected, given = predict_waves(measured[:START], 1)[0], measured[START]
-    part.step({INPUTS[0]: given[0]}, table(drift, STATES)[START])
-    filled.step([given[0], *expected[1:]], table(drift, STATES)[START])
-    for live in (part, filled):
-        play(live, drift, START + 1, START + 20, lost=range(START + 1, START + 20))
-    # Their effect on the states: the estimates of lost states, to the last bit.
-    np.testing.assert_array_equal(part.state, filled.state)
+    measured, live = table(drift, INPUTS), models["plain"].live()
+    play(live, drift, 0, START)
+    live.step({INPUTS[0]: measured[START, 0]}, table(drift, STATES)[START])
+    expected = [measured[START, 0], predict_waves(measured[:START], 1)[0, 1]]
+    np.testing.assert_array_equal(live._known_inputs()[-1], expected)
 
 
 def test_a_step_and_a_forecast_run_on_one_thread(models, drift):
@@ -448,7 +448,7 @@ def test_a_step_and_a_forecast_run_on_one_thread(models, drift):
         assert all(each == {1} for each in seen)
 
 
-@pytest.mark.parametrize("key", ["plain", "aligned"])
+@in_place_and_carried
 def test_a_restarted_process_goes_on_bit_for_bit(models, drift, tmp_path, key):
     live = started(models[key], drift)
     path = tmp_path / "state.nc"
@@ -547,10 +547,11 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
         {str(seed): made(seed) for seed in (1, 2)}, ["surge"], ["eta", "thrust"]
     )
     run = made(3)
-    live = model.live(roles={"thrust": "known"})
+    live, constant = (model.live(roles={"thrust": role}) for role in ("known", "constant"))
     u, y = table(run, ["eta", "thrust"]), table(run, ["surge"])
     for at in range(300):
         live.step(u[at], y[at])
+        constant.step(u[at], y[at])
     for at in range(300, 320):
         live.step([np.nan, u[at, 1]], y[at])  # the probe is dead; the thrust is known
         assert live._known_inputs()[-1, 1] == u[at, 1]
@@ -569,9 +570,6 @@ def test_a_known_actuator_follows_its_plan_whatever_the_probe_does():
     with pytest.raises(RequestError, match="roles names 'eat', which the model does not know"):
         model.live(roles={"eat": "known"})
     # A constant stays; waves that are given count though the other column is not.
-    constant = model.live(roles={"thrust": "constant"})
-    for at in range(300):
-        constant.step(u[at], y[at])
     known = u[300:340].copy()
     known[:, 1] = u[299, 1]
     expected = model.forecast_arrays(y[:300], u[:300], known, steps)

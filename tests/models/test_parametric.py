@@ -16,6 +16,7 @@ DT = 0.1
 ON_STATE = np.array([1.5, -0.9]), np.array([0.2, -0.03])
 """Of x(k) and x(k − 1): at a draught of zero, and their change per unit."""
 ON_WAVE = 0.5, 0.4
+CHANNELS = ["heave"], ["eta"]
 SPEC = HankelDMDc(1, 0, 0.0, standardize=False, delay_rows="exact", parameter="rig.draught")
 CHOSEN = HankelDMDc(
     2, 1, "rollout", delay_rows="exact", ridge_scale="per_snapshot", parameter="rig.draught"
@@ -32,10 +33,14 @@ def vessel(draught, seed, samples=400, noise=0.0):
     return record(DT, attrs, heave=heave, eta=eta)
 
 
+def vessels(draughts, seed, *more):
+    return [vessel(draught, seed + n, *more) for n, draught in enumerate(draughts)]
+
+
 @pytest.fixture(scope="module")
 def family():
     """Noisy runs at four draughts."""
-    return [vessel(p, 30 + n, 800, 0.05) for n, p in enumerate((0.0, 0.3, 0.6, 1.0))]
+    return vessels((0.0, 0.3, 0.6, 1.0), 30, 800, 0.05)
 
 
 def error(model):
@@ -46,7 +51,7 @@ def error(model):
 
 @pytest.fixture(scope="module")
 def model():
-    return SPEC.fit([vessel(p, 10 + n) for n, p in enumerate((0.0, 0.4, 1.0))], ["heave"], ["eta"])
+    return SPEC.fit(vessels((0.0, 0.4, 1.0), 10), *CHANNELS)
 
 
 def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
@@ -71,8 +76,7 @@ def test_an_exact_family_is_recovered_between_its_members(model, tmp_path):
 
 def test_where_waves_are_predicted_the_forecast_is_that_of_its_file(tmp_path):
     spec = replace(SPEC, ridge=1.0, standardize=True)
-    runs = [vessel(p, 40 + n, 800, 0.5) for n, p in enumerate((0.0, 1.0))]
-    model = spec.fit(runs, ["heave"], ["eta"])
+    model = spec.fit(vessels((0.0, 1.0), 40, 800, 0.5), *CHANNELS)
     again = load_model(model.save(tmp_path / "model.nc"))
     run = vessel(0.4, 3).isel(time=slice(0, 60))
     forecast = model.forecast(run, start=5.9, steps=50, ahead="predict")
@@ -101,34 +105,34 @@ def test_means_follow_the_parameter():
 
     spec = replace(SPEC, state_delays=6, ridge=1e-4, ridge_scale="per_snapshot", standardize=True)
     runs = [shifted(p, 20 + n) for n, p in enumerate((0.0, 0.5, 1.0))]
-    model = spec.fit([run.assign_coords(time=run.time) for run in runs], ["heave"], ["eta"])
+    model = spec.fit([run.assign_coords(time=run.time) for run in runs], *CHANNELS)
     mean = model.at(parameter=0.75).state_mean[0]
     # The mean of 4,000 samples of a heave of SD 2 to 6 is known to about a tenth.
     assert mean == pytest.approx(2.25, abs=0.3)
 
 
 def test_free_runs_choose_between_the_parameter_and_one_pooled_model(family):
-    varying = CHOSEN.fit(family, ["heave"], ["eta"])
+    varying = CHOSEN.fit(family, *CHANNELS)
     assert varying.settings.parameter == "rig.draught"
     fixed = replace(CHOSEN, parameter="")
-    pooled, nearest = (fixed.fit(runs, ["heave"], ["eta"]) for runs in (family, family[1]))
+    pooled, nearest = (fixed.fit(runs, *CHANNELS) for runs in (family, family[1]))
     assert error(varying) < 0.5 * min(error(pooled), error(nearest))
     alike = [
-        vessel(0.5, 50 + n, 800, 0.05).assign_attrs(rig=run.attrs["rig"])
-        for n, run in enumerate(family)
+        same.assign_attrs(rig=run.attrs["rig"])
+        for same, run in zip(vessels([0.5] * 4, 50, 800, 0.05), family, strict=True)
     ]
-    same = CHOSEN.fit(alike, ["heave"], ["eta"])
+    same = CHOSEN.fit(alike, *CHANNELS)
     assert same.settings.parameter == ""
     assert "a pooled one" in same.selection
-    assert tune(CHOSEN, alike, ["heave"], ["eta"]).spec.parameter == ""
+    assert tune(CHOSEN, alike, *CHANNELS).spec.parameter == ""
 
 
 def test_a_search_keeps_what_varies_better_and_ends_no_worse_than_it_started(family):
     start = replace(CHOSEN, ridge=1e-6)
-    result = tune(start, family, ["heave"], ["eta"], vary=["state_delays"])
+    result = tune(start, family, *CHANNELS, vary=["state_delays"])
     assert result.spec.parameter == "rig.draught"
     assert result.note.startswith("on runs of inner values that are held out, a model that varies")
-    before, after = (error(spec.fit(family, ["heave"], ["eta"])) for spec in (start, result.spec))
+    before, after = (error(spec.fit(family, *CHANNELS)) for spec in (start, result.spec))
     assert after < 1.01 * before
 
 
@@ -142,7 +146,7 @@ def test_what_grows_in_the_trained_range_is_passed_over(model, family, monkeypat
     largest = specs.largest_radius
     monkeypatch.setattr(specs, "largest_radius", lambda m: 1.0 if m.variation else largest(m))
     spec = replace(SPEC, ridge="rollout", ridge_scale="per_snapshot", standardize=True)
-    assert spec.fit(family, ["heave"], ["eta"]).settings.parameter == ""
+    assert spec.fit(family, *CHANNELS).settings.parameter == ""
 
 
 def test_a_check_takes_the_middle_of_the_training(model):
@@ -167,6 +171,6 @@ def test_words(model):
     with pytest.raises(RequestError, match="does not vary with a parameter"):
         model.at(parameter=0.5).at(parameter=0.5)
     with pytest.raises(DataError, match=r"all runs have rig\.draught = 0\.7"):
-        SPEC.fit([run, vessel(0.7, 4)], ["heave"], ["eta"])
+        SPEC.fit([run, vessel(0.7, 4)], *CHANNELS)
     with pytest.raises(RequestError, match="parameter takes delay_rows = 'exact'"):
         replace(SPEC, delay_rows="ridge")

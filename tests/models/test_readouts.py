@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import DT, INPUTS, LINE, LOAD_NOISE, drifting_run
+from drifting import DT, FOLLOWED, INPUTS, LINE, LOAD_NOISE, drifting_run
 from drifting import STATES as MOTIONS
 from ensembles import few
 from moored import FLOOR, NOISE, moored_run, moored_runs
@@ -13,13 +13,12 @@ from moored import INPUTS as ETA
 from moored import STATES as MOORED
 from records import table
 
-from seakeep import HankelDMDc, ProbeAlignment, RequestError
+from seakeep import HankelDMDc, RequestError
 from seakeep.models import ensemble as ensembles
 from seakeep.models.selection import select
 
 STATES = [*MOTIONS, "mooring_bow"]
 START, STEPS, PERIOD = 60.0, 300, 1.5
-FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
 SPEC = HankelDMDc(
     10, 40, 1e-3, delay_rows="exact", ridge_scale="per_snapshot", alignment=FOLLOWED, lead=12
 )
@@ -38,6 +37,14 @@ def runs():
 @pytest.fixture(scope="module")
 def chosen(runs):
     return bow("auto").fit(runs, STATES, INPUTS)
+
+
+def moored(spec, **more):
+    return spec.fit(moored_runs(**more), MOORED, ETA)
+
+
+def kinds(model):
+    return [each.kind for each in model.signature.readouts]
 
 
 def error(model, run):
@@ -91,7 +98,7 @@ def test_auto_leaves_a_linear_load_as_it_is(runs, drift):
         noise = np.random.default_rng(seed).standard_normal(run.sizes["time"])
         dry[name] = run.assign(mooring_bow=(load + LOAD_NOISE * noise).assign_attrs(units="N"))
     model = replace(SPEC, readouts="auto").fit(dry, STATES, INPUTS)
-    assert [each.kind for each in model.signature.readouts] == ["none"]
+    assert kinds(model) == ["none"]
     xr.testing.assert_identical(
         model.forecast(drift, START, STEPS),
         SPEC.fit(dry, STATES, INPUTS).forecast(drift, START, STEPS),
@@ -116,10 +123,10 @@ def test_a_floor_is_never_undercut_and_a_taut_line_has_none(monkeypatch):
     high = moored_run(9)
     high["eta"] = 2 * high["eta"]
     spec = replace(PLAIN, readouts="auto")
-    model = spec.fit(moored_runs(), MOORED, ETA)
+    model = moored(spec)
     bow, stern = model.signature.readouts
     assert (bow.kind, stern.kind, bow.acts, stern.acts) == ("none", "none", False, True)
-    linear = PLAIN.fit(moored_runs(), MOORED, ETA).forecast(high, 20.0, 400)
+    linear = moored(PLAIN).forecast(high, 20.0, 400)
     load = model.forecast(high, 20.0, 400)
     # The 0.002 quantile of normal noise lies 2.9 standard deviations below.
     assert FLOOR - 3 * NOISE < stern.floor < FLOOR
@@ -128,23 +135,23 @@ def test_a_floor_is_never_undercut_and_a_taut_line_has_none(monkeypatch):
         load["mooring_stern"], np.maximum(linear["mooring_stern"], stern.floor)
     )
     xr.testing.assert_identical(load["mooring_bow"], linear["mooring_bow"])
-    taut = spec.fit(moored_runs(slack=False), MOORED, ETA)
+    taut = moored(spec, slack=False)
     assert not any(each.acts for each in taut.signature.readouts)
-    ensemble = few(readouts="auto").fit(moored_runs(), MOORED, ETA)
+    ensemble = moored(few(readouts="auto"))
     monkeypatch.setattr(ensembles, "weigh_members", lambda _, parts, *__: parts[0].fill(-9.0))
     found = ensemble.forecast(high[{"time": slice(0, 300)}], 20.0, 400, ahead="predict")
     assert np.all(found["mooring_stern"] == ensemble.signature.readouts[1].floor)
-    unknown = replace(spec, centre="run").fit(moored_runs(), MOORED, ETA)
+    unknown = moored(replace(spec, centre="run"))
     assert not any(each.acts for each in unknown.signature.readouts)  # on which zero?
 
 
 def test_no_linear_system_stands_for_it(tmp_path):
-    model = replace(PLAIN, readouts="auto").fit(moored_runs(), MOORED, ETA)
+    model = moored(replace(PLAIN, readouts="auto"))
     for export in (model.to_state_space, lambda: model.to_mat(tmp_path / "m.mat")):
         with pytest.raises(RequestError, match="reads mooring_stern off its other states"):
             export()
     spec = replace(PLAIN, readouts={"mooring_bow": "auto"})
-    assert spec.fit(moored_runs(), MOORED, ETA).to_state_space().C.shape[0] == len(MOORED)
+    assert moored(spec).to_state_space().C.shape[0] == len(MOORED)
 
 
 def test_nothing_after_the_stop_of_training_is_read(runs, drift):
@@ -161,10 +168,10 @@ def test_nothing_after_the_stop_of_training_is_read(runs, drift):
 
 def test_a_single_run_is_held_out_in_parts_and_a_short_one_not_at_all(runs):
     one = bow("auto").fit(runs["run1"], STATES, INPUTS)
-    assert [each.kind for each in one.signature.readouts] == ["wave"]
+    assert kinds(one) == ["wave"]
     short = runs["run1"].isel(time=slice(0, 300))
     model = bow("auto").fit(short, STATES, INPUTS)
-    assert [each.kind for each in model.signature.readouts] == ["none"]
+    assert kinds(model) == ["none"]
     assert "(not judged: no waves are carried, or" in model.summary()
 
 

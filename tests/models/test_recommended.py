@@ -120,11 +120,11 @@ def rig(run, depth, position):
     ],
 )
 def test_an_optional_alignment_is_left_out_where_the_rig_is_not_known(depth, position, missing):
-    given = {"the run": rig(sea(0), depth, position)}
+    given, channels = {"the run": rig(sea(0), depth, position)}, (["heave", "surge"], ["eta"])
     alignment = ProbeAlignment(mode="dispersion", surge="predicted", optional=True)
-    assert alignment.missing(given, ["heave", "surge"], ["eta"]) == missing
+    assert alignment.missing(given, *channels) == missing
     spec = HankelDMDc(6, 12, 1.0, delay_rows="exact", alignment=alignment, lead=8)
-    model = spec.fit(given, ["heave", "surge"], ["eta"])
+    model = spec.fit(given, *channels)
     if depth is None:
         assert model.alignment is None
     else:
@@ -133,4 +133,4 @@ def test_an_optional_alignment_is_left_out_where_the_rig_is_not_known(depth, pos
     needed = dataclasses.replace(spec, alignment=dataclasses.replace(alignment, optional=False))
     if depth is None:
         with pytest.raises(RequestError, match="needs the water depth"):
-            needed.fit(given, ["heave", "surge"], ["eta"])
+            needed.fit(given, *channels)

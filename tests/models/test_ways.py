@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from drifting import DT, INPUTS, drifting_run
+from drifting import DT, FOLLOWED, INPUTS, drifting_run
 from records import table
 
 from seakeep import (
@@ -22,7 +22,6 @@ from seakeep import (
 )
 
 STATES, START, STEPS = ["surge", "heave", "mooring_bow"], 600, 80
-FOLLOWED = ProbeAlignment(mode="dispersion", surge="predicted")
 OBSERVABLES = (SlowSquares("eta_cog", cutoff=1.0, lead=0.75, lags=(0, 1)), Powers("eta_fwd"))
 VARIANTS = {
     "regressed rows": {"delay_rows": "ridge"},
@@ -71,6 +70,10 @@ def model(key, runs):
 
 @pytest.fixture(scope="module")
 def expected(model, run):
+    return forecast_of(model, run)
+
+
+def forecast_of(model, run):
     return model.forecast(run, START * DT, STEPS)
 
 
@@ -109,12 +112,12 @@ def test_members_are_the_models_of_their_settings(key, runs, run, model, tmp_pat
         **settings(key) | {"window": Uniform("60 s", "90 s")},
     )
     ensemble = spec.fit(runs, STATES, INPUTS, stop=110.0)
-    found = ensemble.forecast(run, START * DT, STEPS)
+    found = forecast_of(ensemble, run)
     for number, draw in enumerate(ensemble.members):
         names = ("ridge", "window", "state_delays", "input_delays")
         spec = replace(model.settings, **{name: getattr(draw.settings, name) for name in names})
         alone, member = spec.fit(runs, STATES, INPUTS, stop=110.0), ensemble.member(number)
-        wanted, own = (m.forecast(run, START * DT, STEPS) for m in (alone, member))
+        wanted, own = (forecast_of(m, run) for m in (alone, member))
         mine = found.isel(member=number)
         read = dict(model.settings.readouts)  # once for all members, with the medians of delays
         plain = [name for name in STATES if name not in read]
@@ -125,7 +128,7 @@ def test_members_are_the_models_of_their_settings(key, runs, run, model, tmp_pat
             np.testing.assert_allclose(table(mine, plain), table(wanted, plain), atol=1e-9)
     again = load_model(ensemble.save(tmp_path / "e.nc"))
     for same in (again, ensemble.hold()):
-        xr.testing.assert_identical(same.forecast(run, START * DT, STEPS), found)
+        xr.testing.assert_identical(forecast_of(same, run), found)
 
 
 def test_a_forecast_reads_its_history_and_look_ahead_and_nothing_else(model, run, expected):
@@ -135,11 +138,11 @@ def test_a_forecast_reads_its_history_and_look_ahead_and_nothing_else(model, run
     for name in ("heave", "mooring_bow") if reads_surge(model) else (*STATES, *INPUTS):
         poisoned[name].values[(START if name in STATES else last) + 1 :] = np.nan
         poisoned[name].values[:first] = np.nan
-    xr.testing.assert_identical(model.forecast(poisoned, START * DT, STEPS), expected)
+    xr.testing.assert_identical(forecast_of(model, poisoned), expected)
     gone = run.copy(deep=True)
     gone[INPUTS[0]].values[last] = np.nan  # which it does read
     with pytest.raises(DataError, match="missing"):
-        model.forecast(gone, START * DT, STEPS)
+        forecast_of(model, gone)
 
 
 def test_training_reads_its_window_and_nothing_else(runs, model):
@@ -158,7 +161,7 @@ def test_training_reads_its_window_and_nothing_else(runs, model):
 
 def test_files_and_tables_of_settings_hold_it_all(model, run, expected, tmp_path):
     again = load_model(model.save(tmp_path / "m.nc"))
-    xr.testing.assert_identical(again.forecast(run, START * DT, STEPS), expected)
+    xr.testing.assert_identical(forecast_of(again, run), expected)
     assert again.summary() == model.summary()
     assert again.settings == model.settings
     table = json.loads(json.dumps(model.settings.to_json()))

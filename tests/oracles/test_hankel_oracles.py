@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-import xarray as xr
-from records import table
+from records import record, table
 from scipy import signal
 
 from seakeep import HankelDMDc
@@ -38,27 +37,23 @@ def koopman_pipeline(runs, s, z):
     return pipeline
 
 
-def oracle_matrices(pipeline):
-    coefficients = pipeline.regressor_.coef_.T
-    return coefficients[:, : coefficients.shape[0]], coefficients[:, coefficients.shape[0] :]
+def assert_equals_pykoop(model, runs, s, z):
+    coefficients = koopman_pipeline(runs, s, z).regressor_.coef_.T
+    found = np.hstack([model.A, model.B])
+    np.testing.assert_allclose(found, coefficients, rtol=0, atol=SAME_MATRICES)
 
 
 @pytest.mark.parametrize(("s", "z"), DELAYS)
 @pytest.mark.parametrize("count", [1, 2])
 def test_matrices_equal_pykoop(make_run, s, z, count):
     runs = [make_run(samples=200 + 30 * seed, seed=seed) for seed in range(count)]
-    model = fit(runs, s, z)
-    a, b = oracle_matrices(koopman_pipeline(runs, s, z))
-    np.testing.assert_allclose(model.A, a, rtol=0, atol=SAME_MATRICES)
-    np.testing.assert_allclose(model.B, b, rtol=0, atol=SAME_MATRICES)
+    assert_equals_pykoop(fit(runs, s, z), runs, s, z)
 
 
 def test_a_window_with_history_inside_equals_pykoop_on_these_samples_alone(make_run):
     run = make_run(samples=300)
-    model = fit(run, 4, 7, window=120)
-    a, b = oracle_matrices(koopman_pipeline([run.isel(time=slice(180, 300))], 4, 7))
-    np.testing.assert_allclose(model.A, a, rtol=0, atol=SAME_MATRICES)
-    np.testing.assert_allclose(model.B, b, rtol=0, atol=SAME_MATRICES)
+    samples = run.isel(time=slice(180, 300))
+    assert_equals_pykoop(fit(run, 4, 7, window=120), [samples], 4, 7)
 
 
 @pytest.mark.parametrize(("delay_rows", "relift"), [("ridge", False), ("exact", True)])
@@ -138,17 +133,13 @@ def test_the_papers_formula_in_plain_numpy_at_the_papers_size():
     assert y.shape == (685, 639)
     g = successors @ y.T @ np.linalg.inv(y @ y.T + ridge * np.eye(len(y)))
 
-    names = [f"x{i}" for i in range(n)], [f"u{i}" for i in range(q)]
-    run = xr.Dataset(
-        {name: ("time", x[:, i]) for i, name in enumerate(names[0])}
-        | {name: ("time", u[:, i]) for i, name in enumerate(names[1])},
-        coords={"time": 0.05125 * np.arange(z + m)},
-    )
+    states, inputs = [f"x{i}" for i in range(n)], [f"u{i}" for i in range(q)]
+    columns = zip(states + inputs, np.hstack([x, u]).T, strict=True)
+    run = record(0.05125, **dict(columns))
     spec = HankelDMDc.paper(encounter_period=1.64, dt=1.64 / 32)
-    model = spec.fit(run, states=names[0], inputs=names[1])
+    model = spec.fit(run, states, inputs)
     assert model.training.columns == (639,)
     # Fewer columns than rows; with all rows regressed the primal form is still less work.
     assert model.training.method == "primal"
     # The primal inverse at this size, condition number near 1e4, is good to about 1e-12.
-    np.testing.assert_allclose(model.A, g[:, : n * (s + 1)], rtol=0, atol=1e-10)
-    np.testing.assert_allclose(model.B, g[:, n * (s + 1) :], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(np.hstack([model.A, model.B]), g, rtol=0, atol=1e-10)

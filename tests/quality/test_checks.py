@@ -1,7 +1,6 @@
 """Checks report faults as data: which kind, where, how large."""
 
 import json
-import warnings
 
 import numpy as np
 import pytest
@@ -36,92 +35,93 @@ def kinds(*args, **keys):
     return [each.kind.name for each in against(*args, **keys)]
 
 
-class TestRedundantSensors:
-    def test_a_sound_one(self):
-        assert kinds(waves(0.02)) == []
-
-    def test_a_late_one(self):
-        (found,) = against(waves(0.3))
-        assert found.kind.name == "LAG"
-        assert found.value == pytest.approx(0.3, abs=0.004)  # a tenth of a sample
-        assert (found.unit, found.channel, found.run) == ("s", "two", "r")
-        assert against(waves(-0.3))[0].value == pytest.approx(-0.3, abs=0.004)
-        assert found.text.startswith("against one: lag +0.30 s (± 0.0")
-
-    def test_a_phase_that_drifts_about_zero(self):
-        """0.27 periods over the record, with a median near 0: this one passed."""
-        drifting = np.interp(T + 0.27 * PERIOD * (T / T[-1] - 0.5), T, waves())
-        (found,) = against(drifting)
-        assert found.kind.name == "LAG_GROWS"
-        assert found.value == pytest.approx(-0.27 * PERIOD, rel=0.15)  # windows at the ends
-
-    def test_noise_of_another_size_than_a_model_s_error(self):
-        noise = np.random.default_rng(0).normal(0, waves().std(), T.size)
-        assert kinds(waves() + 0.1 * noise) == []
-        assert kinds(waves() + 0.3 * noise) == ["DIFFERENCE"]
-
-    def test_constant_and_unrelated(self):
-        assert kinds(np.full(3000, 0.2)) == ["STILL"]
-        assert kinds(waves(seed=7)) == ["AGREEMENT"]
-
-    @pytest.mark.parametrize(
-        ("factor", "told"),
-        {1000.0: True, 2.2: True, 1.9: False, 0.55: False, 0.45: True, 0.001: True}.items(),
-    )
-    def test_another_scale(self, factor, told):
-        """A wrong unit does not change a correlation; the limits are 2 and 1/2."""
-        assert kinds(factor * waves()) == (["SCALE"] if told else ["DIFFERENCE"])
-
-    @pytest.mark.parametrize(("part", "told"), [(0.8, False), (1.25, True)])
-    def test_either_side_of_the_limits_on_lags(self, part, told):
-        t = np.sin(2 * np.pi * T / PERIOD)
-        late = np.sin(2 * np.pi * (T / PERIOD - part * LATE))
-        assert bool(kinds(late, t)) is told
-        grown = np.sin(2 * np.pi * (T / PERIOD - part * RUN_AWAY * (T / T[-1] - 0.5)))
-        assert bool(kinds(grown, t)) is told
-
-    @pytest.mark.parametrize(("spanned", "told"), {2: True, 4: True, 7: False, 20: False}.items())
-    def test_motion_below_the_resolution(self, spanned, told):
-        step = 2 * np.sqrt(2) * waves().std() / spanned
-        noisy = waves() + 0.02 * waves().std() * np.random.default_rng(1).standard_normal(T.size)
-        read = step * np.round(noisy / step)
-        assert ("RESOLUTION" in kinds(read, step=reading_step(read))) is told
+def test_a_late_one():
+    (found,) = against(waves(0.3))
+    assert found.kind.name == "LAG"
+    assert found.value == pytest.approx(0.3, abs=0.004)  # a tenth of a sample
+    assert (found.unit, found.channel, found.run) == ("s", "two", "r")
+    assert against(waves(-0.3))[0].value == pytest.approx(-0.3, abs=0.004)
+    assert found.text.startswith("against one: lag +0.30 s (± 0.0")
 
 
-class TestLags:
-    def test_what_stands_still_has_no_lag(self):
-        """A sensor that runs away and then freezes: the windows that it froze in say nothing."""
-        stretched = np.interp(T * (1 - 1.2 / T[-1]), T, waves())
-        # The middles of the first and last windows.
-        assert 0.9 < compare_sensors(stretched, waves(), DT).growth < 1.2
-        frozen = np.where(np.arange(T.size) < 2600, stretched, stretched[2600])
-        held = np.arange(T.size) >= 2600
-        found = compare_sensors(frozen, waves(), DT, stuck_samples=held)
-        assert found.growth == pytest.approx(
-            1.2 * 2600 / T.size, abs=0.15
-        )  # windows of 3 s at the ends
-        assert found.centre[-1] < 2600 * DT
+def test_a_phase_that_drifts_about_zero():
+    """0.27 periods over the record, with a median near 0: this one passed."""
+    drifting = np.interp(T + 0.27 * PERIOD * (T / T[-1] - 0.5), T, waves())
+    (found,) = against(drifting)
+    assert found.kind.name == "LAG_GROWS"
+    assert found.value == pytest.approx(-0.27 * PERIOD, rel=0.15)  # windows at the ends
 
 
-class TestFindings:
-    FOUND = Finding(SamplesKind.DRIFT, "first", "pitch", np.deg2rad(5.0), 0.01, "rad")
+def test_noise_of_another_size_than_a_model_s_error():
+    noise = np.random.default_rng(0).normal(0, waves().std(), T.size)
+    assert kinds(waves() + 0.1 * noise) == []
+    assert kinds(waves() + 0.3 * noise) == ["DIFFERENCE"]
 
-    def test_a_sentence_is_rendered_from_data_angles_in_degrees(self):
-        assert self.FOUND.text == "level drifts by +5 deg over the record"
 
-    def test_a_kind_that_is_not_loaded_keeps_its_sentence(self):
-        stored = json.loads(as_json([self.FOUND]))
-        stored[0]["kind"] = "OF_ANOTHER_VERSION"
-        (found,) = findings_of(xr.Dataset(attrs={"quality": json.dumps(stored)}))
-        assert found.text == self.FOUND.text
-        assert found.value == self.FOUND.value
+def test_constant_and_unrelated():
+    assert kinds(np.full(3000, 0.2)) == ["STILL"]
+    assert kinds(waves(seed=7)) == ["AGREEMENT"]
 
-    def test_warnings_of_the_channels_of_a_model_come_once(self):
-        told = set()
-        with pytest.warns(SeakeepWarning, match=r"^first: pitch level drifts .* record\.$"):
-            warn_of([self.FOUND, self.FOUND], told, ["pitch"])
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            warn_of([self.FOUND], told, ["pitch"])
-            warn_of([self.FOUND], set(), ["heave"])
-            warn_of([self.FOUND], set())  # no remedy: nothing is wrong with the campaign file
+
+@pytest.mark.parametrize(
+    ("factor", "told"),
+    {1000.0: True, 2.2: True, 1.9: False, 0.55: False, 0.45: True, 0.001: True}.items(),
+)
+def test_another_scale(factor, told):
+    """A wrong unit does not change a correlation; the limits are 2 and 1/2."""
+    assert kinds(factor * waves()) == (["SCALE"] if told else ["DIFFERENCE"])
+
+
+@pytest.mark.parametrize(("part", "told"), [(0.8, False), (1.25, True)])
+def test_either_side_of_the_limits_on_lags(part, told):
+    t = np.sin(2 * np.pi * T / PERIOD)
+    late = np.sin(2 * np.pi * (T / PERIOD - part * LATE))
+    assert bool(kinds(late, t)) is told
+    grown = np.sin(2 * np.pi * (T / PERIOD - part * RUN_AWAY * (T / T[-1] - 0.5)))
+    assert bool(kinds(grown, t)) is told
+
+
+@pytest.mark.parametrize(("spanned", "told"), {2: True, 4: True, 7: False, 20: False}.items())
+def test_motion_below_the_resolution(spanned, told):
+    step = 2 * np.sqrt(2) * waves().std() / spanned
+    noisy = waves() + 0.02 * waves().std() * np.random.default_rng(1).standard_normal(T.size)
+    read = step * np.round(noisy / step)
+    assert ("RESOLUTION" in kinds(read, step=reading_step(read))) is told
+
+
+def test_what_stands_still_has_no_lag():
+    """A sensor that runs away and then freezes: the windows that it froze in say nothing."""
+    stretched = np.interp(T * (1 - 1.2 / T[-1]), T, waves())
+    # The middles of the first and last windows.
+    assert 0.9 < compare_sensors(stretched, waves(), DT).growth < 1.2
+    frozen = np.where(np.arange(T.size) < 2600, stretched, stretched[2600])
+    held = np.arange(T.size) >= 2600
+    found = compare_sensors(frozen, waves(), DT, stuck_samples=held)
+    assert found.growth == pytest.approx(
+        1.2 * 2600 / T.size, abs=0.15
+    )  # windows of 3 s at the ends
+    assert found.centre[-1] < 2600 * DT
+
+
+FOUND = Finding(SamplesKind.DRIFT, "first", "pitch", np.deg2rad(5.0), 0.01, "rad")
+
+
+def test_a_sentence_is_rendered_from_data_angles_in_degrees():
+    assert FOUND.text == "level drifts by +5 deg over the record"
+
+
+def test_a_kind_that_is_not_loaded_keeps_its_sentence():
+    stored = json.loads(as_json([FOUND]))
+    stored[0]["kind"] = "OF_ANOTHER_VERSION"
+    (found,) = findings_of(xr.Dataset(attrs={"quality": json.dumps(stored)}))
+    assert found.text == FOUND.text
+    assert found.value == FOUND.value
+
+
+def test_warnings_of_the_channels_of_a_model_come_once():
+    told = set()
+    with pytest.warns(SeakeepWarning, match=r"^first: pitch level drifts .* record\.$"):
+        warn_of([FOUND, FOUND], told, ["pitch"])
+    warn_of([FOUND], told, ["pitch"])
+    warn_of([FOUND], set(), ["heave"])
+    warn_of([FOUND], set())  # no remedy: nothing is wrong with the campaign file

@@ -27,11 +27,14 @@ def noisy():
     return x + 0.02 * x.std() * np.random.default_rng(1).standard_normal(x.size)
 
 
+def recorded(x):
+    group = flag_samples(record(DT, x=x), PreparationSettings())
+    return Record("r", group, {"": group})
+
+
 def reported(x):
     """Kinds of findings about samples."""
-    group = record(DT, x=x)
-    run = Record("r", group, {"": flag_samples(group, PreparationSettings())})
-    return {found.kind.name for check in (flagged, constant, noise) for found in check(run)}
+    return {each.kind.name for check in (flagged, constant, noise) for each in check(recorded(x))}
 
 
 def faulty(x, kind, length, place):
@@ -92,10 +95,8 @@ def test_a_probe_that_dies_has_no_drift_besides():
     x = waves()
     dead = 1500 + int(np.argmax(x[1500:1600]))
     x[dead:] = x[dead]
-    group = flag_samples(record(DT, eta=x), PreparationSettings())
-    run = Record("r", group, {"": group})
-    assert list(levels(run)) == []
-    assert [each.kind.name for each in flagged(run)] == ["STUCK"]
+    assert list(levels(recorded(x))) == []
+    assert reported(x) == {"STUCK"}
 
 
 def test_at_rest_around_the_waves_is_not_held(noisy):

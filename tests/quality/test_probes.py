@@ -33,8 +33,8 @@ def odd(**keys):
     return {(each.run, each.channel): each.value for each in odd_probes(campaign(**keys))}
 
 
-def test_nothing_is_said_of_other_seas_before_a_wall():
-    assert odd() == odd(probes=3) == odd(regular=True) == odd(seconds=30) == {}
+def test_nothing_is_said_of_other_seas_before_a_wall_and_of_small_changes():
+    assert odd() == odd(probes=3) == odd(regular=True) == odd(seconds=30) == odd(high=1.1) == {}
 
 
 @pytest.mark.parametrize("factor", [0.001, -1.0, 0.75, 1000.0])
@@ -46,10 +46,6 @@ def test_another_unit_sign_or_gain(factor):
 
 def test_of_three_probes_the_one_that_moves_otherwise_is_named():
     assert odd(probes=3, high=-0.5) == {("high", "eta_fwd"): pytest.approx(-0.5, rel=0.1)}
-
-
-def test_small_changes_pass():
-    assert odd(high=1.1) == {}
 
 
 @pytest.mark.parametrize("keys", [{"regular": True}, {"seconds": 30}])

@@ -9,7 +9,6 @@ from seas import sea
 from seakeep.quality.faults import reading_step
 
 T = np.arange(0, 100, 0.005)
-RNG = np.random.default_rng(3)
 SEA = sea(3, (0.4, 0.9), peak=1.6, components=20).at(T)
 
 
@@ -35,7 +34,7 @@ def test_frames_that_were_interpolated_to_a_faster_rate(every):
 
 
 def test_noise_larger_than_the_step_hides_it():
-    noisy = SEA + 0.05 * RNG.standard_normal(SEA.size)
+    noisy = SEA + 0.05 * np.random.default_rng(3).standard_normal(SEA.size)
     for read in (SEA, np.full(500, 2.0), np.where(T < 50, SEA, SEA[10_000])):  # the last froze once
         assert np.isnan(reading_step(read))
     assert np.isnan(reading_step(np.round(noisy, 5)))

@@ -14,7 +14,7 @@ from seakeep.check import Checked, check_model
 from seakeep.cli import main
 from seakeep.errors import RequestError
 
-pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+pytest.importorskip("matplotlib")
 
 
 from seakeep.report.check_page import check_sections
@@ -53,14 +53,12 @@ def test_the_page_holds_its_figures_and_tables(checked):
         assert f"{row['state']}: model" in page
 
 
-def test_a_forecast_compares_its_waves_with_those_of_training(checked, monkeypatch):
+def test_a_forecast_compares_its_waves_with_those_of_training(checked, monkeypatch, command):
     asked = []
     monkeypatch.setattr("seakeep.study.fit.warn_of_waves", lambda *given: asked.append(given[2:]))
     folder = checked.parent
-    files = [str(folder / name) for name in ("model.nc", "campaign.toml")]
-    out = str(folder / "forecast.csv")
-    given = ["--run", "unseen", "--start", "20", "--steps", "40", "-o", out]
-    assert main(["forecast", *files, *given]) == 0
+    words = ["--run", "unseen", "--start", 20, "--steps", 40, "-o", folder / "forecast.csv"]
+    command("forecast", folder / "model.nc", folder / "campaign.toml", *words)
     assert asked == [("unseen", 20.0, 40)]
 
 

@@ -15,6 +15,7 @@ DT, SPLIT, SIZE = 0.1, 3.0, 4  # s, encounter periods of 1 s, training sets and 
 MODELS = ["deterministic", "bayesian", "fir"]
 TIME = DT * np.arange(1, 241)
 CELLS = ("training", "window")
+SHAPE = SIZE, TIME.size, len(NAMES)
 
 
 def windows(changes, measured=None, judged=None):
@@ -22,7 +23,7 @@ def windows(changes, measured=None, judged=None):
 
     The keys of `changes` are words of model, measure and channel.
     """
-    measured = np.ones((SIZE, TIME.size, len(NAMES))) if measured is None else measured
+    measured = np.ones(SHAPE) if measured is None else measured
     cells = (*CELLS, "channel")
     error = xr.DataArray(
         0.3 * np.ones((len(MODELS), len(MEASURES), SIZE, SIZE, len(NAMES))),
@@ -101,7 +102,7 @@ def test_loads_diverge_more_by_the_ends_of_both_intervals(lower, expected):
 
 def test_the_slow_part_of_loads_is_judged_without_the_waves():
     fast, slow = np.sin(2 * np.pi * TIME), np.sin(2 * np.pi * TIME / 12)
-    measured = np.broadcast_to((slow + 0.3 * fast)[:, None], (SIZE, TIME.size, len(NAMES)))
+    measured = np.broadcast_to((slow + 0.3 * fast)[:, None], SHAPE)
     test = windows({}, measured)
     for part, expected in ((slow - fast, True), (0.3 * fast - slow, False)):
         test["mean"] = test["mean"].dims, np.broadcast_to(part[:, None], test["mean"].shape)
@@ -110,7 +111,7 @@ def test_the_slow_part_of_loads_is_judged_without_the_waves():
 
 def slack_part(share):
     """Loads of which a share is slack."""
-    measured = np.ones((SIZE, TIME.size, len(NAMES)))
+    measured = np.ones(SHAPE)
     measured[:, : round(share * TIME.size)] = 0.0
     return windows({}, measured)
 
@@ -158,7 +159,7 @@ def test_regular_waves_are_compared_with_irregular_ones(nrmse, nammae, expected)
 def test_cells_that_are_not_judged_stay_out_of_the_band():
     judged = np.ones((SIZE, SIZE), dtype=bool)
     judged[0] = False
-    test = windows({}, np.random.default_rng(1).normal(0, 1, (SIZE, TIME.size, len(NAMES))), judged)
+    test = windows({}, np.random.default_rng(1).normal(0, 1, SHAPE), judged)
     edge = np.full((1, SIZE, SIZE, TIME.size, len(NAMES)), 10.0)
     edge[:, 0] = 0.0  # of the set of training that is not judged
     dims = ("ensemble", *test["mean"].dims[1:])

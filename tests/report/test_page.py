@@ -22,7 +22,7 @@ from seakeep.report.sections.results import (
 from seakeep.report.tables import WORDS
 from seakeep.study import read_result, read_study, run_study
 
-pytest.importorskip("matplotlib", reason="figures need matplotlib (extra 'figures')")
+pytest.importorskip("matplotlib")
 
 
 from seakeep.report.figures.histories import history_figure, shown_cells
@@ -172,9 +172,7 @@ def test_a_report_that_was_interrupted_is_written_again(tmp_path):
 @pytest.fixture(scope="module")
 def browser():
     """A Chromium of the system, without a window, that logs all it complains of."""
-    webdriver = pytest.importorskip(
-        "selenium.webdriver", reason="selenium is not installed (group 'test')"
-    )
+    webdriver = pytest.importorskip("selenium.webdriver")
     chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
     driver = shutil.which("chromedriver")
     if chromium is None or driver is None:
@@ -191,6 +189,14 @@ def browser():
     started = webdriver.Chrome(options=options, service=Service(driver))
     yield started
     started.quit()
+
+
+def told_at(browser, element):
+    """Words beside the time histories, with the mouse on an element."""
+    from selenium.webdriver import ActionChains
+
+    ActionChains(browser).move_to_element(element).perform()
+    return browser.find_element("id", "history-readout").text
 
 
 def state(browser, key):
@@ -226,14 +232,12 @@ def test_the_time_histories_zoom_and_choose(browser, page):
     for place in ("pick-training", "pick-window"):
         Select(browser.find_element("id", place)).select_by_index(0)
     assert state(browser, "cell") == opening
-    ActionChains(browser).move_to_element(browser.find_element("tag name", "h1")).perform()
-    told = browser.find_element("id", "history-readout").text
+    told = told_at(browser, browser.find_element("tag name", "h1"))
     assert re.search(r"NRMSE of pitch in this window: deterministic \d\.\d{3}, Bayesian mean", told)
     assert state(browser, "legend").split(", ") == [
         "Bayesian band", "measured", "deterministic", "Bayesian mean"
     ]  # fmt: skip
-    ActionChains(browser).move_to_element(canvas).perform()
-    told = browser.find_element("id", "history-readout").text
+    told = told_at(browser, canvas)
     assert re.search(r"measured -?[\d.e-]+ deg", told)
     assert re.search(r"wave elevation.* m\b", told)
     assert browser.get_log("browser") == []

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("matplotlib", reason="figures need the extra figures")
+pytest.importorskip("matplotlib")
 
 from PIL import Image
 

@@ -23,8 +23,8 @@ def probes(seed=0, noise=0.0):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_effective_celerity_is_that_of_the_true_spectrum(seed):
-    (upstream, downstream), waves = probes(seed, noise=0.015)
-    found = effective_celerity(upstream, downstream, DT, APART, DEPTH)
+    records, waves = probes(seed, noise=0.015)
+    found = effective_celerity(*records, DT, APART, DEPTH)
     lags = np.linspace(*found.bounds, 8001)
     truth = replace(waves, amplitude=waves.amplitude**2, phase=0.0).at(lags, APART)
     expected = APART / lags[np.argmax(truth)]
@@ -35,9 +35,9 @@ def test_effective_celerity_is_that_of_the_true_spectrum(seed):
 
 
 def test_the_bound_keeps_the_peak_of_the_next_period_out():
-    (upstream, downstream), _ = probes()
-    bounded = effective_celerity(upstream, downstream, DT, APART, DEPTH)
-    wide, _ = correlation_peak(upstream, downstream, DT, (0.0, 8.0))
+    records, _ = probes()
+    bounded = effective_celerity(*records, DT, APART, DEPTH)
+    wide, _ = correlation_peak(*records, DT, (0.0, 8.0))
     # The paper's unbounded peak sits a period late, below every phase speed of the band.
     assert wide - bounded.lag > 1.0
     assert APART / wide < phase_speed(2 * np.pi * 1.13, DEPTH)
@@ -45,8 +45,8 @@ def test_the_bound_keeps_the_peak_of_the_next_period_out():
 
 @pytest.mark.parametrize("frequency", [0.4, 0.5, 0.7])
 def test_phase_celerity_is_that_of_linear_dispersion(frequency):
-    (upstream, downstream), _ = probes(1, noise=0.015)
-    found = phase_celerity(upstream, downstream, DT, APART, DEPTH)
+    records, _ = probes(1, noise=0.015)
+    found = phase_celerity(*records, DT, APART, DEPTH)
     expected = float(phase_speed(2 * np.pi * frequency, DEPTH))
     assert found.at(frequency) == pytest.approx(expected, rel=0.03)
     assert np.interp(frequency, found.frequency, found.coherence) > 0.9

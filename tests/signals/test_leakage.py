@@ -17,10 +17,14 @@ def sea(seed=0, jitter=0.0):
     return seas.sea(seed, (0.28 - half, 1.13 + half), jitter=jitter).at(TIME)
 
 
+def leak(training, test):
+    return find_leakage(training, test, DT)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_equally_spaced_components_come_back_after_116_5_seconds(seed):
     record = sea(seed) + 0.03 * np.random.default_rng(seed).standard_normal(TIME.size)
-    found = find_leakage([sea(9)[:HALF], record[:HALF]], record[HALF:], DT)
+    found = leak([sea(9)[:HALF], record[:HALF]], record[HALF:])
     assert found is not None
     assert (found.training, found.share > 0.6) == (1, True)
     later = HALF * DT + found.test_start - found.training_start
@@ -37,31 +41,31 @@ def test_equally_spaced_components_come_back_after_116_5_seconds(seed):
 @pytest.mark.parametrize("seed", range(5))
 def test_other_seas_do_not(seed):
     record = sea(seed)
-    assert find_leakage([sea(seed + 10), sea(seed + 20)], record, DT) is None
+    assert leak([sea(seed + 10), sea(seed + 20)], record) is None
     jittered = sea(seed, jitter=1.0)
-    assert find_leakage([jittered[:HALF]], jittered[HALF:], DT) is None
+    assert leak([jittered[:HALF]], jittered[HALF:]) is None
 
 
 def test_a_few_waves_are_alike_in_any_two_seas():
     short = sea(0)[1000 : 1000 + 32 * 4]
-    assert find_leakage([sea(10), sea(20), sea(30)], short, DT) is None
-    assert find_leakage([sea(1)], sea(1)[1000 : 1000 + 32 * 25], DT) is not None
+    assert leak([sea(10), sea(20), sea(30)], short) is None
+    assert leak([sea(1)], sea(1)[1000 : 1000 + 32 * 25]) is not None
 
 
 def test_regular_waves_repeat_by_their_nature():
     wave = 0.05 * np.sin(3.0 * TIME) * (1 + 0.04 * np.sin(0.3 * TIME))
-    assert find_leakage([wave[:HALF]], wave[HALF:], DT) is None
-    assert find_leakage([sea()], np.zeros(100), DT) is None
-    assert find_leakage([sea()[:100]], sea(), DT) is None  # shorter than a stretch
+    assert leak([wave[:HALF]], wave[HALF:]) is None
+    assert leak([sea()], np.zeros(100)) is None
+    assert leak([sea()[:100]], sea()) is None  # shorter than a stretch
 
 
 def test_still_water_before_the_waves_is_no_part_of_the_comparison():
     # Two wave trains that build up after still water: they differ in all but that.
     ramp = np.clip((TIME - 20.0) / 10.0, 0.0, 1.0)
     trains = [ramp * np.sin(2 * np.pi * TIME / period) for period in (0.9, 0.63)]
-    assert find_leakage([trains[0]], trains[1], DT) is None
+    assert leak([trains[0]], trains[1]) is None
     late = np.concatenate([np.zeros(600), sea()[:1400]])
-    found = find_leakage([sea()], late, DT)
+    found = leak([sea()], late)
     assert found is not None
     assert found.share == 1.0
     assert found.test_start - found.training_start == pytest.approx(600 * DT, abs=DT)

@@ -21,6 +21,10 @@ def records_of(seed, places, *, length=210.0, band=(0.28, 1.13), reflected=0.0, 
     }
 
 
+def misplaced(records, places):
+    return misplaced_probes(records, places, DT, DEPTH)
+
+
 @pytest.mark.parametrize("stated", [3.67, 3.85, 1.0, -3.67, 40.0])
 def test_the_separation_is_found_whatever_was_stated(stated):
     records = records_of(0, {"a": 0.0, "b": 3.67})
@@ -45,34 +49,33 @@ def test_the_error_of_a_carried_elevation_is_what_carrying_makes():
 def test_right_positions_pass_and_one_wrong_by_the_paper_s_is_named(seed, conditions):
     """Row 27 of the paper's notes: 0.18 m between what two places of the text call one."""
     records = records_of(seed, PLACES, **conditions)
-    assert misplaced_probes(records, PLACES, DT, DEPTH) == []
+    assert misplaced(records, PLACES) == []
     wrong = {**PLACES, "fwd": 48.24}
-    (found,) = misplaced_probes(records, wrong, DT, DEPTH)
+    (found,) = misplaced(records, wrong)
     assert (found.probe, found.certain) == ("fwd", True)
     # The probe stands 0.18 m nearer to the other one than stated; reflections leave 2 cm.
     assert found.separation.separation - found.separation.stated == pytest.approx(0.18, abs=0.03)
     # 5 cm turn the mean wave, 4 m long, by 4 degrees: that does not matter.
-    assert misplaced_probes(records, {**PLACES, "fwd": 48.37}, DT, DEPTH) == []
+    assert misplaced(records, {**PLACES, "fwd": 48.37}) == []
     swapped = {"fwd": PLACES["cog"], "mid": PLACES["mid"], "cog": PLACES["fwd"]}
-    assert misplaced_probes(records, swapped, DT, DEPTH)
+    assert misplaced(records, swapped)
     two = {name: records[name] for name in ("fwd", "cog")}
-    (either,) = misplaced_probes(two, wrong, DT, DEPTH)
+    (either,) = misplaced(two, wrong)
     assert not either.certain
 
 
 def test_what_says_nothing_of_positions_is_silent():
     wrong = {"fwd": 48.24, "cog": 52.09}
-    regular = records_of(5, {"fwd": 48.42, "cog": 52.09}, band=(0.599, 0.601))
-    assert misplaced_probes(regular, wrong, DT, DEPTH) == []
-    short = records_of(5, {"fwd": 48.42, "cog": 52.09}, length=15.0)
-    assert misplaced_probes(short, wrong, DT, DEPTH) == []
+    right = {"fwd": 48.42, "cog": 52.09}
+    regular = records_of(5, right, band=(0.599, 0.601))
+    short = records_of(5, right, length=15.0)
     apart = {
         "fwd": records_of(6, {"fwd": 48.42})["fwd"],
         "cog": records_of(7, {"cog": 52.09})["cog"],
     }
-    assert misplaced_probes(apart, wrong, DT, DEPTH) == []
     dead = {**records_of(5, {"fwd": 48.42}), "cog": np.zeros(4200)}
-    assert misplaced_probes(dead, wrong, DT, DEPTH) == []
+    for records in (regular, short, apart, dead):
+        assert misplaced(records, wrong) == []
     wave = short["fwd"]
     with pytest.raises(RequestError, match=r"1e.06 m is too far .* Correct the positions"):
         probe_separation(wave, wave, DT, DEPTH, 1e6)

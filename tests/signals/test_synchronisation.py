@@ -76,10 +76,11 @@ def test_one_pulse_gives_an_offset_and_no_drift():
     assert np.isnan(clock.drift_error)
 
 
-def test_drifts_that_differ_are_not_pooled():
-    def clock(drift):
-        return Clock(0.1, drift, 1e-3, 2e-6, "trigger pulses", 13, 1e-3, centre=100.0)
+def clock(drift, error=2e-6):
+    return Clock(0.1, drift, 1e-3, error, "trigger pulses", 13, 1e-3, centre=100.0)
 
+
+def test_drifts_that_differ_are_not_pooled():
     apart = [clock(10e-6), clock(60e-6)]
     assert pool_drift(apart) == apart
     one, other, same = pool_drift([clock(20e-6), clock(22e-6), Clock()])
@@ -91,12 +92,12 @@ def test_drifts_that_differ_are_not_pooled():
 
 
 def test_a_doubtful_drift_is_not_applied():
-    doubtful = Clock(0.1, 20e-6, 1e-3, 11e-6, "trigger pulses", 3, 1e-3, centre=30.0)
+    doubtful = clock(20e-6, 11e-6)
     offset = without_doubtful_drift(doubtful)
     assert offset.drift == 0
     assert "offset only" in offset.describe()
-    assert offset.reading(30.0) == pytest.approx(doubtful.reading(30.0), abs=1e-12)
-    certain = Clock(0.1, 20e-6, 1e-3, 9e-6, "trigger pulses", 3, 1e-3, centre=30.0)
+    assert offset.reading(100.0) == pytest.approx(doubtful.reading(100.0), abs=1e-12)
+    certain = clock(20e-6, 9e-6)
     assert without_doubtful_drift(certain) == certain
 
 

@@ -5,17 +5,17 @@ import pytest
 import xarray as xr
 from small_tank import write_csv
 
-from seakeep import cli
 from seakeep.campaign import read_table
 from seakeep.errors import DataError, RequestError
 from seakeep.signals import TrackingSettings, compare_motion, contact_sheet, track_video
 from seakeep.signals.tracking import FLAGS
 
 cv2 = pytest.importorskip("cv2")
-pytest.importorskip("numba", reason="the renderer belongs to the virtual tank")
+pytest.importorskip("numba")
 
 from seakeep.tank import delivery as tank_video  # noqa: E402
 
+cv2.setNumThreads(1)
 RATE, FRAMES = 30.0, 60
 COG = 0.03  # m above still water
 OCCLUDED = range(12, 16)
@@ -31,20 +31,19 @@ def motion(t):
     return surge, 0.05 * np.sin(phase + 1), np.deg2rad(5) * np.sin(phase + 2)
 
 
-def lit_frame(t, lamp=0.0, light=None):
-    place = np.linspace(-1.0, 2.2, 41)
-    surface = 0.05 * np.sin(3 * place - 2 * np.pi * 0.6 * t)
-    frame = tank_video.frame_of(cv2, motion(t), surface, lamp, COG)
-    return cv2.multiply(frame.astype(np.float32), tank_video._light() if light is None else light)
+def writer_of(path):
+    return cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), RATE, (1280, 720))
 
 
 def render(path, hook=None, frames=FRAMES):
     """Write a video with noise; return the panel's place in pixels, frame by frame."""
-    rng = np.random.default_rng(1)
+    rng, place = np.random.default_rng(1), np.linspace(-1.0, 2.2, 41)
     light, stock = tank_video._light(), tank_video._noise(cv2, rng)
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), RATE, (1280, 720))
+    writer = writer_of(path)
     for i in range(frames):
-        lit = lit_frame(i / RATE, float(20 <= i < 30), light)
+        surface = 0.05 * np.sin(3 * place - 2 * np.pi * 0.6 * i / RATE)
+        frame = tank_video.frame_of(cv2, motion(i / RATE), surface, float(20 <= i < 30), COG)
+        lit = cv2.multiply(frame.astype(np.float32), light)
         lit = hook(i, lit) if hook else lit
         lit += np.roll(stock[i % len(stock)], rng.integers(1280), axis=1)[:, :, None]
         writer.write(np.clip(lit, 0, 255).astype(np.uint8))
@@ -56,11 +55,6 @@ def render(path, hook=None, frames=FRAMES):
     )
 
 
-@pytest.fixture(scope="module", autouse=True)
-def one_thread():
-    cv2.setNumThreads(1)
-
-
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
     """Path of an undisturbed video, and the panel's true place."""
@@ -70,7 +64,7 @@ def plain(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def disturbed(tmp_path_factory):
-    """Path of a video with a pole before the panel, floods of light, and darkness."""
+    """A video with a pole before the panel, floods of light, and darkness; the place, the track."""
 
     def hook(i, lit):
         if i in OCCLUDED:
@@ -82,7 +76,7 @@ def disturbed(tmp_path_factory):
         return lit * (0.2 if i in DARK else 1.0)
 
     path = tmp_path_factory.mktemp("video") / "disturbed.mp4"
-    return path, render(path, hook)
+    return path, render(path, hook), track_video(path)
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +160,7 @@ def test_a_hidden_corner_is_flagged_before_it_spoils_the_pitch(tmp_path):
 def test_a_camera_on_the_other_side(plain, tmp_path, tracked):
     """Mirrored, with downstream to the left, a video shows the same motion."""
     path = tmp_path / "mirrored.mp4"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), RATE, (1280, 720))
+    writer = writer_of(path)
     capture = cv2.VideoCapture(str(plain[0]))
     while (read := capture.read())[0]:
         writer.write(cv2.flip(read[1], 1))
@@ -177,13 +171,8 @@ def test_a_camera_on_the_other_side(plain, tmp_path, tracked):
         assert rms(out[name] - tracked[name]) < 5e-4, name
 
 
-@pytest.fixture(scope="module")
-def flagged(disturbed):
-    return track_video(disturbed[0])
-
-
-def test_flags_of_bad_frames(disturbed, flagged):
-    out, place = flagged, disturbed[1]
+def test_flags_of_bad_frames(disturbed):
+    _, place, out = disturbed
     expected = np.full(FRAMES, FLAGS["good"])
     expected[OCCLUDED] = FLAGS["occluded"]
     expected[BURNT] = FLAGS["overexposed"]
@@ -233,8 +222,9 @@ def test_a_lag_one_wave_period_off_is_told():
     assert found([1.0], 1.0, max_lag=0.5).at_limit
 
 
-def test_a_contact_sheet_shows_bad_frames_too(disturbed, flagged, tmp_path):
-    sheet = contact_sheet(disturbed[0], flagged)
+def test_a_contact_sheet_shows_bad_frames_too(disturbed, tmp_path):
+    path, _, flagged = disturbed
+    sheet = contact_sheet(path, flagged)
     picture = cv2.imdecode(np.frombuffer(sheet, np.uint8), cv2.IMREAD_COLOR)
     assert picture.shape == (4 * 270, 3 * 480, 3)
     # Four of the twelve are the worst ones; frames spread evenly may be bad too.
@@ -245,14 +235,12 @@ def test_a_contact_sheet_shows_bad_frames_too(disturbed, flagged, tmp_path):
         contact_sheet(tmp_path / "short.mp4", flagged)
 
 
-def test_the_command_writes_what_a_campaign_reads(plain, tracked, monkeypatch, capsys):
+def test_the_command_writes_what_a_campaign_reads(plain, tracked, monkeypatch, command):
     """The example of its help, on a video of that name."""
     monkeypatch.chdir(plain[0].parent)
-    assert cli.main(["track", "--help"]) == 0
-    example = " ".join(capsys.readouterr().out.partition("Example: seakeep ")[2].split()[:6])
-    assert example == "track side_view.mp4 -o track.csv --contact-sheet sheet.png"
-    assert cli.main(example.split()) == 0
-    err = capsys.readouterr().err
+    example = command("track", "--help")[0].partition("Example: seakeep ")[2].split()[:6]
+    assert " ".join(example) == "track side_view.mp4 -o track.csv --contact-sheet sheet.png"
+    _, err = command(*example)
     assert "Tracking 60/60: frames" in err
     assert "60 frames at 30 Hz; flagged: none (0 bridged); 2.49" in err
     table = read_table(plain[0].parent / "track.csv")
@@ -264,15 +252,14 @@ def test_the_command_writes_what_a_campaign_reads(plain, tracked, monkeypatch, c
     assert cv2.imread("sheet.png").shape[1] == 1440
 
 
-def test_the_command_compares_bridges_short_gaps_and_writes_netcdf(disturbed, tmp_path, capsys):
+def test_the_command_compares_bridges_short_gaps_and_writes_netcdf(disturbed, tmp_path, command):
     time = np.arange(0, 5, 0.02) - 0.5
     _, heave, pitch = motion(time)
     columns = {"time [s]": time, "heave [m]": heave, "pitch [deg]": np.rad2deg(pitch)}
     mru = write_csv(tmp_path / "mru.csv", columns)
     out = tmp_path / "track.nc"
-    words = ["track", disturbed[0], "-o", out, "--bridge", 0.2, "--mru", mru, "--max-lag", 0.4]
-    assert cli.main(list(map(str, words))) == 0
-    err = capsys.readouterr().err
+    words = ["-o", out, "--bridge", 0.2, "--mru", mru, "--max-lag", 0.4]
+    _, err = command("track", disturbed[0], *words)
     assert "flagged: 10 lost, 4 occluded, 6 overexposed (10 bridged)" in err
     assert "pitch against the MRU: correlation 1.0" in err
     assert "Note: pitch: the lags searched (within 0.4 s) do not reach a wave period (1." in err

@@ -20,12 +20,6 @@ def test_crossings_lie_between_samples():
     np.testing.assert_allclose(zero_up_crossings([-1.0, 3.0, -1.0, -1.0], 0.5), [0.125])
 
 
-def test_it_is_a_period_and_no_frequency():
-    # The paper prints N/T; its value, 1.64 s, is T/N.
-    t = np.arange(0, 164, 0.01)
-    assert encounter_period(np.sin(2 * np.pi * t / 1.64), 0.01) == pytest.approx(1.64, rel=1e-6)
-
-
 def test_the_spectrum_holds_the_variance():
     rng = np.random.default_rng(0)
     series = rng.standard_normal(20_000)

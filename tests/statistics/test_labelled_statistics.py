@@ -22,20 +22,22 @@ MEASURED = xr.Dataset(
 PREDICTED = 0.9 * MEASURED[["pitch", "heave"]]
 
 
+def redrawn(series, room=statistics):
+    return room.moving_block_bootstrap(series, 5, 20, np.random.default_rng(1))
+
+
 def test_a_dataset_is_redrawn_in_step():
-    drawn = statistics.moving_block_bootstrap(MEASURED, 5, 20, np.random.default_rng(1))
-    plain = core_bootstrap.moving_block_bootstrap(HEAVE, 5, 20, np.random.default_rng(1))
+    drawn, plain = redrawn(MEASURED), redrawn(HEAVE, core_bootstrap)
     assert drawn["heave"].dims == ("draw", "time")
     assert np.array_equal(drawn["heave"], plain)
     # Sums of the same numbers.
     assert np.array_equal(drawn["surge"], drawn["pitch"] + drawn["heave"])
     assert drawn["pitch"].attrs["units"] == "deg"
     assert np.array_equal(drawn["time"], TIME)
-    alone = statistics.moving_block_bootstrap(MEASURED["heave"], 5, 20, np.random.default_rng(1))
-    assert alone.identical(drawn["heave"])
+    assert redrawn(MEASURED["heave"]).identical(drawn["heave"])
     gap = MEASURED.where(MEASURED.time != TIME[3])
     with pytest.raises(DataError, match="channel 'heave' holds 1 value"):
-        statistics.moving_block_bootstrap(gap, 5, 20, np.random.default_rng(1))
+        redrawn(gap)
 
 
 def test_divergence_of_each_channel():

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import re
-import warnings
 
 import numpy as np
 import pandas as pd
@@ -14,7 +13,6 @@ from small_tank import write_csv
 
 import seakeep
 from seakeep.campaign.store import write_prepared
-from seakeep.cli import main
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import KINDS
 from seakeep.study import compare, comparison_table, fit_campaign
@@ -98,23 +96,21 @@ def test_a_model_of_other_channels_and_one_that_nothing_drives_are_said(halves):
         fit_campaign(seakeep.read_campaign(halves / "campaign.toml"))
 
 
-ENSEMBLE = """
+WINDOWED = """
 kind = "bayesian_hankel_dmdc"
 n_members = 4
 seed = 7
+state_delays = "0.2 T"
+input_delays = { uniform = ["1 T", "3 T"] }
+ridge = 1e-9
+window = { uniform = ["4 T", "8 T"] }
 """
-
-
-WINDOWED = (
-    ENSEMBLE + "state_delays = '0.2 T'\ninput_delays = { uniform = ['1 T', '3 T'] }\nridge = 1e-9"
-)
 LATE = '[runs.all]\nfile = "run.csv"\ntrain = [100.0, 150.0]\ntest = [150.0, 200.0]\n'
 
 
 @pytest.mark.parametrize("train_on", ["all", "runs", "windows"])
 def test_an_ensemble_learns_inside_the_training_span(halves, train_on):
-    model = f"{WINDOWED}\nwindow = {{ uniform = ['4 T', '8 T'] }}\ntrain_on = '{train_on}'"
-    ensemble = fit_campaign(campaign(halves, model, LATE))
+    ensemble = fit_campaign(campaign(halves, f"{WINDOWED}train_on = '{train_on}'", LATE))
     assert ensemble.n_members == 4
     first, stop = ensemble.training_spans["all"]
     longest = 0.1 * (int(ensemble.draws.window_samples.max()) - 1)
@@ -211,14 +207,12 @@ def test_a_run_that_disagrees_with_the_others_is_warned_of(tmp_path):
         fit_campaign(campaign(tmp_path, EXACT, text))
 
 
-def test_a_setting_has_one_score_whether_fit_or_tune_chose_it(halves, capsys):
+@pytest.mark.filterwarnings("ignore::seakeep.SeakeepWarning")
+def test_a_setting_has_one_score_whether_fit_or_tune_chose_it(halves, command):
     lengths = 'state_delays = "1 T"\ninput_delays = "1 T"\nridge = "rollout"\ndelay_rows = "exact"'
     asked = campaign(halves, f"{lengths}\n[campaign]\nencounter_period = 2.5")  # 2 s is measured
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeakeepWarning)
-        chosen = fit_campaign(asked)
-        assert main(["tune", str(asked.path), "--vary", "ridge"]) == 0
-    assert capsys.readouterr().out.startswith(chosen.selection)
+    chosen = fit_campaign(asked)
+    assert command("tune", asked.path, "--vary", "ridge")[0].startswith(chosen.selection)
 
 
 def test_a_lead_reads_waves_ahead_of_time(halves):
@@ -227,8 +221,7 @@ def test_a_lead_reads_waves_ahead_of_time(halves):
         model = fit_campaign(asked)
     with pytest.warns(SeakeepWarning, match=r"of all reads the waves up to 0\.7 s after"):
         compare(model, asked, steps=20)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SeakeepWarning)
+    with pytest.warns(SeakeepWarning):
         (whole,) = compare(model, asked)
     # The step to instant k reads the waves of k + 7: seven instants before the end it is the last.
     run = asked.prepare()[whole.run]

@@ -1,10 +1,10 @@
 """What the presets choose, row by row of the paper map, through each door that takes one."""
 
 import re
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from pages import page
 
 from seakeep import Uniform
 from seakeep.campaign import read_campaign
@@ -14,13 +14,12 @@ from seakeep.study import judge, read_study
 from seakeep.study.reproduce import ACTS, Size, study_text
 from seakeep.study.resolve import can_align, resolve_model
 
-pytest.importorskip("numba", reason="the campaign is the virtual tank's")
+pytest.importorskip("numba")
 
 PERIOD, DT, ENSEMBLE = 1.64, 1.64 / 32, "bayesian_hankel_dmdc"
-MAP = (Path(__file__).parents[2] / "docs/paper_map.md").read_text("utf-8")
 ROWS = {
     int(cells[1]): (cells[3].strip(), cells[4].strip())
-    for line in MAP.splitlines()
+    for line in page("paper_map.md").splitlines()
     if (cells := line.split("|"))[1:] and re.fullmatch(r" \d+ ", cells[1])
 }
 OF_JUDGEMENT = {16, 19, 21, 22, 25, 26}
@@ -96,7 +95,6 @@ def paper(found):
 @pytest.mark.parametrize("door", ["fit", "study", "reproduce"])
 def test_the_papers_column_is_taken_in_every_row(tmp_path, door):
     taken = found(tmp_path, "paper", door)
-    assert sorted(ROWS) == list(range(1, 32))
     checked = paper(taken)
     assert checked == dict.fromkeys(checked, True)
     same = {row for row, (theirs, ours) in ROWS.items() if ours.startswith(("the same", theirs))}

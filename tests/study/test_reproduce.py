@@ -12,7 +12,7 @@ from seakeep.study import read_study
 from seakeep.study.plan import make_plan
 from seakeep.study.reproduce import ACTS, HIGH_PASS, SLOW, Size, reproduce, study_text
 
-pytest.importorskip("seakeep.tank.play", reason="the virtual tank needs its libraries")
+pytest.importorskip("seakeep.tank.play")
 from seakeep.tank.delivery import campaign_text, write_record
 from seakeep.tank.settings import default_settings
 

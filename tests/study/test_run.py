@@ -12,7 +12,7 @@ from tutorial_study import assert_cells_are_what_the_models_say, assert_same, pu
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.executor import processes
 from seakeep.statistics import split_bands
-from seakeep.study import read_study, run, run_study, store
+from seakeep.study import read_study, run, run_study
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.run import compute, compute_task, facts_of, tasks_of, units_of
@@ -126,13 +126,13 @@ def test_a_damaged_unit_is_computed_again(change, tmp_path):
 
 
 def test_a_folder_without_a_finished_unit_belongs_to_no_study(tmp_path):
-    store.UnitFolder(tmp_path, "one").open("first")
-    second = store.UnitFolder(tmp_path, "two")
+    UnitFolder(tmp_path, "one").open("first")
+    second = UnitFolder(tmp_path, "two")
     second.open("second")
     assert json.loads((tmp_path / "study.json").read_text("utf-8"))["digest"] == "two"
     second.write("cell", CELL)
     with pytest.raises(RequestError, match="holds the results of another study"):
-        store.UnitFolder(tmp_path, "one").open("first")
+        UnitFolder(tmp_path, "one").open("first")
 
 
 def test_the_smallest_study_tests_runs_that_do_not_state_their_waves(study_folder):

@@ -1,6 +1,5 @@
 """Tables of a study: what they take of its cells, and that they are the named statistics."""
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -43,6 +42,7 @@ def found(tmp_path_factory):
     return run_study(read_study(folder / "study.toml"), folder / "out")
 
 
+@pytest.mark.filterwarnings("ignore::seakeep.SeakeepWarning")
 @pytest.mark.parametrize(
     ("variant", "block", "bandwidth", "crosses"),
     [("paper", "carlstein", "paper", True), ("recommended", "politis_white", "silverman", False)],
@@ -55,18 +55,16 @@ def test_divergences_are_those_of_the_joined_windows(found, variant, block, band
     for model, predicted in forecasts.items():
         for c, channel in enumerate(found.channels):
             every = [each[..., c] for each in forecasts.values()]
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", SeakeepWarning)
-                alone = statistics.jsd_interval(
-                    predicted[..., c],
-                    measured[:, c],
-                    block_length=block,
-                    bandwidth=bandwidth,
-                    grid=density_grid(*every, measured[:, c], bandwidth=bandwidth),
-                    segments=None if crosses else [test.sizes["time"]] * test.sizes["window"],
-                    n_series=8,
-                    rng=random_stream(3, f"jsd.unseen.{variant}.{channel}"),
-                )
+            alone = statistics.jsd_interval(
+                predicted[..., c],
+                measured[:, c],
+                block_length=block,
+                bandwidth=bandwidth,
+                grid=density_grid(*every, measured[:, c], bandwidth=bandwidth),
+                segments=None if crosses else [test.sizes["time"]] * test.sizes["window"],
+                n_series=8,
+                rng=random_stream(3, f"jsd.unseen.{variant}.{channel}"),
+            )
             row = table.sel(model=model, variant=variant, channel=channel)
             for key in ("mean", "lower", "upper", "uncertainty", "noise_floor", "block_length"):
                 assert row[key] == getattr(alone, key)
@@ -179,6 +177,9 @@ def test_forecasts_that_diverge_are_named_and_left_out(tmp_path):
     assert np.isfinite(found.groups["statistics/divergence"]["mean"].sel(model="bayesian")).all()
 
 
+TRAINING = xr.Dataset({"begin": ("training", np.zeros(10))})
+
+
 def crossed(rng, levels):
     """Errors of models in 100 cells that share training sets and windows."""
     rows, columns = 0.1 * rng.standard_normal((10, 1)), 0.1 * rng.standard_normal(10)
@@ -195,8 +196,7 @@ def test_differences_between_models_have_intervals_and_verdicts():
     test = crossed(rng, {"good": 0.8, "same": 1.0, "noisy": 1.0})
     noise = 1 + 0.3 * rng.standard_normal((10, 10, 1))
     test["error"].loc[{"model": "noisy", "measure": "nrmse"}] *= noise
-    training = xr.Dataset({"begin": ("training", np.zeros(10))})
-    found = difference_table(test, training, rng).sel(measure="nrmse")
+    found = difference_table(test, TRAINING, rng).sel(measure="nrmse")
     # The same cells but for a factor: no draw can tell another change than the factor's.
     for key in ("change", "lower", "upper"):
         np.testing.assert_allclose(found[key].sel(model="good", other="same"), -0.2, rtol=1e-12)
@@ -229,8 +229,7 @@ def test_growth_is_pooled_over_cells_and_its_interval_holds_it():
             growth=(dims, grows),
             error_over_time=((*dims[:-1], "time"), np.ones((1, 1, 10, 10, 2))),
         ).assign_coords(band=["all"])
-        training = xr.Dataset({"begin": ("training", np.zeros(10))})
-        at = trend_table(test, training, rng).sel(model="m", band="all")
+        at = trend_table(test, TRAINING, rng).sel(model="m", band="all")
         inside += at["lower"] <= growth <= at["upper"]
         changes.append(float(at["change"]))
     assert np.mean(changes) == pytest.approx(growth, abs=0.03)  # a standard error of 0.01

@@ -13,23 +13,25 @@ from seakeep.tank.play import play_run
 from seakeep.tank.seas import Sea
 from seakeep.tank.settings import DriftSettings, default_settings
 
+of_all_tests = pytest.fixture(scope="session")
 
-@pytest.fixture(scope="session")
+
+@of_all_tests
 def settings():
     return default_settings()
 
 
-@pytest.fixture(scope="session")
+@of_all_tests
 def hydro():
     return load_hydrodynamics()
 
 
-@pytest.fixture(scope="session")
+@of_all_tests
 def rig(settings, hydro):
     return assemble_rig(settings, hydro)
 
 
-@pytest.fixture(scope="session")
+@of_all_tests
 def linear_rig(rig):
     """The rig without drag, drift or quadratic pool loss."""
     return replace(
@@ -40,7 +42,7 @@ def linear_rig(rig):
     )
 
 
-@pytest.fixture(scope="session")
+@of_all_tests
 def ideal_rig(linear_rig):
     """The rig with no losses but radiation."""
     lines = linear_rig.lines.copy()
@@ -53,7 +55,7 @@ def ideal_rig(linear_rig):
     )
 
 
-@pytest.fixture(scope="session")
+@of_all_tests
 def short(settings):
     """One irregular and one regular run, half a minute each."""
     runs = {
@@ -63,13 +65,13 @@ def short(settings):
     return settings.model_copy(update={"runs": runs})
 
 
-@pytest.fixture(scope="session")
+@of_all_tests
 def played(short, rig):
     """The irregular one."""
     return play_run(short, "irregular_1", rig)
 
 
-@pytest.fixture(scope="session")
+@of_all_tests
 def delivered(tmp_path_factory):
     """The irregular runs as the tank delivers them; the truth was read and then deleted.
 
@@ -91,13 +93,13 @@ def delivered(tmp_path_factory):
     return pickle.loads(kept.read_bytes())
 
 
-@pytest.fixture(scope="session")
+@of_all_tests
 def prepared(delivered):
     """Those runs, prepared."""
     return load_prepared(delivered.campaign)
 
 
-@pytest.fixture(scope="session")
+@of_all_tests
 def calm():
     none = np.zeros(0)
     return Sea(none, none, none, none)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from alignment_on_tank import ALIGNMENTS, STATES, paired, window_errors
 
-pytest.importorskip("numba", reason="needs the extra tank")
+pytest.importorskip("numba")
 
 
 @pytest.mark.filterwarnings("ignore::seakeep.SeakeepWarning")

@@ -2,12 +2,10 @@
 
 import pytest
 
-from seakeep import cli
-
-pytest.importorskip("numba", reason="needs the extra tank")
+pytest.importorskip("numba")
 
 
-def test_one_logger_and_the_truth(tmp_path):
+def test_one_logger_and_the_truth(tmp_path, command):
     short, out = tmp_path / "short.toml", tmp_path / "out"
     short.write_text(
         "[runs.sea]\nstartup = 5.0\nduration = 30.0\n"
@@ -15,7 +13,6 @@ def test_one_logger_and_the_truth(tmp_path):
         "[runs.regular]\nstartup = 5.0\nduration = 20.0\nwavelength = 2.8\nheight = 0.1\n",
         "utf-8",
     )
-    words = f"tank --settings {short} --out {out} --seed 3 --one-logger --run sea"
-    assert cli.main(words.split()) == 0
+    command("tank", "--settings", short, "--out", out, "--seed", 3, "--one-logger", "--run", "sea")
     assert (out / "raw" / "sea" / "all.csv").is_file()
     assert (out / "truth" / "sea.nc").is_file()

@@ -7,7 +7,7 @@ from seakeep.tank.instruments import _immersed, clock_instants, record_run, slap
 from seakeep.tank.play import generator, play_run, truth
 from seakeep.tank.settings import SlapSettings
 
-pytest.importorskip("numba", reason="needs the extra tank")
+pytest.importorskip("numba")
 
 
 @pytest.fixture(scope="module")

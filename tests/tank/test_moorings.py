@@ -3,7 +3,7 @@ import pytest
 
 from seakeep.tank.dynamics import tensions
 
-pytest.importorskip("numba", reason="needs the extra tank")
+pytest.importorskip("numba")
 
 from seakeep.tank._loop import line_tension
 
@@ -49,7 +49,7 @@ def test_stiffness_is_the_slope_of_the_forces(rig):
 
 @pytest.mark.oracle
 def test_tension_is_that_of_a_catenary_solver(rig):
-    catenary = pytest.importorskip("moorpy.Catenary", reason="oracle").catenary
+    catenary = pytest.importorskip("moorpy.Catenary").catenary
     unstretched, stiffness = rig.lines[0, 5], rig.lines[0, 4]
     for offset in (-0.2, 0.0, 0.5, 1.4):
         reach = 2.95 + offset

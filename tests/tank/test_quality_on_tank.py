@@ -9,7 +9,7 @@ from seakeep.core.metrics import slack_share
 from seakeep.signals.waves import noise_floor
 from seakeep.tank.play import play_run, truth
 
-pytest.importorskip("numba", reason="needs the extra tank")
+pytest.importorskip("numba")
 
 
 @pytest.fixture(scope="module", params=["irregular_1", "regular_3"])

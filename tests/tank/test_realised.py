@@ -6,9 +6,9 @@ from tank_figures import comparison, realise
 
 from seakeep.tank.play import play_run
 
-pytest.importorskip("numba", reason="needs the extra tank")
+pytest.importorskip("numba")
 
-pytest.importorskip("matplotlib", reason="needs the extra figures")
+pytest.importorskip("matplotlib")
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ from seakeep.tank.delivery import PANEL_HEIGHT, pixel_of, render_side_view
 from seakeep.tank.instruments import clock_instants
 from seakeep.tank.play import play, play_run
 
-pytest.importorskip("cv2", reason="needs the extra video")
-pytest.importorskip("numba", reason="needs the extra tank")
+pytest.importorskip("cv2")
+pytest.importorskip("numba")
 
 
 @pytest.fixture(scope="module")
