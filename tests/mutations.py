@@ -373,7 +373,7 @@ CHANGES = {
         ("if (starts := begin + self.starts(run, steps)).size:", "if (starts := 1 + begin + self.starts(run, steps)).size:", "models/test_kinds.py::test_scores_of_kinds_are_those_of_a_plain_loop_of_fits_and_forecasts"),
         ("known[at][:, :steps] for at in starts", "known[at][:, -steps:] for at in starts", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
         ("self.groups[other] != self.groups[run]]", "True]", "test_tuning.py::test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts"),
-        ("zero=None,  # read-outs", "zero=windows.zero,  # read-outs", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
+        ("replace(windows, zero=None, ", "replace(windows, zero=windows.zero, ", "models/test_centre.py::test_a_surge_that_is_followed_stays_as_it_is"),
         ("measured += np.stack([zeros[at] for at in starts])[:, None]", "pass", "test_tuning.py::test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts"),
     ],
     "models/settings.py": [
