@@ -409,7 +409,8 @@ class Problem:
                 zeros |= zip(new, data.zeros[run] - windows.zero, strict=True)
             # Read-outs are learnt from departures.
             groups.append(replace(windows, zero=None, delayed=windows.delayed[:, :last]))
-        for (new, _), computed in zip(read.values(), linear_runs(models, groups), strict=True):
+        runs = linear_runs(models, groups) if groups else []
+        for (new, _), computed in zip(read.values(), runs, strict=True):
             known |= zip(new, computed.swapaxes(0, 1), strict=True)
         for steps in horizons:
             if starts := self.starts(run, steps).tolist():
