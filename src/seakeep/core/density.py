@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 from scipy import fft
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array
 from scipy.special import rel_entr
 from scipy.stats import gaussian_kde
 
@@ -165,9 +165,9 @@ def _densities(ordered: FloatArray, times: IntArray, grid: FloatArray, h: FloatA
     near = np.flatnonzero((position >= 0) & (position < bins - 1))
     left = position[near].astype(np.intp)
     share = position[near] - left
-    places = np.concatenate([left, left + 1]), np.concatenate([near, near])
-    shares = csr_array((np.concatenate([1.0 - share, share]), places), (bins, ordered.size))
-    counts = (shares @ times.T).T
+    pairs = [np.stack(each, axis=1).ravel() for each in ((1.0 - share, share), (left, left + 1))]
+    shares = csc_array((*pairs, 2 * np.arange(near.size + 1)), (bins, near.size))
+    counts = (shares @ times.T[near]).T
     # So many values to a grid step resolve all frequencies that the narrowest kernel leaves.
     enough = math.ceil(span / steps / h.min() * REACH / np.pi)
     angular = 2.0 * np.pi * fft.rfftfreq(bins, bin_width)[: points * enough // 2 + 1]
