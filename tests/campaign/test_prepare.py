@@ -56,6 +56,16 @@ def test_offset_is_added_in_the_files_unit_before_the_sign(changed):
     assert "accuracy" not in run["eta_fwd"].attrs
 
 
+@pytest.mark.parametrize("number", [-999.9, 0])  # times begin at zero
+def test_a_number_for_no_reading_is_a_gap_of_channels_alone(changed, tank, number):
+    columns = tank_columns(0)
+    columns["Heave [mm]"][7:9] = number, np.float32(number)
+    write_csv(tank / "first.csv", columns)
+    campaign = changed(("[rig]", f"[files]\nmissing = {number}\n\n[rig]"))
+    with pytest.raises(DataError, match=r"'heave' has 2 missing values .* the first at t = 0\.14 s"):
+        campaign.read_run("first")
+
+
 def test_parameters_of_a_run_are_its_attributes(changed):
     stated = "span = [2, 18]\nparameters = { draught = 0.083, water_depth = 3.0 }"
     runs = changed(("span = [2, 18]", stated)).prepare()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scipy import io
 
 from seakeep.campaign import read_table
 from seakeep.campaign.settings import FileSettings
@@ -154,15 +153,6 @@ def test_missing_values_are_nan(tmp_path):
     run = read_table(write(tmp_path, "t,a,b\n0,,nan\n1,NaN,1\n2,3,\n"))
     np.testing.assert_array_equal(run["a"], [np.nan, np.nan, 3])
     np.testing.assert_array_equal(run["b"], [np.nan, 1, np.nan])
-
-
-def test_a_number_for_no_reading_is_a_gap_in_every_format(tmp_path):
-    values = {"time": np.arange(3.0), "heave": np.array([1.0, -999.0, -99.0])}
-    (tmp_path / "a.csv").write_text("time,heave\n0,1\n1,-999\n2,-99\n")
-    io.savemat(tmp_path / "a.mat", values)
-    for name in ("a.csv", "a.mat"):
-        found = read_table(tmp_path / name, FileSettings(missing=-999))["heave"]
-        np.testing.assert_array_equal(found, [1.0, np.nan, -99.0])
 
 
 def test_a_column_by_its_full_header(tmp_path):

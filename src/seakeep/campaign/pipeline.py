@@ -322,7 +322,10 @@ def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings])
             )
         target = units_of(name, unit)
         factor = conversion(unit, target, f"channel '{name}' (column '{wanted}' of {path})")
-        values = each.sign * factor * (logger.columns.values[column] + each.offset)
+        readings, missing = logger.columns.values[column], logger.options.missing
+        if missing is not None:  # of float32 as well
+            readings = np.where(np.isclose(readings, missing, rtol=1e-6, atol=0), np.nan, readings)
+        values = each.sign * factor * (readings + each.offset)
         attributes = {"units": target, "long_name": long_name_of(name, each.long_name)}
         accuracy = {} if each.accuracy is None else {"accuracy": factor * each.accuracy}
         variables[name] = ("time", values[records], attributes | accuracy)

@@ -4,10 +4,7 @@ A reader takes a path and :class:`Options` and returns :class:`Columns`. :data:`
 readers.
 """
 
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from seakeep.errors import DataError
 from seakeep.files import reading
@@ -76,21 +73,13 @@ def read_columns(path: Path | str, options: Options | None = None) -> Columns:
     """
     options = options or Options()
     if folder := folder_reader(Path(path)):
-        return _without(folder.read(Path(path), options), options.missing)
+        return folder.read(Path(path), options)
     with reading(path) as place:
         with place.open("rb") as file:
             head = file.read(HEAD)
         if not head:
             raise DataError(f"{path} is empty (0 bytes). Export the run again.")
-        return _without(_reader_of(place, head).read(place, options), options.missing)
-
-
-def _without(columns: Columns, missing: float | None) -> Columns:
-    """Columns with gaps where a number stands for no reading."""
-    if missing is None:
-        return columns
-    values = {key: np.where(x == missing, np.nan, x) for key, x in columns.values.items()}
-    return replace(columns, values=values)
+        return _reader_of(place, head).read(place, options)
 
 
 def folder_reader(path: Path) -> Reader | None:

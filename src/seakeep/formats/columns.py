@@ -199,7 +199,7 @@ class Options(Table):
     skip_rows: Annotated[int, Field(ge=0)] = optional(
         "lines to leave out at the head of the file", 0
     )
-    missing: float | None = optional("number that stands for no reading, such as -999")
+    missing: float | None = optional("number that stands for no reading of a channel, such as -999")
     encoding: str | None = optional(
         "of a text file, such as 'utf-8', 'cp1252' or 'utf-16-le'; left out, UTF-8, "
         "UTF-16 with its mark, or Windows-1252 (Latin-1)"
