@@ -6,12 +6,7 @@ lengths in metres; all functions take scalars or arrays and broadcast.
 
 import numpy as np
 
-from seakeep.arrays import (
-    ArrayLike,
-    FloatArray,
-    as_real,
-    undefined,
-)
+from seakeep.arrays import ArrayLike, FloatArray, as_real, undefined
 from seakeep.errors import RequestError
 
 __all__ = ["GRAVITY", "group_speed", "phase_speed", "wavelength_to_frequency", "wavenumber"]

@@ -20,6 +20,7 @@ from seakeep.study.judge import (
     MEASURES,
     band_tables,
     box_table,
+    density_tables,
     difference_table,
     joined,
     median_of,
@@ -69,6 +70,19 @@ def test_divergences_are_those_of_the_joined_windows(found, variant, block, band
             for key in ("mean", "lower", "upper", "uncertainty", "noise_floor", "block_length"):
                 assert row[key] == getattr(alone, key)
             assert row["noise_floor"] > 0
+
+
+def test_a_forecast_that_runs_far_away_moves_no_density_of_another(found):
+    settings = read_study(found.folder.parent / "study.toml").settings
+    test, (kept, wild) = found.tests["unseen"].copy(deep=True), found.models
+    before = density_tables(test, found.channels, settings, "unseen", None)["divergence"]
+    test["mean"].loc[{"model": wild}] *= 300.0
+    after = density_tables(test, found.channels, settings, "unseen", None)["divergence"]
+    # On a grid of both models, and on one of its own: sums of smooth functions.
+    np.testing.assert_allclose(
+        after["mean"].sel(model=kept), before["mean"].sel(model=kept), rtol=1e-2
+    )
+    assert (after["mean"].sel(model=wild) > before["mean"].sel(model=wild)).all()
 
 
 def test_the_truth_is_read_at_the_instants_of_the_windows(found):

@@ -7,12 +7,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import FloatArray
-from seakeep.campaign.settings import (
-    CampaignSettings,
-    DerivedSettings,
-    long_name_of,
-    units_of,
-)
+from seakeep.campaign.settings import CampaignSettings, DerivedSettings, long_name_of, units_of
 from seakeep.campaign.validation import sources_of
 from seakeep.conventions import TURNS, conversion, si_unit
 from seakeep.errors import DataError, RequestError, naming

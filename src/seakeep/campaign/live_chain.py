@@ -14,11 +14,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import (
-    ArrayLike,
-    FloatArray,
-    as_real,
-)
+from seakeep.arrays import ArrayLike, FloatArray, as_real
 from seakeep.campaign.pipeline import Logger, Run, cleaned, derived, mapped, resampled
 from seakeep.campaign.readers import find_column, time_column, time_unit_of
 from seakeep.conventions import conversion

@@ -19,14 +19,7 @@ from scipy.sparse import csc_array
 from scipy.special import rel_entr
 from scipy.stats import gaussian_kde
 
-from seakeep.arrays import (
-    FloatArray,
-    IntArray,
-    as_bundle,
-    as_real,
-    as_series,
-    whole_number,
-)
+from seakeep.arrays import FloatArray, IntArray, as_bundle, as_real, as_series, whole_number
 from seakeep.core.bootstrap import BlockRule, bootstrap_indices, resolve_block_length
 from seakeep.errors import DataError, RequestError, did_you_mean, warn
 

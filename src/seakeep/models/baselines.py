@@ -174,16 +174,14 @@ class LinearSpec(LinearKind, Plain):
         if self.ridge != "rollout":
             data = gather(named, states, inputs, stop, spec)
             solution = spec.solve(data)
-            given, widths = (
-                solution.coefficients,
-                (data.delayed[0].shape[1], data.direct[0].shape[1]),
-            )
-            count = len(states) * (spec.state_reach + 1) + widths[0] * (spec.input_delays + 1)
-            needed = len(states), count + widths[1]
+            count = len(states) * (spec.state_reach + 1) + data.direct[0].shape[1]
+            needed = len(states), count + data.delayed[0].shape[1] * (spec.input_delays + 1)
+            given = solution.coefficients
             if given.shape != needed or not np.isfinite(given).all():
+                lost = np.count_nonzero(~np.isfinite(given))
                 raise RequestError(
-                    f"solve of '{self.kind}' returned coefficients of shape {given.shape}; finite "
-                    f"ones of shape {needed} are needed. Correct it."
+                    f"solve of '{self.kind}' returned coefficients of shape {given.shape}, "
+                    f"{lost} of them not finite; finite ones of shape {needed} are needed. Correct it."
                 )
             return HankelDMDcModel.fitted(spec, data, solution, named)
         read = named = until(named, stop)

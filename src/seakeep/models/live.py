@@ -47,12 +47,7 @@ from seakeep.models.growth import WINDOWS, LeadErrors, weighed
 from seakeep.models.inputs import Drive, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.validity import Conditions, Coverage, Validity
-from seakeep.signals.prediction import (
-    close_gaps,
-    fill_future,
-    predict_waves,
-    predictable_time,
-)
+from seakeep.signals.prediction import close_gaps, fill_future, predict_waves, predictable_time
 
 STATE = "live state"
 """Kind of the files of :meth:`Live.save`."""

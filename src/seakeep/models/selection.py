@@ -6,7 +6,8 @@ and channels of the NRMSE decides. The noise is the standard error, over what is
 difference between two candidates. Of what settings leave open, the simplest candidate is taken that
 errs at most 5 % more than the best, or is as good but for the noise; what a search starts from is
 left for nothing less. The regressors of all candidates are made once; one Gram matrix of a
-fold gives the path of λ of all candidates with the same delays (:mod:`seakeep.core.gram`).
+fold, with the longest delays, gives the path of λ of all of them (:mod:`seakeep.core.gram`). Free
+runs of candidates with equal columns go side by side: a worker takes all of them on a fold.
 """
 
 from __future__ import annotations
@@ -96,6 +97,8 @@ HYSTERESIS = 0.1
 """Part of the wave amplitude that noise does not pass where the period of a run is counted."""
 FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
+UNHELD = "samples can be held out of runs of at most"
+"""What a note says then."""
 DELAYS = {"input_delays": (2.0, 3.0, 5.0), "state_delays": (0.5, 1.0, 1.5)}
 """Delays that are tried, encounter periods."""
 LENGTHS = (1.0, 0.6, 0.4)
@@ -274,7 +277,7 @@ class Problem:
     def models(
         self, candidate: HankelSettings, levels: Sequence[float], runs: Sequence[int]
     ) -> list[Dynamics]:
-        """Models of some runs, one per level; regressors that a candidate lacks count nothing."""
+        """Models of some runs, one per level; coefficients of what a candidate lacks are zero."""
         data, (delayed, direct) = self.data, self.parts(candidate)
         count, s, z = len(data.signature.states), candidate.state_delays, candidate.input_delays
         wide, scales, system = self._system(candidate, runs)
@@ -309,9 +312,9 @@ class Problem:
     def _system(
         self, candidate: HankelSettings, runs: Sequence[int]
     ) -> tuple[HankelSettings, list[Scale], PrimalSystem]:
-        """Moments and normal equations of all columns of some runs, with the longest delays.
+        """Settings with the longest delays, and moments and normal equations of some runs for them.
 
-        The delays are those of the settings that are returned.
+        The normal equations are those of all columns.
         """
         ahead, of = self.ahead(candidate), tuple(runs)
         longest = {"input_delays": self.widest.input_delays - ahead}
@@ -816,7 +819,7 @@ def select(
         longest = max(run.sizes["time"] for run in runs.values())
         note = (
             f"{settings.ridge_text(float(settings.ridge))}: no window of "
-            f"{round(min(horizon) * samples)} samples can be held out of runs of at most {longest}"
+            f"{round(min(horizon) * samples)} {UNHELD} {longest}"
         )
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
         complete = settings.having(readouts=_asked(settings, fitted, vary))

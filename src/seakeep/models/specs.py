@@ -46,14 +46,7 @@ from seakeep.models.settings import (
     periods_to_samples,
 )
 from seakeep.models.terms import Observable
-from seakeep.models.training import (
-    TrainingArrays,
-    check_names,
-    departures,
-    gather,
-    moments,
-    until,
-)
+from seakeep.models.training import TrainingArrays, check_names, departures, gather, moments, until
 from seakeep.models.validity import Coverage
 from seakeep.toml import Length
 

@@ -548,8 +548,9 @@ def acts_table(results: Results) -> Table:
     ]
     seas = [*map(first.sea_of, first.tests)]
     conditions = [
-        f"{act.letter}:{conditional(results[act.name], results[act.name].models)}"
+        f"{act.letter}:{words}"
         for act in _played(results)
+        if (words := conditional(results[act.name], results[act.name].models))
     ]
     columns = ("act", "model", *(f"{sea}: {part}" for sea in seas for part in ("waves", "slow")))
     return table("acts", rows, more=" ".join(conditions), columns=columns)

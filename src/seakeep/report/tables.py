@@ -49,7 +49,6 @@ class Table:
         Cells.
     note : str
         What a reader must know about it.
-
     elsewhere : sequence of int
         Columns that come from another data set.
     averages : sequence of int
@@ -68,7 +67,6 @@ class Table:
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
-
     elsewhere: Sequence[int] = ()
     averages: Sequence[int] = ()
     marked: Sequence[int] = ()

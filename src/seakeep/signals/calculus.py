@@ -7,13 +7,7 @@ import numpy as np
 import scipy
 from scipy import fft
 
-from seakeep.arrays import (
-    ArrayLike,
-    FloatArray,
-    as_pair,
-    as_series,
-    time_step,
-)
+from seakeep.arrays import ArrayLike, FloatArray, as_pair, as_series, time_step
 from seakeep.errors import RequestError
 
 SHORTEST_RECORD = 0.05

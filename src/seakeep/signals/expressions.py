@@ -17,11 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from seakeep.arrays import (
-    ArrayLike,
-    FloatArray,
-    as_real,
-)
+from seakeep.arrays import ArrayLike, FloatArray, as_real
 from seakeep.errors import DataError, RequestError, did_you_mean
 
 GREATEST_EXPONENT = 16

@@ -10,15 +10,7 @@ import numpy as np
 import scipy
 from scipy import special
 
-from seakeep.arrays import (
-    ArrayLike,
-    FloatArray,
-    as_real,
-    as_series,
-    number,
-    positive,
-    time_step,
-)
+from seakeep.arrays import ArrayLike, FloatArray, as_real, as_series, number, positive, time_step
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import span_text, uniform_step
 

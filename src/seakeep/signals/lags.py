@@ -6,15 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from seakeep.arrays import (
-    ArrayLike,
-    FloatArray,
-    IntArray,
-    as_pair,
-    positive,
-    time_step,
-    undefined,
-)
+from seakeep.arrays import ArrayLike, FloatArray, IntArray, as_pair, positive, time_step, undefined
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.time_axis import record, usual_step
 

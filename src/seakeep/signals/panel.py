@@ -175,8 +175,8 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     for end in (-1.0, 1.0):
         # Pixels that a border divides count in part, or the sum would depend on the grid.
         near = np.clip(end * along - (0.5 * long_side - side) + 0.5, 0.0, 1.0)
-        for half in (-1.0, 1.0):
-            covered = near * np.clip(half * down + 0.5, 0.0, 1.0) * weights
+        for sign in (-1.0, 1.0):
+            covered = near * np.clip(sign * down + 0.5, 0.0, 1.0) * weights
             seen.append(np.sum(covered) / side**2)
     _, sides, _ = cv2.minAreaRect(outline)  # runs through the centres of the outermost pixels
     cut = min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0]

@@ -8,13 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from seakeep.arrays import (
-    ArrayLike,
-    BoolArray,
-    FloatArray,
-    as_series,
-    whole_number,
-)
+from seakeep.arrays import ArrayLike, BoolArray, FloatArray, as_series, whole_number
 from seakeep.signals.calculus import autoregression, continued
 from seakeep.signals.propagation import LEAST_CORRELATION, band_limit, carry_by_dispersion
 from seakeep.waves import group_speed

@@ -8,11 +8,7 @@ Angular velocities and accelerations are those a gyroscope fixed in the body giv
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from seakeep.arrays import (
-    ArrayLike,
-    FloatArray,
-    as_real,
-)
+from seakeep.arrays import ArrayLike, FloatArray, as_real
 from seakeep.errors import RequestError
 from seakeep.waves import GRAVITY
 

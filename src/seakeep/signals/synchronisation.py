@@ -14,12 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from seakeep.arrays import (
-    ArrayLike,
-    FloatArray,
-    IntArray,
-    as_real,
-)
+from seakeep.arrays import ArrayLike, FloatArray, IntArray, as_real
 from seakeep.errors import DataError, RequestError
 from seakeep.signals.lags import windowed_lags
 from seakeep.signals.time_axis import record, stretches, uniform_step, usual_step

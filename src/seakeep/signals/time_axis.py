@@ -6,14 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from seakeep.arrays import (
-    ArrayLike,
-    BoolArray,
-    FloatArray,
-    IntArray,
-    as_real,
-    time_step,
-)
+from seakeep.arrays import ArrayLike, BoolArray, FloatArray, IntArray, as_real, time_step
 from seakeep.errors import DataError
 
 STEP_TOLERANCE = 0.01

@@ -37,6 +37,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "paper": {"block_length": "carlstein", "bandwidth": "paper", "joins": True},
     "recommended": {"block_length": "politis_white", "bandwidth": "silverman", "joins": False},
 }
+FAR = 5.0
+"""Range of a forecast, in those of the measurement, from which on its densities stand apart."""
 SHOWN = 5
 """Lost forecasts that a warning names."""
 Statistic = Callable[..., FloatArray]
@@ -452,7 +454,8 @@ def density_tables(
 ) -> Groups:
     """Divergences of forecasts from the measurement, and the densities, per model and channel."""
     windows, steps = test.sizes["window"], test.sizes["time"]
-    moving: list[dict[int, FloatArray]] = [{} for _ in channels]  # forecasts by model
+    # Forecasts by model; one that runs far away has a grid of its own.
+    moving = defaultdict[tuple[int, bool], dict[int, FloatArray]](dict)
     diverged = []
     for m, model in enumerate(settings.models):
         predicted, measured, lost = joined(test, model)
@@ -460,27 +463,24 @@ def density_tables(
         for c, forecasts in enumerate(np.moveaxis(predicted, 2, 0) if len(predicted) else ()):
             moves = np.ptp(forecasts.reshape(-1, windows, steps), axis=2).max(axis=1) > 0
             if moves.all() and np.ptp(measured[:, c]) > 0:  # what stands still has no density
-                moving[c][m] = forecasts
+                # Contiguous, as they are in a worker: sums are then the same to the last bit.
+                far = bool(np.ptp(forecasts) > FAR * np.ptp(measured[:, c]))
+                moving[c, far][m] = forecasts.copy("C")
     coords = {"model": list(settings.models), "channel": list(channels)}
     shape = len(diverged), len(channels)
     table = np.full((*shape, len(VARIANTS), len(DIVERGENCE)), np.nan)
     curves = np.full((*shape, len(CURVES), 512), np.nan)
     data = settings, name, [steps] * windows
-    # Contiguous, as they are in a worker: sums are then the same to the last bit.
-    items = {
-        c: (channels[c], [each.copy("C") for each in of.values()], measured[:, c].copy())
-        for c, of in enumerate(moving)
-        if of
-    }
-    rows = in_order(_channel_densities, data, list(items.values()), executor)
-    for c, each in zip(items, rows, strict=True):
+    items = [(channels[c], [*of.values()], measured[:, c].copy()) for (c, _), of in moving.items()]
+    rows = in_order(_channel_densities, data, items, executor)
+    for ((c, _), of), each in zip(moving.items(), rows, strict=True):
         if isinstance(each, str):
             warn(
                 f"the densities of {channels[c]} as forecast and as measured, over the windows of "
                 f"'{name}', cannot be compared and are left out: {each}"
             )
         else:
-            table[list(moving[c]), c], curves[list(moving[c]), c] = each
+            table[list(of), c], curves[list(of), c] = each
     both = {**coords, "variant": list(VARIANTS)}
     divergence = numbered(table, (*both, "number"), DIVERGENCE, both)
     divergence["diverged_series"] = ("model", diverged)

@@ -17,10 +17,7 @@ import numpy.typing as npt
 import xarray as xr
 from numpy.random import Generator
 
-from seakeep.arrays import (
-    ArrayLike,
-    FloatArray,
-)
+from seakeep.arrays import ArrayLike, FloatArray
 from seakeep.errors import SeakeepError
 from seakeep.files import MARK, write_netcdf, write_text
 from seakeep.signals.panel import Image, opencv

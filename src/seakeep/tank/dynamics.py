@@ -15,11 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from seakeep.arrays import (
-    ArrayLike,
-    ComplexArray,
-    FloatArray,
-)
+from seakeep.arrays import ArrayLike, ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError, needing
 from seakeep.tank.hydrodynamics import (
     Hydrodynamics,

@@ -13,11 +13,7 @@ import numpy as np
 import scipy
 import xarray as xr
 
-from seakeep.arrays import (
-    ArrayLike,
-    ComplexArray,
-    FloatArray,
-)
+from seakeep.arrays import ArrayLike, ComplexArray, FloatArray
 from seakeep.errors import RequestError, SeakeepError
 from seakeep.files import reading
 from seakeep.signals.calculus import rising

@@ -13,12 +13,7 @@ import scipy
 import xarray as xr
 from numpy.random import Generator
 
-from seakeep.arrays import (
-    ArrayLike,
-    BoolArray,
-    FloatArray,
-    Groups,
-)
+from seakeep.arrays import ArrayLike, BoolArray, FloatArray, Groups
 from seakeep.signals.calculus import rising
 from seakeep.tank.dynamics import Motion, Rig, tensions
 from seakeep.tank.seas import Sea

@@ -9,11 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from seakeep.arrays import (
-    ArrayLike,
-    ComplexArray,
-    FloatArray,
-)
+from seakeep.arrays import ArrayLike, ComplexArray, FloatArray
 from seakeep.errors import RequestError
 from seakeep.tank.settings import FacilitySettings, RunPlan, SpectrumSettings
 from seakeep.waves import wavelength_to_frequency, wavenumber

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from seakeep.models.selection import UNHELD
 from seakeep.report.figures.histories import spectrum_figure
 from seakeep.report.page import Section, drawing, section
 from seakeep.report.quality_sheet import clock_rows, other_findings, run_row
@@ -247,7 +248,7 @@ def not_chosen(result: StudyResult) -> str:
     fallen = defaultdict[str, list[str]](list)
     for at in entries(result.groups["chosen"], "model", "training"):
         model, training, said = row(at, "model", "training", "words")
-        if "can be held out" in said:
+        if UNHELD in said:
             fallen[model].append(training)
     groups = grouped({model: f"in {', '.join(sets)}" for model, sets in fallen.items()})
     where = WORDS["sections"]["chosen"]["title"]
