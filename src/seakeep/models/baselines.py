@@ -181,7 +181,7 @@ class LinearSpec(LinearKind, Plain):
                 lost = np.count_nonzero(~np.isfinite(given))
                 raise RequestError(
                     f"solve of '{self.kind}' returned coefficients of shape {given.shape}, "
-                    f"{lost} of them not finite; finite ones of shape {needed} are needed. Correct it."
+                    f"{lost} of them not finite; finite ones of shape {needed} are needed."
                 )
             return HankelDMDcModel.fitted(spec, data, solution, named)
         read = named = until(named, stop)
