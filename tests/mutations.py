@@ -357,7 +357,7 @@ CHANGES = {
         ("(1.0 + alike) * self.best", "trial.best", "models/test_selection.py::test_unseen_seas_are_offered_the_envelopes_of_several_probes_alone"),
         ("(0, delayed.size * (wide.input_delays - z))", "(delayed.size * (wide.input_delays - z), 0)", "models/test_selection.py::test_each_delay_is_scored_as_by_a_fit_and_forecasts_of_its_own"),
         ("np.arange(every) < own", "np.arange(every) >= every - own", "models/test_selection.py::test_each_delay_is_scored_as_by_a_fit_and_forecasts_of_its_own"),
-        ("on_inputs[..., there] = ", "on_inputs[..., : np.count_nonzero(there)] = ", "test_tuning.py::test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts"),
+        ("on_inputs[..., there] = known", "on_inputs[..., : np.count_nonzero(there)] = known", "test_tuning.py::test_scores_are_those_of_a_plain_loop_of_fits_and_forecasts"),
         ("], axis=1), ends[:-1])", "], axis=1)[::-1], ends[:-1])", "models/test_selection.py::test_free_runs_side_by_side_score_as_one_after_the_other"),
         ("factor * level for level in levels", "level for level in levels", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
         ("joined / joined.sum()", "joined / len(folds)", "models/test_selection.py::test_a_run_in_which_nothing_moves_weighs_nothing_beside_plain_fits_and_forecasts"),
@@ -498,6 +498,7 @@ CHANGES = {
         ("return float((crossings[-1] - crossings[0]) / (crossings.size - 1))", "return float((crossings[-1] - crossings[0]) / crossings.size)", "signals/test_waves.py::test_statistics_of_a_regular_wave"),
     ],
     "study/comparison.py": [
+        ('.where(np.isfinite(coverage["width"])).values', ".values", "report/test_comparison_report.py::test_the_band_of_an_ensemble_is_judged_by_hand"),
         ("known.sum(axis=0), np.nan", "len(known), np.nan", "models/test_live.py::test_skill_against_lead_time_is_that_of_forecasts_by_hand"),
         ("if first < end - 0.5 * model.dt and last > begin:", "if last > begin:", "study/test_fit.py::test_the_test_starts_in_the_test_span_with_history_from_before_it"),
         ("lead = max(model.signature.lead_samples for model in models.values())", "lead = 0", "study/test_fit.py::test_a_lead_reads_waves_ahead_of_time"),

@@ -95,6 +95,11 @@ def test_the_band_of_an_ensemble_is_judged_by_hand():
     for judged, names in ((table, UNITS), (row_of(ensemble(slack=True)), ["heave", "pitch"])):
         mean = judged["coverage"].sel(channel=list(names)).mean()  # without a slack line
         assert judged["mean_coverage"] == pytest.approx(float(mean), rel=1e-12)
+    endless = ensemble()
+    endless.band["heave"].loc[{"statistic": "upper"}] = np.inf
+    judged = row_of(endless)
+    assert np.isnan(judged["coverage"].sel(channel="heave"))
+    assert judged["mean_coverage"] == judged["coverage"].mean()
     degrees = row_of(in_degrees(ensemble()))
     np.testing.assert_array_equal(table["coverage"], degrees["coverage"])
     assert degrees["band_width"].sel(channel="pitch") == pytest.approx(np.degrees(0.4))

@@ -472,11 +472,13 @@ def _row(comparison: Comparison, intervals: bool) -> xr.Dataset:
     if comparison.band is not None:
         lower, upper = (comparison.band.sel(statistic=key, drop=True) for key in metrics.BOUNDS)
         coverage = statistics.coverage(lower, upper, comparison.measured)
-        row["coverage"] = inside = 100.0 * coverage["inside"].values
+        # A band without end holds everything: nothing is said of it.
+        inside = 100.0 * coverage["inside"].where(np.isfinite(coverage["width"])).values
+        row["coverage"], judged = inside, inside[~slack & np.isfinite(inside)]
         row["band_width"] = coverage["width"].values
         row["relative_band_width"] = coverage["relative_width"].values
         row |= {key: facts[key] for key in ("members", "diverged", "level")}
-        row["mean_coverage"] = inside[~slack].mean() if not slack.all() else np.nan
+        row["mean_coverage"] = judged.mean() if judged.size else np.nan
         row["band"] = str(facts.get("band", "members"))
     if comparison.full_scale is not None:
         row |= {"scale": "full", "scale_factor": comparison.full_scale}
