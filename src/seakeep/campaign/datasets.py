@@ -105,39 +105,43 @@ def fetch(dataset: PublicDataset, folder: Path, progress: Progress | None = None
     """
     if not dataset.sources:
         raise RequestError(f"'{dataset.name}' cannot be fetched; {dataset.note}.")
-    import pooch
-
-    pooch.get_logger().setLevel("ERROR")
     target = make_folder(folder / dataset.name)
     for done, (name, wanted) in enumerate(dataset.files.items(), start=1):
-        failures, altered = [], False
-        for address in dataset.sources:  # the first that has it whole
-            try:
-                pooch.retrieve(
-                    f"{address}/{name}",
-                    known_hash=f"sha256:{wanted}",
-                    fname=name,
-                    path=target,
-                    downloader=pooch.HTTPDownloader(timeout=TIMEOUT),
-                )
-                break
-            except ValueError:  # another checksum
-                altered = True
-                failures.append(f"{address}/{name}: another file")
-            except OSError as error:  # all errors of the network are such
-                failures.append(f"{address}/{name}: {error}")
-        else:
-            tried = "; ".join(failures)
-            if altered:
-                raise DataError(
-                    f"{name} was received with another SHA-256 than the published file's "
-                    f"{wanted[:12]}…: upstream changed it, or the download was cut short. Try "
-                    f"again, or look at the origin. Tried: {tried}."
-                )
-            raise RequestError(
-                f"{name} could not be fetched. Tried: {tried}. Check the network, or copy the "
-                "files by hand and set SEAKEEP_DATA_DIR."
-            )
+        _fetch_file(name, wanted, target, dataset.sources)
         if progress:
             progress(done, len(dataset.files), name)
     return target
+
+
+def _fetch_file(name: str, wanted: str, target: Path, addresses: Sequence[str]) -> None:
+    """Fetch a file from the first address that has it whole; it is written once it is checked."""
+    import pooch
+
+    pooch.get_logger().setLevel("ERROR")
+    failures, altered = [], False
+    for address in addresses:
+        try:
+            pooch.retrieve(
+                f"{address}/{name}",
+                known_hash=f"sha256:{wanted}",
+                fname=name,
+                path=target,
+                downloader=pooch.HTTPDownloader(timeout=TIMEOUT),
+            )
+        except ValueError:  # another checksum
+            altered = True
+            failures.append(f"{address}/{name}: another file")
+        except OSError as error:  # all errors of the network are such
+            failures.append(f"{address}/{name}: {error}")
+        else:
+            return
+    if altered:
+        raise DataError(
+            f"{name} was received with another SHA-256 than the published file's {wanted[:12]}…: "
+            "upstream changed it, or the download was cut short. Try again, or look at the "
+            f"origin. Tried: {'; '.join(failures)}."
+        )
+    raise RequestError(
+        f"{name} could not be fetched. Tried: {'; '.join(failures)}. Check the network, or copy "
+        "the files by hand and set SEAKEEP_DATA_DIR."
+    )

@@ -253,9 +253,8 @@ class DerivedSettings(Table):
     def _one_way(self) -> DerivedSettings:
         if (self.expression is None) == (self.step is None):
             raise ValueError("a derived channel needs either 'expression', or 'from' and 'step'")
-        given = self.model_fields_set.difference(
-            ("expression", "source", "step", "unit", "long_name")
-        )
+        keys = {key for needed, others, _ in _STEPS.values() for key in (*needed, *others)}
+        given = {key for key in keys if getattr(self, key) is not None}
         if self.step is None:
             if self.source is not None or given:
                 raise ValueError("'from' and the keys of steps do not go with 'expression'")

@@ -145,20 +145,7 @@ def free_runs(
 
     def played(name: str) -> FreeRun:
         if (label, name) not in known:
-            run, own = runs[name], (like or {}).get(name)
-            if own is None:
-                at, last = window_of(model, run)
-                time = run["time"].values
-                measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
-                empty = np.full_like(measured, np.nan)
-                own = FreeRun(float(time[at]), time[at + 1 : last + 1], empty, measured)
-            if is_ensemble(model):
-                steps = len(own.time)
-                forecast = model.forecast_summary(run, own.start, steps).sel(statistic="mean")
-            else:
-                forecast = model.forecast(run, own.start, len(own.time))
-            forecasts = channel_matrix(forecast, model.states, name)
-            known[label, name] = own._replace(forecast=forecasts)
+            known[label, name] = _free_run(model, runs[name], name, (like or {}).get(name))
         return known[label, name]
 
     names = runs if like is None else like
@@ -292,6 +279,21 @@ def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
             if np.isfinite(series).all() and np.ptp(series):
                 begins.append(first_wave(series, name in MOTIONS))
     return max(begins)
+
+
+def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:
+    if like is None:
+        at, last = window_of(model, run)
+        time = run["time"].values
+        measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
+        empty = np.full_like(measured, np.nan)
+        like = FreeRun(float(time[at]), time[at + 1 : last + 1], empty, measured)
+    steps = len(like.time)
+    if is_ensemble(model):
+        forecast = model.forecast_summary(run, like.start, steps).sel(statistic="mean")
+    else:
+        forecast = model.forecast(run, like.start, steps)
+    return like._replace(forecast=channel_matrix(forecast, model.states, name))
 
 
 def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) -> FloatArray:

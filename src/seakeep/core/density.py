@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -420,10 +420,17 @@ def jsd_interval(
     one that a record of this length cannot distinguish from none. It is not a lower bound, because
     paired draws share their sampling error and the floor's do not.
     """
-    bundle = as_bundle(predicted, "predicted")
-    how: dict[str, Any] = {"n_series": n_series, "bandwidth": bandwidth}
-    how |= {"block_length": block_length, "rng": rng, "segments": segments}
-    return jsd_intervals([bundle], measured, grid=grid, **how)[0]
+    (interval,) = jsd_intervals(
+        [as_bundle(predicted, "predicted")],
+        measured,
+        block_length=block_length,
+        rng=rng,
+        n_series=n_series,
+        bandwidth=bandwidth,
+        grid=grid,
+        segments=segments,
+    )
+    return interval
 
 
 def jsd_intervals(
@@ -460,20 +467,22 @@ def jsd_intervals(
         drawn = np.stack([bootstrapped_densities(x, positions, points, bandwidth) for x in p])
         draws = jensen_shannon(drawn, np.broadcast_to(truth, drawn.shape))
         low, high = np.quantile(draws, [0.025, 0.975])
-        interval = JsdInterval(
-            mean=float(draws.mean()),
-            lower=float(low),
-            upper=float(high),
-            of_series=float(np.mean(jensen_shannon(kernel_density(p, points, bandwidth), once))),
-            noise_floor=float(noise.mean()),
-            noise_floor_lower=float(floor_low),
-            noise_floor_upper=float(floor_high),
-            draws=draws,
-            noise=noise,
-            block_length=block,
-            grid=points,
-            predicted=drawn,
-            measured=truth,
+        own = jensen_shannon(kernel_density(p, points, bandwidth), once)
+        intervals.append(
+            JsdInterval(
+                mean=float(draws.mean()),
+                lower=float(low),
+                upper=float(high),
+                of_series=float(np.mean(own)),
+                noise_floor=float(noise.mean()),
+                noise_floor_lower=float(floor_low),
+                noise_floor_upper=float(floor_high),
+                draws=draws,
+                noise=noise,
+                block_length=block,
+                grid=points,
+                predicted=drawn,
+                measured=truth,
+            )
         )
-        intervals.append(interval)
     return intervals

@@ -292,9 +292,9 @@ class Problem:
         path = ridge_path(gram, right, [factor * level for level in levels])
         path = spread_means(path, count, s, candidate.blocks)
         there = np.concatenate([lags, direct])
+        on_states, known = np.split(path, [path.shape[2] - np.count_nonzero(there)], axis=2)
         on_inputs = np.zeros((*path.shape[:2], there.size))
-        on_inputs[..., there] = path[..., path.shape[2] - np.count_nonzero(there) :]
-        on_states = path[..., : path.shape[2] - np.count_nonzero(there)]
+        on_inputs[..., there] = known
         if candidate.is_filter:
             on_states = np.zeros((*path.shape[:2], count))
         x, u, w = scales

@@ -166,18 +166,6 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     angle = 0.5 * np.arctan2(2 * xy, xx - yy)
     mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
     long_side, short_side = (np.sqrt(12 * (mean + sign * half)) for sign in (1, -1))
-    # Part seen of the corners of the rectangle.
-    rows, columns = np.indices(weights.shape, dtype=np.float32)
-    right, below = columns - centre[0], rows - centre[1]
-    along = right * np.cos(angle) + below * np.sin(angle)
-    down = below * np.cos(angle) - right * np.sin(angle)
-    side, seen = 0.5 * short_side, []
-    for end in (-1.0, 1.0):
-        # Pixels that a border divides count in part, or the sum would depend on the grid.
-        near = np.clip(end * along - (0.5 * long_side - side) + 0.5, 0.0, 1.0)
-        for sign in (-1.0, 1.0):
-            covered = near * np.clip(sign * down + 0.5, 0.0, 1.0) * weights
-            seen.append(np.sum(covered) / side**2)
     _, sides, _ = cv2.minAreaRect(outline)  # runs through the centres of the outermost pixels
     cut = min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0]
     return panel | {
@@ -189,8 +177,25 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
         "area": area,
         "fill": area / ((sides[0] + 1.0) * (sides[1] + 1.0)),
         "cut": cut,
-        **dict(zip(CORNERS, seen, strict=True)),
+        **_corners(weights, centre, angle, long_side, short_side),
     }
+
+
+def _corners(
+    seen: Weights, centre: tuple[float, float], angle: float, length: float, height: float
+) -> dict[str, float]:
+    """Part seen of the corners of a rectangle."""
+    rows, columns = np.indices(seen.shape, dtype=np.float32)
+    x, y = columns - centre[0], rows - centre[1]
+    along, down = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    side = 0.5 * height
+    out = []
+    for end in (-1.0, 1.0):
+        # Pixels that a border divides count in part, or the sum would depend on the grid.
+        near = np.clip(end * along - (0.5 * length - side) + 0.5, 0.0, 1.0)
+        for half in (-1.0, 1.0):
+            out.append(np.sum(near * np.clip(half * down + 0.5, 0.0, 1.0) * seen) / side**2)
+    return dict(zip(CORNERS, out, strict=True))
 
 
 def _weights(patch: Image, filled: Image) -> Weights:

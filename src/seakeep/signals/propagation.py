@@ -334,14 +334,7 @@ def misplaced_probes(
     phases move by up to a fifth of a wavelength with what the model reflects.
     """
     telling = {name: as_series(elevations[name]) for name in elevations if name in positions}
-    names = [
-        name
-        for name in sorted(telling, key=positions.__getitem__)
-        # Irregular waves, and enough of them.
-        if (x := telling[name]).size >= 64
-        and np.sum(np.diff(np.sign(x - x.mean())) > 0) >= LEAST_WAVES
-        and not is_regular(x)
-    ]
+    names = sorted(filter(lambda n: _telling(telling[n]), telling), key=positions.__getitem__)
     pairs = list(pairwise(names))
     if len(names) > 2:
         pairs.append((names[0], names[-1]))
@@ -362,6 +355,14 @@ def misplaced_probes(
             certain = b not in backed and a in backed
             out.setdefault((b,) if certain else (a, b), Misplaced(b, a, separations[a, b], certain))
     return list(out.values())
+
+
+def _telling(series: FloatArray) -> bool:
+    """Whether a record holds irregular waves, and enough of them."""
+    if series.size < 64 or np.ptp(series) == 0:
+        return False
+    rises = np.diff(np.sign(series - series.mean())) > 0
+    return bool(rises.sum() >= LEAST_WAVES) and not is_regular(series)
 
 
 def probe_separation(

@@ -407,10 +407,8 @@ def trend_table(test: xr.Dataset, training: xr.Dataset, rng: np.random.Generator
             return np.nansum(growth, axis=(1, 2)) / np.nansum(level, axis=(1, 2))
 
     blocks = blocks_of([test], training)[1], 1
-    values = with_bounds(
-        change, level.values, growth.values, rng=rng, blocks=blocks, n_series=DIFFERENCES,
-        signed=True,
-    )  # fmt: skip
+    how = {"rng": rng, "blocks": blocks, "n_series": DIFFERENCES, "signed": True}
+    values = with_bounds(change, level.values, growth.values, **how)
     growths = numbered(values, ("number", *coords), ("change", "lower", "upper"), coords)
     lines = numbered(series, (*coords, "number", "time"), TREND_LINES, {**coords, "time": time})
     return xr.merge([growths, lines])

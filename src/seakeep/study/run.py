@@ -571,19 +571,16 @@ def _heights(elevation: xr.DataArray, dt: float) -> FloatArray:
 
 def _truth(folder: Path, plan: Plan, run: str) -> FloatArray:
     """True states at the instants of a run; NaN of a channel that has no truth."""
+    import h5py
+
     path = folder / f"{run}.nc"
     if not path.exists():
         raise DataError(
             f"the study names the folder {folder} of true channels, and {path.name} is not in "
             "it. Play the tank again, or leave study.truth out."
         )
-    import h5py
-
-    time, nothing = plan.runs[run]["time"].values, np.full(plan.runs[run].sizes["time"], np.nan)
     with decoding(path, "true channels", "Play the tank again."), h5py.File(path) as file:
-        known = file["time"][:]
-        columns = [
-            np.interp(time, known, file[name][:]) if name in file else nothing
-            for name in plan.states
-        ]
-    return np.stack(columns, axis=-1)
+        wanted = [name for name in ("time", *plan.states) if name in file]
+        true = xr.Dataset({name: ("time", file[name][:]) for name in wanted})
+    time, known = plan.runs[run]["time"].values, true["time"].values
+    return np.stack([np.interp(time, known, each) for each in _columns(plan, true).T], axis=-1)

@@ -95,35 +95,10 @@ class UnitFolder:
         with storing(self.folder):
             units.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=units).close()
-        started = None
-        if header.exists():
-            with suppress(RequestError, ValueError, RecursionError):
-                started = json.loads(read_bytes(header))
-            if not isinstance(started, dict) or "digest" not in started:
-                raise RequestError(
-                    f"{header} is damaged or belongs to no study. Give another folder with -o, or "
-                    "remove this one."
-                )
+        started = _read_header(header) if header.exists() else None
         is_finished = (self.folder / RESULT).exists()
         if started is not None and (is_finished or any(units.glob("*.nc"))):
-            if started["digest"] != self.digest:
-                raise RequestError(
-                    f"{self.folder} holds the results of another study: its digest starts with "
-                    f"{str(started['digest'])[:12]} and this study's with {self.digest[:12]}. "
-                    "Settings, campaign or raw files have changed since. Give another folder with "
-                    "-o, or remove this one."
-                )
-            before = started.get("versions", {})
-            changed = [
-                f"{k} {before.get(k)} (now {v})"
-                for k, v in versions().items()
-                if before.get(k) != v
-            ]
-            if changed:
-                raise RequestError(
-                    f"{self.folder} was started with {', '.join(changed)}; arrays of both would be "
-                    "mixed. Give another folder with -o, or remove this one."
-                )
+            self._check_header(started)
         elif not is_finished:
             check_report(self.folder)
             if started is None and any(units.iterdir()):
@@ -131,6 +106,22 @@ class UnitFolder:
                     f"{units} holds files, and {header} does not say of which study. "
                     "Choose another folder (-o), or remove this one."
                 )
+
+    def _check_header(self, started: Mapping[str, Any]) -> None:
+        if started["digest"] != self.digest:
+            raise RequestError(
+                f"{self.folder} holds the results of another study: its digest starts with "
+                f"{str(started['digest'])[:12]} and this study's with {self.digest[:12]}. "
+                "Settings, campaign or raw files have changed since. Give another folder with -o, "
+                "or remove this one."
+            )
+        before, now = started.get("versions", {}), versions()
+        changed = [f"{k} {before.get(k)} (now {v})" for k, v in now.items() if before.get(k) != v]
+        if changed:
+            raise RequestError(
+                f"{self.folder} was started with {', '.join(changed)}; arrays of both would be "
+                "mixed. Give another folder with -o, or remove this one."
+            )
 
     def open(self, name: str) -> None:
         """Make the folder this study's, or see that it belongs to it; errors as :meth:`check`."""
@@ -191,6 +182,19 @@ class UnitFolder:
             path.unlink(missing_ok=True)
         with suppress(OSError):  # files of others stay
             (self.folder / UNITS).rmdir()
+
+
+def _read_header(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(read_bytes(path))
+    except (RequestError, ValueError, RecursionError):
+        content = None
+    if not isinstance(content, dict) or "digest" not in content:
+        raise RequestError(
+            f"{path} is damaged or belongs to no study. Give another folder with -o, or remove "
+            "this one."
+        )
+    return content
 
 
 @dataclass(frozen=True, eq=False)
