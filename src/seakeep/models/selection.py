@@ -344,8 +344,8 @@ class Problem:
         return self.ridges if candidate.has_path else (float(candidate.ridge),)
 
     def grows(self, candidate: HankelSettings, level: float) -> bool:
-        """Whether the model that a candidate gives of all runs grows; a subspace model does not."""
-        if not candidate.has_path:
+        """Whether the model of all runs grows; neither a filter nor a subspace model does."""
+        if candidate.is_filter or not candidate.has_path:
             return False
         return spectral_radius(self.models(candidate, [level], range(len(self.groups)))[0]) >= 1.0
 

@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -56,6 +57,9 @@ from seakeep.study.plan import (
 )
 from seakeep.study.settings import Study
 from seakeep.study.store import RESULT, StudyResult, UnitFolder, read_result, write_result
+
+EIGENVALUES_OF = 10
+"""Members whose eigenvalues are computed: as many show where those of an ensemble lie."""
 
 
 def run_study(
@@ -343,8 +347,8 @@ def _known(facts: xr.Dataset, unit: Unit, windows: Sequence[int]) -> dict[str, F
 
 
 def _eigenvalues(fitted: Any) -> xr.Dataset:
-    """Eigenvalues of all members, in descending order of modulus."""
-    values = [np.linalg.eigvals(matrix) for matrix in fitted.system_matrices()]
+    """Eigenvalues of the first members, in descending order of modulus."""
+    values = [np.linalg.eigvals(each) for each in islice(fitted.system_matrices(), EIGENVALUES_OF)]
     padded = np.full((len(values), max(each.size for each in values)), complex(np.nan, np.nan))
     for row, each in zip(padded, values, strict=True):
         row[: each.size] = each[np.argsort(-np.abs(each), kind="stable")]

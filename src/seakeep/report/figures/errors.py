@@ -217,7 +217,7 @@ def density_figure(result: StudyResult, model: str) -> Figure:
 
 @figure_style()
 def eigenvalue_figure(result: StudyResult) -> Figure:
-    """Eigenvalues of each model of the first training set, for an ensemble those of all members."""
+    """Eigenvalues of each model of the first training set, for an ensemble those of its members."""
     figure = new_figure(8.5, 3.0)
     plane, decay = figure.subplots(1, 2)
     circle = np.exp(1j * np.linspace(0, np.pi, 400))
