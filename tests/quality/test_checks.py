@@ -12,6 +12,7 @@ from seakeep.errors import SeakeepWarning
 from seakeep.quality import Finding, Record, as_json, findings_of, warn_of
 from seakeep.quality.faults import reading_step
 from seakeep.quality.samples import SamplesKind
+from seakeep.quality.samples import waves as waves_of
 from seakeep.quality.sensors import LATE, RUN_AWAY, compare_sensors, redundant
 
 DT = 0.04
@@ -101,6 +102,27 @@ def test_what_stands_still_has_no_lag():
         1.2 * 2600 / T.size, abs=0.15
     )  # windows of 3 s at the ends
     assert found.centre[-1] < 2600 * DT
+
+
+@pytest.mark.parametrize(
+    ("height", "slower", "stated", "told"),
+    [
+        (0.13, 1, None, []),  # m; waves of 1.6 s are 4 m long, and break at 0.57 m
+        (0.50, 1, None, []),
+        (0.62, 1, None, ["WAVES"]),
+        (0.13, 20, None, []),
+        (0.13, 1000, None, ["WAVES"]),  # times in ms
+        (0.13, 1, 1.6 * 2.9, []),
+        (0.13, 1, 1.6 * 3.2, ["STATED_PERIOD"]),
+        (0.13, 1, 1.6 / 3.2, ["STATED_PERIOD"]),
+    ],
+)
+def test_waves_that_none_of_their_period_is(height, slower, stated, told):
+    run = record(DT * slower, eta_fwd=height / 8**0.5 * np.sin(2 * np.pi * T / PERIOD))
+    run["eta_fwd"].attrs["units"] = "m"
+    found = [*waves_of(Record("r", run, stated_period=stated))]
+    assert [each.kind.name for each in found] == told
+    assert not [*waves_of(Record("r", run, stated_period=stated, waves="still"))]
 
 
 FOUND = Finding(SamplesKind.DRIFT, "first", "pitch", np.deg2rad(5.0), 0.01, "rad")

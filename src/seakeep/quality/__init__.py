@@ -45,6 +45,7 @@ CHECKS: list[Callable[[Record], Iterable[Finding]]] = [
     clocks.others,
     clocks.records,
     samples.impossible,
+    samples.waves,
     samples.units,
     clocks.rates,
     clocks.steps,

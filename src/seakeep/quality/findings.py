@@ -210,6 +210,8 @@ class Record:
         Channel on which the encounter period is counted.
     period : (float, float), optional
         Counted period and energy period of the spectrum, s, where they disagree.
+    stated_period : float, optional
+        Encounter period that the campaign states, s.
     redundant : mapping of tuple of str to float, optional
         Sensors that are compared, the trusted one first, and the windows (s).
     rates : mapping of str to Rate, optional
@@ -235,6 +237,7 @@ class Record:
     water_depth: float | None = None
     wave_channel: str | None = None
     period: tuple[float, float] | None = None
+    stated_period: float | None = None
     redundant: Redundant = field(default_factory=dict)
     rates: Mapping[str, Rate] = field(default_factory=dict)
     assumed_units: Mapping[str, str] = field(default_factory=dict)

@@ -17,7 +17,10 @@ from seakeep.quality.faults import (
 from seakeep.quality.findings import Findings, Kind, Record, channels_of, sound, step_of
 from seakeep.signals.time_axis import stretches
 from seakeep.signals.waves import dominant_period
+from seakeep.waves import GRAVITY
 
+FLATTEST, STEEPEST = 5e-5, 1 / 7
+"""Heights of waves over their lengths in deep water, between which all that is measured lies."""
 NO_SLOW_MOTION = ("heave", "roll", "pitch")
 """Besides wave elevations, channels whose level has no reason to change within a run."""
 
@@ -41,6 +44,18 @@ class SamplesKind(Kind):
     DRIFT = "level drifts by {value:+.3g} over the record"
     IMPOSSIBLE = "reaches {value:.3g}, more than {limit:.3g}", _UNIT
     OUT_OF_WATER = "leaves its mean by {value:.3g} in water of {limit:g}", _UNIT
+    WAVES = (
+        "shows waves of {value:.3g} and {period:.3g} s: no sea and no basin has them (heights are "
+        "1/20 000 to 1/7 of the length in deep water)",
+        "Check unit in [channels.{channel}], and the unit of the times (time_unit in [files]).",
+        True,
+    )
+    STATED_PERIOD = (
+        "shows waves of {value:.3g}, and encounter_period is stated as {limit:.3g}",
+        "Correct encounter_period (s) in [campaign], at the scale of the files, or leave it out: "
+        "it is measured then.",
+        True,
+    )
     WAVE_COLUMN = (
         "is read from the column '{column}', which is called as wave probes are",
         "Correct column in [channels.{channel}], or rename it in the files.",
@@ -140,6 +155,29 @@ def impossible(record: Record) -> Findings:
             kind = SamplesKind.IMPOSSIBLE if turns else SamplesKind.OUT_OF_WATER
             if reached > limit:
                 yield record.finding(kind, name, reached, limit, "rad" if turns else "m")
+
+
+def waves(record: Record) -> Findings:
+    """Waves that none of their period is, as times and heights in wrong units are; a wrong period.
+
+    Waves break at a seventh of their length. An encounter period may differ from that of the
+    highest waves, but not by a factor of three.
+    """
+    dt = step_of(record.whole)
+    for name, channel in channels_of(record.whole).items():
+        x = sound(record.whole, name)
+        period = dominant_period(x, dt)
+        is_wave = is_elevation(name) and channel.attrs["units"] == "m" and record.waves != "still"
+        if not is_wave or np.isnan(period) or noise_share(x) > 0.5:
+            continue
+        height, length = 4 * float(x.std()), GRAVITY * period**2 / (2 * np.pi)
+        if record.water_depth and height > record.water_depth:  # which `impossible` reports
+            continue
+        if not FLATTEST < height / length < STEEPEST:
+            yield record.finding(SamplesKind.WAVES, name, height, unit="m", period=period)
+        elif record.stated_period and not 1 / 3 < record.stated_period / period < 3:
+            stated = record.stated_period
+            yield record.finding(SamplesKind.STATED_PERIOD, name, period, stated, "s")
 
 
 def units(record: Record) -> Findings:
