@@ -9,6 +9,7 @@ from tables import rows_of
 
 from seakeep.files import check_output
 from seakeep.report.comparison import (
+    band_findings,
     comparison_blocks,
     difference_blocks,
     forecast_header,
@@ -246,3 +247,17 @@ def test_each_channel_has_a_panel_and_inputs_share_one_with_those_of_their_unit(
         label = axes.yaxis.label.get_window_extent()
         assert label.height <= axes.get_window_extent().height
         assert label.x0 >= 0
+
+
+@pytest.mark.parametrize(
+    ("least", "words"),
+    [(88.0, "which is what it claims (88 % of pitch, not what it claims)."),
+     (91.0, "which is what it claims.")],
+)  # fmt: skip
+def test_the_worst_channel_of_a_band_is_named_where_its_verdict_is_another(least, words):
+    coverage = xr.DataArray([[99.0, least, np.nan]], dims=("run", "channel"))
+    facts = {"mean_coverage": 94.0, "diverged": 0, "members": 20, "level": 0.95, "band": "members"}
+    table = xr.Dataset(
+        {"coverage": coverage} | facts, {"run": ["R1"], "channel": ["heave", "pitch", "surge"]}
+    )
+    assert words in band_findings(table)[0]

@@ -143,7 +143,8 @@ def main(arguments: list[str] | None = None) -> int:
         status = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
         if status == INTERRUPTED:
             say(
-                "Interrupted. Finished files are kept: run the same command again to continue.",
+                "Interrupted. Finished files are kept. Run the same command again: a study goes on "
+                "where it stopped, and so does tune --resume; others start anew.",
                 style="red",
             )
         return status

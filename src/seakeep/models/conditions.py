@@ -94,7 +94,7 @@ class Disagreement:
             '{ mode = "dispersion", surge = "none" } in [model] if it has none, or correct the '
             "position",
             "scale": f"{self.channel} moves {self.value:.3g} times as much as in a model of "
-            f"{rest}. Check its calibration",
+            f"{rest}. Check its calibration, or its sign where it is negative",
             "dynamics": f"{place}. Fit one model per condition, and forecast each with its own",
         }[self.reason]
         pair = f"{self.run} disagrees with {rest}"

@@ -246,7 +246,10 @@ def band_findings(table: xr.Dataset) -> list[str]:
             said.append(f"{run}: there is no band to judge{left_out}.")
             continue
         level, band = at["level"].item(), at["band"].item()
+        least = at["coverage"].isel(channel=int(at["coverage"].argmin("channel")))
         words = band_verdict(inside / 100, level)
+        if (of_least := band_verdict(float(least) / 100, level)) != words:
+            words += f" ({least:.0f} % of {least['channel'].item()}, {of_least})"
         said.append(
             f"{run}: the {band_words(level, band)} of {members - lost:.0f} members holds "
             f"{inside:.0f} % of the measured instants, {words}. {_CARRIES[band]}{left_out}."
