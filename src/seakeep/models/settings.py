@@ -427,6 +427,11 @@ class HankelSettings:
         return InputMap(aligned, observed=observed, follows=follows)
 
     @property
+    def follows_surge(self) -> bool:
+        """Whether waves are carried to the surge that the model predicts."""
+        return self.alignment is not None and self.alignment.surge == "predicted"
+
+    @property
     def may_observe(self) -> tuple[Observable, ...]:
         """Observables that a model of these settings may have."""
         return self.observables
