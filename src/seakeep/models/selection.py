@@ -259,7 +259,7 @@ class Problem:
         data, (delayed, direct) = self.data, self.parts(candidate)
         count, s, z = len(data.signature.states), candidate.state_delays, candidate.input_delays
         wide = self._widened(candidate)
-        (x, u, w), system = self._system(candidate, wide, runs)
+        scales, system = self._system(candidate, wide, runs)
         own, every = (0 if candidate.is_filter else count * (d + 1) for d in (s, wide.state_delays))
         lags = np.tile(delayed, z + 1)
         later = np.pad(lags, (0, delayed.size * (wide.input_delays - z)))
@@ -270,17 +270,12 @@ class Problem:
         gram, right = system.gram.compress(kept, 0).compress(kept, 1), system.right[:, kept]
         path = ridge_path(gram, right, [factor * level for level in levels])
         path = spread_means(path, count, s, candidate.blocks)
-        reach = np.full(count * (candidate.state_reach + 1), not candidate.is_filter)
-        there = np.concatenate([reach, lags, direct])
+        states = np.full(count * (candidate.state_reach + 1), not candidate.is_filter)
+        there = np.concatenate([states, lags, direct])
         coefficients = np.zeros((*path.shape[:2], there.size))
         coefficients[..., there] = path
         signature = replace(
-            data.signature,
-            state_delays=candidate.state_reach,
-            input_delays=z,
-            state_scale=x,
-            input_scale=u,
-            direct_scale=w,
+            data.signature.scaled(*scales), state_delays=candidate.state_reach, input_delays=z
         )
         return [Dynamics(each, signature) for each in coefficients]
 
@@ -301,8 +296,7 @@ class Problem:
         if made is None or made[0] != key:
             data, chain = self.data, self.data.signature.input_map
             windows = [data.windows[run] for run in runs]
-            groups_of = data.signature.state_labels, *chain.regressors(data.signature.input_labels)
-            labels = [[label.name for label in group] for group in groups_of]
+            labels = data.signature.state_labels, *chain.regressors(data.signature.input_labels)
             series = [list(group) for group in zip(*map(data.physical, runs), strict=True)]
             scales = list(scales_of(series, windows, labels, True, chain.stretch))
             # Later by the samples that a row looks ahead too far.

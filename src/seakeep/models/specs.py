@@ -825,7 +825,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
         groups = (labels[0], *input_map.regressors(labels[1]))
         scales = [
-            moments(each, None, [label.name for label in group], standardize=False)
+            moments(each, None, group, standardize=False)
             for each, group in zip(series, groups, strict=True)
         ]
         signature = Signature(
