@@ -513,6 +513,15 @@ class _Trials:
         """The candidate that errs least."""
         return min(self.made, key=lambda each: self.made[each].best)
 
+    @property
+    def tried(self) -> list[tuple[Any, float]]:
+        """Candidates, each with every λ that was tried."""
+        return [
+            (candidate, level)
+            for candidate, trial in self.made.items()
+            for level in np.array(trial.levels)[np.isfinite(trial.means)].tolist()
+        ]
+
     def searched(self, best: Any, steps: Iterable[Step]) -> Any:
         """The best candidate, from one on, after each step of a search."""
         for step_of in steps:
@@ -542,52 +551,41 @@ class _Trials:
     def _try(self, levels: Mapping[Any, Sequence[float]], later: int) -> None:
         """Try λ of candidates, of which so many more parts are to come."""
         problem = next(iter(self.problems.values()))
-        folds, firsts = problem.folds(), list(dict.fromkeys(problem.groups))
-        levels = {each: own for each, own in levels.items() if own}
+        folds, levels = problem.folds(), {each: own for each, own in levels.items() if own}
         again = sum(each in self.made for each in levels)  # each has two parts
-        # The second round begins with the runs that the first one read last.
-        units = [*itertools.product(folds[::-1] if again else folds, levels)]
-        keys = {
-            (fold, each): json.dumps([each.to_json(), fold, [*levels[each]]], sort_keys=True)
-            for fold, each in units
-        }
-        left = [unit for unit in units if keys[unit] not in self.known]
         batches: dict[Alike, list[tuple[Any, Sequence[float]]]] = {}
-        for fold, each in left:
-            alike = fold, self.search.columns(each), each.lead if each.has_path else each
-            batches.setdefault(alike, []).append((each, levels[each]))
+        # The second round begins with the runs that the first one read last.
+        order = folds[::-1] if again else folds
+        for fold, (each, own) in itertools.product(order, levels.items()):
+            if _key(each, fold, own) not in self.known:
+                alike = fold, self.search.columns(each), each.lead if each.has_path else each
+                batches.setdefault(alike, []).append((each, own))
         outcomes = in_order(_judged, self.problems, [*batches.items()], self.executor)
         done = len(folds) * (2 * len(self.made) - again)
-        total = done + len(left) + len(folds) * later
+        total = done + sum(map(len, batches.values())) + len(folds) * later
         for ((fold, *_), tried), outcome in zip(batches.items(), outcomes, strict=True):
-            for (each, _), judged in zip(tried, outcome, strict=True):
-                self.known[keys[fold, each]] = [part.tolist() for part in judged]
+            for (each, own), judged in zip(tried, outcome, strict=True):
+                self.known[_key(each, fold, own)] = [part.tolist() for part in judged]
             done += len(tried)
             if self.progress is not None:
                 self.progress(done, total, f"candidate and fold {done}")
         for each, own in levels.items():
-            every = self.problem(each).levels(each)
-            parts = [map(np.array, self.known[keys[fold, each]]) for fold in folds]
-            found, weights = zip(*parts, strict=True)
+            found = [map(np.array, self.known[_key(each, fold, own)]) for fold in folds]
+            scores, weights = zip(*found, strict=True)
             joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
-            places = [firsts.index(problem.groups[fold]) for fold in folds]
-            groups = np.repeat(places, [len(each) for each in weights])
-            scores = np.full((len(every), joined.size), np.nan)
+            firsts = [problem.groups.index(problem.groups[fold]) for fold in folds]
+            groups = np.repeat(firsts, [len(part) for part in weights])
+            every = self.problem(each).levels(each)
+            known = np.full((len(every), joined.size), np.nan)
             if each in self.made:
-                scores[:] = self.made[each].scores
-            scores[[every.index(level) for level in own]] = np.concatenate(found, axis=1)
-            self.made[each] = Trial(every, scores, joined / joined.sum(), groups)
+                known[:] = self.made[each].scores
+            known[[every.index(level) for level in own]] = np.concatenate(scores, axis=1)
+            self.made[each] = Trial(every, known, joined / joined.sum(), groups)
 
     def stable(self, taken: Any, level: float) -> tuple[Any, float]:
         """A candidate and λ; where that grows, the best of all that do not."""
-        every = [
-            (score, candidate, ridge)
-            for candidate, trial in self.made.items()
-            for score, ridge in zip(trial.means.tolist(), trial.levels, strict=True)
-            if math.isfinite(score)
-        ]
-        ranked = sorted(every, key=lambda each: each[0])
-        for candidate, ridge in [(taken, level), *(each[1:] for each in ranked)]:
+        ranked = sorted(self.tried, key=lambda pair: self.made[pair[0]].at(pair[1]))
+        for candidate, ridge in [(taken, level), *ranked]:
             if not self.problem(candidate).grows(candidate, ridge):
                 return candidate, ridge
         return taken, level
@@ -600,6 +598,11 @@ class _Trials:
         return "".join(
             f"; without {named(o)} {self.made[less].best:.3f}" for o, less in without.items()
         )
+
+
+def _key(candidate: HankelSettings, fold: int, levels: Sequence[float]) -> str:
+    """What scores of a candidate are known by."""
+    return json.dumps([candidate.to_json(), fold, [*levels]], sort_keys=True)
 
 
 def _judged(problems: Mapping[Columns, Problem], batch: tuple[Alike, Tried]) -> list[Scores]:
@@ -815,10 +818,27 @@ def select(
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
         complete = settings.having(readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
+    trials = _Trials(search, problems, {} if known is None else known, executor, progress)
+    taken, level, words = _chosen(trials, stated, kinds)
+    problem = trials.problem(taken)
+    readouts = readouts if taken.kind == settings.kind else {}
+    fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
+    return Selected(
+        taken.having(ridge=level, readouts=_asked(settings, fitted, vary)),
+        tuple(_rows_of(trials.made, taken, level, seed)),
+        _note(trials, taken, level, words),
+        fitted,
+    )
+
+
+def _chosen(
+    trials: _Trials, stated: float | None, kinds: Sequence[HankelSettings]
+) -> tuple[Any, float, str]:
+    """The candidate and λ that a search ends with, and words on what else was tried."""
+    search, made = trials.search, trials.made
+    base, alike = search.base, 0.0 if search.unseen else ALIKE
     left, varied = search.left_open(), search.varied()
-    later = sum(len(step_of(base)) - 1 for step_of in (*left, *varied))
-    trials = _Trials(search, problems, {} if known is None else known, executor, progress, later)
-    made, alike = trials.made, 0.0 if by_sea else ALIKE
+    trials.later = sum(len(step_of(base)) - 1 for step_of in (*left, *varied))
     if left:
         start = simplest(made, trials.searched(base, left), alike)
     else:
@@ -829,7 +849,7 @@ def select(
     trials.refine([taken])
     level = made[taken].level(alike, stated if taken == start else None)
     taken, level = trials.stable(taken, level)
-    worth = trials.worth(taken) if settings.role == "model" else ""
+    worth = trials.worth(taken) if base.role == "model" else ""
     if taken != best or (varied and taken == start):
         worth += (
             "; what it starts from: nothing that was tried is better by more than the noise"
@@ -837,15 +857,7 @@ def select(
             else f"; the simplest that is as good as the best ({made[best].best:.3f})"
         )
     taken, level, words = _rivalled(trials, taken, level, kinds, alike)
-    problem = trials.problem(taken)
-    readouts = readouts if taken.kind == settings.kind else {}
-    fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
-    return Selected(
-        taken.having(ridge=level, readouts=_asked(settings, fitted, vary)),
-        tuple(_rows_of(made, taken, level, seed)),
-        _note(trials, taken, level, worth + words),
-        fitted,
-    )
+    return taken, level, worth + words
 
 
 def simplest(trials: Mapping[Settings, Trial], best: Settings, alike: float) -> Settings:
@@ -910,12 +922,11 @@ def _rivalled(
 
 def _note(trials: _Trials, taken: Settings, level: float, worth: str) -> str:
     """How the choice was made, in words."""
-    search, problem, made = trials.search, trials.problem(taken), trials.made
-    count = sum(np.isfinite(trial.means).sum() for trial in made.values())
+    search, problem = trials.search, trials.problem(taken)
     note = (
-        f"{taken.ridge_text(level)}: out of {count} settings (below, the best λ of each kind) "
-        f"in free runs on {len(problem.folds())} parts held out in turn, mean NRMSE "
-        f"{made[taken].at(level):.3f}{worth}"
+        f"{taken.ridge_text(level)}: out of {len(trials.tried)} settings (below, the best λ of "
+        f"each kind) in free runs on {len(problem.folds())} parts held out in turn, mean NRMSE "
+        f"{trials.made[taken].at(level):.3f}{worth}"
     )
     if {"lead", "input_delays", "state_delays", "alignment", "memory"} & {
         *search.vary,
