@@ -453,7 +453,7 @@ class HankelSettings:
         """
         before, after = zip((0, self.lead), *(o.reach(dt) for o in self.may_observe), strict=True)
         delayed = self.input_delays
-        if encounter_period and self.alignment and self.alignment.surge == "predicted":
+        if encounter_period and self.follows_surge:
             delayed += round(BACK * encounter_period / dt)
         return Needs(
             self.window or 1,
