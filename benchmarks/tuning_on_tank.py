@@ -22,7 +22,8 @@ from alignment_on_tank import INPUTS, STATES, irregular_runs
 from chain_on_tank import used
 
 import seakeep
-from seakeep.models.selection import WORST, default_observables
+from seakeep.models.candidates import default_observables
+from seakeep.models.selection import WORST
 
 HORIZONS = (15.0, 45.0)
 EVERY = 10

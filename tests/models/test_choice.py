@@ -127,9 +127,8 @@ def test_windows_of_few_runs_stay_in_memory_and_are_read_once(monkeypatch):
     # Rounds go back and forth, and the runs where they turn are read once.
     assert len(made) < 2 * 5 + 5
     for each in one.read.values():
-        for steps, (starts, windows) in each.items():
-            assert len(windows) == len(starts)
-            assert windows.steps == steps
+        for starts, windows, measured in each:
+            assert len(windows) == len(starts) == len(measured)
 
 
 def test_squares_are_tried_with_the_look_ahead_of_each_candidate():
@@ -137,6 +136,15 @@ def test_squares_are_tried_with_the_look_ahead_of_each_candidate():
     found = select(start, runs(), STATES, INPUTS, vary=("lead", "observables"))
     squared = {row["lead"] for row in found.rows if "slow_squares" in row["observables"]}
     assert len(squared) > 1
+
+
+def test_a_look_ahead_that_is_left_open_may_be_varied_too():
+    spec = replace(SPEC, alignment=None, select=None)
+    found = select(spec, runs(), STATES, INPUTS, vary=("lead",), opened=("observables", "lead"))
+    # The squares are those that go with each look-ahead: what was tried without one is not new.
+    tried = [(row["lead"], row["observables"], row["ridge"]) for row in found.rows]
+    assert {lead for lead, *_ in tried} == {0, 5, 8, 10}
+    assert len(set(tried)) == len(tried)
 
 
 def test_what_brings_nothing_is_not_recommended():

@@ -14,8 +14,9 @@ from scipy import signal
 from squared import DT, INPUTS, PERIOD, STATES, runs
 
 from seakeep import DataError, HankelDMDc, ProbeAlignment
+from seakeep.models.candidates import default_observables
 from seakeep.models.labelled import mean_period
-from seakeep.models.selection import RIDGES, Problem, default_observables, groups_of, select
+from seakeep.models.selection import RIDGES, Problem, groups_of, select
 from seakeep.models.settings import Select
 
 SPEC = HankelDMDc(6, 12, "rollout", delay_rows="exact")

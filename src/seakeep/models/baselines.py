@@ -337,7 +337,7 @@ class Subspace(Plain):
         for name, value in (("order", self.order), ("future", self.future)):
             if value is not None:
                 whole_number(value, name)
-        if self.alignment is not None and self.alignment.surge == "predicted":
+        if self.follows_surge:
             raise RequestError(
                 "a subspace model cannot be aligned to the surge that it predicts itself. Use "
                 "alignment surge = 'measured' or 'none'."

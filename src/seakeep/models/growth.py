@@ -127,21 +127,13 @@ def lead_errors(
     Residuals are those of the states as they are regressed; free runs are read off as forecasts
     are.
     """
-    s = max(each.signature.state_delays for each in members)
-    z = max(each.signature.input_delays for each in members)
+    own = [each.signature for each in members]
+    delays = max(max(each.state_delays, each.input_delays) for each in own)
     longest = max(each.last - each.first for each in stretches)
-    steps = max(1, min(max(REACH * (max(s, z) + 1), LEAST), longest // 2))
-    residuals = np.concatenate(
-        [
-            _errors(members, each, starts, s, z, 1, ())[:, 0]
-            for each, starts in _places(stretches, 1, STEPS)
-        ]
-    )
+    steps = max(1, min(max(REACH * (delays + 1), LEAST), longest // 2))
+    residuals = _errors(members, stretches, 1, STEPS)[:, 0]
     longest_first = sorted(stretches, key=lambda each: each.first - each.last)
-    places = _places(longest_first, steps, WINDOWS)
-    errors = np.concatenate(
-        [_errors(members, each, starts, s, z, steps, readouts) for each, starts in places]
-    )
+    errors = _errors(members, longest_first, steps, WINDOWS, readouts)
     known = np.isfinite(errors)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where all have diverged
         square = np.where(known, errors**2, 0.0).sum(axis=0) / known.sum(axis=0)
@@ -167,31 +159,29 @@ def _unseen(members: Sequence[Dynamics], stretches: Sequence[Stretch]) -> float:
     return float((n + p) / (n - p))
 
 
-def _places(stretches: Sequence[Stretch], steps: int, most: int) -> list[tuple[Stretch, list[int]]]:
-    """Starts of windows, spread evenly over the stretches in which one fits."""
-    room = [max(each.last - steps - each.first + 1, 0) for each in stretches]
-    out = []
-    for each, count in zip(stretches, room, strict=True):
-        number = min(count, -(-most * count // max(sum(room), 1)))
-        if number:
-            places = np.linspace(each.first, each.last - steps, number).astype(int)
-            out.append((each, [int(start) for start in places]))
-    return out
-
-
 def _errors(
     members: Sequence[Dynamics],
-    stretch: Stretch,
-    starts: Sequence[int],
-    s: int,
-    z: int,
+    stretches: Sequence[Stretch],
     steps: int,
-    readouts: Sequence[FittedReadOut],
+    most: int,
+    readouts: Sequence[FittedReadOut] = (),
 ) -> FloatArray:
-    """Forecast minus measurement, shape (window, steps, N)."""
-    windows = stretch.windows(starts, s, z, steps)
-    mean = linear_runs(members, [windows], readouts)[0].mean(axis=0)
-    return mean - np.stack([stretch.states[at + 1 : at + steps + 1] for at in starts])
+    """Forecast minus measurement in windows, shape (window, steps, N).
+
+    Their starts are spread evenly over the stretches in which one fits.
+    """
+    s = max(each.signature.state_delays for each in members)
+    z = max(each.signature.input_delays for each in members)
+    room = [max(each.last - steps - each.first + 1, 0) for each in stretches]
+    errors = []
+    for each, count in zip(stretches, room, strict=True):
+        if number := min(count, -(-most * count // max(sum(room), 1))):
+            starts = np.linspace(each.first, each.last - steps, number).astype(int).tolist()
+            windows = each.windows(starts, s, z, steps)
+            mean = linear_runs(members, [windows], readouts)[0].mean(axis=0)
+            measured = np.stack([each.states[at + 1 : at + steps + 1] for at in starts])
+            errors.append(mean - measured)
+    return np.concatenate(errors)
 
 
 def training_errors(
@@ -201,18 +191,12 @@ def training_errors(
     runs: Datasets,
 ) -> LeadErrors:
     """Errors of a single model in the runs that it was fitted to."""
-    stretches = []
-    for number, name in enumerate(data.names):
-        window = data.windows[number]
-        follows = signature.input_map.follows is not None
-        stretches.append(
-            Stretch(
-                *data.physical(number),
-                window.first_column,
-                window.last,
-                Source(signature, name, runs[name], data.begin(number)) if follows else None,
-            )
-        )
+    stretches, source = [], None
+    for number, (name, window) in enumerate(zip(data.names, data.windows, strict=True)):
+        if signature.input_map.follows is not None:
+            source = Source(signature, name, runs[name], data.begin(number))
+        own = data.physical(number)
+        stretches.append(Stretch(*own, window.first_column, window.last, source))
     return lead_errors([dynamics], stretches, signature.readouts)
 
 

@@ -10,9 +10,9 @@ beside them. The elevation is carried to a vessel whose position is measured as 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -381,6 +381,15 @@ class Signature:
         return [
             label.name for group in self.input_map.regressors(self.input_labels) for label in group
         ]
+
+    @property
+    def scales(self) -> tuple[Scale, Scale, Scale]:
+        """Moments of the states, of the delayed and of the direct regressors."""
+        return self.state_scale, self.input_scale, self.direct_scale
+
+    def scaled(self, states: Scale, inputs: Scale, direct: Scale) -> Self:
+        """The same with other moments."""
+        return replace(self, state_scale=states, input_scale=inputs, direct_scale=direct)
 
     @property
     def history_samples(self) -> int:

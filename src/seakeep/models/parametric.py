@@ -20,11 +20,9 @@ from seakeep.core.gram import ridge_path
 from seakeep.core.solve import Solution
 from seakeep.errors import DataError, warn
 from seakeep.models.engine import parameter_of
-from seakeep.models.inputs import Scale, Signature
+from seakeep.models.inputs import Signature
 from seakeep.models.settings import HankelSettings
 from seakeep.models.training import TrainingData, system_of
-
-GROUPS = ("state", "input", "direct")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +58,11 @@ class Variation:
                 f"{self.high:g} of the training: the model extrapolates. Train on a run beyond it."
             )
         q = (value - self.centre) / self.spread
-        scales: dict[str, Any] = {}
-        for group, shift in zip(GROUPS, self.shifts, strict=True):
-            scale: Scale = getattr(signature, f"{group}_scale")
-            scales[f"{group}_scale"] = replace(scale, mean=scale.mean + q * shift)
-        return coefficients + q * self.slopes, replace(signature, parameter="", **scales)
+        moved = (
+            replace(scale, mean=scale.mean + q * shift)
+            for scale, shift in zip(signature.scales, self.shifts, strict=True)
+        )
+        return coefficients + q * self.slopes, replace(signature.scaled(*moved), parameter="")
 
 
 def regress_varying(
@@ -106,10 +104,8 @@ def regress_varying(
     centre = float(np.average(known, weights=counts))
     spread = float(np.sqrt(np.average((known - centre) ** 2, weights=counts)))
     q = (known - centre) / spread
-    series, shifts = [], []
-    scales: dict[str, Any] = {}
-    for group, each in zip(GROUPS, (data.states, data.delayed, data.direct), strict=True):
-        scale: Scale = getattr(data.signature, f"{group}_scale")
+    series, shifts, scales = [], [], []
+    for scale, each in zip(data.signature.scales, data.series, strict=True):
         means = np.stack(
             [
                 x[window.first_column : window.last + 1].mean(axis=0)
@@ -122,12 +118,11 @@ def regress_varying(
             at_zero, slope = np.zeros_like(at_zero), np.zeros_like(slope)
         series.append([x - at_zero - part * slope for x, part in zip(each, q, strict=True)])
         shifts.append(slope * scale.std)
-        scales[f"{group}_scale"] = replace(scale, mean=scale.mean + at_zero * scale.std)
-    states, delayed, direct = series
+        scales.append(replace(scale, mean=scale.mean + at_zero * scale.std))
     gram: Any = 0.0
     right: Any = 0.0
-    for x, u, w, window, part in zip(states, delayed, direct, data.windows, q, strict=True):
-        system = system_of(([x], [u], [w]), [window], settings)
+    for run, (window, part) in enumerate(zip(data.windows, q, strict=True)):
+        system = system_of([[x[run]] for x in series], [window], settings)
         own = np.triu(system.gram) + np.triu(system.gram, 1).T
         gram = gram + np.kron(np.array([[1.0, part], [part, part**2]]), own)
         right = right + np.concatenate([system.right, part * system.right], axis=1)
@@ -146,7 +141,8 @@ def regress_varying(
         float(known.min()),
         float(known.max()),
     )
-    data = replace(data, signature=replace(data.signature, **scales, parameter=parameter))
+    signature = replace(data.signature.scaled(*scales), parameter=parameter)
+    data = replace(data, signature=signature)
     return Solution(fixed, "primal", ridge, len(gram)), data, variation
 
 

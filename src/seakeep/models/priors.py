@@ -30,36 +30,44 @@ class Prior(Protocol):
         """Quantile function: the value below which lies the probability `q`."""
 
 
-def _values(name: str, *given: object) -> tuple[list[float], str]:
-    """Finite numbers of the parameters of a prior, and the unit that they share."""
-    read = [parse_length(each) if isinstance(each, str) else each for each in given]
-    units = {each.unit if isinstance(each, Length) else "" for each in read}
-    values = [each.value if isinstance(each, Length) else each for each in read]
-    if len(units) > 1:
-        raise RequestError(
-            f"{name} needs one unit; received {' and '.join(map(repr, given))}. Write 'T', for "
-            "encounter periods, or 's' behind each number, or behind none."
-        )
-    finite = [float(x) for x in values if isinstance(x, int | float | np.number)]
-    if len(finite) < len(values) or not all(map(math.isfinite, finite)):
-        received = " and ".join(f"{each!r:.{SHOWN}}" for each in given)
-        raise RequestError(f"{name} needs finite numbers; received {received}.")
-    return finite, units.pop()
-
-
-class _Bounded:
-    """Two parameters in order, and their unit."""
+class _Stated:
+    """Parameters that are finite numbers, or lengths, and the unit that they share."""
 
     key: ClassVar[str]
+    bounds: tuple[float, ...]
+    unit: str
+
+    def __post_init__(self) -> None:
+        name, stated = type(self).__name__, dict(vars(self))
+        given = [*stated.values()]
+        read = [parse_length(each) if isinstance(each, str) else each for each in given]
+        units = {each.unit if isinstance(each, Length) else "" for each in read}
+        values = [each.value if isinstance(each, Length) else each for each in read]
+        if len(units) > 1:
+            raise RequestError(
+                f"{name} needs one unit; received {' and '.join(map(repr, given))}. Write 'T', for "
+                "encounter periods, or 's' behind each number, or behind none."
+            )
+        finite = [float(x) for x in values if isinstance(x, int | float | np.number)]
+        if len(finite) < len(values) or not all(map(math.isfinite, finite)):
+            received = " and ".join(f"{each!r:.{SHOWN}}" for each in given)
+            raise RequestError(f"{name} needs finite numbers; received {received}.")
+        for key, value in stated.items():
+            object.__setattr__(self, key, str(value) if isinstance(value, Length) else value)
+        object.__setattr__(self, "bounds", tuple(finite))
+        object.__setattr__(self, "unit", units.pop())
+
+
+class _Bounded(_Stated):
+    """Two parameters in order."""
+
     low: Bound
     high: Bound
-    bounds: tuple[float, float]
-    unit: str
     least: ClassVar[float] = -math.inf
 
     def __post_init__(self) -> None:
-        name = type(self).__name__
-        (low, high), unit = _values(name, self.low, self.high)
+        super().__post_init__()
+        name, (low, high) = type(self).__name__, self.bounds
         if not low < high:
             raise RequestError(
                 f"{name} needs its lower bound below the upper one; received {self.low!r} and "
@@ -70,10 +78,6 @@ class _Bounded:
                 f"{name} needs a positive lower bound; received {self.low!r}. Logarithms start "
                 "above zero."
             )
-        object.__setattr__(self, "low", _written(self.low))
-        object.__setattr__(self, "high", _written(self.high))
-        object.__setattr__(self, "bounds", (low, high))
-        object.__setattr__(self, "unit", unit)
 
 
 @dataclass(frozen=True)
@@ -138,7 +142,7 @@ class LogUniform(_Bounded):
 
 
 @dataclass(frozen=True)
-class Fixed:
+class Fixed(_Stated):
     """One value, the same for every member.
 
     Parameters
@@ -154,15 +158,10 @@ class Fixed:
 
     key: ClassVar[str] = "fixed"
     value: Bound
-    unit: str = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "unit", _values("Fixed", self.value)[1])
-        object.__setattr__(self, "value", _written(self.value))
 
     def ppf(self, q: float) -> float:
         """Quantile function: the value, for any probability."""
-        return _values("Fixed", self.value)[0][0]
+        return self.bounds[0]
 
 
 @dataclass(frozen=True)
@@ -302,7 +301,3 @@ def unit_of(written: object) -> str:
     """Unit of a length as a file states it: a prior, a text, or a number of samples."""
     length = parse_length(written) if isinstance(written, str) else prior_of("", written)
     return {"T": "encounter periods", "s": "s"}.get(getattr(length, "unit", ""), "samples")
-
-
-def _written(value: Bound) -> float | str:
-    return str(value) if isinstance(value, Length | str) else value

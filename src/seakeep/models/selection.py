@@ -16,8 +16,6 @@ import itertools
 import json
 import math
 from collections.abc import (
-    Callable,
-    Collection,
     Iterable,
     Iterator,
     Mapping,
@@ -26,28 +24,25 @@ from collections.abc import (
 )
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, NamedTuple, TypeVar, cast
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray, IntArray, Progress
-from seakeep.conventions import is_elevation
 from seakeep.core import metrics
 from seakeep.core.embedding import spread_means
 from seakeep.core.gram import PrimalSystem, ridge_path
-from seakeep.errors import DataError, RequestError, did_you_mean
+from seakeep.errors import RequestError, did_you_mean
 from seakeep.executor import in_order
 from seakeep.models import labelled
-from seakeep.models.alignment import FittedAlignment, ProbeAlignment
+from seakeep.models.candidates import Candidates, Columns, Given, Step, alignments_of
 from seakeep.models.engine import Dynamics, Windows, linear_runs, read_groups
 from seakeep.models.ensemble import spectral_radius
-from seakeep.models.following import LEAD
 from seakeep.models.inputs import Scale, Signature
 from seakeep.models.loads import PERIODS, Held, fit_readouts
-from seakeep.models.observables import Powers, SlowSquares, named
+from seakeep.models.observables import named
 from seakeep.models.readouts import Asked, FittedReadOut, ReadOuts, readouts_asked
 from seakeep.models.settings import Folds, HankelSettings, Select
-from seakeep.models.terms import Observable
 from seakeep.models.training import TrainingData, gather, scales_of, system_of
 from seakeep.signals import encounter_period, repeated_waves
 from seakeep.signals.waves import is_regular
@@ -59,22 +54,16 @@ On the virtual tank and on both measured sets the best lies between 3e-5 and 3e-
 within half a decade of it."""
 Settings = TypeVar("Settings", bound=HankelSettings)
 Chosen = TypeVar("Chosen")
-Given = tuple[Datasets, Sequence[str], Sequence[str]]
-"""Training runs, states and inputs."""
-Changes = dict[str, Any]
-"""Settings of a candidate that differ from those of the best so far."""
-Columns = tuple[ProbeAlignment | None, int | None, bool]
-"""An alignment, the look-ahead in samples where it is part of that, and whether there is any."""
-Step = Callable[[Any], list[Any]]
-"""Candidates that differ from one in a setting; it is among them."""
 Tried = Sequence[tuple[HankelSettings, Sequence[float]]]
 """Candidates of equal columns and look-ahead, each with its λ."""
-Unit = tuple[Any, int, tuple[float, ...]]
-"""A candidate, what is held out, and the λ that are tried."""
 Scores = tuple[FloatArray, FloatArray]
 """Scores, shape (level, window), and weights of the windows, which sum to one in a fold."""
 Known = MutableMapping[str, list[list[Any]]]
 """Scores and weights by candidate, fold and λ, as JSON values."""
+Read = tuple[list[int], Windows, FloatArray]
+"""Starts of windows of one length, what is read from there, and what was measured after them."""
+Alike = tuple[int, Columns, Any]
+"""What is held out, columns, and look-ahead: free runs of such candidates go side by side."""
 COARSE = 4
 """Every so-many-th λ is tried first."""
 NEAR = 1.2
@@ -99,14 +88,6 @@ FALLBACK = 1e-3
 """λ per snapshot pair where nothing can be held out."""
 UNHELD = "samples can be held out of runs of at most"
 """What a note says then."""
-DELAYS = {"input_delays": (2.0, 3.0, 5.0), "state_delays": (0.5, 1.0, 1.5)}
-"""Delays that are tried, encounter periods."""
-LENGTHS = (1.0, 0.6, 0.4)
-"""Lengths of a filter that are tried, in parts of the one that is stated."""
-LEADS = (0.0, 0.5, 0.75, 1.0)
-"""Look-aheads that are tried, encounter periods."""
-MEMORY = 8.0
-"""Memory that is tried, encounter periods."""
 VARIED = (
     *("ridge", "observables", "lead", "input_delays", "state_delays", "alignment", "memory"),
     *("readouts", "kind"),
@@ -173,20 +154,17 @@ class Trial:
 
     def is_as_good_as(self, other: Trial) -> bool:
         """Whether it errs no more than another, but for a standard error over the groups."""
-        scores, weights = zip(*(each._by_group() for each in (self, other)), strict=True)
-        judged = np.logical_and(*weights)
-        worse = scores[0][judged] - scores[1][judged]
+        worse = self._by_group() - other._by_group()
+        worse = worse[np.isfinite(worse)]
         doubt = worse.std(ddof=1) / len(worse) ** 0.5 if len(worse) > 1 else 0.0
         return bool(worse.mean() <= doubt)
 
-    def _by_group(self) -> tuple[FloatArray, FloatArray]:
-        """Scores at the best level in each group, and the weights of the groups."""
+    def _by_group(self) -> FloatArray:
+        """Scores at the best level in each group, NaN where nothing moves."""
         best = self.scores[np.nanargmin(self.means)]
-        sums, total = (
-            np.bincount(self.groups, self.weights * each).astype(float)
-            for each in (best, np.ones(best.size))
-        )
-        return sums / np.where(total > 0, total, 1.0), total
+        total = np.bincount(self.groups, self.weights)
+        total[total == 0.0] = np.nan
+        return np.bincount(self.groups, self.weights * best) / total
 
 
 class FreeRuns(NamedTuple):
@@ -242,7 +220,7 @@ class Problem:
     widest: HankelSettings
     ridges: tuple[float, ...]
     horizons: tuple[int, ...]
-    read: dict[tuple[int, tuple[int, ...]], dict[int, tuple[list[int], Windows]]] = field(
+    read: dict[tuple[int, tuple[int, ...]], list[Read]] = field(
         default_factory=dict, init=False, repr=False
     )
     taught: dict[tuple[int, ...], tuple[Any, list[Scale], PrimalSystem]] = field(
@@ -265,8 +243,8 @@ class Problem:
 
     def parts(self, candidate: HankelSettings) -> tuple[BoolArray, BoolArray]:
         """Which delayed and direct regressors a candidate has."""
-        signature, direct = self.data.signature, list[bool]()
-        chain, delayed = signature.input_map, [True] * len(signature.inputs)
+        chain = self.data.signature.input_map
+        delayed, direct = [True] * len(self.data.signature.inputs), list[bool]()
         bound = () if chain.observed is None else chain.observed.bound
         for observable, each in zip(self.widest.observables, bound, strict=True):
             columns = [observable in candidate.observables] * len(each.labels)
@@ -280,7 +258,8 @@ class Problem:
         """Models of some runs, one per level; coefficients of what a candidate lacks are zero."""
         data, (delayed, direct) = self.data, self.parts(candidate)
         count, s, z = len(data.signature.states), candidate.state_delays, candidate.input_delays
-        wide, scales, system = self._system(candidate, runs)
+        wide = self._widened(candidate)
+        scales, system = self._system(candidate, wide, runs)
         own, every = (0 if candidate.is_filter else count * (d + 1) for d in (s, wide.state_delays))
         lags = np.tile(delayed, z + 1)
         later = np.pad(lags, (0, delayed.size * (wide.input_delays - z)))
@@ -291,43 +270,33 @@ class Problem:
         gram, right = system.gram.compress(kept, 0).compress(kept, 1), system.right[:, kept]
         path = ridge_path(gram, right, [factor * level for level in levels])
         path = spread_means(path, count, s, candidate.blocks)
-        there = np.concatenate([lags, direct])
-        on_states, known = np.split(path, [path.shape[2] - np.count_nonzero(there)], axis=2)
-        on_inputs = np.zeros((*path.shape[:2], there.size))
-        on_inputs[..., there] = known
-        if candidate.is_filter:
-            on_states = np.zeros((*path.shape[:2], count))
-        x, u, w = scales
+        states = np.full(count * (candidate.state_reach + 1), not candidate.is_filter)
+        there = np.concatenate([states, lags, direct])
+        coefficients = np.zeros((*path.shape[:2], there.size))
+        coefficients[..., there] = path
         signature = replace(
-            data.signature,
-            state_delays=candidate.state_reach,
-            input_delays=z,
-            state_scale=x,
-            input_scale=u,
-            direct_scale=w,
+            data.signature.scaled(*scales), state_delays=candidate.state_reach, input_delays=z
         )
-        both = np.concatenate([on_states, on_inputs], axis=2)
-        return [Dynamics(each, signature) for each in both]
+        return [Dynamics(each, signature) for each in coefficients]
 
-    def _system(
-        self, candidate: HankelSettings, runs: Sequence[int]
-    ) -> tuple[HankelSettings, list[Scale], PrimalSystem]:
-        """Settings with the longest delays, and moments and normal equations of some runs for them.
-
-        The normal equations are those of all columns.
-        """
-        ahead, of = self.ahead(candidate), tuple(runs)
-        longest = {"input_delays": self.widest.input_delays - ahead}
+    def _widened(self, candidate: HankelSettings) -> HankelSettings:
+        """A candidate with the longest delays, as far as its own columns are among those."""
+        longest = {"input_delays": self.widest.input_delays - self.ahead(candidate)}
         if not candidate.memory:  # whose blocks begin after the delays of the states
             longest["state_delays"] = self.widest.state_delays
-        wide = candidate.having(**longest)
+        return candidate.having(**longest)
+
+    def _system(
+        self, candidate: HankelSettings, wide: HankelSettings, runs: Sequence[int]
+    ) -> tuple[list[Scale], PrimalSystem]:
+        """Moments of some runs, and normal equations of all columns with the longest delays."""
+        ahead, of = self.ahead(candidate), tuple(runs)
         key = ahead, wide.state_delays, wide.memory, wide.is_filter
         made = self.taught.get(of)
         if made is None or made[0] != key:
             data, chain = self.data, self.data.signature.input_map
             windows = [data.windows[run] for run in runs]
-            groups_of = data.signature.state_labels, *chain.regressors(data.signature.input_labels)
-            labels = [[label.name for label in group] for group in groups_of]
+            labels = data.signature.state_labels, *chain.regressors(data.signature.input_labels)
             series = [list(group) for group in zip(*map(data.physical, runs), strict=True)]
             scales = list(scales_of(series, windows, labels, True, chain.stretch))
             # Later by the samples that a row looks ahead too far.
@@ -337,7 +306,7 @@ class Problem:
                 for group, scale in zip(series, scales, strict=True)
             ]
             made = self.taught[of] = key, scales, system_of(groups, windows, wide)
-        return wide, *made[1:]
+        return made[1:]
 
     def levels(self, candidate: HankelSettings) -> tuple[float, ...]:
         """λ that are tried of a candidate."""
@@ -355,23 +324,31 @@ class Problem:
         first = window.first_column + self.widest.centre
         return np.arange(first, window.last - steps + 1, steps)
 
-    def windows(self, run: int, horizons: Sequence[int]) -> dict[int, tuple[list[int], Windows]]:
-        """By length, new samples from which a run is forecast, and what is read from there.
+    def windows(self, run: int, horizons: Sequence[int]) -> list[Read]:
+        """Windows by which a run is forecast over all horizons, the longest first.
 
         A longer free run begins with the shorter one from the same sample.
         """
         key = run, tuple(horizons)
         if (found := self.read.get(key)) is None:
-            begin, dt, known = self.data.begin(run), self.data.signature.dt, set[int]()
-            new: dict[int, list[int]] = {}
+            data, dt, name = self.data, self.data.signature.dt, self.data.names[run]
+            new, known = dict[int, list[int]](), set[int]()
             for steps in sorted(horizons, reverse=True):
-                starts = [at for at in self.starts(run, steps).tolist() if at not in known]
-                known.update(starts)
-                new |= {steps: starts} if starts else {}
-            name = self.data.names[run]
-            places = [([(name, begin + at * dt) for at in new[steps]], steps) for steps in new]
-            read = read_groups(self.reader, self.runs, places)
-            found = {each.steps: (new[each.steps], each) for each in read}
+                new[steps] = [at for at in self.starts(run, steps).tolist() if at not in known]
+                known.update(new[steps])
+            places = [
+                ([(name, data.begin(run) + at * dt) for at in starts], steps)
+                for steps, starts in new.items()
+                if starts
+            ]
+            states, found = data.signature.state_scale.physical(data.states[run]), []
+            for windows in read_groups(self.reader, self.runs, places):
+                starts = new[windows.steps]
+                measured = np.stack([states[at + 1 : at + 1 + windows.steps] for at in starts])
+                if windows.zero is not None:
+                    measured += (data.zeros[run] - windows.zero)[:, None]
+                # Read-outs are learnt from departures.
+                found.append((starts, replace(windows, zero=None), measured))
             for old in list(self.read)[: len(self.read) - LAST + 1]:
                 self.read.pop(old, None)
             self.read[key] = found
@@ -387,41 +364,41 @@ class Problem:
 
         Runs of other groups teach, if there are any.
         """
-        data, candidate = self.data, tried[0][0]
+        candidate = tried[0][0]
         rest = [other for other in range(len(self.groups)) if other != run]
-        others = [other for other in rest if self.groups[other] != self.groups[run]]
+        others = [other for other in rest if self.groups[other] != self.groups[run]] or rest
         if not candidate.has_path:
-            spec, own, name = cast("Any", candidate), data.signature, data.names[run]
-            given = {data.names[other]: self.runs[data.names[other]] for other in others or rest}
-            model, judged = spec.fit(given, own.states, own.inputs), self.runs[name]
-            begin = round((data.begin(run) - float(judged["time"][0])) / own.dt)
-            for steps in horizons:
-                if (starts := begin + self.starts(run, steps)).size:
-                    predicted, measured = model.judged_runs(judged, name, starts, steps)
-                    yield FreeRuns(predicted[None], measured, model.signature.state_scale.std)
+            yield from self._fitted_runs(candidate, others, run, horizons)
             return
-        models = [each for one in tried for each in self.models(*one, others or rest)]
-        states = data.signature.state_scale.physical(data.states[run])
-        zeros: dict[int, FloatArray] = {}
-        known: dict[int, FloatArray] = {}  # by start: a longer run begins with the shorter one
-        read = self.windows(run, horizons)
-        groups = []
-        for new, windows in read.values():
-            last = windows.delayed.shape[1] - self.ahead(candidate)
-            if windows.zero is not None:
-                zeros |= zip(new, data.zeros[run] - windows.zero, strict=True)
-            # Read-outs are learnt from departures.
-            groups.append(replace(windows, zero=None, delayed=windows.delayed[:, :last]))
+        models = [each for one in tried for each in self.models(*one, others)]
+        read, ahead = self.windows(run, horizons), self.ahead(candidate)
+        groups = [
+            replace(each, delayed=each.delayed[:, : each.delayed.shape[1] - ahead])
+            for _, each, _ in read
+        ]
         runs = linear_runs(models, groups) if groups else []
-        for (new, _), computed in zip(read.values(), runs, strict=True):
-            known |= zip(new, computed.swapaxes(0, 1), strict=True)
+        known: dict[int, tuple[FloatArray, FloatArray]] = {}
+        for (starts, _, measured), computed in zip(read, runs, strict=True):
+            pairs = zip(computed.swapaxes(0, 1), measured, strict=True)
+            known |= zip(starts, pairs, strict=True)
         for steps in horizons:
-            if starts := self.starts(run, steps).tolist():
-                predicted = np.stack([known[at][:, :steps] for at in starts], axis=1)
-                measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
-                if zeros:
-                    measured += np.stack([zeros[at] for at in starts])[:, None]
+            if at := self.starts(run, steps).tolist():
+                predicted = np.stack([known[start][0][:, :steps] for start in at], axis=1)
+                measured = np.stack([known[start][1][:steps] for start in at])
                 yield FreeRuns(predicted, measured, models[0].signature.state_scale.std)
+
+    def _fitted_runs(
+        self, candidate: Any, others: Sequence[int], run: int, horizons: Sequence[int]
+    ) -> Iterator[FreeRuns]:
+        """The same of a candidate that is fitted for itself."""
+        own, names = self.data.signature, self.data.names
+        given = {names[other]: self.runs[names[other]] for other in others}
+        model, judged = candidate.fit(given, own.states, own.inputs), self.runs[names[run]]
+        begin = round((self.data.begin(run) - float(judged["time"][0])) / own.dt)
+        for steps in horizons:
+            if (starts := begin + self.starts(run, steps)).size:
+                predicted, measured = model.judged_runs(judged, names[run], starts, steps)
+                yield FreeRuns(predicted[None], measured, model.signature.state_scale.std)
 
     def judge(self, tried: Tried, fold: int) -> list[Scores]:
         """Judge free runs on a run that is held out, over all horizons that fit."""
@@ -441,26 +418,19 @@ class Problem:
 
 
 def _problem(
-    candidates: Sequence[HankelSettings],
-    observables: tuple[Observable, ...],
+    widest: HankelSettings,
     given: Given,
     folds: Mapping[str, str] | int,
     ridges: Iterable[float],
     horizons: tuple[int, ...],
 ) -> Problem | None:
-    """The columns of all candidates; None where the runs are too short for them.
+    """The columns of all candidates, which the widest holds; None where the runs are too short.
 
     `folds` holds the group of each run, or the number of parts that runs are split into.
     """
-    most = {
-        name: max(getattr(each, name) for each in candidates)
-        for name in ("state_delays", "input_delays", "lead", "memory")
-    }
-    settings = candidates[0]
-    most["input_delays"] += most["lead"] - min(each.lead for each in candidates)
-    widest = settings.having(**most, observables=observables, ridge=1.0, standardize=True)
+    widest = replace(widest, ridge=1.0, standardize=True)
     runs, states, inputs = given
-    chain = widest.input_map(runs, states, inputs, settings.window)
+    chain = widest.input_map(runs, states, inputs, widest.window)
     before = max(widest.state_reach, chain.history(widest.input_delays))
     after = max(chain.lead_samples - 1, 0)
     pieces = dict(runs)
@@ -478,125 +448,145 @@ def _problem(
     return Problem(pieces, groups, data, widest, tuple(ridges), horizons)
 
 
+def _problems(
+    tried: Candidates,
+    folds: Mapping[str, str] | int,
+    ridges: Sequence[float],
+    horizons: tuple[int, ...],
+) -> dict[Columns, Problem]:
+    """The columns of all that is tried; none where what it starts from is too long."""
+    problems: dict[Columns, Problem] = {}
+    for key, widest in tried.widest().items():  # that of the base is the first
+        try:
+            problem = _problem(widest, tried.given, folds, ridges, horizons)
+        except RequestError:
+            if not problems:
+                raise
+            continue  # a look-ahead of nothing takes a probe up-wave
+        if problem is not None and problem.folds():
+            problems[key] = problem
+        elif not problems:
+            break
+    return problems
+
+
 def _lacking(settings: HankelSettings, given: Given) -> str:
     """What an optional alignment goes without, in words."""
     aligned = settings.alignment
     return aligned.missing(*given) if aligned is not None and aligned.optional else ""
 
 
-def _columns_of(candidate: HankelSettings) -> Columns:
-    """What makes columns of their own."""
-    aligned, lead = candidate.alignment, int(candidate.lead)
-    if aligned is not None and aligned.surge == "predicted":
-        return aligned, lead, True
-    squares = (getattr(each, "lead", 0.0) for each in candidate.observables)
-    return aligned, None, bool(lead) or any(squares)
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Trials:
     """Trials of candidates, and what more are made with.
 
     Parameters
     ----------
+    search : Candidates
+        What is tried.
     problems : mapping
         Columns of the candidates.
     known : mapping
         As for :func:`select`.
     executor, progress
         As for :func:`select`.
+    later : int
+        Candidates that are to come at most.
     made : dict of Trial
         By candidate.
     """
 
+    search: Candidates
     problems: Mapping[Columns, Problem]
     known: Known
     executor: Executor | None
     progress: Progress | None
+    later: int = 0
     made: dict[Any, Trial] = field(default_factory=dict)
 
-    def problem(self, candidate: HankelSettings) -> Problem | None:
-        """The columns of a candidate; without a look-ahead, at best those that have none."""
-        aligned, lead, ahead = _columns_of(candidate)
-        problems = self.problems
-        return problems.get((aligned, lead, ahead)) or problems.get((aligned, lead, True))
+    def problem(self, candidate: HankelSettings) -> Problem:
+        """The columns of a candidate."""
+        return self.problems[self.search.columns(candidate)]
 
     @property
     def best(self) -> Any:
         """The candidate that errs least."""
         return min(self.made, key=lambda each: self.made[each].best)
 
-    def judge(self, candidates: Iterable[HankelSettings], later: int = 0) -> None:
-        """Try candidates that were not and have columns; `later` more are to come at most.
+    @property
+    def tried(self) -> list[tuple[Any, float]]:
+        """Candidates, each with every λ that was tried."""
+        return [
+            (candidate, level)
+            for candidate, trial in self.made.items()
+            for level in np.array(trial.levels)[np.isfinite(trial.means)].tolist()
+        ]
+
+    def searched(self, best: Any, steps: Iterable[Step]) -> Any:
+        """The best candidate, from one on, after each step of a search."""
+        for step_of in steps:
+            tried = step_of(best)
+            self.later -= len(tried) - 1  # the best is among them
+            self.judge([best, *tried])
+            best = self.best
+        return best
+
+    def judge(self, candidates: Iterable[HankelSettings]) -> None:
+        """Try candidates that were not and have columns.
 
         Every ``COARSE``-th λ is tried, and of what errs little more than the best those about its
         own.
         """
         new = [each for each in dict.fromkeys(candidates) if each not in self.made]
-        new = [each for each in new if self.problem(each)]
-        self.try_more(new, later)
+        new = [each for each in new if self.search.columns(each) in self.problems]
+        coarse = {each: self.problem(each).levels(each)[::COARSE] for each in new}
+        self._try(coarse, 2 * self.later + len(new))
         least = NEAR * min((each.best for each in self.made.values()), default=math.inf)
-        self.try_more([each for each in new if self.made[each].best <= least], later)
+        self.refine([each for each in new if self.made[each].best <= least])
 
-    def try_more(self, candidates: Sequence[HankelSettings], later: int = 0) -> None:
-        """Try every ``COARSE``-th λ of candidates, or those next to the best of what was tried.
+    def refine(self, candidates: Iterable[HankelSettings]) -> None:
+        """Try the λ of candidates next to the best of those that were tried."""
+        self._try({each: self.made[each].between() for each in candidates}, 2 * self.later)
 
-        The second round begins with the runs that the first one read last.
-        """
+    def _try(self, levels: Mapping[Any, Sequence[float]], later: int) -> None:
+        """Try λ of candidates, of which so many more parts are to come."""
         problem = next(iter(self.problems.values()))
-        folds, firsts = problem.folds(), list(dict.fromkeys(problem.groups))
-        again = sum(each in self.made for each in candidates)  # each has two parts
+        folds, levels = problem.folds(), {each: own for each, own in levels.items() if own}
+        again = sum(each in self.made for each in levels)  # each has two parts
+        batches: dict[Alike, list[tuple[Any, Sequence[float]]]] = {}
+        # The second round begins with the runs that the first one read last.
+        order = folds[::-1] if again else folds
+        for fold, (each, own) in itertools.product(order, levels.items()):
+            if _key(each, fold, own) not in self.known:
+                alike = fold, self.search.columns(each), each.lead if each.has_path else each
+                batches.setdefault(alike, []).append((each, own))
+        outcomes = in_order(_judged, self.problems, [*batches.items()], self.executor)
         done = len(folds) * (2 * len(self.made) - again)
-        after = len(folds) * (len(candidates) - again + 2 * later)
-        left: dict[Any, list[float]] = {}
-        for each in candidates:
-            levels = problem.levels(each)
-            new = self.made[each].between() if each in self.made else [*levels[::COARSE]]
-            left |= {each: new} if new else {}
-        keys = {
-            (each, fold, tuple(new)): json.dumps([each.to_json(), fold, new], sort_keys=True)
-            for fold in (folds[::-1] if again else folds)
-            for each, new in left.items()
-        }
-        units = [unit for unit, key in keys.items() if key not in self.known]
-        batches: dict[Any, list[Unit]] = {}
-        for unit in units:  # free runs of equal columns and look-ahead, side by side
-            alike = (_columns_of(unit[0]), unit[0].lead) if unit[0].has_path else unit[0]
-            batches.setdefault((unit[1], alike), []).append(unit)
-        alone = _Trials(self.problems, {}, None, None)  # what a worker needs
-        outcomes = in_order(_judged, alone, [*batches.values()], self.executor)
-        total = done + len(units) + after
-        for batch, outcome in zip(batches.values(), outcomes, strict=True):
-            for unit, judged in zip(batch, outcome, strict=True):
-                self.known[keys[unit]] = [part.tolist() for part in judged]
-            done += len(batch)
+        total = done + sum(map(len, batches.values())) + len(folds) * later
+        for ((fold, *_), tried), outcome in zip(batches.items(), outcomes, strict=True):
+            for (each, own), judged in zip(tried, outcome, strict=True):
+                self.known[_key(each, fold, own)] = [part.tolist() for part in judged]
+            done += len(tried)
             if self.progress is not None:
                 self.progress(done, total, f"candidate and fold {done}")
-        for each, new in left.items():
-            levels = problem.levels(each)
-            parts = [map(np.array, self.known[keys[each, fold, tuple(new)]]) for fold in folds]
-            scores, weights = zip(*parts, strict=True)
+        for each, own in levels.items():
+            found = [map(np.array, self.known[_key(each, fold, own)]) for fold in folds]
+            scores, weights = zip(*found, strict=True)
             joined = np.concatenate(weights)  # a fold sums to one, unless nothing moves in it
-            places = [firsts.index(problem.groups[fold]) for fold in folds]
-            groups = np.repeat(places, [len(each) for each in weights])
-            every = np.full((len(levels), joined.size), np.nan)
+            firsts = [problem.groups.index(problem.groups[fold]) for fold in folds]
+            groups = np.repeat(firsts, [len(part) for part in weights])
+            every = self.problem(each).levels(each)
+            known = np.full((len(every), joined.size), np.nan)
             if each in self.made:
-                every[:] = self.made[each].scores
-            every[[levels.index(level) for level in new]] = np.concatenate(scores, axis=1)
-            self.made[each] = Trial(levels, every, joined / joined.sum(), groups)
+                known[:] = self.made[each].scores
+            known[[every.index(level) for level in own]] = np.concatenate(scores, axis=1)
+            self.made[each] = Trial(every, known, joined / joined.sum(), groups)
 
     def stable(self, taken: Any, level: float) -> tuple[Any, float]:
         """A candidate and λ; where that grows, the best of all that do not."""
-        every = [
-            (float(score), candidate, ridge)
-            for candidate, trial in self.made.items()
-            for score, ridge in zip(trial.means, trial.levels, strict=True)
-            if np.isfinite(score)
-        ]
-        wanted = [(taken, level), *(each[1:] for each in sorted(every, key=lambda each: each[0]))]
-        for candidate, ridge in wanted:
-            problem = self.problem(candidate)
-            if problem is not None and not problem.grows(candidate, ridge):
+        ranked = sorted(self.tried, key=lambda pair: self.made[pair[0]].at(pair[1]))
+        for candidate, ridge in [(taken, level), *ranked]:
+            if not self.problem(candidate).grows(candidate, ridge):
                 return candidate, ridge
         return taken, level
 
@@ -610,11 +600,14 @@ class _Trials:
         )
 
 
-def _judged(trials: _Trials, batch: Sequence[Unit]) -> list[Scores]:
-    first, fold, _ = batch[0]
-    problem = trials.problem(first)
-    assert problem is not None
-    return problem.judge([(each, levels) for each, _, levels in batch], fold)
+def _key(candidate: HankelSettings, fold: int, levels: Sequence[float]) -> str:
+    """What scores of a candidate are known by."""
+    return json.dumps([candidate.to_json(), fold, [*levels]], sort_keys=True)
+
+
+def _judged(problems: Mapping[Columns, Problem], batch: tuple[Alike, Tried]) -> list[Scores]:
+    (fold, columns, _), tried = batch
+    return problems[columns].judge(tried, fold)
 
 
 @dataclass(frozen=True, eq=False)
@@ -809,10 +802,11 @@ def select(
     horizons = tuple(max(round(each * samples), 1) for each in horizon)
     aligned = None if _lacking(settings, given) else settings.alignment
     # One that reads the measured surge is no choice.
-    first = _alignments(aligned, given)[0] if "alignment" in vary else aligned
+    first = alignments_of(aligned, given)[0] if "alignment" in vary else aligned
     base = settings.having(readouts=(), alignment=first)
-    for search in _Search(base, given, samples, step, vary, opened, by_sea, bool(kinds)).shorter():
-        problems = search.problems(apart, ridges, horizons)
+    whole = Candidates(base, given, samples, step, vary, opened, by_sea, bool(kinds))
+    for search in whole.shorter():
+        problems = _problems(search, apart, ridges, horizons)
         if problems:
             break
     else:  # runs are too short for the shortest
@@ -824,230 +818,46 @@ def select(
         fitted = _learnt(readouts, None, settings, 0.0, 0, given)
         complete = settings.having(readouts=_asked(settings, fitted, vary))
         return Selected(complete, (), note, fitted)
-    trials = _Trials(problems, {} if known is None else known, executor, progress)
+    trials = _Trials(search, problems, {} if known is None else known, executor, progress)
+    taken, level, words = _chosen(trials, stated, kinds)
+    problem = trials.problem(taken)
+    readouts = readouts if taken.kind == settings.kind else {}
+    fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
+    return Selected(
+        taken.having(ridge=level, readouts=_asked(settings, fitted, vary)),
+        tuple(_rows_of(trials.made, taken, level, seed)),
+        _note(trials, taken, level, words),
+        fitted,
+    )
+
+
+def _chosen(
+    trials: _Trials, stated: float | None, kinds: Sequence[HankelSettings]
+) -> tuple[Any, float, str]:
+    """The candidate and λ that a search ends with, and words on what else was tried."""
+    search, made = trials.search, trials.made
+    base, alike = search.base, 0.0 if search.unseen else ALIKE
     left, varied = search.left_open(), search.varied()
-    later = sum(len(step_of(base)) - 1 for step_of in (*left, *varied))  # the best is among them
-
-    def searched(best: Settings, steps: Sequence[Step]) -> Settings:
-        nonlocal later
-        for step_of in steps:
-            tried = step_of(best)
-            later -= len(tried) - 1
-            trials.judge((best, *tried), later)
-            best = trials.best
-        return best
-
-    made, best = trials.made, searched(base, left or [lambda alone: [alone]])
-    alike = 0.0 if by_sea else ALIKE
-    start = simplest(made, best, alike) if left else base
-    best = searched(start, varied)
+    trials.later = sum(len(step_of(base)) - 1 for step_of in (*left, *varied))
+    if left:
+        start = simplest(made, trials.searched(base, left), alike)
+    else:
+        start = base
+        trials.judge([base])
+    best = trials.searched(start, varied)
     taken = start if made[start].is_as_good_as(made[best]) else best
-    trials.try_more([taken])
+    trials.refine([taken])
     level = made[taken].level(alike, stated if taken == start else None)
     taken, level = trials.stable(taken, level)
-    worth = trials.worth(taken) if settings.role == "model" else ""
+    worth = trials.worth(taken) if base.role == "model" else ""
     if taken != best or (varied and taken == start):
         worth += (
             "; what it starts from: nothing that was tried is better by more than the noise"
             if varied
             else f"; the simplest that is as good as the best ({made[best].best:.3f})"
         )
-    taken, level, words = _rivalled(search, trials, taken, level, kinds, alike)
-    problem = trials.problem(taken)
-    assert problem is not None
-    readouts = readouts if taken.kind == settings.kind else {}
-    fitted = _learnt(readouts, problem, taken, level, round(PERIODS * samples), given)
-    return Selected(
-        taken.having(ridge=level, readouts=_asked(settings, fitted, vary)),
-        tuple(_rows_of(made, taken, level, seed)),
-        _note(
-            problem,
-            made,
-            taken,
-            level,
-            worth + words,
-            {*vary, *opened},
-            by_sea,
-            regular_periods(runs, inputs),
-        ),
-        fitted,
-    )
-
-
-@dataclass(frozen=True)
-class _Search:
-    """What is tried of the settings that a search starts from.
-
-    Parameters
-    ----------
-    base : HankelSettings
-        Where it starts.
-    given : (runs, states, inputs)
-        Training runs, and channels.
-    period, step : float
-        Encounter period, samples, and time step, s.
-    vary, opened : sequence of str
-        As for :func:`select`.
-    unseen : bool
-        Whether what is chosen must hold in sea states that no run holds.
-    rivals : bool
-        Whether other kinds of models are tried, which follow no surge.
-    cut : int
-        How many of the observables are left out that could be offered.
-    remembers : bool
-        Whether a memory is tried.
-    """
-
-    base: Any
-    given: Given
-    period: float
-    step: float
-    vary: Sequence[str]
-    opened: Sequence[str]
-    unseen: bool
-    rivals: bool
-    cut: int = 0
-    remembers: bool = True
-
-    def shorter(self) -> Iterator[_Search]:
-        """The same with less and less that needs long runs."""
-        for cut, remembers in itertools.product(range(3), (True, False)):
-            yield replace(self, cut=cut, remembers=remembers)
-
-    def offered(self, candidate: HankelSettings) -> tuple[Observable, ...]:
-        """Observables to choose among beside the other settings of a candidate."""
-        if self.base.observables or "observables" not in {*self.vary, *self.opened}:
-            return self.base.observables
-        aligned, lead = candidate.alignment, None
-        if aligned is not None and aligned.surge == "predicted":
-            lead = int(candidate.lead)
-        every = default_observables(self.given[2], self.period * self.step, self.unseen, lead)
-        if lead is None and "lead" in self.opened and candidate.lead == 0 < self.base.lead:
-            every = tuple(replace(o, lead=0.0) if isinstance(o, SlowSquares) else o for o in every)
-        return every[self.cut :]
-
-    def left_open(self) -> list[Step]:
-        """Steps through what the settings leave open."""
-        steps = self._delays(self.opened)
-        if "observables" in self.opened:
-            steps.append(self._subsets)
-        if {"alignment", "lead"} & {*self.opened}:
-            steps.append(self._with_and_without)
-        if "memory" in self.opened and self.remembers and not self._follows:
-            steps.append(self._remembering)
-        return steps
-
-    @property
-    def _follows(self) -> bool:
-        """Whether waves are carried to the predicted surge: a memory of it fits one sea only."""
-        return _columns_of(self.base)[1] is not None
-
-    def varied(self) -> list[Step]:
-        """Steps through what is varied."""
-        tried = {"observables"} if self._follows else {"observables", "memory"}
-        vary = {*self.vary} - (tried & {*self.opened})
-        steps: list[Step] = []
-        if "observables" in vary:
-            steps.append(self._subsets)
-        if "lead" in vary and not self._follows:
-            steps.append(self._lengths("lead", LEADS))
-        steps += self._delays(vary)
-        if "memory" in vary and self.remembers:
-            steps.append(self._remembering)
-        if "alignment" in vary or ("lead" in vary and self._follows):
-            steps.append(self._variants)
-        return steps
-
-    def _delays(self, names: Collection[str]) -> list[Step]:
-        """Delays in periods, or the length of a filter in parts of its own."""
-        if self.base.is_filter and "input_delays" in names:
-            own = self.base.input_delays / self.period
-            return [self._lengths("input_delays", [own * part for part in LENGTHS])]
-        return [self._lengths(n, periods) for n, periods in DELAYS.items() if n in names]
-
-    def _subsets(self, best: Any) -> list[Any]:
-        every = self.offered(best)
-        subsets = dict.fromkeys([(), *((each,) for each in every), every])
-        return [replace(best, observables=each) for each in subsets]
-
-    def _remembering(self, best: Any) -> list[Any]:
-        return [best, replace(best, memory=round(MEMORY * self.period))]
-
-    def _lengths(self, name: str, periods: Sequence[float]) -> Step:
-        return lambda best: [replace(best, **{name: round(p * self.period)}) for p in periods]
-
-    def _with_and_without(self, best: Any) -> list[Any]:
-        """Alignment and look-ahead as stated, without one of them, and with nothing at all."""
-        absent = {"alignment": None, "lead": 0}
-        without = {name: absent[name] for name in absent if name in self.opened}
-        pairs = itertools.product(
-            *(dict.fromkeys([getattr(self.base, name), value]) for name, value in without.items())
-        )
-        changes = [dict(zip(without, pair, strict=True)) for pair in pairs]
-        plain = replace(best, **without, observables=self.base.observables)
-        return [*(self._fitting(best, each) for each in changes), plain]
-
-    def _variants(self, best: Any) -> list[Any]:
-        """Alignments, with each look-ahead that is tried where the model follows its own surge."""
-        leads = [self.base.lead]
-        leads += [round(p * self.period) for p in LEADS if p > LEAD and "lead" in self.vary]
-        alignments = [self.base.alignment]
-        if "alignment" in self.vary:
-            alignments = _alignments(self.base.alignment, self.given)
-        candidates = []
-        for each in alignments:
-            changes: list[Changes] = [{"alignment": each}]
-            if each is not None and each.surge == "predicted":
-                changes = [{"alignment": each, "lead": lead} for lead in dict.fromkeys(leads)]
-            candidates += [self._fitting(best, change) for change in changes]
-        return candidates
-
-    def at_rest(self, best: Any) -> Any:
-        """A candidate without the alignment to a predicted surge."""
-        return (
-            self._fitting(best, {"alignment": None}) if _columns_of(best)[1] is not None else best
-        )
-
-    def _fitting(self, best: Any, changes: Changes) -> Any:
-        """A candidate with the observables of the same kinds that go with its other settings."""
-        candidate, kinds = replace(best, **changes), {each.kind for each in best.observables}
-        if self.base.observables:
-            return candidate
-        fitting = tuple(each for each in self.offered(candidate) if each.kind in kinds)
-        return replace(candidate, observables=fitting)
-
-    def problems(
-        self,
-        folds: Mapping[str, str] | int,
-        ridges: Sequence[float],
-        horizons: tuple[int, ...],
-    ) -> dict[Columns, Problem]:
-        """The columns of all that is tried; none where what it starts from is too long."""
-        candidates = [self.base, *([self.at_rest(self.base)] * self.rivals)]
-        for step_of in (*self.left_open(), *self.varied()):
-            candidates += step_of(self.base)
-        starts: dict[Columns, list[Any]] = {}
-        names = ("state_delays", "input_delays", "memory")
-        longest = {name: max(getattr(each, name) for each in candidates) for name in names}
-        for each in candidates:
-            aligned, lead, ahead = _columns_of(replace(each, observables=self.offered(each)))
-            is_without = "lead" in self.opened and each.lead == 0 < self.base.lead
-            mine = starts.setdefault((aligned, lead, ahead or not is_without), [])
-            mine.append(each.having(**longest))
-        problems: dict[Columns, Problem] = {}
-        for number, (key, mine) in enumerate(starts.items()):  # that of the base is the first
-            every = tuple(dict.fromkeys(o for each in mine for o in self.offered(each)))
-            try:
-                problem = _problem(mine, every, self.given, folds, ridges, horizons)
-            except RequestError:
-                if not number:
-                    raise
-                continue  # a look-ahead of nothing takes a probe up-wave
-            if problem is not None and problem.folds():
-                problems[key] = problem
-            elif not number:
-                return {}
-        return problems
+    taken, level, words = _rivalled(trials, taken, level, kinds, alike)
+    return taken, level, worth + words
 
 
 def simplest(trials: Mapping[Settings, Trial], best: Settings, alike: float) -> Settings:
@@ -1074,67 +884,57 @@ def _parts_of(candidate: HankelSettings) -> int:
 
     The look-ahead of waves that are carried to the predicted surge is part of their alignment.
     """
-    aligned = candidate.alignment
-    follows = aligned is not None and aligned.surge == "predicted"
-    parts = aligned, candidate.lead and not follows, candidate.memory
+    own_lead = 0 if candidate.follows_surge else candidate.lead
+    parts = candidate.alignment, own_lead, candidate.memory
     return sum(map(bool, parts)) + len(candidate.observables)
 
 
 def _rivalled(
-    search: _Search,
-    trials: _Trials,
-    taken: Any,
-    level: float,
-    kinds: Sequence[HankelSettings],
-    alike: float,
+    trials: _Trials, taken: Any, level: float, kinds: Sequence[HankelSettings], alike: float
 ) -> tuple[Any, float, str]:
     """A candidate and λ, of another kind where that is varied and better, and words on the better.
 
     The better one is the best that errs less by more than the noise and does not grow.
     """
     # Beside a fit only the waves themselves are tried, which takes a hundredth of its time.
-    is_varied, words = "kind" in search.vary, ""
+    search, made, words = trials.search, trials.made, ""
+    is_varied = "kind" in search.vary
     own = {"ridge"} if is_varied else {"ridge", "observables"}
     plain = {key: v for key, v in vars(search.at_rest(taken)).items() if key not in own}
-    both = replace(trials, made=dict(trials.made))
-    both.judge(each.having(**plain) for each in kinds if search.given[2])
-    others = [each for each in both.made if each not in trials.made]
-    for other in sorted(others, key=lambda each: both.made[each].best):
-        if trials.made[taken].is_as_good_as(both.made[other]):
+    before = {*made}
+    trials.judge(each.having(**plain) for each in kinds if search.given[2])
+    others = [each for each in made if each not in before]
+    for other in sorted(others, key=lambda each: made[each].best):
+        if made[taken].is_as_good_as(made[other]):
             continue
-        both.try_more([other])
-        problem, own_level = both.problem(other), both.made[other].level(alike)
-        assert problem is not None
-        if not problem.grows(other, own_level):
-            score = both.made[other].at(own_level)
+        trials.refine([other])
+        own_level = made[other].level(alike)
+        if not trials.problem(other).grows(other, own_level):
+            score = made[other].at(own_level)
             words = f"; kind = '{other.kind}' errs {score:.3f}, less by more than the noise"
             taken, level = (other, own_level) if is_varied else (taken, level)
             break
-    if is_varied:
-        trials.made.update(both.made)
+    if not is_varied:
+        for other in others:
+            del made[other]
     return taken, level, words
 
 
-def _note(
-    problem: Problem,
-    trials: Mapping[Settings, Trial],
-    taken: Settings,
-    level: float,
-    worth: str,
-    tried: Collection[str],
-    by_sea: bool,
-    periods: Mapping[str, float],
-) -> str:
+def _note(trials: _Trials, taken: Settings, level: float, worth: str) -> str:
     """How the choice was made, in words."""
-    count = sum(np.isfinite(trial.means).sum() for trial in trials.values())
+    search, problem = trials.search, trials.problem(taken)
     note = (
-        f"{taken.ridge_text(level)}: out of {count} settings (below, the best λ of each kind) "
-        f"in free runs on {len(problem.folds())} parts held out in turn, mean NRMSE "
-        f"{trials[taken].at(level):.3f}{worth}"
+        f"{taken.ridge_text(level)}: out of {len(trials.tried)} settings (below, the best λ of "
+        f"each kind) in free runs on {len(problem.folds())} parts held out in turn, mean NRMSE "
+        f"{trials.made[taken].at(level):.3f}{worth}"
     )
-    if {"lead", "input_delays", "state_delays", "alignment", "memory"} & {*tried}:
+    if {"lead", "input_delays", "state_delays", "alignment", "memory"} & {
+        *search.vary,
+        *search.opened,
+    }:
         note += "; over instants that all of these can forecast"
-    if periods:
+    runs, _, inputs = search.given
+    if periods := regular_periods(runs, inputs):
         low, high = min(periods.values()), max(periods.values())
         note += (
             "; all runs are of regular waves: forecasts at periods other than "
@@ -1142,13 +942,13 @@ def _note(
         )
     seas = len(set(problem.groups))
     if 1 < seas < len(problem.groups):
-        if by_sea:
+        if search.unseen:
             alike = f"the runs of its sea state, of which there are {seas}"
         else:
             what = "of its period" if periods else "that repeat its waves"
             alike = f"the runs {what}; {seas} waves differ"
         note += f"; held out with each: {alike}"
-    elif by_sea or seas == 1:
+    elif search.unseen or seas == 1:
         shared = "no two runs share a sea state" if seas > 1 else "all runs have the same sea state"
         note += f"; {shared}, so each was held out alone"
     return note
@@ -1240,66 +1040,8 @@ def readouts_for(
         settings = replace(settings, window=None)
     apart = 3 if len(runs) == 1 else groups_of(runs, "auto", inputs)
     given = runs, states, inputs
-    problem = _problem([settings], settings.observables, given, apart, (ridge,), (steps,))
+    problem = _problem(settings, given, apart, (ridge,), (steps,))
     return _learnt(readouts, problem, settings, ridge, steps, given)
-
-
-def default_observables(
-    inputs: Sequence[str],
-    period: float | None = None,
-    unseen: bool = False,
-    follows: int | None = None,
-) -> tuple[Observable, ...]:
-    """Slow squares of the elevation at the vessel, or of all, and powers of all elevations.
-
-    `period` is the encounter period, s; by default that of the training runs. Where what is chosen
-    must hold in sea states that are `unseen`, several elevations give their envelopes alone,
-    without a look-ahead: few training seas do not tell how a force is weighed by frequency, and
-    probes away from the vessel see the waves before it. A model that `follows` its own surge and
-    looks so many samples ahead takes a filter of one period that reads no further than its waves;
-    without a look-ahead the squares of all elevations, of which those up-wave tell what comes.
-    """
-    elevations = tuple(name for name in inputs if is_elevation(name))
-    if not elevations:
-        return ()
-    at_vessel = tuple(name for name in elevations if name == "eta_cog") or elevations
-    slow = SlowSquares(at_vessel, period=period)
-    if follows is not None:
-        lead, of = (0.75, at_vessel) if follows else (0.0, elevations)
-        slow = replace(slow, of=of, cutoff=1.0, lead=lead)
-    elif unseen and len(at_vessel) > 1:
-        slow = replace(slow, orders=(0,), lead=0.0)
-    return slow, Powers(elevations)
-
-
-def _alignments(
-    stated: ProbeAlignment | None,
-    given: Given,
-) -> list[ProbeAlignment | None]:
-    """Alignments that these runs allow and that differ, the stated one first, and none.
-
-    None reads the measured surge: what is read after a start is no choice of a setting.
-    """
-    base = replace(stated or ProbeAlignment(), optional=False)
-    carried = replace(base, mode="dispersion", celerity=None)
-    alignments: list[ProbeAlignment | None] = []
-    for alignment in (
-        replace(carried, surge="predicted"),
-        replace(carried, surge="none"),
-        replace(base, mode="effective", surge="none"),
-    ):
-        try:
-            fitted = alignment.fit(*given, None)
-        except (RequestError, DataError):
-            continue  # no depth, no positions, or no surge among the states
-        assert isinstance(fitted, FittedAlignment)
-        if alignment.surge == "predicted" or any(
-            any(fitted.rig(run).offsets) for run in given[0].values()
-        ):
-            alignments.append(alignment)
-    alignments.append(None)
-    first = None if stated is None else base
-    return sorted(alignments, key=lambda each: each != first)
 
 
 def groups_of(runs: Datasets, folds: Folds, inputs: Sequence[str]) -> dict[str, str]:
@@ -1314,18 +1056,16 @@ def groups_of(runs: Datasets, folds: Folds, inputs: Sequence[str]) -> dict[str, 
     waves = {name: labelled.wave_channel(run, inputs, name) for name, run in runs.items()}
     if folds == "run" or None in waves.values():
         return {name: name for name in runs}
-    records = {name: runs[name][wave].values for name, wave in waves.items()}
     periods = regular_periods(runs, inputs)
-    firsts: list[str] = []
+    groups, first = dict[str, str](), ""
     for name in sorted(periods, key=lambda each: periods[each]):
-        if not firsts or periods[name] > SAME * periods[firsts[-1]]:
-            firsts.append(name)
-    if len(firsts) < 2:
-        return repeated_waves(records, labelled.common_step(runs))
-    return {
-        name: next(each for each in firsts[::-1] if periods[each] <= period)
-        for name, period in periods.items()
-    }
+        if not first or periods[name] > SAME * periods[first]:
+            first = name
+        groups[name] = first
+    if len({*groups.values()}) > 1:
+        return {name: groups[name] for name in runs}
+    records = {name: runs[name][wave].values for name, wave in waves.items()}
+    return repeated_waves(records, labelled.common_step(runs))
 
 
 def regular_periods(runs: Datasets, inputs: Sequence[str]) -> dict[str, float]:

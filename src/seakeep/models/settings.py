@@ -427,6 +427,11 @@ class HankelSettings:
         return InputMap(aligned, observed=observed, follows=follows)
 
     @property
+    def follows_surge(self) -> bool:
+        """Whether waves are carried to the surge that the model predicts."""
+        return self.alignment is not None and self.alignment.surge == "predicted"
+
+    @property
     def may_observe(self) -> tuple[Observable, ...]:
         """Observables that a model of these settings may have."""
         return self.observables
@@ -448,7 +453,7 @@ class HankelSettings:
         """
         before, after = zip((0, self.lead), *(o.reach(dt) for o in self.may_observe), strict=True)
         delayed = self.input_delays
-        if encounter_period and self.alignment and self.alignment.surge == "predicted":
+        if encounter_period and self.follows_surge:
             delayed += round(BACK * encounter_period / dt)
         return Needs(
             self.window or 1,

@@ -18,6 +18,7 @@ from seakeep.errors import SHOWN, DataError, RequestError, SeakeepWarning
 from seakeep.models import labelled, store
 from seakeep.models.alignment import ProbeAlignment
 from seakeep.models.baselines import FIR
+from seakeep.models.candidates import MEMORY, default_observables
 from seakeep.models.draws import PRIORS, Draw, Sampling, TrainOn, draw_members, draws_of
 from seakeep.models.engine import parameter_of
 from seakeep.models.ensemble import PARTS, HankelEnsemble, spectral_radius
@@ -29,10 +30,8 @@ from seakeep.models.parametric import regress_varying
 from seakeep.models.priors import LogUniform, Prior, Uniform, prior_of
 from seakeep.models.readouts import FittedReadOut
 from seakeep.models.selection import (
-    MEMORY,
     FreeRuns,
     Selected,
-    default_observables,
     readouts_for,
     scores_of,
     settle,
@@ -826,7 +825,7 @@ class BayesianHankelDMDc(Choosing[HankelEnsemble]):
         arrays = replace(arrays, direct=tuple(np.nan_to_num(values) for values in arrays.direct))
         groups = (labels[0], *input_map.regressors(labels[1]))
         scales = [
-            moments(each, None, [label.name for label in group], standardize=False)
+            moments(each, None, group, standardize=False)
             for each, group in zip(series, groups, strict=True)
         ]
         signature = Signature(

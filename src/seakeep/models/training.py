@@ -95,14 +95,16 @@ class TrainingData:
         """Instant of the first sample of a run's arrays, s."""
         return self.instants[run][0] - self.windows[run].first * self.signature.dt
 
+    @property
+    def series(self) -> tuple[tuple[FloatArray, ...], ...]:
+        """States, delayed and direct regressors, each by run."""
+        return self.states, self.delayed, self.direct
+
     def physical(self, run: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """States and both kinds of regressors of a run, physical units, less its zeros."""
-        own = self.signature
-        return (
-            own.state_scale.physical(self.states[run]),
-            own.input_scale.physical(self.delayed[run]),
-            own.direct_scale.physical(self.direct[run]),
-        )
+        groups = zip(self.signature.scales, self.series, strict=True)
+        x, u, w = (scale.physical(values[run]) for scale, values in groups)
+        return x, u, w
 
     def regress(
         self, settings: HankelSettings, state_delays: int | None, *, all_rows: bool = False
@@ -283,9 +285,7 @@ def _standardised(
         ]
         for group in zip(*series, strict=True)
     ]
-    channels = [
-        [label.name for label in group] for group in (labels[0], *input_map.regressors(labels[1]))
-    ]
+    channels = labels[0], *input_map.regressors(labels[1])
     scales = scales_of(groups, windows, channels, settings.standardize, input_map.stretch)
     x, u, w = (
         tuple(scale.deviations(values) for values in each)
@@ -553,7 +553,7 @@ def _check_length(
 def scales_of(
     series: Sequence[Sequence[FloatArray]],
     windows: Sequence[TrainingWindow],
-    channels: Sequence[Sequence[str]],
+    channels: Sequence[Sequence[ChannelLabel]],
     standardize: bool,
     stretch: tuple[FloatArray, FloatArray] | None = None,
 ) -> tuple[Scale, Scale, Scale]:
@@ -566,8 +566,8 @@ def scales_of(
     if channels[2]:
         later = [replace(each, first=max(each.first, each.first_column)) for each in windows]
     x, u, w = (
-        moments(values, spans, names, standardize)
-        for values, spans, names in zip(series, (windows, windows, later), channels, strict=True)
+        moments(values, spans, labels, standardize)
+        for values, spans, labels in zip(series, (windows, windows, later), channels, strict=True)
     )
     if stretch is not None and standardize:
         u, w = (replace(own, std=own.std * by) for own, by in zip((u, w), stretch, strict=True))
@@ -577,7 +577,7 @@ def scales_of(
 def moments(
     series: Sequence[FloatArray],
     windows: Sequence[TrainingWindow] | None,
-    names: Sequence[str],
+    labels: Sequence[ChannelLabel],
     standardize: bool,
 ) -> Scale:
     """Means and standard deviations (ddof = 1) over the windows of all runs, or all of them.
@@ -587,7 +587,7 @@ def moments(
     DataError
         If a channel is constant there and `standardize` is set.
     """
-    if not names:
+    if not labels:
         return Scale(*np.zeros((5, 0)))
     if windows is not None:
         series = [values[window.samples] for values, window in zip(series, windows, strict=True)]
@@ -600,7 +600,7 @@ def moments(
     if not np.isfinite(spread).all():
         column = int(np.flatnonzero(~np.isfinite(spread))[0])
         raise DataError(
-            f"channel '{names[column]}' has a standard deviation that is not finite over the "
+            f"channel '{labels[column].name}' has a standard deviation that is not finite over the "
             f"training window: its largest value is {np.abs(pooled[column]).max():.3g}. Look "
             "for a fault of the sensor or of its conversion."
         )
@@ -614,8 +614,8 @@ def moments(
     if constant.any():
         column = int(np.flatnonzero(constant)[0])
         raise DataError(
-            f"channel '{names[column]}' is constant ({pooled[column, 0]:g}) over the training "
-            "window, so it cannot be standardised. Look for a dead sensor, choose another window, "
-            "leave the channel out, or set standardize=False."
+            f"channel '{labels[column].name}' is constant ({pooled[column, 0]:g}) over the "
+            "training window, so it cannot be standardised. Look for a dead sensor, choose another "
+            "window, leave the channel out, or set standardize=False."
         )
     return Scale(mean, spread, spread, mean, reach)
