@@ -85,7 +85,7 @@ def test_each_clock_has_a_row_and_none_is_parsed_from_a_sentence():
             "method": "trigger pulses, drift of 2 runs", "count": 13}  # fmt: skip
     run = xr.Dataset(attrs={f"clock_mru_{key}": value for key, value in told.items()})
     row = ("mru", "+370.00 ± 0.10 ms", "+25.0 ppm", "trigger pulses, drift of 2 runs, n = 13")
-    assert clock_rows(run) == [row]
+    assert list(clock_rows(run)) == [row]
     same = run.assign_attrs(clock_mru_method=Clock.method, clock_mru_count=0)
-    assert clock_rows(same) == [("mru", "", "", "the same clock")]
-    assert clock_rows(xr.Dataset()) == []
+    assert list(clock_rows(same)) == [("mru", "", "", "the same clock")]
+    assert list(clock_rows(xr.Dataset())) == []

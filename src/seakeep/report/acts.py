@@ -1,16 +1,16 @@
 """The page over the acts of ``seakeep reproduce``: side by side, and against the paper's claims."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field, replace
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from scipy.stats import binomtest
 
-from seakeep.arrays import FloatArray, IntArray, Progress, undefined
+from seakeep.arrays import FloatArray, Progress, undefined
 from seakeep.core.metrics import slack_share
 from seakeep.core.spectra import split_bands
 from seakeep.report.figures.histories import acts_figure
@@ -24,7 +24,6 @@ from seakeep.study.describe import words_of_repeats
 from seakeep.study.judge import (
     Statistic,
     average_of,
-    band_of,
     blocks_of,
     median_of,
     phase_leads,
@@ -76,71 +75,72 @@ def all_of(verdicts: Iterable[bool | None]) -> bool | None:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Cells of an act, training sets in the order of their runs, and statistics of them.
+    """Cells of an act in some seas, training sets in the order of their runs, and statistics.
 
     Parameters
     ----------
     result : StudyResult
         The act.
+    seas : sequence of str, optional
+        Test sets, whose windows follow each other; by default the irregular one.
     """
 
     result: StudyResult
+    seas: Sequence[str] = field(default=SEA, kw_only=True)
 
-    @cached_property
-    def order(self) -> IntArray:
-        """Places of the training sets, run by run."""
-        return training_order(self.result.groups["training"])[0]
+    def among(self, *seas: str) -> "Evidence":
+        """Return the evidence of the act in other seas."""
+        return Evidence(self.result, seas=seas)
+
+    @property
+    def tests(self) -> list[xr.Dataset]:
+        """Test sets of the seas."""
+        return [self.result.tests[sea] for sea in self.seas]
 
     @property
     def motions(self) -> list[str]:
         """Channels that are no loads."""
         return [name for name in self.result.channels if name not in LOADS]
 
-    def columns(self, channels: Sequence[str]) -> list[int]:
-        """Places of channels."""
-        return [self.result.channels.index(name) for name in channels]
+    def ordered(self, data: xr.DataArray) -> FloatArray:
+        """Values over (training, window, …), training sets run by run."""
+        order, _ = training_order(self.result.groups["training"])
+        return data.transpose("training", "window", ...).values[order]
 
     def cells(
-        self,
-        tests: Sequence[str] = SEA,
-        channels: Sequence[str] = (),
-        measure: str = "nrmse",
-        model: str = ENSEMBLE,
+        self, channels: Sequence[str] = (), measure: str = "nrmse", model: str = ENSEMBLE
     ) -> FloatArray:
-        """Errors over (training, window, channel), NaN where not judged; windows of all tests."""
+        """Errors over (training, window, channel), NaN where not judged."""
         names = list(channels or self.result.channels)
         at = {"model": model, "measure": measure, "channel": names}
-        of_tests = [self.result.tests[test] for test in tests]
-        parts = [data["error"].where(data["judged"]).sel(at).values for data in of_tests]
-        return np.concatenate(parts, axis=1)[self.order]
+        errors = (test["error"].where(test["judged"]).sel(at) for test in self.tests)
+        return np.concatenate([*map(self.ordered, errors)], axis=1)
 
-    def interval(
-        self,
-        statistic: Statistic,
-        *cells: FloatArray,
-        tests: Sequence[str] = SEA,
-        signed: bool = False,
-    ) -> Interval:
+    def interval(self, statistic: Statistic, *cells: FloatArray, signed: bool = False) -> Interval:
         """A statistic of cells (training, window, …) with its interval."""
-        of_tests = [self.result.tests[test] for test in tests]
-        blocks = blocks_of(of_tests, self.result.groups["training"])
+        blocks = blocks_of(self.tests, self.result.groups["training"])
         rng = random_stream(int(self.result.attrs["seed"]), "claims")
         numbers = with_bounds(statistic, *cells, rng=rng, blocks=blocks, signed=signed)
         return Interval(*map(float, numbers))
 
-    def error(self, tests: Sequence[str] = SEA, *of: Any, **named: str) -> Interval:
+    def error(self, *of: Any, **named: str) -> Interval:
         """Median of the errors of :meth:`cells`, averaged over the channels."""
-        return self.interval(_median, self.cells(tests, *of, **named), tests=tests)
+        return self.interval(_median, self.cells(*of, **named))
 
-    def variants(self, key: str) -> dict[str, FloatArray]:
-        """A number of the models with λ, without, and truncated, over (training, 1)."""
-        data = self.result.groups[f"regularisation/{SINGLE}"][key].transpose("variant", "training")
-        return {each["variant"].item(): each.values[self.order, None] for each in data}
+    def variant(self, key: str, variant: str) -> FloatArray:
+        """A number of the model with λ, without, or truncated, over (training, 1)."""
+        data = self.result.groups[f"regularisation/{SINGLE}"][key].sel(variant=variant)
+        return self.ordered(data.expand_dims("window"))
 
 
 def _flat(drawn: FloatArray) -> FloatArray:
     """All cells of each series."""
     return drawn.reshape(len(drawn), -1)
+
+
+def _mean(drawn: FloatArray) -> FloatArray:
+    """Average over all cells of each series."""
+    return average_of(_flat(drawn))
 
 
 def _middle(drawn: FloatArray) -> FloatArray:
@@ -161,7 +161,7 @@ def _spread(drawn: FloatArray) -> FloatArray:
 
 def _share(act: Evidence, measure: str, channels: Sequence[str]) -> Interval:
     """Fraction of the average error that some channels make."""
-    picked = act.columns(channels)
+    picked = np.isin(act.result.channels, channels)
 
     def statistic(drawn: FloatArray) -> FloatArray:
         means = average_of(drawn.reshape(len(drawn), -1, drawn.shape[-1]).swapaxes(1, 2))
@@ -180,15 +180,11 @@ def _ratio(statistic: Statistic) -> Statistic:
     return ratio
 
 
-def _against_single(
-    act: Evidence, tests: Sequence[str] = SEA, statistic: Statistic = _median
-) -> dict[str, Interval]:
+def _against_single(act: Evidence, statistic: Statistic = _median) -> dict[str, Interval]:
     """A statistic of the ensemble over that of the single model, in both measures."""
     return {
         words: act.interval(
-            _ratio(statistic),
-            *(act.cells(tests, (), key, model) for model in (ENSEMBLE, SINGLE)),
-            tests=tests,
+            _ratio(statistic), *(act.cells((), key, model) for model in (ENSEMBLE, SINGLE))
         )
         for key, words in HEADING.items()
     }
@@ -201,24 +197,19 @@ def _changes(ratios: Mapping[str, Interval]) -> str:
 
 def _band(act: Evidence, channels: Sequence[str]) -> list[Interval]:
     """Part of the instants inside the band of irregular waves, and its width in window SDs."""
-    test, picked = act.result.tests["irregular"], act.columns(channels)
-    lower, upper = (bound[act.order][..., picked] for bound in band_of(test, ENSEMBLE, None))
-    measured = test["measured"].values[..., picked]
-    inside = ((measured >= lower) & (measured <= upper)).mean(axis=2)
-    width = (upper - lower).mean(axis=2) / measured.std(axis=1, ddof=1)
-    judged = test["judged"].values[act.order][..., None]
-    return [
-        act.interval(lambda drawn: average_of(_flat(drawn)), np.where(judged, each, np.nan))
-        for each in (inside, width)
-    ]
+    at = act.tests[0].sel(channel=list(channels), ensemble=ENSEMBLE)
+    measured, lower, upper = (at[key] for key in ("measured", "lower", "upper"))
+    inside = ((measured >= lower) & (measured <= upper)).mean("time")
+    width = (upper - lower).mean("time", skipna=False) / measured.std("time", ddof=1)
+    both = (act.ordered(each.where(at["judged"])) for each in (inside, width))
+    return [act.interval(_mean, each) for each in both]
 
 
-def _slack(act: Evidence, test: str, line: str) -> Interval:
+def _slack(act: Evidence, line: str) -> Interval:
     """Part of the time at which a line is slack in the windows of a test set."""
-    data = act.result.tests[test].sel(channel=line)
+    data = act.tests[0].sel(channel=line)
     loads = zip(data["measured"].values, data["noise_std"].values, strict=True)
-    shares = np.array([[slack_share(load, noise) for load, noise in loads]])
-    return act.interval(lambda drawn: _flat(drawn).mean(axis=1), shares, tests=(test,))
+    return act.interval(_mean, np.array([[slack_share(*each) for each in loads]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,7 +247,7 @@ class Claims(Evidence):
 
     def _any_length(self) -> Judged:
         period = self.result.encounter_period
-        length = self.result.tests["irregular"]["time"].values[-1]
+        length = self.tests[0]["time"].values[-1]
         return f"{length / period:.0f} T̂ were forecast, as in the paper", None
 
     def _who_errs(self) -> Judged:
@@ -293,7 +284,7 @@ class Claims(Evidence):
         differences = [
             each.below(1.0)
             for test in self.result.tests
-            for each in _against_single(self, (test,)).values()
+            for each in _against_single(self.among(test)).values()
         ]
         better, worse, unknown = map(differences.count, (True, False, None))
         words = (
@@ -303,7 +294,7 @@ class Claims(Evidence):
 
     def _narrow(self) -> Judged:
         inside, width = _band(self, self.motions)
-        error = self.error(SEA, self.motions).value
+        error = self.error(self.motions).value
         words = f"motions: {width.text()} SD wide, {inside.part()} of the instants inside 95 %"
         return f"{words}; median error {error:.2f} SD", width.below(USEFUL)
 
@@ -313,34 +304,31 @@ class Claims(Evidence):
 
     def _slow_loads(self) -> Judged:
         result = self.raw.result
-        split = result.settings["statistics"]["split_period"]
-        test = result.tests["irregular"].sel(channel=list(LOADS))
-        forecasts = test["mean"].sel(model=ENSEMBLE).values[self.raw.order]
-        measured, forecast = (
-            split_bands(values, result.dt, 1 / (split * result.encounter_period))[0]
-            for values in (test["measured"].values, forecasts)
-        )
+        edge = 1 / (result.settings["statistics"]["split_period"] * result.encounter_period)
+        test = self.raw.tests[0].sel(channel=list(LOADS), model=ENSEMBLE)
+        both = test["measured"].values, self.raw.ordered(test["mean"])
+        measured, forecast = (split_bands(values, result.dt, edge)[0] for values in both)
         errors = np.sqrt(np.mean((forecast - measured) ** 2, axis=2)) / measured.std(axis=1)
         of = {line: self.raw.interval(_median, errors[..., [k]]) for k, line in enumerate(LOADS)}
         words = [f"{line.removeprefix('mooring_')} {each.text()}" for line, each in of.items()]
         return f"act (b): {', '.join(words)}", all_of(each.below(1.0) for each in of.values())
 
     def _peaks(self) -> Judged:
-        loads = self.error(SEA, LOADS, "nammae")
+        loads = self.error(LOADS, "nammae")
         return f"median NAMMAE of the loads {loads.text()} SD", loads.below(1.0)
 
     def _regular(self) -> Judged:
-        both = [[self.error((test,), k) for test in REGULAR] for k in (self.motions, LOADS)]
+        waves = [*map(self.among, REGULAR)]
+        both = [[each.error(k) for each in waves] for k in (self.motions, LOADS)]
         motions, loads = (", ".join(each.text() for each in group) for group in both)
         better = [a.below_other(b) for a, b in zip(*both, strict=True)]
         holds = all_of([*(each.below(USEFUL) for each in both[0]), *better])
         return f"λ/L 1.5, 2, 3: motions {motions}; loads {loads}", holds
 
     def _against_irregular(self) -> Judged:
-        tests = (*SEA, *REGULAR)
-        sizes = [self.result.tests[test].sizes["window"] for test in tests]
-        regular = np.repeat([0.0, *[1.0] * len(REGULAR)], sizes)
-        labels = np.broadcast_to(regular, (self.order.size, regular.size))
+        both = self.among(*SEA, *REGULAR)
+        sizes = [test.sizes["window"] for test in both.tests]
+        regular = np.repeat([0.0, *[1.0] * len(REGULAR)], sizes)[None]
 
         def ratio(drawn: FloatArray, label: FloatArray) -> FloatArray:
             averages, kind = _flat(average_of(drawn)), _flat(label) > 0.5
@@ -348,8 +336,9 @@ class Claims(Evidence):
             return ours / sea
 
         differences = {
-            words: self.interval(ratio, self.cells(tests, (), key), labels, tests=tests)
+            words: both.interval(ratio, cells, np.broadcast_to(regular, cells.shape[:2]))
             for key, words in HEADING.items()
+            for cells in [both.cells((), key)]
         }
         return _changes(differences), all_of(
             [differences["ANRMSE"].above(1.0), differences["NAMMAE"].below(1.0)]
@@ -357,17 +346,17 @@ class Claims(Evidence):
 
     def _phase(self) -> Judged:
         leads = [np.abs(phase_leads(self.result.groups, test, ENSEMBLE)) for test in REGULAR]
-        cells = np.concatenate(leads, axis=1)[self.order]
-        both = [cells[..., self.columns(names)] for names in (LOADS, self.motions)]
-        interval = partial(self.interval, tests=REGULAR)
+        order, _ = training_order(self.result.groups["training"])
+        cells, is_load = np.concatenate(leads, axis=1)[order], np.isin(self.result.channels, LOADS)
+        both, interval = (cells[..., is_load], cells[..., ~is_load]), self.among(*REGULAR).interval
         loads, motions = (interval(_middle, each).text(0, "°") for each in both)
         more = interval(lambda a, b: _middle(a) - _middle(b), *both, signed=True)
         return f"median |phase|: loads {loads}, motions {motions}", more.above(0.0)
 
     def _stern(self) -> Judged:
         line = "mooring_stern"
-        errors = [self.error((test,), (line,)) for test in REGULAR]
-        slack = [_slack(self.raw, test, line) for test in REGULAR]
+        errors = [self.among(test).error((line,)) for test in REGULAR]
+        slack = [_slack(self.raw.among(test), line) for test in REGULAR]
         falls = [
             longer.below_other(shorter)
             for (shorter, wet), (longer, dry) in pairwise(zip(errors, slack, strict=True))
@@ -378,21 +367,20 @@ class Claims(Evidence):
         return f"NRMSE {listed}; slack {parts} of the time", all_of(falls) if falls else None
 
     def _stable(self) -> Judged:
-        radii = self.variants("radius")
-        ours, none = (self.interval(_middle, radii[k]) for k in ("ridge", "none"))
+        both = (self.variant("radius", each) for each in ("ridge", "none"))
+        ours, none = (self.interval(_middle, each) for each in both)
         words = f"spectral radius {ours.text()} with λ, {none.text()} without"
         return words, all_of([ours.below(1.0), none.above(1.0)])
 
     def _cheaper(self) -> Judged:
-        seconds = self.variants("seconds")
-        times = self.interval(_middle, seconds["truncated"] / seconds["ridge"])
+        svd, ours = (self.variant("seconds", each) for each in ("truncated", "ridge"))
+        times = self.interval(_middle, svd / ours)
         return f"the SVD takes {times.text(0)} times as long", times.above(1.0)
 
     def _robust_to_noise(self) -> Judged:
         data = self.result.groups[f"regularisation/{SINGLE}"]
-        truncated = data["truncated_nrmse"].transpose("training", "window", "channel")
-        cells = self.cells(model=SINGLE), truncated.values[self.order]
-        ratio = self.interval(_ratio(_median), *cells)
+        truncated = self.ordered(data["truncated_nrmse"])
+        ratio = self.interval(_ratio(_median), self.cells(model=SINGLE), truncated)
         rank = int(data["rank"].median())
         return f"ANRMSE {ratio.change()} from {rank} singular values to λ", ratio.below(1.0)
 
@@ -481,14 +469,17 @@ def short_table(results: Results) -> Table:
 
 def finding(results: Results) -> str:
     """The conclusion on irregular waves in one sentence, with 95 % intervals."""
-    errors = {act: Evidence(results[act]).error(model=SINGLE).text() for act in results}
     still = Evidence([*results.values()][-1]).error(model="hold_last").text()
     words = {
         "recommended": "the recommended model errs {} SD of the measurement",
         "raw": "the paper's procedure errs {} on the channels as measured",
         "paper": "and {} without the slow drift",
     }
-    parts = [each.format(errors[act]) for act, each in words.items() if act in errors]
+    parts = [
+        each.format(Evidence(results[act]).error(model=SINGLE).text())
+        for act, each in words.items()
+        if act in results
+    ]
     return f"In irregular waves {', '.join(parts)}; the last measured state errs {still}."
 
 

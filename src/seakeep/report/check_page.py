@@ -13,7 +13,7 @@ import xarray as xr
 from seakeep.check import Checked
 from seakeep.conventions import displayed
 from seakeep.report.figures import checks
-from seakeep.report.page import Drawing, Section, drawing, section, write_page
+from seakeep.report.page import Section, drawing, section, write_page
 from seakeep.report.style import shown_unit
 from seakeep.report.tables import (
     MISSING,
@@ -297,8 +297,7 @@ def _advice(model: float, linear: float, more: float, ahead: bool, turned: bool)
 
 def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
     """Return free decay, beside measured ones, and the modes."""
-    words, points = [], []
-    parts: list[Drawing | Table] = []
+    words, points, decay, shown = [], [], None, None
     if result := checked.results.get("decay"):
         cells = partial(row, period=3, damping_ratio=3, p=3)
         rows = [
@@ -308,7 +307,7 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
             rows += [
                 (*cells(at, "motion", q=3), *row(at, "run")) for at in entries(measured, "run")
             ]
-        parts = [drawing("decay", checks.decay, result), table("decay", rows)]
+        decay, shown = drawing("decay", checks.decay, result), table("decay", rows)
         most = abs(result["displacement"]).max("time", skipna=False)
         # None swings farther than it was moved in still water.
         points = [
@@ -330,16 +329,15 @@ def decay_section(modes: xr.Dataset, checked: Checked) -> Section:
         rows.append((*row(own, period=4, damping_ratio=4, decay_time=4, modulus=4), taking))
     figure = drawing("modes", checks.modes, modes) if modes.sizes["state"] > 1 else None
     listed = table("modes", rows, modes=len(rows))
-    return section("modes", *parts, figure, listed, more=words, points=points)
+    return section("modes", decay, shown, figure, listed, more=words, points=points)
 
 
 def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
     """Return whiteness, past inputs, bands and age of the errors."""
     lag, period = result["lag"].values, result.attrs["encounter_period"]
-    trained = checked.results.get("training_residuals")
-    shown = [result] if trained is None else [result, trained]
-    rows = []
-    for own in (each.sel(state=state) for state in result["state"].values for each in shown):
+    both, rows = (result, checked.results.get("training_residuals")), []
+    parts = (each.sel(state=k) for k in result["state"].values for each in both if each)
+    for own in parts:
         beyond = MISSING
         if "input_correlation" in own:
             part = (np.abs(own["input_correlation"]) > own["input_limit"]).mean()
@@ -348,15 +346,17 @@ def residuals_section(result: xr.Dataset, checked: Checked) -> Section:
         ages = own["age_nrmse"][[own.sizes["lag"] - 2, -1]]
         errors = (*numbers(own["band_nrmse"]), *numbers(ages))
         rows.append((*row(own, "state"), own.attrs["of"], *tests, beyond, *errors))
-    words = {
-        "oldest": result.sizes["age"] * (lag[1] - lag[0]) / period,
-        "lag": lag[-1],
-        "lags": lag.size - 1,
-        "instants": result.attrs["instants"],
-        "period": period,
-    }
+    shown = table(
+        "residuals",
+        rows,
+        oldest=result.sizes["age"] * (lag[1] - lag[0]) / period,
+        lag=lag[-1],
+        lags=lag.size - 1,
+        instants=result.attrs["instants"],
+        period=period,
+    )
     figure = drawing("residuals", checks.residuals, result)
-    return section("residuals", figure, table("residuals", rows, **words), **result.attrs)
+    return section("residuals", figure, shown, **result.attrs)
 
 
 def statistics_section(result: xr.Dataset, checked: Checked) -> Section:
@@ -408,12 +408,12 @@ def drift_section(result: xr.Dataset, checked: Checked) -> Section:
     if "offset" in result:
         shown = _as_shown(result, "slow_response", "offset", "offset_uncertainty")
         for own in entries(shown.dropna("state", how="all", subset=["slow_response"]), "state"):
-            mean, points = own["slow_response"][0], own["point_frequency"].values
-            modelled = np.interp(points, mean["frequency"], mean, left=np.nan, right=np.nan)
-            for value, at in zip(modelled, entries(own, "point"), strict=True):
+            mean = own["slow_response"][0]
+            beyond, points = {"left": np.nan, "right": np.nan}, own["point_frequency"]
+            model = np.interp(points, mean["frequency"], mean, **beyond)
+            for at in entries(own.assign(model=("point", model)), "point"):
                 offset = uncertain(at["offset"], at["offset_uncertainty"])
-                place = row(at, "shown", "run", point_frequency=3)
-                rows.append((*place, number(value, 4), offset))
+                rows.append((*row(at, "shown", "run", point_frequency=3, model=4), offset))
     figure = drawing("drift", checks.drift, result)
     return section("drift", figure, table("drift", rows), **result.attrs)
 

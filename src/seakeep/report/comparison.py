@@ -5,10 +5,9 @@ Table of the margins of a calibrated band.
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -44,52 +43,45 @@ HEADER = "model,run,channel,lead,error,claimed,coverage,lead_time"
 
 def comparison_blocks(table: xr.Dataset) -> Iterator[Table]:
     """Comparison of forecasts with measurements, tables per run that fit a terminal."""
-    shown = {name: each for name, each in WORDS["comparison"].items() if name in table}
-    heads, places, of_all = zip(*shown.values(), strict=True)
-    cells = partial(row, **dict(zip(shown, places, strict=True)))
     for at in entries(table, "run"):
         title = "forecast against measurement"
         if "scale" in at:
             title += f", full scale (1:{float(at['scale_factor']):g})"
         if "level" in at:
             title += f", {band_words(at['level'].item(), at['band'].item())}"
-        decimals = zip(of_all, places, strict=True)
-        means = [number(at[mean], digits) if mean else "" for mean, digits in decimals]
-        yield _by_channel(at, "comparison", title, heads, cells, means, _note(at))
-        yield _by_channel(
-            at,
-            "intervals",
-            "intervals over blocks of the forecast",
-            ("NRMSE, 95 %", "NAMMAE, 95 %"),
-            lambda one: [interval(one, "nrmse"), interval(one, "nammae")],
-            [interval(at, "anrmse"), interval(at, "mean_nammae")],
-        )
+        columns = [
+            [head, *numbers(at[key], digits), number(at[mean], digits) if mean else ""]
+            for key, (head, digits, mean) in WORDS["comparison"].items()
+            if key in at
+        ]
+        yield _by_channel(at, "comparison", title, columns, _note(at))
+        bounds = [
+            [f"{head}, 95 %", *(interval(one, key) for one in entries(at, "channel")), of_all]
+            for head, key, of_all in (
+                ("NRMSE", "nrmse", interval(at, "anrmse")),
+                ("NAMMAE", "nammae", interval(at, "mean_nammae")),
+            )
+        ]
+        yield _by_channel(at, "intervals", "intervals over blocks of the forecast", bounds)
         yield _extremes(at, "extremes")
 
 
 def _by_channel(
-    at: xr.Dataset,
-    name: str,
-    title: str,
-    heads: Sequence[str],
-    cells: Callable[[xr.Dataset], Iterable[str]],
-    averages: Sequence[str] = (),
-    note: str = "",
+    at: xr.Dataset, name: str, title: str, columns: Iterable[Iterable[str]], note: str = ""
 ) -> Table:
-    """A row per channel of a run, with the averages over the channels last."""
-    run = at["run"].values
-    rows = [(*row(one, "channel"), *cells(one)) for one in entries(at, "channel")]
-    last = [len(rows)] if averages else []
-    if averages:
-        rows.append(("average", *averages))
-    return Table(f"{name}_{run}", f"{run}: {title}", ("channel", *heads), rows, note, averages=last)
+    """A row per channel of a run, and one of averages where columns have it; headings first."""
+    run, names = at["run"].values, ["channel", *map(str, at["channel"].values), "average"]
+    heads, *rows = zip(names, *columns, strict=False)
+    averages = range(at.sizes["channel"], len(rows))
+    return Table(f"{name}_{run}", f"{run}: {title}", heads, rows, note, averages=averages)
 
 
 def _extremes(at: xr.Dataset, title: str) -> Table:
-    shown = {name: heading for name, heading in WORDS["extremes"].items() if name in at}
-    cells = partial(row, **dict.fromkeys(shown, short))
-    heads = ("unit", *shown.values())
-    return _by_channel(at, "extremes", title, heads, lambda one: cells(one, "channel_units"))
+    columns = [["unit", *map(str, at["channel_units"].values)]]
+    for key, head in WORDS["extremes"].items():
+        if key in at:
+            columns.append([head, *map(short, at[key])])
+    return _by_channel(at, "extremes", title, columns)
 
 
 def _note(at: xr.Dataset) -> str:
@@ -123,9 +115,9 @@ def model_blocks(tables: Datasets) -> Iterator[Table]:
                 ahead.append(f"{model} {words}")
         title = f"{run}: models against measurement"
         yield Table(f"models_{run}", title, heads, rows, "; ".join(status + ahead))
-        every = [table["nrmse"].sel(run=run).values for table in tables.values()]
-        at = first.sel(run=run).assign(every=(("model", "channel"), every))
-        yield _by_channel(at, "channels", "NRMSE", [*tables], lambda one: numbers(one["every"]))
+        errors = ([model, *numbers(each["nrmse"].sel(run=run))] for model, each in tables.items())
+        at = first.sel(run=run)
+        yield _by_channel(at, "channels", "NRMSE", errors)
         yield _extremes(at, f"extremes of {name}")
 
 
@@ -218,21 +210,19 @@ def nowcast_blocks(nowcasts: Datasets) -> Iterator[Table]:
     for model, of_model in nowcasts.items():
         share, lead = of_model.attrs["share"], of_model["lead"].values
         places = [max(round(len(lead) * part) - 1, 0) for part in (0.05, 0.2, 0.5, 1.0)]
-        heads = ("lead time s", *(f"at {number(each)} s" for each in lead[places]), "in band %")
         note = (
             f"errors in training SD over {of_model.attrs['starts']} forecasts, no wave after "
             f"a start known; lead time: error below {share:g} SD"
         )
-
-        def cells(at: xr.Dataset, lead: Any = lead, places: Any = places) -> Iterator[str]:
-            whole = float(at["lead_time"]) >= lead[-1] - 1e-9
-            yield Number(f"at least {number(lead[-1])}") if whole else number(at["lead_time"])
-            yield from numbers(at["error"][places])
-            yield number(at["coverage"].mean(), 0)
-
+        most = number(lead[-1])
         for at in entries(of_model, "run"):
-            title = f"{model} in service"
-            yield _by_channel(at, f"nowcast_{model}", title, heads, cells, note=note)
+            times = zip(numbers(at["lead_time"]), at["lead_time"] >= lead[-1] - 1e-9, strict=True)
+            columns = [
+                ["lead time s", *(Number(f"at least {most}") if end else t for t, end in times)],
+                *([f"at {number(lead[k])} s", *numbers(at["error"].isel(lead=k))] for k in places),
+                ["in band %", *numbers(at["coverage"].mean("lead"), 0)],
+            ]
+            yield _by_channel(at, f"nowcast_{model}", f"{model} in service", columns, note)
 
 
 def band_findings(table: xr.Dataset) -> list[str]:

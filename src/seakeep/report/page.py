@@ -6,7 +6,7 @@ import base64
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 from seakeep.arrays import Progress
 from seakeep.files import MARK, check_output, templates, write_text
 from seakeep.report.style import Figure, figure_style, save_figure
-from seakeep.report.tables import WORDS, Table, shade, write_csv, write_latex
+from seakeep.report.tables import WORDS, Table, parts_of, shade, write_csv, write_latex
 from seakeep.study.store import storing
 
 UNFINISHED = f"""<!DOCTYPE html>
@@ -116,7 +116,7 @@ def section(
         [*paragraphs, *filter(None, more)],
         figures=[each for each in parts if isinstance(each, Drawing)],
         tables=[each for each in parts if isinstance(each, Table) and each.rows],
-        **{name: given[name] for name in given.keys() & {each.name for each in fields(Section)}},
+        **parts_of(Section, given),
     )
 
 

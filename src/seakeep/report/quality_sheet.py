@@ -1,6 +1,7 @@
 """The data-quality sheet: one page with a table per run and a picture of its channels."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +25,12 @@ SHEET = "data-quality sheet"
 """Kind of the files of a sheet, which sets them apart from the user's."""
 
 
-def channel_rows(run: xr.Dataset) -> list[tuple[str, ...]]:
+def channel_rows(run: xr.Dataset) -> Iterator[tuple[str, ...]]:
     """Data quality of each channel of a prepared run; angles and their rates in degrees.
 
     Statistics (min, max, mean, SD), parts that are flagged, and what was found and done.
     """
-    findings, rows = findings_of(run), []
+    findings = findings_of(run)
     for name, channel in run.data_vars.items():
         factor, unit = displayed(channel.attrs.get("units", ""))
         values = channel.values[np.isfinite(channel.values)]
@@ -43,31 +44,26 @@ def channel_rows(run: xr.Dataset) -> list[tuple[str, ...]]:
         texts = [each.text for each in findings if each.channel == name]
         if channel.attrs.get("repaired"):
             texts.append(f"repaired: {channel.attrs['repaired']}")
-        cells = (str(name), shown_unit(unit), *map(short, numbers))
-        rows.append((*cells, flagged, "; ".join(texts)))
-    return rows
+        yield str(name), shown_unit(unit), *map(short, numbers), flagged, "; ".join(texts)
 
 
-def clock_rows(run: xr.Dataset) -> list[tuple[str, str, str, str]]:
+def clock_rows(run: xr.Dataset) -> Iterator[tuple[str, ...]]:
     """Logger, offset, drift and how they were found, of each clock but the reference."""
-    rows = []
     for key, method in run.attrs.items():
-        if not (key.startswith("clock_") and key.endswith("_method")):
+        if not (clock := re.fullmatch("clock_(.+)_method", key)):
             continue
-        clock = key.removesuffix("_method")
-        logger, texts = clock.removeprefix("clock_"), []
+        logger, texts = clock[1], []
         if method in (Clock.method, ASSUMED):
-            rows.append((logger, "", "", method))
+            yield logger, "", "", method
             continue
         for what, error, factor, digits, unit in (
             ("offset", "offset_error", 1e3, 2, "ms"),
             ("drift_ppm", "drift_error_ppm", 1.0, 1, "ppm"),
         ):
-            value, spread = (factor * run.attrs[f"{clock}_{k}"] for k in (what, error))
+            value, spread = (factor * run.attrs[f"clock_{logger}_{k}"] for k in (what, error))
             known = f" ± {spread:.{digits}f}" if np.isfinite(spread) else ""
             texts.append(f"{value:+z.{digits}f}{known} {unit}")
-        rows.append((logger, *texts, f"{method}, n = {run.attrs[f'{clock}_count']}"))
-    return rows
+        yield logger, *texts, f"{method}, n = {run.attrs[f'clock_{logger}_count']}"
 
 
 def write_quality_sheet(
@@ -118,7 +114,7 @@ def other_findings(run: xr.Dataset) -> list[str]:
 def _section(name: str, run: xr.Dataset) -> Section:
     """Clocks, findings, channels and picture of a run."""
     clocks = [f"clock of {key}: {run.attrs[f'clock_{key}']}" for key, *_ in clock_rows(run)]
-    rows = channel_rows(run)
+    rows = list(channel_rows(run))
     marked = [k for k, each in enumerate(rows) if each[-1]]
     shown = table("channels_of_run", rows, name=f"channels_{name}", marked=marked, run=name)
     figure = drawing("quality", quality_figure, run, {}, name=f"quality_{name}", run=name)

@@ -43,19 +43,16 @@ LINES = {what: _line(**each) for what, each in _STYLE["lines"].items()}
 """Lines differ in dash and width as well as in colour."""
 DASHED, DOTTED = LINES["forecast"]["linestyle"], (0, (1, 1))
 
-THIN = {**LINES["measured"], "linewidth": 0.8}
-"""Measured, between a band and its mean: a band is often little wider than a line."""
-
 SERIES = [_line(**each) | {"marker": marker} for marker, each in _STYLE["series"].items()]
 """Colour, dash and marker of each of several things of one kind."""
 
 FLAGGED = {
-    word: {"color": PALETTE[colour], "marker": marker}
+    word: {"color": PALETTE[colour], "marker": marker, "markersize": 3.5, "linestyle": "none"}
     for word, (colour, marker) in _STYLE["flags"].items()
 }
 
-MARKS = _STYLE["marks"]
-"""Measured points, by the kind of the waves."""
+MARKS, TESTS = _STYLE["marks"], _STYLE["tests"]
+"""Measured points, by the kind of the waves; runs, by what they are to a model."""
 
 HEADING = {"nrmse": "ANRMSE", "nammae": "NAMMAE"}
 """Names of the paper for the averages of the two measures over the channels."""
@@ -111,14 +108,15 @@ def panels(
     return given[0].figure, given
 
 
-def legend_outside(figure: Any, *places: Any, side: str = "lower center", **options: Any) -> Any:
-    """Legend beside all panels of what some of them label, in as many columns as fit."""
+def legend_outside(*places: Any, side: str = "lower center", **options: Any) -> Any:
+    """Legend beside all panels of a figure of what some label, in as many columns as fit."""
     unique: dict[str, Any] = {}
     for place in places:
         handles, labels = place.get_legend_handles_labels()
         unique |= dict(zip(labels, handles, strict=True))
     if not unique:
         return None
+    figure = places[0].figure
     across = max(1, int(13 * figure.get_figwidth() / (6 + max(map(len, unique)))))  # letters
     options |= {"loc": f"outside {side}", "ncols": min(len(unique), across)}
     return figure.legend(unique.values(), unique, **options)
@@ -152,12 +150,12 @@ def judged_models(result: StudyResult) -> list[str]:
 
 def line_of(result: StudyResult, model: str) -> dict[str, Any]:
     """Line of a model: that of a forecast or an ensemble, in its own colour beyond the first."""
-    kinds = {name: "ensemble" if name in result.ensembles else "forecast" for name in result.models}
-    line = LINES[kinds[model]]
-    first = {kind: name for name, kind in reversed(kinds.items())}.values()
+    singles = [name for name in result.models if name not in result.ensembles]
+    line = LINES["forecast" if model in singles else "ensemble"]
+    first = (*singles[:1], *result.ensembles[:1])
     if model in first:
         return line
-    others = [name for name in kinds if name not in first]
+    others = [name for name in result.models if name not in first]
     return {**line, "color": SERIES[2 + others.index(model) % (len(SERIES) - 2)]["color"]}
 
 

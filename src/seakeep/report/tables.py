@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property, partial
 from itertools import product
@@ -108,8 +108,12 @@ def table(key: str, rows: Sequence[Sequence[str]], more: str = "", **given: Any)
     for part in ("title", "note"):
         entry[part] = entry[part].format(**given)
     entry["note"] += more
-    parts = {each.name for each in fields(Table)} & entry.keys()
-    return Table(rows=rows, **{part: entry[part] for part in parts})
+    return Table(rows=rows, **parts_of(Table, entry))
+
+
+def parts_of(kind: type, given: Mapping[str, Any]) -> dict[str, Any]:
+    """What of all that is given is a part of a dataclass."""
+    return {each.name: given[each.name] for each in fields(kind) if each.name in given}
 
 
 SHADES = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
@@ -419,15 +423,15 @@ def rich_tables(table: Table, width: int) -> list[RichTable]:
     from rich import box
     from rich.table import Table as RichTable
 
-    columns = range(len(table.columns))
-    least = [_least_width(table, k) for k in columns]
+    columns = list(zip(table.columns, *table.rows, strict=True))
+    least = [_least_width(column, k in table.numbers) for k, column in enumerate(columns)]
     first = min(table.numbers, default=len(columns))
 
     def room(block: Iterable[int]) -> int:
         return width - 1 - sum(least[k] + 2 for k in block)  # two spaces behind each column
 
     blocks = [[*range(first)]]
-    for k in columns[first:]:
+    for k in range(first, len(columns)):
         if len(blocks[-1]) > first and room([*blocks[-1], k]) < 0:
             blocks.append([*range(first)])
         blocks[-1].append(k)
@@ -435,12 +439,10 @@ def rich_tables(table: Table, width: int) -> list[RichTable]:
     for block in blocks:
         left, each = max(room(block), 0), RichTable(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
         for k in block:
-            head = table.columns[k]
-            wanted = max(map(len, [head, *(row[k] for row in table.rows)])) - least[k]
-            more = min(left, max(wanted, 0))
+            more = min(left, max(max(map(len, columns[k])) - least[k], 0))
             left -= more
             side: JustifyMethod = "right" if k in table.numbers else "left"
-            each.add_column(head, justify=side, width=least[k] + more, overflow="fold")
+            each.add_column(columns[k][0], justify=side, width=least[k] + more, overflow="fold")
         for number, row in enumerate(table.rows):
             bold = "bold" if number in table.averages else None
             each.add_row(*(row[k] for k in block), style=bold)
@@ -448,11 +450,11 @@ def rich_tables(table: Table, width: int) -> list[RichTable]:
     return out
 
 
-def _least_width(table: Table, k: int) -> int:
+def _least_width(column: Sequence[str], whole: bool) -> int:
     """Characters that a column needs: of its longest number, or of its longest word."""
-    whole = k in table.numbers
-    words = [word for row in table.rows for word in ([row[k]] if whole else row[k].split())]
-    longest = max(map(len, [*words, *table.columns[k].split()]), default=0)
+    head, *cells = column
+    words = cells if whole else " ".join(cells).split()
+    longest = max(map(len, [*words, *head.split()]), default=0)
     return longest if whole else min(longest, NAME)
 
 

@@ -16,6 +16,7 @@ from seakeep.report.style import (
     LINES,
     MARKS,
     PALETTE,
+    TESTS,
     Figure,
     Places,
     figure_style,
@@ -26,8 +27,6 @@ from seakeep.report.style import (
 )
 
 SHADE = {"color": PALETTE["light"], "alpha": 0.6, "linewidth": 0}
-SOLID = {**LINES["forecast"], "linestyle": "-"}
-ZERO = {"color": COLOURS["input"], "linewidth": 0.5}
 POINTS = {"linestyle": "none", "elinewidth": 0.8}
 
 
@@ -47,7 +46,7 @@ def by_state(
         draw(result.sel(state=name), *places[each * number :][:each])
     if axes is None:
         side = "upper center" if each > 1 else "lower center"
-        legend_outside(figure, *places[:each], side=side)
+        legend_outside(*places[:each], side=side)
     return figure
 
 
@@ -92,8 +91,7 @@ def response(
             place.set(xlim=frequency[[0, -1]], xlabel="frequency [Hz]")
         gain.plot(frequency, factor * own["amplitude"], **LINES["forecast"], label="model")
         wraps = 1 + np.flatnonzero(np.abs(np.diff(phase)) > 180)  # no line runs across
-        turn.plot(np.insert(frequency, wraps, np.nan), np.insert(phase, wraps, np.nan),
-                  **LINES["forecast"])  # fmt: skip
+        turn.plot(*np.insert([frequency, phase], wraps, np.nan, axis=1), **LINES["forecast"])
         if "amplitude_lower" in own:
             bounds = (factor * own[f"amplitude_{each}"] for each in ("lower", "upper"))
             band = {"color": COLOURS["forecast"], "alpha": 0.25, "linewidth": 0}
@@ -207,8 +205,8 @@ def decay(result: xr.Dataset, *, axes: Places = None) -> Figure:
 
     def draw(own: xr.Dataset, place: Any) -> None:
         left = own["displacement"].values
-        place.axhline(0.0, **ZERO)
-        place.plot(own["time"], left, **SOLID)
+        place.axhline(0.0, **LINES["zero"])
+        place.plot(own["time"], left, **LINES["solid"])
         moving = np.flatnonzero(np.abs(left) > 0.01)
         place.set_xlim(0, float(own["time"][min(moving[-1] + 2, left.size - 1)]))
         place.set_xlabel("time after the release [s]")
@@ -339,25 +337,21 @@ def validity(result: xr.Dataset, *, axes: Places = None) -> Figure:
         maps.append(("drift", "mean surge [m]", "steepness", "wave steepness [1]"))
     outside = result["outside"].values != ""
     train, test = (result.sel(part=each) for each in ("train", "test"))
-    kinds = (
-        (train, "trained", {"marker": "o", "markersize": 11, "color": PALETTE["pale"]}),
-        (test.isel(run=~outside), "test, inside", {"marker": "s", "color": COLOURS["ensemble"]}),
-        (test.isel(run=outside), "test, outside", {"marker": "X", "color": COLOURS["forecast"]}),
-    )
+    beyond = test.isel(run=outside)
+    kinds = {"trained": train, "test, inside": test.isel(run=~outside), "test, outside": beyond}
     figure, places = panels(axes, len(maps), 2, (3.75, 2.8))
     for place, (x, across, y, up) in zip(places, maps, strict=True):
-        for at, label, style in kinds:
+        for kind, at in kinds.items():
             if at[y].notnull().any():
-                place.plot(at[x], at[y], linestyle="none", label=label, **style)
-        for run in test["run"].values[outside]:
-            spot = tuple(float(test[key].sel(run=run)) for key in (x, y))
+                place.plot(at[x], at[y], linestyle="none", label=kind, **TESTS[kind])
+        for run, *spot in zip(*(beyond[key].values for key in ("run", x, y)), strict=True):
             if np.isfinite(spot).all():
                 place.annotate(run, spot, (6, 4), textcoords="offset points", fontsize=7)
         place.set(xlabel=across, ylabel=up)
         place.margins(x=0.15)
         place.set_ylim(0, 1.2 * float(result[y].max()))
     if axes is None:
-        legend_outside(figure, places[0])
+        legend_outside(places[0])
     return figure
 
 
@@ -379,8 +373,8 @@ def drift(result: xr.Dataset, *, axes: Places = None) -> Figure:
     def draw(own: xr.Dataset, place: Any) -> None:
         factor, unit, label = _shown(own)
         mean, *slow = factor * own["slow_response"]
-        place.axhline(0.0, **ZERO)
-        place.plot(own["frequency"], mean, **SOLID, label="model, mean")
+        place.axhline(0.0, **LINES["zero"])
+        place.plot(own["frequency"], mean, **LINES["solid"], label="model, mean")
         dashes = (DASHED, DOTTED, (0, (5, 1, 1, 1)), (0, (8, 2)))
         for each, dash in zip(slow, dashes, strict=False):
             style = {"color": COLOURS["ensemble"], "linewidth": 0.9, "linestyle": dash}

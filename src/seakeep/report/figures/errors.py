@@ -59,7 +59,7 @@ def average_boxes(result: StudyResult, tests: Sequence[str]) -> Figure:
             for model in result.models
         }
         _draw_boxes(axes, result, columns, labels, heading)
-    legend_outside(figure, axes, side="upper right")
+    legend_outside(axes, side="upper right")
     return figure
 
 
@@ -76,7 +76,7 @@ def channel_boxes(result: StudyResult, test: str) -> Figure:
         axes.set_yscale(scale)
         columns = {model: [*each.T] for model, each in zip(models, cells, strict=True)}
         _draw_boxes(axes, result, columns, labels, measure.upper())
-    legend_outside(figure, axes, side="upper right")
+    legend_outside(axes, side="upper right")
     return figure
 
 
@@ -152,7 +152,9 @@ def _narrow(label: str) -> str:
     """A label in lines, parted behind its commas first."""
     if len(label) <= NARROW:
         return label
-    return "\n".join(textwrap.fill(part, NARROW) for part in label.replace(", ", ",\n").split("\n"))
+    return "\n".join(
+        textwrap.fill(part, NARROW) for part in label.replace(", ", ",\n").splitlines()
+    )
 
 
 @figure_style()
@@ -195,9 +197,8 @@ def density_figure(result: StudyResult, model: str) -> Figure:
     for axes, name in zip(places, result.channels, strict=True):
         curves = data.sel(channel=name)
         x, weight = curves["value"].values, curves["measured_mean"].values
-        weight = weight / weight.sum()
-        centre = (x * weight).sum()
-        spread = np.sqrt((weight * (x - centre) ** 2).sum())
+        centre = np.average(x, weights=weight)
+        spread = np.sqrt(np.average((x - centre) ** 2, weights=weight))
         z = (x - centre) / spread
         highest = np.fmax(curves["measured_upper"].values, curves["predicted_upper"].values)
         seen = z[highest > 1e-3 * highest.max()]  # of all models, one may have run away
@@ -211,7 +212,7 @@ def density_figure(result: StudyResult, model: str) -> Figure:
         axes.set_ylim(bottom=0)
         axes.set_xlabel("measured SD from the mean", fontsize=7)
         axes.tick_params(labelsize=7)
-    legend_outside(figure, places[0], side="upper right")
+    legend_outside(places[0], side="upper right")
     return figure
 
 
@@ -241,8 +242,8 @@ def eigenvalue_figure(result: StudyResult) -> Figure:
     decay.axhline(1.0, color=PALETTE["slate"], linewidth=0.8)
     decay.set(xlabel="frequency [Hz]", ylabel="modulus", ylim=(LOWEST, 1.01))
     decay.set_xlim(0, 3 / result.encounter_period)
-    legend = legend_outside(figure, decay, side="upper right", markerscale=2)
-    for handle in filter(None, legend.legend_handles):
+    legend = legend_outside(decay, side="upper right", markerscale=2)
+    for handle in legend.legend_handles:
         handle.set_alpha(0.9)
     return figure
 
@@ -268,7 +269,7 @@ def errors(table: xr.Dataset, *, axes: Places = None) -> Figure:
     place.set_ylim(bottom=0)
     place.set_ylabel("NRMSE [SD], 95 % intervals")
     if axes is None and table.sizes["run"] > 1:
-        legend_outside(figure, place)
+        legend_outside(place)
     return figure
 
 
@@ -293,7 +294,7 @@ def error_figure(table: xr.Dataset) -> Figure:
     else:
         axes.set_ylim(bottom=0.0)
     axes.set(xlabel="run, and mean period of its waves", ylabel="ANRMSE [SD], 95 %")
-    legend_outside(figure, axes)
+    legend_outside(axes)
     return figure
 
 
@@ -328,7 +329,7 @@ def nowcast_figure(nowcasts: Datasets, run: str) -> Figure:
         axes.set_ylim(bottom=0)
         if axes.get_subplotspec().is_first_col():
             axes.set_ylabel("error [training SD]")
-    legend_outside(figure, places[0], side="upper right")
+    legend_outside(places[0], side="upper right")
     return figure
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -26,7 +26,6 @@ from seakeep.report.style import (
     LINES,
     PALETTE,
     SERIES,
-    THIN,
     Figure,
     Places,
     axis_label,
@@ -92,45 +91,39 @@ class Curve(NamedTuple):
     calibrated: Sequence[Values] = ()
 
 
-def draw_history(
-    axes: Any, time: Any, measured: Values, curves: Sequence[Curve], period: float | None = None
-) -> None:
-    """Draw bands, the measurement and forecasts over time; as envelopes where a period is given."""
-    envelope = partial(_envelope, axes, time, period=period)
-    if period is not None:
-        pale = {"color": PALETTE["pale"], "linewidth": 0}
-        envelope(measured, fill=True, label="measured, envelope", **pale)
-    alpha = 0.3 if len(curves) == 1 else 0.2
+def draw_history(axes: Any, time: Any, measured: Values, curves: Sequence[Curve]) -> None:
+    """Draw bands, the measurement and forecasts over time."""
     banded = [each for each in curves if each.band]
+    band = {"alpha": 0.3 if len(curves) == 1 else 0.2, "linewidth": 0.6}
     for each in banded:
-        edge = {"color": each.line["color"], "linewidth": 0.6}
-        if period is None:
-            axes.fill_between(time, *each.band, alpha=alpha, label=each.words, **edge)
-        else:
-            envelope(*each.band, alpha=2 * alpha, **edge)
-    if period is None:
-        axes.plot(time, measured, label="measured", **(THIN if banded else LINES["measured"]))
+        axes.fill_between(time, *each.band, label=each.words, color=each.line["color"], **band)
+    axes.plot(time, measured, label="measured", **LINES["thin" if banded else "measured"])
     for each in curves:
-        if period is not None:
-            envelope(each.values, color=each.line["color"], linewidth=0.8)
-            continue
+        edge = {**each.line, "linewidth": 0.7, "linestyle": DOTTED}
         for bound, label in zip(each.calibrated, ("calibrated", None), strict=False):
-            style = {**each.line, "linewidth": 0.7, "linestyle": DOTTED}
-            axes.plot(time, bound, label=label, **style)
+            axes.plot(time, bound, label=label, **edge)
         axes.plot(time, each.values, label=each.label, **each.line)
 
 
-def _envelope(
-    axes: Any, time: Any, low: Values, high: Values | None = None, *, period: Any, **style: Any
-) -> None:
+def _draw_envelopes(envelope: Any, measured: Values, curves: Sequence[Curve]) -> None:
+    """Draw the measurement, bands and forecasts, each by what draws its envelope."""
+    pale = {"color": PALETTE["pale"], "linewidth": 0}
+    envelope(measured, fill=True, label="measured, envelope", **pale)
+    band = {"alpha": 0.6 if len(curves) == 1 else 0.4, "linewidth": 0.6}
+    for each in curves:
+        if each.band:
+            envelope(*each.band, color=each.line["color"], **band)
+    for each in curves:
+        envelope(each.values, color=each.line["color"], linewidth=0.8)
+
+
+def _envelope(axes: Any, time: FloatArray, period: float, *bounds: Values, **style: Any) -> None:
     """Draw the least and the greatest value in steps of a period, or of several."""
-    highest = low if high is None else high
-    instants = np.asarray(time)
-    steps = min(int((instants[-1] - instants[0]) / period), MOST_STEPS)
-    edges = np.linspace(instants[0], instants[-1], steps + 1)
-    first = np.searchsorted(instants, edges[:-1])
-    bottom = np.minimum.reduceat(np.asarray(low), first)
-    top = np.maximum.reduceat(np.asarray(highest), first)
+    steps = min(int((time[-1] - time[0]) / period), MOST_STEPS)
+    edges = np.linspace(time[0], time[-1], steps + 1)
+    first = np.searchsorted(time, edges[:-1])
+    bottom = np.minimum.reduceat(np.asarray(bounds[0]), first)
+    top = np.maximum.reduceat(np.asarray(bounds[-1]), first)
     axes.stairs(top, edges, baseline=bottom, **style)
 
 
@@ -149,10 +142,9 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
         groups[each.attrs.get("units", "")].append(str(name))
     period = wave_period(first.inputs, first.measured[states[0]])
     is_long = (time[-1] - time[0]) / period >= LONG
-    spans = [period, None] if is_long else [None]
     rows = len(states) + len(groups)
     figure = new_figure(11.0 if is_long else 7.5, 1.0 + 1.45 * rows)
-    axes = figure.subplots(rows, len(spans), squeeze=False, sharex="col", sharey="row")
+    axes = figure.subplots(rows, 1 + is_long, squeeze=False, sharex="col", sharey="row")
     for each in axes.flat:
         each.use_sticky_edges = False  # an envelope would lie on the frame
         each.margins(x=0.01)
@@ -162,18 +154,22 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
         attrs = first.measured[name].attrs
         factor, units = prefixed(attrs.get("units", ""), largest)
         curves = [_curve(each, key, name, factor, several) for key, each in several.items()]
-        for place, span in zip(row, spans, strict=True):
-            draw_history(place, time, factor * first.measured[name], curves, span)
+        measured = factor * first.measured[name]
+        draw_history(row[-1], time, measured, curves)
+        if is_long:
+            _draw_envelopes(partial(_envelope, row[0], time, period), measured, curves)
         row[0].set_ylabel(axis_label(name, units, attrs.get("long_name")), fontsize=LABEL)
         judged = _judgement([table.sel(channel=name) for table in tables])
         row[0].set_title(judged, loc="right", fontsize=8, pad=2)
     for row, (units, names) in zip(axes[len(states) :], groups.items(), strict=True):
-        for place, span in zip(row, spans, strict=True):
-            _draw_inputs(place, first.inputs[names], span)
+        inputs = first.inputs[names]
+        _draw_inputs(row[-1], partial(row[-1].plot, time), inputs)
+        if is_long:
+            _draw_inputs(row[0], partial(_envelope, row[0], time, period), inputs)
         waves = "wave elevations" if all(map(is_elevation, names)) else "inputs"
         label = f"{waves}\n[{shown_unit(units) or '?'}]"
         if len(names) == 1:
-            label = axis_label(names[0], units, first.inputs[names[0]].attrs.get("long_name"))
+            label = axis_label(names[0], units, inputs[names[0]].attrs.get("long_name"))
         row[0].set_ylabel(label, fontsize=LABEL)
         handles, labels = row[-1].get_legend_handles_labels()
         columns = max(1, min(4, len(labels), ACROSS // (6 + max(map(len, labels)))))
@@ -186,7 +182,7 @@ def overlay_figure(several: Mapping[str, Comparison]) -> Figure:
         axes[0, 0].set_title("whole forecast, envelopes", fontsize=10)
         axes[0, 1].set_xlim(time[-1] - ENLARGED * period, time[-1])
         axes[0, 1].set_title(f"last {ENLARGED} periods", fontsize=10)
-    legend_outside(figure, *axes[0])
+    legend_outside(*axes[0])
     figure.suptitle(_title(compared), x=0.01, ha="left")
     return figure
 
@@ -202,8 +198,7 @@ def _curve(
         attrs = each.forecast.attrs
         words = band_words(attrs["level"], attrs.get("band"))
     if len(several) > 1:
-        style = SERIES[list(several).index(key) % len(SERIES)]
-        line = {what: value for what, value in style.items() if what != "marker"}
+        line = {**SERIES[list(several).index(key) % len(SERIES)], "marker": None}
         status = "" if each.status == "ok" else f", {each.status}"
         label = plain_text(f"{key}, ANRMSE {each.anrmse:.3f}{status}")
     return Curve(label, line, factor * each.forecast[name], band, words)
@@ -230,16 +225,14 @@ def _title(comparisons: Sequence[Comparison]) -> str:
     return plain_text(" · ".join(filter(None, parts)))
 
 
-def _draw_inputs(axes: Any, inputs: xr.Dataset, period: float | None) -> None:
+def _draw_inputs(axes: Any, draw: Callable[..., Any], inputs: xr.Dataset) -> None:
     """Inputs of one unit; beyond the first, colours and dashes set them apart."""
-    time = inputs["time"].values
     for number, (name, each) in enumerate(inputs.data_vars.items()):
         line = dict(LINES["input"])
         if number:
             other = SERIES[(number + 1) % len(SERIES)]
             line |= {key: other[key] for key in ("color", "linestyle")}
-        draw: Any = axes.plot if period is None else partial(_envelope, axes, period=period)
-        draw(time, each, **line, label=plain_text(str(each.attrs.get("long_name", name))))
+        draw(each, **line, label=plain_text(str(each.attrs.get("long_name", name))))
     axes.axhline(0.0, color=COLOURS["input"], linewidth=0.4)
 
 
@@ -324,7 +317,7 @@ def _histories(
     places[-1].set_xlabel("time [s]")
     if axes is None:
         figure.align_ylabels(places)
-        legend_outside(figure, places[0])
+        legend_outside(places[0])
     return figure
 
 
@@ -332,12 +325,12 @@ def shown_cells(result: StudyResult) -> list[tuple[str, int, int]]:
     """Cells that are drawn: test set, training set and window."""
     count = result.settings["output"]["shown_windows"]
     cells = []
-    for number, (name, test) in enumerate(result.tests.items()):
+    for name, test in result.tests.items():
         judged = test["judged"].values
-        total = judged.shape[1]
-        wanted = min(count, total, 1 if number else total)
-        for window in np.linspace(0, total - 1, wanted).round().astype(int).tolist():
+        last, wanted = judged.shape[1] - 1, min(count, judged.shape[1])
+        for window in np.linspace(0, last, wanted).round().astype(int).tolist():
             cells.append((name, int(np.argmax(judged[:, window])), window))
+        count = min(count, 1)  # of each other test set
     return cells
 
 
@@ -357,7 +350,7 @@ def history_figure(
     words = "deviation from the training mean, in training SD" if len(names) > 1 else "training SD"
     figure.supylabel(words, fontsize=8)
     axes[-1].set_xlabel("time after the last measured state, in encounter periods")
-    legend_outside(figure, axes[0], side="upper right")
+    legend_outside(axes[0], side="upper right")
     run, learnt, start = (cell[key].item() for key in ("run", "training", "start"))
     left_out = result.groups["training"]["left_out"].values[training]
     axes[0].set_title(f"{run}, from {start:.1f} s; trained {'' if left_out else 'on '}{learnt}")
@@ -414,7 +407,7 @@ def acts_figure(results: Mapping[str, StudyResult]) -> Figure:
             axes.set_title(f"{act.title}: {name}")
     for axes in grid[-1]:
         axes.set_xlabel("time after the last measured state, in encounter periods")
-    legend_outside(figure, grid[0, 0], side="upper right")
+    legend_outside(grid[0, 0], side="upper right")
     figure.supylabel("deviation from the training mean, in training SD", fontsize=8)
     return figure
 
@@ -449,12 +442,11 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
             filled = over_gaps(x)  # a sample that is not there stands between its neighbours
             for word, bit in FLAGS.items():
                 if (hit := (flags & bit) > 0).any():
-                    style = {**FLAGGED[word], "markersize": 3.5, "linestyle": "none"}
-                    at.plot(time[hit], filled[hit], label=word, zorder=3, **style)
+                    at.plot(time[hit], filled[hit], label=word, zorder=3, **FLAGGED[word])
             place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
             at.legend(**place, fontsize=7, ncols=6, borderpad=0.1)
         known = x[np.isfinite(x)]
-        if known.size and np.ptp(known) <= 1e-9 * max(np.abs(known).max(), 1e-300):
+        if known.size and np.ptp(known) <= 1e-9 * np.abs(known).max():
             value = known[0]  # an axis that shows no rounding
             reach = 0.1 * abs(value) or 1.0
             at.set_ylim(value - reach, value + reach)
@@ -466,9 +458,9 @@ def quality_figure(run: xr.Dataset, agreements: Mapping[str, Agreement]) -> Figu
         apart = np.diff(each.centre)
         usual = np.median(apart) if apart.size else 0.0
         holes = 1 + np.flatnonzero(apart > 1.5 * usual)
-        instants = np.insert(each.centre + time[0], holes, np.nan)  # no line across a hole
-        lags = np.insert(each.lags, holes, np.nan)
-        at.plot(instants, lags, "o-", color=COLOURS["ensemble"], markersize=3)
+        trace = each.centre + time[0], each.lags
+        lags = np.insert(trace, holes, np.nan, axis=1)  # no line across a hole
+        at.plot(*lags, "o-", color=COLOURS["ensemble"], markersize=3)
         reach = max(1.5 * limit, 1.1 * np.nanmax(np.abs(each.lags), initial=0.0))
         at.set_ylim(-reach, reach)
         at.set_ylabel(f"lag of\n{name.replace('_', ' ')} [s]", fontsize=8)
@@ -497,11 +489,11 @@ def spectrum_figure(result: StudyResult) -> Figure:
         chosen = [spectra.sel(run=run, kind=kind).dropna("bin", subset=["density"]) for run in of]
         return [(at["frequency"].values, at["density"].values) for at in chosen if at["bin"].size]
 
-    words = {
-        "paper": "measured, segments of 8.2 s (paper)",
-        "recommended": "measured, segments of 60 s",
+    lengths = {"paper": "8.2 s (paper)", "recommended": "60 s"}
+    measured = {
+        kind: (f"measured, segments of {length}", curves(kind, names))
+        for kind, length in lengths.items()
     }
-    measured = {kind: (words[kind], curves(kind, names)) for kind in WELCH}
     known = result.groups.get("nominal", xr.Dataset())
     nominal = [
         (str(each.attrs.get("long_name", name)), (known["frequency"].values, each.values))

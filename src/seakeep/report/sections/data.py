@@ -102,8 +102,8 @@ def settings(result: StudyResult) -> Section:
         for m, stated in result.model_settings.items()
         for key, each in stated["settings"].items()
     ]
-    every = {key: value for key, value in result.settings.items() if key != "models"}
-    every["statistics"] = {**every["statistics"], "calibrate": result.is_calibrated}
+    statistics = {**result.settings["statistics"], "calibrate": result.is_calibrated}
+    every = result.settings | {"statistics": statistics, "models": None}
     stated = [(key, setting_text(key, value)) for key, value in _leaves("", every)]
     windows, training = [], result.groups["training"]
     for each, spans in zip(entries(training, "training"), training_spans(result), strict=True):

@@ -2,7 +2,7 @@
 
 import base64
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -41,7 +41,7 @@ def pack(values: npt.ArrayLike) -> dict[str, Any]:
     >>> packed["low"], packed["high"], packed["data"]
     (0.0, 1.0, 'AAD+////')
     """
-    x = np.asarray(values, dtype=float).ravel()
+    x = np.asarray(values, dtype=float)
     known = np.isfinite(x)
     low, high = (float(x[known].min()), float(x[known].max())) if known.any() else (0.0, 1.0)
     step = (high - low) / (MISSING - 1) or 1.0
@@ -59,11 +59,10 @@ def explorer(result: StudyResult) -> Section:
     if not cells:
         return section("explore")
     test, training, window = cells[0]
-    units = _shown(result)
     channels, waves = (
         [
-            {"name": name, "label": result.words_of(name), "unit": shown_unit(units[name][1])}
-            for name in group
+            {"name": name, "label": result.words_of(name), "unit": shown_unit(unit)}
+            for name, (_, unit) in _units(result, group)
         ]
         for group in (result.channels, _elevations(result))
     )
@@ -127,22 +126,22 @@ def _elevations(result: StudyResult) -> list[str]:
     return list(filter(is_elevation, result.groups["channels"]["name"].values))
 
 
-def _shown(result: StudyResult) -> dict[str, tuple[float, str]]:
-    """Factor to the unit in which each channel is shown, and that unit."""
-    units = result.groups["channels"]["units"]
-    return dict(zip(units["name"].values, map(displayed, units.values), strict=True))
+def _units(result: StudyResult, names: list[str]) -> Iterator[tuple[str, tuple[float, str]]]:
+    """Channels, each with the factor to the unit in which it is shown, and that unit."""
+    units = result.groups["channels"]["units"].sel(name=names)
+    return zip(names, map(displayed, units.values), strict=True)
 
 
 def _cells(result: StudyResult, test: str) -> Callable[[int, int], dict[str, Any]]:
     """Packs a cell of a test set, by training set and window: waves, motions, bands, errors."""
-    data, elevations, units = result.tests[test], _elevations(result), _shown(result)
-    factors = [units[name][0] for name in result.channels]
+    data, elevations = result.tests[test], _elevations(result)
+    factors = [factor for _, (factor, _) in _units(result, result.channels)]
     series = {}
     for model in judged_models(result):
-        one, keys = data.sel(model=model, measure="nrmse"), ["error", "mean"]
+        one, keys = data.sel(model=model, measure="nrmse"), ["mean"]
         if model in result.ensembles:
-            one, keys = one.sel(ensemble=model), [*keys, "lower", "upper"]
-        series[model] = {key: one[key].values for key in keys}
+            one, keys = one.sel(ensemble=model), ["mean", "lower", "upper"]
+        series[model] = one["error"].values, {key: one[key].values for key in keys}
 
     def packed(values: npt.NDArray[Any]) -> list[dict[str, Any]]:
         """Values (…, channel) in the units that are shown, packed channel by channel."""
@@ -150,10 +149,10 @@ def _cells(result: StudyResult, test: str) -> Callable[[int, int], dict[str, Any
 
     def cell(training: int, window: int) -> dict[str, Any]:
         models = {}
-        for model, own in series.items():
-            errors, *parts = ((key, values[training, window]) for key, values in own.items())
-            nrmse = [round(float(e), 3) if e == e else None for e in errors[1]]
-            models[model] = {**{key: packed(values) for key, values in parts}, "nrmse": nrmse}
+        for model, (errors, parts) in series.items():
+            nrmse = [round(float(e), 3) if e == e else None for e in errors[training, window]]
+            own = {key: packed(values[training, window]) for key, values in parts.items()}
+            models[model] = {**own, "nrmse": nrmse}
         run = result.prepared[data["run"].values[window]]
         at = np.argmin(np.abs(run["time"].values - data["start"].values[window])) + 1
         part = slice(at, at + data.sizes["time"])

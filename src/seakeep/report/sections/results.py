@@ -2,7 +2,7 @@
 
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from itertools import chain
 from typing import Any
@@ -109,38 +109,41 @@ def _tested(result: StudyResult) -> str:
 def by_channel(
     result: StudyResult,
     key: str,
-    cells: Callable[[str], Iterable[str]],
-    columns: Iterable[str],
+    columns: Iterable[Iterable[str]],
     more: str,
     test: str = "",
     **given: Any,
 ) -> Table:
-    """Table of numbers with a row per channel, and one of averages; `cells` takes a channel.
+    """Table of numbers with a row per channel, and one of averages; columns start with headings.
 
     One of several test sets is named after it; that of the first is not folded away.
     """
-    rows = [(result.words_of(name), *map(Number, cells(name))) for name in result.channels]
-    rows.append(("average", *map(Number, cells("average"))))
+    names = ["channel", *map(result.words_of, result.channels), "average"]
+    heads, *rows = zip(names, *(map(Number, column) for column in columns), strict=True)
     if test:
         of_test = {"name": f"{key}_{test}", "folded": test != next(iter(result.tests))}
         given = {"test": result.label_of(test), **of_test, **given}
-    heads, last = ("channel", *columns), [len(rows) - 1]
-    return table(key, rows, more, columns=heads, averages=last, **given)
+    return table(key, rows, more, columns=heads, averages=[len(rows) - 1], **given)
+
+
+def _rows(result: StudyResult, statistic: str, **at: Any) -> xr.Dataset:
+    """A statistic over the rows of :func:`by_channel`."""
+    data = result.groups[f"statistics/{statistic}"]
+    return data.sel(channel=[*result.channels, "average"], **at)
 
 
 def _heat(result: StudyResult) -> Table:
     """Median error of each channel in each test set, of the models that are not baselines."""
-    places = {
-        f"{result.label_of(test)}: {model_words(model)}": {"test": test, "model": model}
+    median = _rows(result, "boxes", measure="nrmse")["median"]
+    columns = [
+        [
+            f"{result.label_of(test)}: {model_words(model)}",
+            *numbers(median.sel(test=test, model=model), 2),
+        ]
         for test in result.tests
         for model in judged_models(result)
-    }
-    median = result.groups["statistics/boxes"]["median"].sel(measure="nrmse")
-
-    def cells(channel: str) -> Iterator[str]:
-        return (number(median.sel({**at, "channel": channel}), 2) for at in places.values())
-
-    return by_channel(result, "heat", cells, places, of_judged(result))
+    ]
+    return by_channel(result, "heat", columns, of_judged(result))
 
 
 def overview_table(result: StudyResult) -> Table:
@@ -373,25 +376,23 @@ def errors(result: StudyResult) -> Section:
 
 def error_table(result: StudyResult, test: str) -> Table:
     """Medians and inter-quartile ranges of both measures, average and per channel."""
-    boxes, models = result.groups["statistics/boxes"].sel(test=test), judged_models(result)
-    places = [(measure, model) for measure in HEADING for model in models]
-    spread = boxes["upper_quartile"] - boxes["lower_quartile"]
-
-    def cells(name: str) -> Iterator[Number]:
-        for measure, model in places:
-            at = {"channel": name, "measure": measure, "model": model}
-            yield beside(boxes["median"].sel(at), spread.sel(at))
-
+    models = judged_models(result)
+    boxes = _rows(result, "boxes", test=test, measure=[*HEADING], model=models)
+    columns = []
+    for at in entries(boxes, "measure", "model"):
+        measure, model = row(at, "measure", "model")
+        spread = at["upper_quartile"] - at["lower_quartile"]
+        head = f"{measure.upper()} {model_words(model)}: median [IQR]"
+        columns.append([head, *map(beside, at["median"], spread)])
     more = of_judged(result)
-    if lost := int(boxes["left_out"].sel(model=models, measure="nrmse").sum()):
+    if lost := int(boxes["left_out"].sel(measure="nrmse").sum()):
         more += (
             f" {lost} values were left out: a channel whose measured SD is below 1 % of its "
             "training SD (a slack line), or more than half of whose variance is noise, is not "
             "judged, nor is a forecast that diverged."
         )
-    heads = [f"{key.upper()} {model_words(model)}: median [IQR]" for key, model in places]
     count = int(result.tests[test]["judged"].sum())
-    return by_channel(result, "errors", cells, heads, more, test=test, count=count)
+    return by_channel(result, "errors", columns, more, test, count=count)
 
 
 def scales(result: StudyResult) -> Section:
@@ -401,18 +402,15 @@ def scales(result: StudyResult) -> Section:
 
 def _scales_table(result: StudyResult, test: str) -> Table:
     data = result.tests[test]
-    median = result.groups["statistics/boxes"]["median"].sel(test=test)
     spread = data["measured"].std("time", ddof=1) / data["training_std"]
     size = spread.where(data["judged"]).median(["training", "window"])
-
-    def cells(name: str) -> Iterator[str]:
-        yield "" if name == "average" else number(size.sel(channel=name), 2)
-        for model in result.models:
-            at = median.sel(channel=name, model=model)
-            yield "{} ({})".format(*numbers(at.sel(measure=["nrmse", "training_nrmse"])))
-
-    heads = ("SD of the window [training SD]", *map(model_words, result.models))
-    return by_channel(result, "scales", cells, heads, conditional(result, result.models), test=test)
+    sizes = ["SD of the window [training SD]", *numbers(size.sel(channel=result.channels), 2), ""]
+    columns = []
+    for at in entries(_rows(result, "boxes", test=test), "model"):
+        both = (numbers(at["median"].sel(measure=key)) for key in ("nrmse", "training_nrmse"))
+        columns.append([model_words(at["model"].item()), *map("{} ({})".format, *both)])
+    more = conditional(result, result.models)
+    return by_channel(result, "scales", [sizes, *columns], more, test)
 
 
 def regular(result: StudyResult) -> Section:
@@ -520,16 +518,16 @@ def coverage(result: StudyResult) -> Section:
 def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
     """Coverage and width of the members' band, or of the calibrated one, per test and channel."""
     prefix, band = "calibrated_" * calibrated, "calibrated" if calibrated else "members"
-    shares = result.groups["statistics/coverage"].sel(model=model, band=band)
-    true = "truth" in shares["against"].values
-    kinds, two = ("inside" + " [of the truth]" * true, "width [SD]"), partial(number, digits=2)
-
-    def cells(name: str) -> Iterator[str]:
-        for test in result.tests:
-            at = shares.sel(test=test, channel=name)
-            yield beside(*at["inside"], form=two) if true else two(*at["inside"])
-            yield two(at["relative_width"].sel(against="measured"))
-
+    shares = _rows(result, "coverage", model=model, band=band)
+    true, two = "truth" in shares["against"].values, partial(number, digits=2)
+    columns = []
+    for test in result.tests:
+        label, at = result.label_of(test), shares.sel(test=test)
+        inside = at["inside"].transpose("channel", "against")
+        parts = [beside(*each, form=two) if true else two(*each) for each in inside]
+        columns.append([f"{label}: inside" + " [of the truth]" * true, *parts])
+        widths = numbers(at["relative_width"].sel(against="measured"), 2)
+        columns.append([f"{label}: width [SD]", *widths])
     level = result.level
     more = _calibrated_words(result, model, level) if calibrated else ""
     if true:
@@ -538,12 +536,10 @@ def coverage_table(result: StudyResult, model: str, calibrated: bool) -> Table:
             "slap; rates are not filtered."
         )
     more += conditional(result, [model])
-    heads = [f"{result.label_of(test)}: {each}" for test in result.tests for each in kinds]
     return by_channel(
         result,
         "coverage",
-        cells,
-        heads,
+        columns,
         more,
         name=f"coverage_{prefix}{model}",
         kind=prefix.replace("_", " "),
@@ -608,34 +604,32 @@ def densities(result: StudyResult) -> Section:
 def divergence_table(result: StudyResult, model: str, variant: str) -> Table:
     """Jensen–Shannon divergence per channel beside its noise floor and, if asked, the paper's."""
     data = result.groups["statistics/divergence"]
-    at = data.sel(model=model, variant=variant)
-    keys = ("mean", "lower", "upper", "uncertainty", "noise_floor")
-    comparable = model in result.ensembles and result.settings["output"]["paper"]
-
-    def cells(name: str) -> Iterator[str]:
-        of_all = name == "average"
-        one = at.mean("channel", skipna=False) if of_all else at.sel(channel=name)
-        yield from (small_number(one[key]) for key in keys)
-        yield "" if of_all else number(one["block_length"], 0)
-        if comparable:
-            yield from WORDS["published"].get(name, (MISSING,) * 4)
-
-    quantiles = ("EV", "q0.025", "q0.975", "U")
-    heads = [*quantiles, "noise floor", "block (samples)"]
-    published = [f"paper: {each}" for each in quantiles] if comparable else []
+    at = data.sel(model=model, variant=variant, channel=result.channels)
+    average = at.mean("channel", skipna=False)
+    quantiles = {"mean": "EV", "lower": "q0.025", "upper": "q0.975", "uncertainty": "U"}
+    own = [
+        [head, *map(small_number, at[key]), small_number(average[key])]
+        for key, head in (*quantiles.items(), ("noise_floor", "noise floor"))
+    ]
+    own.append(["block (samples)", *numbers(at["block_length"], 0), ""])
+    published = []
+    if model in result.ensembles and result.settings["output"]["paper"]:
+        heads = [f"paper: {each}" for each in quantiles.values()]
+        names = (*result.channels, "average")
+        cells = (WORDS["published"].get(name, (MISSING,) * 4) for name in names)
+        published = [*zip(heads, *cells, strict=True)]
     how = "blocks may cross joins, block length and bandwidth as printed in the paper"
     if variant == "recommended":
         how = "no block crosses a join, Politis–White blocks, Silverman's bandwidth"
     return by_channel(
         result,
         "jsd",
-        cells,
-        [*heads, *published],
-        " The paper's columns are of another vessel in another tank." * comparable
+        [*own, *published],
+        " The paper's columns are of another vessel in another tank." * bool(published)
         + conditional(result, [model]),
         test=data.attrs["test"],
         name=f"jsd_{model}_{variant}",
-        elsewhere=range(1 + len(heads), 1 + len(heads) + len(published)),
+        elsewhere=range(1 + len(own), 1 + len(own) + len(published)),
         folded=model not in (result.ensembles or [model]),
         model=model_words(model),
         variant=variant,
