@@ -115,7 +115,7 @@ class _Video:
             stamp = 1e-3 * self.capture.get(cv2.CAP_PROP_POS_MSEC)
             first = stamp if count == 0 else first
             number = round((stamp - first) * self.rate)
-            if not np.isfinite(stamp) or (count and stamp <= first):
+            if count and stamp <= first:
                 number = previous + 1  # a container without time stamps
             if number <= previous:
                 raise DataError(
