@@ -172,8 +172,8 @@ def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
     for name, run in still.items():
         values = channel_matrix(run, motions, name)
         values = values[np.isfinite(values).all(axis=1)]
-        spread = dict(zip(model.states, model.signature.state_scale.spread, strict=True))
-        moved = (values - values[-1]) / [spread[each] for each in motions]
+        spread = model.signature.state_scale.spread[[*map(model.states.index, motions)]]
+        moved = (values - values[-1]) / spread
         column = np.argmax(np.abs(moved).max(axis=0))
         first = np.argmax(np.abs(moved[:, column]))
         released = free_decay(values[first:, column], model.dt)
