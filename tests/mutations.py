@@ -494,7 +494,7 @@ CHANGES = {
         ("offset = level - drift * centre", "offset = level + drift * centre", "signals/test_synchronisation.py::test_pulses_give_offset_and_drift_with_honest_errors"),
     ],
     "signals/tracking.py": [
-        ('pitch = side * seen["angle"]', 'pitch = seen["angle"]', "signals/test_tracking.py::test_a_camera_on_the_other_side"),
+        ('pitch = side * seen["panel_angle"]', 'pitch = seen["panel_angle"]', "signals/test_tracking.py::test_a_camera_on_the_other_side"),
     ],
     "signals/waves.py": [
         (" or record.size < SHORTEST * period", "", "signals/test_leakage.py::test_a_few_waves_are_alike_in_any_two_seas"),

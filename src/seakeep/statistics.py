@@ -7,9 +7,8 @@ by channel; text, such as the status of an ensemble's members, is left out. All 
 """
 
 import functools
-import inspect
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -20,7 +19,6 @@ from seakeep.arrays import finite
 from seakeep.core import bootstrap, density
 from seakeep.core import coverage as of_arrays
 from seakeep.core.bootstrap import (
-    BlockRule,
     block_length,
     lag_one_correlation,
     overlap_block,
@@ -73,31 +71,13 @@ __all__ = [
 ]
 
 
-def _labelled(
-    of_arrays: Callable[..., Any], *sides: str
-) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Let a function of arrays take Datasets for its arguments `sides`, by the one decorated.
-
-    Its name, signature and docstring are those of the function of arrays.
-    """
-    signature = inspect.signature(of_arrays)
-
-    def decorate(of_datasets: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(of_arrays)
-        def either(*args: Any, **settings: Any) -> Any:
-            received = signature.bind(*args, **settings).arguments
-            kinds = {side: type(received[side]).__name__ for side in sides}
-            labelled = sum(isinstance(received[side], xr.Dataset) for side in sides)
-            if labelled not in (0, len(sides)):
-                words = ", ".join(f"{side}: {kind}" for side, kind in kinds.items())
-                raise RequestError(
-                    f"give Datasets throughout, or arrays throughout; received {words}."
-                )
-            return (of_datasets if labelled else of_arrays)(*args, **settings)
-
-        return either
-
-    return decorate
+def _are_datasets(**sides: Any) -> bool:
+    """Whether all sides are Datasets; some of them alone are refused."""
+    labelled = sum(isinstance(each, xr.Dataset) for each in sides.values())
+    if labelled not in (0, len(sides)):
+        words = ", ".join(f"{side}: {type(each).__name__}" for side, each in sides.items())
+        raise RequestError(f"give Datasets throughout, or arrays throughout; received {words}.")
+    return labelled > 0
 
 
 @functools.wraps(bootstrap.moving_block_bootstrap)
@@ -129,18 +109,14 @@ def moving_block_bootstrap(
     return drawn["series"].rename(series.name) if alone else drawn
 
 
-@_labelled(density.jsd_interval, "predicted", "measured")
+@functools.wraps(density.jsd_interval)
 def jsd_interval(
-    predicted: xr.Dataset,
-    measured: xr.Dataset,
-    *,
-    block_length: int | BlockRule,
-    rng: np.random.Generator,
-    grid: None = None,
-    **settings: Any,
-) -> xr.Dataset:
+    predicted: Any, measured: Any, *, rng: np.random.Generator, **settings: Any
+) -> Any:
     """Judge each channel with a child of the generator; one that has none is named."""
-    if grid is not None:
+    if not _are_datasets(predicted=predicted, measured=measured):
+        return density.jsd_interval(predicted, measured, rng=rng, **settings)
+    if settings.pop("grid", None) is not None:
         raise RequestError("channels of a Dataset have grids of their own; leave grid out.")
     pairs = pair(predicted=predicted, measured=measured)
     p, m = pairs.arrays["predicted"], pairs.arrays["measured"]
@@ -152,9 +128,8 @@ def jsd_interval(
     draws = []
     for column, (name, child) in enumerate(zip(pairs.names, rng.spawn(p.shape[-1]), strict=True)):
         rows = p[..., column].reshape(-1, len(m))
-        how = {"block_length": block_length, "rng": child, **settings}
         with naming(f"channel '{name}'"), warnings.catch_warnings(record=True) as caught:
-            draws.append(density.jsd_interval(rows, m[:, column], **how))
+            draws.append(density.jsd_interval(rows, m[:, column], rng=child, **settings))
         for each in caught:
             warn(f"channel '{name}': {each.message}")
     arrays = ("draws", "noise", "grid", "predicted", "measured")
@@ -171,9 +146,11 @@ def jsd_interval(
     )  # fmt: skip
 
 
-@_labelled(of_arrays.coverage, "lower", "upper", "measured")
-def coverage(lower: xr.Dataset, upper: xr.Dataset, measured: xr.Dataset) -> xr.Dataset:
+@functools.wraps(of_arrays.coverage)
+def coverage(lower: Any, upper: Any, measured: Any) -> Any:
     """Judge the channels of all; one with gaps is named."""
+    if not _are_datasets(lower=lower, upper=upper, measured=measured):
+        return of_arrays.coverage(lower, upper, measured)
     pairs = pair(lower=lower, upper=upper, measured=measured)
     names, lead = pairs.names, pairs.lead
     m = pairs.arrays["measured"]
@@ -197,15 +174,13 @@ def _channels(names: Sequence[str], measured: xr.Dataset) -> dict[str, Any]:
     return {"channel": list(names), "unit": ("channel", units)}
 
 
-@_labelled(of_arrays.coverage_table, "lower", "upper", "measured")
+@functools.wraps(of_arrays.coverage_table)
 def coverage_table(
-    lower: xr.Dataset,
-    upper: xr.Dataset,
-    measured: xr.Dataset,
-    level: float = 0.95,
-    waves: xr.DataArray | None = None,
-) -> xr.Dataset:
+    lower: Any, upper: Any, measured: Any, level: float = 0.95, waves: Any = None
+) -> Any:
     """Judge the channels of all, by parts of the horizon and by wave height."""
+    if not _are_datasets(lower=lower, upper=upper, measured=measured):
+        return of_arrays.coverage_table(lower, upper, measured, level, waves)
     pairs = pair(lower=lower, upper=upper, measured=measured)
     heights = None
     if waves is not None:

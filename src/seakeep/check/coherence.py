@@ -174,7 +174,7 @@ def _bound(
     best = np.argmin(np.where(np.isfinite(error[0]), error[0], np.inf), axis=0), np.arange(size)
     rest = spectra.unexplained().reshape(len(spectra.frequency), -1, size)[:, *best]
     power = spectra.outputs[:, :size]
-    alike = 1 - np.divide(rest, power, out=np.ones_like(power), where=power > 0)
+    alike = 1 - ratio(rest, power, 1.0)
     return np.minimum(error[:, *best], 1.0), np.clip(alike, 0, 1).T
 
 

@@ -172,18 +172,16 @@ def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
     for name, run in still.items():
         values = channel_matrix(run, motions, name)
         values = values[np.isfinite(values).all(axis=1)]
-        spread = dict(zip(model.states, model.signature.state_scale.spread, strict=True))
-        moved = (values - values[-1]) / [spread[each] for each in motions]
+        spread = model.signature.state_scale.spread[[*map(model.states.index, motions)]]
+        moved = (values - values[-1]) / spread
         column = np.argmax(np.abs(moved).max(axis=0))
         first = np.argmax(np.abs(moved[:, column]))
         released = free_decay(values[first:, column], model.dt)
-        numbers = {key: getattr(released, key) for key in ("period", "damping_ratio", "p", "q")}
-        cycles = {
-            "amplitude": ("cycle", released.amplitudes),
-            "decrement": ("cycle", released.decrements),
-        }
-        each = {"motion": motions[column], **numbers, "cycles": released.cycles, **cycles}
-        parts.append(xr.Dataset(each, {"cycle": range(len(released.decrements))}))
+        keys = ("period", "damping_ratio", "p", "q", "cycles")
+        facts = {"motion": motions[column], **{key: getattr(released, key) for key in keys}}
+        cycles = {"amplitude": released.amplitudes, "decrement": released.decrements}
+        facts |= {key: ("cycle", each) for key, each in cycles.items()}
+        parts.append(xr.Dataset(facts, {"cycle": range(released.cycles)}))
     names = xr.Variable("run", list(still))
     return xr.concat(parts, names, join="outer").drop_vars("cycle")
 

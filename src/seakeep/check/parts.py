@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups
+from seakeep.arrays import BoolArray, Datasets, FloatArray, Groups, undefined
 from seakeep.conventions import MOTIONS, in_waves, is_elevation
 from seakeep.errors import DataError, RequestError, SeakeepError, SeakeepWarning, warn
 from seakeep.models import HankelDMDcModel, InputMap, Model, is_ensemble
@@ -61,7 +61,7 @@ class FreeRun(NamedTuple):
 
 
 HERTZ = {"units": "Hz", "long_name": "frequency"}
-Known = dict[tuple[str, str], FreeRun]
+Known = dict[str, dict[str, FreeRun]]
 """Free runs that several checks share, by label of a baseline ("" is the model) and run."""
 
 
@@ -141,12 +141,12 @@ def free_runs(
     DataError
         If no run can be forecast, with the reason of each.
     """
-    known = {} if free is None else free
+    known = ({} if free is None else free).setdefault(label, {})
 
     def played(name: str) -> FreeRun:
-        if (label, name) not in known:
-            known[label, name] = _free_run(model, runs[name], name, (like or {}).get(name))
-        return known[label, name]
+        if name not in known:
+            known[name] = _free_run(model, runs[name], name, (like or {}).get(name))
+        return known[name]
 
     names = runs if like is None else like
     return gathered(names, played, "no run can be forecast.", "left out:")
@@ -180,11 +180,10 @@ def deviations(runs: Mapping[str, FreeRun], kind: str) -> list[FloatArray]:
     return [x - x.mean(axis=0) for x in (getattr(run, kind) for run in runs.values())]
 
 
-def ratio(values: FloatArray, per: FloatArray) -> FloatArray:
-    """Quotient; NaN where nothing is divided by."""
-    out = np.full(values.shape, np.nan)
-    np.divide(values, per, out=out, where=per > 0)
-    return out
+def ratio(values: FloatArray, per: FloatArray, without: float = np.nan) -> FloatArray:
+    """Quotient, and what stands where nothing is divided by."""
+    with undefined():
+        return np.where(per > 0, values / per, without)
 
 
 def no_energy(names: str) -> DataError:
@@ -282,18 +281,17 @@ def _waves_come(run: xr.Dataset, names: Iterable[str]) -> int:
 
 
 def _free_run(model: Model, run: xr.Dataset, name: str, like: FreeRun | None) -> FreeRun:
-    if like is None:
-        at, last = window_of(model, run)
-        time = run["time"].values
-        measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
-        empty = np.full_like(measured, np.nan)
-        like = FreeRun(float(time[at]), time[at + 1 : last + 1], empty, measured)
-    steps = len(like.time)
-    if is_ensemble(model):
-        forecast = model.forecast_summary(run, like.start, steps).sel(statistic="mean")
+    if like:
+        start, time, _, measured = like
     else:
-        forecast = model.forecast(run, like.start, steps)
-    return like._replace(forecast=channel_matrix(forecast, model.states, name))
+        at, last = window_of(model, run)
+        start, time = float(run["time"][at]), run["time"].values[at + 1 : last + 1]
+        measured = channel_matrix(run, model.states, name, slice(at + 1, last + 1))
+    if is_ensemble(model):
+        forecast = model.forecast_summary(run, start, len(time)).sel(statistic="mean")
+    else:
+        forecast = model.forecast(run, start, len(time))
+    return FreeRun(start, time, channel_matrix(forecast, model.states, name), measured)
 
 
 def free_windows(model: Model, run: xr.Dataset, starts: FloatArray, steps: int) -> FloatArray:

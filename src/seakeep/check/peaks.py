@@ -96,9 +96,7 @@ def _law(moved: list[FloatArray], dt: float, duration: float) -> xr.Dataset:
     """Statistics of the deviations of several records of a state; peaks largest first."""
     every, between = [np.empty(0)], [np.empty(0)]  # peaks and zero-crossing periods
     for x in moved:
-        if not np.all(np.isfinite(x)):
-            continue  # a free run that was lost
-        with suppress(SeakeepError):  # a record without waves has no peaks
+        with suppress(SeakeepError):  # without waves, or lost, a free run has no peaks
             crossings = zero_up_crossings(x, dt)
             if crossings.size > 1:
                 every.append(peaks_between(x, crossings / dt))

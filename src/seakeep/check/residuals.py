@@ -123,7 +123,7 @@ def residuals(model: Model, runs: Datasets, free: Known | None = None) -> xr.Dat
         "probability": ("state", probability),
         "one_step": ("state", ratio(np.sqrt(np.mean(whole**2, axis=0)), spread)),
         **_of_free_runs(model, known, period),
-        "age_nrmse": (("state", "age"), ratio(np.sqrt(by_age), spread + 0 * by_age).T),
+        "age_nrmse": (("state", "age"), ratio(np.sqrt(by_age), spread).T),
     }
     if model.inputs:
         past, limit = input_correlation([*zip(every, inputs, strict=True)], lags)

@@ -76,11 +76,11 @@ def worth(
     runs, of = judged(runs)
     own = free_runs(model, runs, free)
     every = {"model": own, **beside(baselines, runs, own, free)}
-    spread = dict(zip(model.states, model.signature.state_scale.spread, strict=True))
+    spread = model.signature.state_scale.spread
 
     def labelled(values: FloatArray, run: xr.Dataset, states: list[str]) -> xr.Dataset:
         return xr.Dataset({
-            s: ("time", values[:, k], {**run[s].attrs, "training_std": spread[s]})
+            s: ("time", values[:, k], {**run[s].attrs, "training_std": spread[k]})
             for k, s in enumerate(model.states)
         })[states]  # fmt: skip
 

@@ -334,10 +334,9 @@ def reading_step(series: npt.ArrayLike) -> float:
     frame = _frame(x)
     steps = []
     for begin, end in stretches(change == 0):  # x[begin] to x[end] are equal
-        if end - begin < max(2, frame):
-            continue
-        steps += [abs(x[begin - frame] - x[begin])] if begin >= frame else []
-        steps += [abs(x[end + frame] - x[end])] if end + frame < x.size else []
+        if end - begin >= max(2, frame):
+            beside = (begin - frame, end + frame)
+            steps += [abs(x[at] - x[begin]) for at in beside if 0 <= at < x.size]
     return float(np.median(steps)) if len(steps) >= LEAST_STEPS else np.nan
 
 

@@ -61,7 +61,7 @@ class Finding:
         Unit of both.
     place : float, optional
         Instant at which it starts, s; None where it concerns the whole record.
-    details : mapping, optional
+    details : dict, optional
         What else the sentence says: numbers and words.
     """
 
@@ -72,24 +72,18 @@ class Finding:
     limit: float | None = None
     unit: str = ""
     place: float | None = None
-    details: Mapping[str, Any] = field(default_factory=dict)
+    details: dict[str, Any] = field(default_factory=dict)
 
     @property
     def text(self) -> str:
         """The sentence: what, how much, and what was done about it."""
-        return self.kind.sentence.format(
-            value=_Quantity(self.value, self.unit),
-            limit=_Quantity(self.limit, self.unit),
-            place=self.place,
-            channel=self.channel,
-            run=self.run,
-            **self.details,
-        )
+        both = {key: _Quantity(getattr(self, key), self.unit) for key in ("value", "limit")}
+        return self.kind.sentence.format(**vars(self) | both | self.details)
 
     @property
     def remedy(self) -> str:
         """What to do about it; empty where nothing is wrong with the campaign file."""
-        return self.kind.remedy.format(run=self.run, channel=self.channel, **self.details)
+        return self.kind.remedy.format(**vars(self) | self.details)
 
 
 class _Quantity:
@@ -166,8 +160,7 @@ def warn_of(
         names = dict.fromkeys(name for e in alike for name in (e.run, e.channel))
         more = [name for name in names if name not in (each.run, each.channel)]
         others = f" ({', '.join(more)} likewise)" if more else ""
-        remedy = f" {each.remedy}" if each.remedy else ""
-        warn(f"{each.run}: {each.channel} {each.text}{others}.{remedy}")
+        warn(f"{each.run}: {each.channel} {each.text}{others}. {each.remedy}".rstrip())
 
 
 Findings = Iterator[Finding]

@@ -108,10 +108,11 @@ def judge_probes(runs: Datasets) -> list[str]:
     """Put such findings beside the others of each run, warn of them, and say which runs changed."""
     found, changed = list(odd_probes(runs)), []
     for name, run in runs.items():
-        own, before = [each for each in found if each.run == name], findings_of(run)
-        rest = [each for each in before if each.kind is not SensorsKind.PROBE]
-        if as_json(own) != as_json(each for each in before if each not in rest):
-            run.attrs["quality"] = as_json([*rest, *own])
+        before = findings_of(run)
+        others = [each for each in before if each.kind is not SensorsKind.PROBE]
+        every = as_json([*others, *(each for each in found if each.run == name)])
+        if every != as_json(before):
+            run.attrs["quality"] = every
             changed.append(name)
     warn_of(found, set())
     return changed

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep.arrays import BoolArray, FloatArray, as_series
+from seakeep.arrays import FloatArray, as_series
 from seakeep.quality.faults import STUCK, find_held
 from seakeep.quality.findings import Findings, Kind, Record, Redundant, channels_of, filled, step_of
 from seakeep.signals import misplaced_probes
@@ -300,9 +300,8 @@ def compare_sensors(
     if not spans:
         return nothing
     error, moved, own = (np.array([z[span].std() for span in spans]) for z in (x - y, y, x))
-    motion, lags = float(np.sqrt(np.mean(moved**2))), windows.lag[_together(windows)]
-    short, _ = moving(0.5 * length)
-    straight = np.unwrap(short.lag[_together(short)], period=period)
+    motion, lags = float(np.sqrt(np.mean(moved**2))), _telling(windows)
+    straight = np.unwrap(_telling(moving(0.5 * length)[0]), period=period)
     middle = float(np.median(lags))
     return Agreement(
         period=period,
@@ -319,7 +318,7 @@ def compare_sensors(
     )
 
 
-def _together(lags: Lags) -> BoolArray:
-    """Windows in which the two go together: elsewhere a lag says nothing."""
+def _telling(lags: Lags) -> FloatArray:
+    """Lags of the windows in which the two go together, of all where these are few."""
     alike = lags.correlation >= 0.6
-    return alike if alike.sum() > 3 else np.ones(alike.size, dtype=bool)
+    return lags.lag[alike] if alike.sum() > 3 else lags.lag

@@ -87,8 +87,7 @@ class Expression:
             out = self.of(arrays.__getitem__)
         # Of means alone it is one number.
         result = np.array(np.broadcast_to(out, arrays[self.channels[0]].shape))
-        if not np.all(np.isfinite(result)):
-            bad = np.flatnonzero(~np.isfinite(result))
+        if (bad := np.flatnonzero(~np.isfinite(result))).size:
             raise DataError(
                 f"the expression {self.text!r} gives {bad.size} value(s) that are not finite, the "
                 f"first at sample {bad[0]}. Look for a division by zero, the root of a negative "

@@ -63,7 +63,7 @@ def lowpass_taps(
         # Distances of the gain from one in the pass band and from zero in the stop band.
         points = 64 * taps.size
         gain, frequency = np.abs(np.fft.rfft(taps, points)), np.fft.rfftfreq(points)
-        at_edges = np.abs(np.exp(-2j * np.pi * np.outer(edges, np.arange(taps.size))) @ taps)
+        at_edges = np.abs(scipy.signal.freqz(taps, worN=edges, fs=1.0)[1])
         passing = np.append(gain[frequency <= edges[0]], at_edges[0])
         stopped = np.append(gain[frequency >= edges[1]], at_edges[1])
         if max(np.abs(passing - 1).max(), stopped.max()) <= 10 ** (-attenuation / 20):

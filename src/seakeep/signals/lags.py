@@ -92,11 +92,9 @@ def _peak(stretch: FloatArray, reference: FloatArray, reach: int) -> tuple[float
     length = reference.size
     views = np.lib.stride_tricks.sliding_window_view(stretch, length)
     centred = reference - reference.mean()
-    scale = np.sqrt(centred @ centred)
-    spread = views.std(axis=1) * np.sqrt(length)
-    moving = (spread > 0) & (scale > 0)
+    power = views.std(axis=1) * np.sqrt(length) * np.sqrt(centred @ centred)
     with undefined():
-        coefficient = np.where(moving, (views @ centred) / (spread * scale), np.nan)
+        coefficient = np.where(power > 0, (views @ centred) / power, np.nan)
     if not np.isfinite(coefficient).any():
         return np.nan, np.nan
     best = int(np.nanargmax(coefficient))

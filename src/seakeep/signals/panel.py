@@ -30,13 +30,14 @@ EDGE, CLEAR = 5, 11
 """Sides of the squares by which a component grows to take in its edge, and to leave it behind."""
 CORNERS = ("left_top", "left_bottom", "right_top", "right_bottom")
 """Fields that say how much of each corner is seen."""
-FIELDS = ("x", "y", "angle", "length", "height", "area", "fill", "cut", "saturation", "brightness",
-          *CORNERS, "picture", "lamp")  # fmt: skip
-"""Measurements of a frame: centroid, pixels; orientation of the long axis, rad in (−π/2, π/2],
+SIDES = ("panel_length", "panel_height")
+PANEL = ("centroid_x", "centroid_y", "panel_angle", *SIDES, "panel_area", "panel_fill")
+"""Measurements of the panel: centroid, pixels; orientation of the long axis, rad in (−π/2, π/2],
 positive clockwise as seen; sides of the rectangle of the same second moments; pixels, holes
-included; area by that of the smallest rectangle around it; one where it touches the border of the
-region; saturated pixels; mean of the colours; part seen of squares of half the rectangle's height
-at its corners."""
+included; area by that of the smallest rectangle around it."""
+FIELDS = (*PANEL, "cut", "saturation", "brightness", *CORNERS, "picture", "lamp")
+"""Measurements of a frame: further, one where the panel touches the border of the region; saturated
+pixels; mean of the colours; part seen of squares of half the rectangle's height at its corners."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,7 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     left, top, width, height = how.region or (0, 0, frame.shape[1], frame.shape[0])
     part = frame[top : top + height, left : left + width]
     panel = {
-        "area": 0.0,
+        "panel_area": 0.0,
         "cut": 0.0,
         "saturation": cv2.countNonZero(cv2.inRange(part, (SATURATED,) * 3, (255,) * 3)),
         "brightness": np.mean(cv2.mean(part)[:3]),
@@ -169,13 +170,13 @@ def find_panel(frame: Image, how: TrackingSettings) -> dict[str, float]:
     _, sides, _ = cv2.minAreaRect(outline)  # runs through the centres of the outermost pixels
     cut = min(x, y) == 0 or x + wide == mask.shape[1] or y + high == mask.shape[0]
     return panel | {
-        "x": left + x0 + centre[0],
-        "y": top + y0 + centre[1],
-        "angle": angle,
-        "length": long_side,
-        "height": short_side,
-        "area": area,
-        "fill": area / ((sides[0] + 1.0) * (sides[1] + 1.0)),
+        "centroid_x": left + x0 + centre[0],
+        "centroid_y": top + y0 + centre[1],
+        "panel_angle": angle,
+        "panel_length": long_side,
+        "panel_height": short_side,
+        "panel_area": area,
+        "panel_fill": area / ((sides[0] + 1.0) * (sides[1] + 1.0)),
         "cut": cut,
         **_corners(weights, centre, angle, long_side, short_side),
     }

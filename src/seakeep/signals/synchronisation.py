@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
+from scipy.interpolate import CubicSpline
 
 from seakeep.arrays import ArrayLike, FloatArray, IntArray, as_real
 from seakeep.errors import DataError, RequestError
@@ -84,12 +85,11 @@ class Clock:
         """One line for people: offset and drift with their errors, and where they come from."""
         if not self.known:
             return self.method
-        doubt = [1e3 * self.offset_error, 1e6 * self.drift_error]
-        errors = [f" ± {doubt[0]:.2f}", f" ± {doubt[1]:.1f}"] if np.isfinite(doubt[1]) else ["", ""]
-        return (
-            f"{1e3 * self.offset:+z.2f}{errors[0]} ms, {1e6 * self.drift:+z.1f}{errors[1]} ppm "
-            f"({self.method}, n = {self.count})"
-        )
+        offset, drift = f"{1e3 * self.offset:+z.2f}", f"{1e6 * self.drift:+z.1f}"
+        if np.isfinite(self.drift_error):
+            offset += f" ± {1e3 * self.offset_error:.2f}"
+            drift += f" ± {1e6 * self.drift_error:.1f}"
+        return f"{offset} ms, {drift} ppm ({self.method}, n = {self.count})"
 
     def with_drift(self, drift: float, why: str) -> Clock:
         """Clock of another drift, which reads the same in the middle of what this rests on."""
@@ -195,7 +195,7 @@ def clock_from_pulses(
     pulses = [find_pulses(*side, name) for side, name in zip(sides, names, strict=True)]
     *chosen, modulus = match_pulses(pulses[0][0], pulses[1][0], expected_offset)
     matched = [centres[at] for (centres, _), at in zip(pulses, chosen, strict=True)]
-    fast = int(np.median(np.diff(sides[1][1])) <= np.median(np.diff(sides[0][1])))
+    fast = int(usual_step(sides[1][1]) <= usual_step(sides[0][1]))
     template = pulse_template(*sides[fast], pulses[fast][1], matched[fast])
     timed = [time_pulses(*side, at, template) for side, at in zip(sides, matched, strict=True)]
     (own, reference), errors = (np.stack(each) for each in zip(*timed, strict=True))
@@ -258,8 +258,8 @@ def clock_from_correlation(
         )
     grid = begin + step * np.arange(int((end - begin) / step + 1e-9) + 1)
     lags = windowed_lags(
-        scipy.interpolate.CubicSpline(c, a)(grid),
-        scipy.interpolate.CubicSpline(t, b)(grid),
+        CubicSpline(c, a)(grid),
+        CubicSpline(t, b)(grid),
         step,
         window,
         largest_lag,
@@ -307,10 +307,10 @@ def clock_from_shared(
     a, c = record(series, time, "the logger")
     b, t = record(reference, reference_time, "the reference")
     offset, rate = first.offset, 1 + first.drift
-    turned = np.median(np.diff(c)) < np.median(np.diff(t))  # the spline is of the faster one
+    turned = usual_step(c) < usual_step(t)  # the spline is of the faster one
     if turned:
         (a, c), (b, t), offset, rate = (b, t), (a, c), -offset / rate, 1 / rate
-    other = scipy.interpolate.CubicSpline(t, b)
+    other = CubicSpline(t, b)
     centre = float(c.mean())
     for _ in range(6):
         instants = (c - offset) / rate
@@ -487,8 +487,8 @@ def match_pulses(
     if first.size < max(1, min(own.size, reference.size) // 3):
         raise DataError(
             f"of {own.size} pulses of the logger and {reference.size} of the reference only "
-            f"{first.size} fit together; the former come every {np.median(np.diff(own)):.4g} s, "
-            f"the latter every {np.median(np.diff(reference)):.4g} s. Check that both columns hold "
+            f"{first.size} fit together; the former come every {usual_step(own):.4g} s, "
+            f"the latter every {usual_step(reference):.4g} s. Check that both columns hold "
             "the same trigger, and the unit of both times."
         )
     return first, second, modulus
@@ -496,7 +496,7 @@ def match_pulses(
 
 def pulse_template(
     trigger: FloatArray, time: FloatArray, width: float, centres: FloatArray
-) -> scipy.interpolate.CubicSpline:
+) -> CubicSpline:
     """Mean pulse of a record over the time from its centre, 1.5 widths to each side."""
     step = usual_step(time)
     count = math.ceil(1.5 * width / step) + 2
@@ -505,14 +505,14 @@ def pulse_template(
     inside = (centres + away[0] >= time[0]) & (centres + away[-1] <= time[-1])
     whole = centres[inside] if inside.any() else centres
     mean = np.interp(whole[:, None] + away, time, x).mean(axis=0)
-    return scipy.interpolate.CubicSpline(away, mean - np.median(x))
+    return CubicSpline(away, mean - np.median(x))
 
 
 def time_pulses(
     trigger: FloatArray,
     time: FloatArray,
     centres: FloatArray,
-    template: scipy.interpolate.CubicSpline,
+    template: CubicSpline,
 ) -> tuple[FloatArray, FloatArray]:
     """Instants of pulses and their standard errors, s; NaN where the fit fails.
 

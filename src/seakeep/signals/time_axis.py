@@ -399,10 +399,8 @@ def bridge(series: ArrayLike, dt: float, longest: float) -> Bridged:
         kind[begin:end] = True
         # Four samples on either side, spread over a gap's own length so that noise counts less.
         hop = max(1, (end - begin) // 4)
-        left = begin - 1 - hop * np.arange(4)
-        right = end + hop * np.arange(4)
-        near = np.concatenate([left[left >= 0][::-1], right[right < x.size]])
-        near = near[~missing[near]]
+        near = np.concatenate([begin - 1 - hop * np.arange(4)[::-1], end + hop * np.arange(4)])
+        near = np.intersect1d(near, there)
         if inner and near.size >= 2:
             filled[begin:end] = scipy.interpolate.PchipInterpolator(near, x[near])(
                 np.arange(begin, end)

@@ -25,7 +25,16 @@ from seakeep.arrays import BoolArray, FloatArray, IntArray, Progress
 from seakeep.errors import DataError, RequestError, warn
 from seakeep.files import existing_file
 from seakeep.signals.filters import low_pass
-from seakeep.signals.panel import CORNERS, FIELDS, Image, TrackingSettings, find_panel, opencv
+from seakeep.signals.panel import (
+    CORNERS,
+    FIELDS,
+    PANEL,
+    SIDES,
+    Image,
+    TrackingSettings,
+    find_panel,
+    opencv,
+)
 from seakeep.signals.time_axis import stretches
 from seakeep.toml import packaged
 
@@ -115,7 +124,7 @@ class _Video:
             stamp = 1e-3 * self.capture.get(cv2.CAP_PROP_POS_MSEC)
             first = stamp if count == 0 else first
             number = round((stamp - first) * self.rate)
-            if not np.isfinite(stamp) or (count and stamp <= first):
+            if count and stamp <= first:
                 number = previous + 1  # a container without time stamps
             if number <= previous:
                 raise DataError(
@@ -200,7 +209,7 @@ def track_video(
         _check_fit(video, how)
         seen = _measure(video, how, progress)
         size, rate = video.size, video.rate
-    count = seen["area"].size
+    count = seen["panel_area"].size
     if count < 2:
         raise DataError(f"{path} holds one frame; a motion needs at least two. Export it again.")
     usual = _usual_panel(seen, how, str(path))
@@ -216,12 +225,9 @@ def track_video(
             "distorts."
         )
     motion, bridged = _motions(seen, flag == FLAGS["good"], usual, how, rate, str(path))
-    panel = ("angle", "length", "height", "area", "fill")
     channels: dict[str, npt.NDArray[Any]] = {
         **motion,
-        "centroid_x": seen["x"],
-        "centroid_y": seen["y"],
-        **{f"panel_{name}": seen[name] for name in panel},
+        **{name: seen[name] for name in PANEL},
         "saturation": seen["saturation"] / pixels,
         "quality": quality,
         "bridged": bridged.astype(np.int8),
@@ -237,8 +243,7 @@ def track_video(
         "frame_rate": rate,
         "metres_per_pixel": usual["scale"],
         "calibration": "stated" if how.metres_per_pixel else "size of the panel",
-        "panel_length_seen": usual["length"],
-        "panel_height_seen": usual["height"],
+        **{f"{side}_seen": usual[side] for side in SIDES},
         "settings": json.dumps(asdict(how)),
     }
     return Track(np.arange(count) / rate, channels, attributes)
@@ -309,12 +314,13 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
     of the corner seen least.
     """
     panel, known = how.panel, how.metres_per_pixel
-    aspect = (seen["length"] / seen["height"]) / (panel[0] / panel[1])
-    like = (abs(aspect - 1) < ASPECT_BAND) & (seen["fill"] > LEAST_FILL) & (seen["cut"] == 0)
+    length, height = (seen[side] for side in SIDES)
+    aspect = (length / height) / (panel[0] / panel[1])
+    like = (abs(aspect - 1) < ASPECT_BAND) & (seen["panel_fill"] > LEAST_FILL) & (seen["cut"] == 0)
     if known:
-        like &= abs(seen["length"] / (panel[0] / known) - 1) < SIZE_BAND
+        like &= abs(length / (panel[0] / known) - 1) < SIZE_BAND
     if not like.any():
-        there, wanted = seen["area"] > 0, f"{panel[0]:g} × {panel[1]:g} m"
+        there, wanted = seen["panel_area"] > 0, f"{panel[0]:g} × {panel[1]:g} m"
         if known:
             wanted += f", {panel[0] / known:.0f} × {panel[1] / known:.0f} pixels"
         why = (
@@ -322,9 +328,9 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
             "(lower; --threshold), or correct the region."
         )
         if there.any():
-            length, height = (np.median(seen[side][there]) for side in ("length", "height"))
             why = (
-                f"the largest bright component measures {length:.0f} × {height:.0f} pixels "
+                "the largest bright component measures "
+                f"{np.median(length[there]):.0f} × {np.median(height[there]):.0f} pixels "
                 f"(median of {there.sum()} frames), which is not its shape. Raise the least red, "
                 "green and blue (lower; --threshold), state a region that holds no other bright "
                 "thing, or correct the panel's size."
@@ -335,7 +341,7 @@ def _usual_panel(seen: Seen, how: TrackingSettings, name: str) -> dict[str, floa
     usual = {field: float(np.median(values[like])) for field, values in seen.items()}
     lowest = np.min([seen[corner][like] - usual[corner] for corner in CORNERS], axis=0)
     usual["corner_noise"] = 1.4826 * np.median(abs(lowest - np.median(lowest)))
-    square = panel[0] * panel[1] / (usual["length"] * usual["height"])
+    square = panel[0] * panel[1] / (usual["panel_length"] * usual["panel_height"])
     usual["scale"] = known or np.sqrt(square)
     return usual
 
@@ -348,14 +354,15 @@ def _judge(
     Quality is one less half the largest deviation in units of what is allowed: at 0.5 and above
     the shape is good; 0 where there is nothing to see. A flagged frame has less than 0.5.
     """
-    tolerance, panel_area = how.tolerance * usual["length"], usual["length"] * usual["height"]
+    length, height = (usual[side] for side in SIDES)
+    tolerance, panel_area = how.tolerance * length, length * height
     less = {field: usual[field] - values for field, values in seen.items()}
     drop = max(CORNER_DROP, CORNER_NOISE * usual["corner_noise"])
     hidden = np.max([less[corner] for corner in CORNERS], axis=0) / drop
-    sides = (abs(less[side]) / tolerance for side in ("length", "height"))
-    shape = np.max([hidden, *sides, less["fill"] / FILL_DROP], axis=0)
+    sides = (abs(less[side]) / tolerance for side in SIDES)
+    shape = np.max([hidden, *sides, less["panel_fill"] / FILL_DROP], axis=0)
     shape[np.isnan(shape)] = np.inf
-    cut, area, excess = seen["cut"] > 0, seen["area"], np.nan_to_num(-less["saturation"])
+    cut, area, excess = seen["cut"] > 0, seen["panel_area"], np.nan_to_num(-less["saturation"])
     off, glare = (shape > 1) | cut, excess > GLARE * panel_area
     brighter = seen["brightness"] > BRIGHTER * usual["brightness"]
     kinds = {
@@ -370,7 +377,7 @@ def _judge(
     reach = how.max_speed * step * NEIGHBOURS / usual["scale"] + tolerance
     at = np.flatnonzero(flag == FLAGS["good"])
     if at.size >= NEIGHBOURS:
-        place = np.stack([seen["x"][at], seen["y"][at]])
+        place = np.stack([seen["centroid_x"][at], seen["centroid_y"][at]])
         middle = scipy.ndimage.median_filter(place, (1, NEIGHBOURS), mode="nearest")
         flag[at[np.hypot(*(place - middle)) > reach]] = FLAGS["jump"]
     quality = np.clip(1.0 - 0.5 * shape, 0.0, 1.0)
@@ -387,11 +394,11 @@ def _motions(
 ) -> tuple[dict[str, FloatArray], BoolArray]:
     """Surge, heave and pitch of the centre of gravity, filtered, and what was bridged."""
     side = 1.0 if how.downstream == "right" else -1.0
-    pitch = side * seen["angle"] - how.camera_pitch
+    pitch = side * seen["panel_angle"] - how.camera_pitch
     (along, up), scale = how.panel_place, usual["scale"]
     # Where the panel's centre would be if the vessel had turned about its centre of gravity alone.
-    x = side * scale * seen["x"] - along * np.cos(pitch) - up * np.sin(pitch)
-    z = -scale * seen["y"] + along * np.sin(pitch) - up * np.cos(pitch)
+    x = side * scale * seen["centroid_x"] - along * np.cos(pitch) - up * np.sin(pitch)
+    z = -scale * seen["centroid_y"] + along * np.sin(pitch) - up * np.cos(pitch)
     table = np.stack([x, z, pitch], axis=1)
     if how.origin:
         table[:, :2] -= side * scale * how.origin[0] - along, -scale * how.origin[1] - up
