@@ -9,7 +9,6 @@ puts those of all units side by side, along models and training sets.
 from __future__ import annotations
 
 import json
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -23,6 +22,7 @@ import xarray as xr
 from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
 from seakeep.conventions import is_elevation
 from seakeep.core import embed, metrics
+from seakeep.core.calibration import ConformalMargin
 from seakeep.errors import DataError, SeakeepError, warn
 from seakeep.executor import WorkerLostError, as_finished, versions
 from seakeep.formats.columns import decoding
@@ -47,7 +47,6 @@ from seakeep.study.judge import (
 )
 from seakeep.study.plan import (
     Plan,
-    TestWindow,
     make_plan,
     named,
     parts_of,
@@ -117,18 +116,12 @@ def run_study(
     hand_on = finished or (lambda result: None)
     folder = UnitFolder(out, study.digest)
     folder.check()
-    if (result := _finished(study, out, report)) is not None:
-        labels = _labels(study)
-        if any(result.attrs[key] != value for key, value in labels.items()):
-            return write_result(out, {**result.attrs, **labels}, result.groups, hand_on)
-        hand_on(result)
-        return result
-    plan = make_plan(study, named(report, "preparing "))
-    warn_of_slow_study(plan)
-    folder.open(study.name)
     with folder.alone():
-        result = _finished(study, out, report)  # by another process, meanwhile
+        labels, result = _labels(study), _finished(study, out)
         if result is None:
+            plan = make_plan(study, named(report, "preparing "))
+            warn_of_slow_study(plan)
+            folder.open(study.name)
             facts = facts_of(study, plan)
             computed = _computed(plan, facts, folder, executor, report)
             report(len(computed), len(computed), "statistics and densities")
@@ -140,23 +133,22 @@ def run_study(
             if "statistics/lost" in groups:
                 warn(words_of_lost(groups["statistics/lost"]))
             groups |= extra or {}
-            attributes = {**_labels(study), **_attributes(study, plan), **(notes or {})}
+            attributes = {**labels, **_attributes(study, plan), **(notes or {})}
             result = write_result(out, attributes, groups, hand_on)
         else:
-            hand_on(result)
+            report(1, 1, "finished before")
+            if labels.items() <= result.attrs.items():
+                hand_on(result)
+            else:
+                result = write_result(out, {**result.attrs, **labels}, result.groups, hand_on)
         folder.clear()
     return result
 
 
-def _finished(study: Study, out: Path, report: Progress) -> StudyResult | None:
+def _finished(study: Study, out: Path) -> StudyResult | None:
     """The result of an earlier run, if there is one of the same study."""
-    if not (out / RESULT).exists():
-        return None
-    result = read_result(out)
-    if result.attrs.get("digest") != study.digest:
-        return None
-    report(1, 1, "finished before")
-    return result
+    result = read_result(out) if (out / RESULT).exists() else None
+    return result if result and result.attrs.get("digest") == study.digest else None
 
 
 def _labels(study: Study) -> dict[str, str]:
@@ -193,14 +185,14 @@ def _computed(
     units = units_of(plan)
     known = {unit: folder.read(unit.name) for unit in units}
     done = {unit: groups for unit, groups in known.items() if groups is not None}
-    items = deque(tasks_of(plan, [unit for unit in units if unit not in done]))
+    tasks = tasks_of(plan, [unit for unit in units if unit not in done])
     members = sum(each.spec.n_members for each in plan.models.values())
     steps = [w.steps for each in plan.training for w in plan.windows if each.may_test(w.run)]
     mebibytes = 8 * members * sum(steps) * len(plan.states) / 2**20
     taken = f"{members * len(steps)} forecasts of {mebibytes:.3g} MiB"
     report(len(done), len(units), f"fitting and forecasting, {taken}")
     try:
-        for task, computed in as_finished(compute_task, (plan, facts), items, executor):
+        for task, computed in as_finished(compute_task, (plan, facts), tasks, executor):
             for unit, groups in zip(task, computed, strict=True):
                 folder.write(unit.name, groups)
                 done[unit] = groups
@@ -441,13 +433,13 @@ def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
         ).values()
     ]
     nothing = np.full(len(plan.states), np.nan)
-    keys = ("margin", "blocks", "warranted")
-    out: dict[str, Any] = dict.fromkeys(keys, ("channel", nothing))
-    floor: FloatArray | None = nothing
-    law: FloatArray | None = np.tile(nothing, (4, 1))
+    unknown = ConformalMargin(nothing, nothing, nothing, nothing, statistics.level)
+    learnt: Any = unknown, nothing, [nothing] * 4
     if judged:
-        margin, floor, law = learn_margin(judged, statistics.level, statistics.scale)
-        out = {key: ("channel", getattr(margin, key)) for key in keys}
+        learnt = learn_margin(judged, statistics.level, statistics.scale)
+    margin, floor, law = learnt
+    keys = ("margin", "blocks", "warranted")
+    out: dict[str, Any] = {key: ("channel", getattr(margin, key)) for key in keys}
     out["windows"] = sum(len(each.measured) for each in judged)
     if statistics.scale != "constant":
         out["floor"] = ("channel", floor)
@@ -502,55 +494,46 @@ def facts_of(study: Study, plan: Plan) -> Groups:
         channel), ``judged``, ``start``, ``run``, moments of the training, ``noise_std`` and, with
         an elevation among the inputs, ``wave_height``.
     """
-    tested = {window.run: plan.runs[window.run] for window in plan.windows}
-    known = {"measured": {name: _columns(plan, run) for name, run in tested.items()}}
-    if (waves := next(filter(is_elevation, plan.inputs), None)) is not None:
-        known["wave_height"] = {n: _heights(run[waves], plan.dt) for n, run in tested.items()}
-    if (folder := study.truth_folder) is not None:
-        known["truth"] = {name: _truth(folder, plan, name) for name in tested}
+    known = {each.run: _known_of(study, plan, each.run) for each in plan.windows}
     taught = [parts_of(plan.runs, each.spans).values() for each in plan.training]
     pooled = [np.concatenate([_columns(plan, each) for each in of]).T.copy() for of in taught]
-    out, dims = {}, ("window", "time", "channel")
+    out = {}
     for test, windows in plan.tests.items():
-        series = {key: _cut(plan, each, windows) for key, each in known.items()}
-        noise = [
-            [tested[each.run][name].attrs.get("noise_std", 0.0) for name in plan.states]
-            for each in windows
-        ]
-        out[test] = xr.Dataset(
-            {
-                **{key: (dims[: each.ndim], each) for key, each in series.items()},
-                "judged": (
-                    ("training", "window"),
-                    [[each.may_test(w.run) for w in windows] for each in plan.training],
-                ),
-                "start": ("window", [each.start for each in windows]),
-                "run": ("window", [each.run for each in windows]),
-                "training_mean": (("training", "channel"), [x.mean(axis=1) for x in pooled]),
-                "training_std": (("training", "channel"), [x.std(axis=1, ddof=1) for x in pooled]),
-                "noise_std": (("window", "channel"), noise),
-            },
-            coords={
-                "model": list(plan.models),
-                "ensemble": plan.ensembles,
-                "measure": list(MEASURES),
-                "band": list(BANDS),
-                "training": [each.name for each in plan.training],
-                "window": range(len(windows)),
-                "time": ("time", plan.dt * np.arange(1, windows[0].steps + 1), {"units": "s"}),
-                "channel": list(plan.states),
-            },
+        cut = []
+        for each in windows:
+            at = int(np.argmin(np.abs(plan.runs[each.run]["time"].values - each.start))) + 1
+            cut.append(known[each.run].isel(time=slice(at, at + each.steps)))
+        judged = [[each.may_test(w.run) for w in windows] for each in plan.training]
+        out[test] = xr.concat(cut, "window", data_vars="all").assign(
+            judged=(("training", "window"), judged),
+            start=("window", [each.start for each in windows]),
+            training_mean=(("training", "channel"), [x.mean(axis=1) for x in pooled]),
+            training_std=(("training", "channel"), [x.std(axis=1, ddof=1) for x in pooled]),
+        )
+        out[test] = out[test].assign_coords(
+            model=list(plan.models),
+            ensemble=plan.ensembles,
+            measure=list(MEASURES),
+            band=list(BANDS),
+            training=[each.name for each in plan.training],
+            window=range(len(windows)),
+            time=("time", plan.dt * np.arange(1, windows[0].steps + 1), {"units": "s"}),
+            channel=list(plan.states),
         )
     return out
 
 
-def _cut(plan: Plan, whole: Mapping[str, FloatArray], windows: Sequence[TestWindow]) -> FloatArray:
-    """Samples of arrays over the time of runs that windows forecast."""
-    parts = []
-    for each in windows:
-        at = int(np.argmin(np.abs(plan.runs[each.run]["time"].values - each.start))) + 1
-        parts.append(whole[each.run][at : at + each.steps])
-    return np.stack(parts)
+def _known_of(study: Study, plan: Plan, name: str) -> xr.Dataset:
+    """What a run says without any model, at its instants."""
+    run = plan.runs[name]
+    noise = [run[each].attrs.get("noise_std", 0.0) for each in plan.states]
+    known: dict[str, Any] = {"measured": (("time", "channel"), _columns(plan, run))}
+    known |= {"run": name, "noise_std": ("channel", noise)}
+    if (waves := next(filter(is_elevation, plan.inputs), None)) is not None:
+        known["wave_height"] = "time", _heights(run[waves], plan.dt)
+    if (folder := study.truth_folder) is not None:
+        known["truth"] = ("time", "channel"), _truth(folder, plan, name)
+    return xr.Dataset(known)
 
 
 def _columns(plan: Plan, run: xr.Dataset) -> FloatArray:
