@@ -54,7 +54,6 @@ def in_order(
     items: Sequence[Item],
     executor: Executor | None = None,
     progress: Progress | None = None,
-    what: str = "member",
 ) -> Iterator[Result]:
     """Yield ``function(data, item)`` for each item, in the order of the items."""
     size = max(-(-len(items) // BATCHES), 1) if executor else 1
@@ -63,7 +62,7 @@ def in_order(
     results = (result for _, piece in pieces for result in piece)
     for done, result in enumerate(results, start=1):
         if progress:
-            progress(done, len(items), f"{what} {done}")
+            progress(done, len(items), f"member {done}")
         yield result
 
 

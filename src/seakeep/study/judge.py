@@ -23,7 +23,7 @@ from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.density import jsd_intervals
 from seakeep.core.metrics import over_channels, paired, root_mean_square
 from seakeep.core.spectra import split_bands
-from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
+from seakeep.errors import DataError, SeakeepError, SeakeepWarning, warn
 from seakeep.executor import in_order
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
@@ -425,9 +425,7 @@ def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
     mean = test["mean"].sel(model=model).values
     count = int(judged.sum(axis=0).min())
     rows = np.argsort(~judged, axis=0, kind="stable")[:count]
-    windows = np.arange(judged.shape[1])
-    picked = np.stack([mean[row, windows] for row in rows])
-    picked = picked.reshape(count, -1, mean.shape[-1])
+    picked = mean[rows, np.arange(judged.shape[1])].reshape(count, -1, mean.shape[-1])
     whole = np.isfinite(picked).all(axis=(1, 2))
     measured = test["measured"].values.reshape(-1, mean.shape[-1])
     return picked[whole], measured, int(np.count_nonzero(~whole))
@@ -510,7 +508,7 @@ def _channel_densities(
                     rng=random_stream(settings.study.seed, f"jsd.{name}.{variant}.{channel}"),
                     n_series=settings.statistics.n_series,
                 )
-    except (DataError, RequestError) as error:
+    except SeakeepError as error:
         return str(error)
     tables = [
         [[getattr(each, number) for number in DIVERGENCE] for each in of_model]
@@ -547,13 +545,13 @@ def regular_response(groups: Datasets, test: str) -> xr.Dataset:
     the measurement, degrees.
     """
     data = groups[f"tests/{test}"]
-    squares, answer = (each[..., data["judged"].values, :] for each in _responses(groups, test))
+    squares, answer = _responses(groups, test)
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         # A constant forecast has no phase, and nothing judged no mean.
         warnings.simplefilter("ignore", RuntimeWarning)
-        errors = np.sqrt(np.nanmean(np.maximum(squares, 0.0), axis=2))
-        phase = np.degrees(np.angle(np.nanmean(answer / np.abs(answer), axis=1)))
-        ratio = np.nanmedian(np.abs(answer), axis=1)
+        errors = np.sqrt(np.nanmean(np.maximum(squares, 0.0), axis=(2, 3)))
+        phase = np.degrees(np.angle(np.nanmean(answer / np.abs(answer), axis=(1, 2))))
+        ratio = np.nanmedian(np.abs(answer), axis=(1, 2))
     coords = {"model": data["model"], "channel": data["channel"]}
     return numbered([*errors, ratio, phase], ("number", "model", "channel"), RESPONSE, coords)
 

@@ -173,8 +173,8 @@ def choose_training(
         )
     if training.scheme == "pooled":
         return (TrainingSet("pooled", tuple(whole.values())),)
-    rng, remedy = random_stream(settings.study.seed, "training"), "shorten the training length"
-    places = _places("training", training, spans, needed, needs.snapshots, rng, remedy)
+    seed, remedy = settings.study.seed, "shorten the training length"
+    places = _places("training", training, spans, needed, needs.snapshots, seed, remedy)
     return tuple(
         TrainingSet(f"t{number:02d}", (part(*place),)) for number, place in enumerate(places)
     )
@@ -186,7 +186,7 @@ def _places(
     spans: Mapping[str, tuple[int, int]],
     needed: int,
     width: int,
-    rng: np.random.Generator,
+    seed: int,
     remedy: str,
 ) -> list[tuple[str, int]]:
     """Feasible last samples in random order; with 'apart' no two within `width` samples."""
@@ -202,7 +202,7 @@ def _places(
             f"{table}.windows: {count} windows were asked for and {len(every)} are feasible. Ask "
             f"for fewer, or {remedy}."
         )
-    return [every[i] for i in rng.permutation(len(every))[:count]]
+    return [every[i] for i in random_stream(seed, table).permutation(len(every))[:count]]
 
 
 def choose_tests(
@@ -235,8 +235,7 @@ def choose_tests(
             f"{max(longest, 0)} samples after {needs.history} of delay history and the start-up. "
             f"Reduce length or startup{at_most}, or give longer runs."
         )
-    rng = random_stream(seed, f"tests.{name}")
-    places = _places(f"tests.{name}", test, spans, steps + 1, steps, rng, "reduce length")
+    places = _places(f"tests.{name}", test, spans, steps + 1, steps, seed, "reduce length")
     return tuple(
         TestWindow(each, float(runs[each]["time"].values[last - steps]), steps)
         for each, last in sorted(places, key=lambda place: (names.index(place[0]), place[1]))
