@@ -146,13 +146,12 @@ def _training(plan: Plan) -> xr.Dataset:
 
 def _runs(plan: Plan) -> xr.Dataset:
     """Waves and spans of each run, and the part of the time at which its lines are slack."""
-    waves = next(filter(is_elevation, plan.inputs), None)
     names = [*plan.states, *plan.inputs]
     rows, slack = [], []
     for key, run in plan.runs.items():
         facts, frequency = run.attrs, np.nan
-        if waves is not None and facts.get("waves") == "regular":
-            elevation = between(run, whole_span(run))[waves].values
+        if plan.waves is not None and facts.get("waves") == "regular":
+            elevation = between(run, whole_span(run))[plan.waves].values
             frequency = dominant_frequency(elevation, plan.dt)
         train, test = (facts.get(f"{use}_span", (np.nan, np.nan)) for use in ("train", "test"))
         rows.append(
@@ -181,7 +180,7 @@ def _runs(plan: Plan) -> xr.Dataset:
 
 def _spectra(plan: Plan) -> xr.Dataset | None:
     """Spectra of the first wave elevation in all runs, as the paper and as recommended."""
-    waves = next(filter(is_elevation, plan.inputs), None)
+    waves = plan.waves
     if waves is None:
         return None
 

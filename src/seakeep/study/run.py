@@ -12,6 +12,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -20,8 +21,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
-from seakeep.conventions import is_elevation
-from seakeep.core import embed, metrics
+from seakeep.core import metrics
 from seakeep.core.calibration import ConformalMargin
 from seakeep.errors import DataError, SeakeepError, warn
 from seakeep.executor import WorkerLostError, as_finished, versions
@@ -30,10 +30,11 @@ from seakeep.models.calibration import envelope_of, held_out, learn_margin
 from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.forecasts import STATISTICS, reduce_members
+from seakeep.models.labelled import channel_matrix, nearest_sample
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
-from seakeep.models.training import gather
+from seakeep.models.training import gather, system_of
 from seakeep.signals import envelope_squared
 from seakeep.study.describe import describe_study, words_of_repeats
 from seakeep.study.judge import (
@@ -113,12 +114,14 @@ def run_study(
     """
     out = Path(out)
     report = progress or (lambda done, total, what: None)
-    hand_on = finished or (lambda result: None)
     folder = UnitFolder(out, study.digest)
     folder.check()
     with folder.alone():
-        labels, result = _labels(study), _finished(study, out)
-        if result is None:
+        labels, before = _labels(study), _finished(study, out)
+        if before is not None:
+            report(1, 1, "finished before")
+            result = replace(before, attrs={**before.attrs, **labels})
+        else:
             plan = make_plan(study, named(report, "preparing "))
             warn_of_slow_study(plan)
             folder.open(study.name)
@@ -132,15 +135,12 @@ def run_study(
             groups |= judge(groups, study.settings, list(plan.states), executor)
             if "statistics/lost" in groups:
                 warn(words_of_lost(groups["statistics/lost"]))
-            groups |= extra or {}
             attributes = {**labels, **_attributes(study, plan), **(notes or {})}
-            result = write_result(out, attributes, groups, hand_on)
-        else:
-            report(1, 1, "finished before")
-            if labels.items() <= result.attrs.items():
-                hand_on(result)
-            else:
-                result = write_result(out, {**result.attrs, **labels}, result.groups, hand_on)
+            result = StudyResult(out, attributes, {**groups, **(extra or {})})
+        if finished is not None:
+            finished(result)
+        if before is None or before.attrs != result.attrs:
+            write_result(result)
         folder.clear()
     return result
 
@@ -164,6 +164,7 @@ def _labels(study: Study) -> dict[str, str]:
 def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
     general = study.settings.study
     return {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "campaign": study.campaign.name,
         "preset": general.preset,
         "seed": general.seed,
@@ -260,14 +261,14 @@ def compute_task(data: tuple[Plan, Groups], units: Sequence[Unit]) -> list[Group
     (plan, facts), selected, out = data, None, []
     for unit in units:
         training, spec = plan.training[unit.training], left_open(plan.specs[unit.model])
+        place = f"training set '{training.name}', model '{unit.model}'"
         try:
             if selected is None and spec is not None:
                 selected = spec.central(plan.dt).settled(*plan.taught(training.spans))
             out.append(compute(plan, facts, unit, selected))
+        except SeakeepError as error:
+            raise DataError(f"{place}: {error}") from error
         except Exception as error:
-            place = f"training set '{training.name}', model '{unit.model}'"
-            if isinstance(error, SeakeepError):
-                raise DataError(f"{place}: {error}") from error
             error.add_note(place)  # a model of somebody's own
             raise
     return out
@@ -359,12 +360,8 @@ def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcMode
     spec = fitted.settings
     parts, states, inputs = plan.taught(plan.training[unit.training].spans)
     data = gather(parts, states, inputs, None, spec)
-    groups = (data.states, spec.state_delays), (data.delayed, spec.input_delays)
-    regressors = [
-        np.concatenate([embed(x[k], lags, at.first_column, at.columns) for x, lags in groups])
-        for k, at in enumerate(data.windows)
-    ]
-    squares = np.linalg.svd(np.concatenate(regressors, axis=1), compute_uv=False) ** 2
+    system = system_of((data.states, data.delayed, data.direct), data.windows, spec)
+    squares = np.linalg.eigvalsh(system.gram, UPLO="U")
     rank = round(float(np.sum(squares / (squares + fitted.training.ridge))))
     truncated = replace(spec, ridge=0.0, rank=rank)
     variants = {"none": replace(spec, ridge=0.0), "truncated": truncated, "ridge": spec}
@@ -451,24 +448,22 @@ def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
 def collect(plan: Plan, facts: Groups, computed: Mapping[Unit, Groups]) -> Groups:
     """Put all units together, with the facts of their windows."""
     sets = [each.name for each in plan.training]
+    numbers = list(dict.fromkeys(unit.training for unit in computed))
+    nothing = xr.Dataset()
 
     def stacked(group: str, models: Iterable[str], dim: str) -> xr.Dataset:
         """A group of several models, over (`dim`, training)."""
-        mine = [unit for unit in computed if group in computed[unit] and unit.model in models]
-        numbers = list(dict.fromkeys(unit.training for unit in mine))
         names = {dim: list(models), "training": [sets[k] for k in numbers]}
-        grid = [[computed[Unit(model, k)][group] for k in numbers] for model in models]
+        grid = [[computed[Unit(m, k)].get(group, nothing) for k in numbers] for m in models]
         return side_by_side(grid, names, FILL)
 
     out = {}
-    for test, windows in plan.tests.items():
-        every = {"training": sets, "window": range(len(windows))}
-        means = stacked(f"tests/{test}", plan.models, "model").reindex(every)
+    for test in plan.tests:
+        means = stacked(f"tests/{test}", plan.models, "model")
         parts = [means.transpose("model", "measure", "band", "training", ...)]
         if plan.ensembles:
-            bands = stacked(f"bands/{test}", plan.ensembles, "ensemble")
-            parts.append(bands.reindex(every, fill_value=FILL))
-        data = xr.merge([*parts, facts[test]], join="outer")
+            parts.append(stacked(f"bands/{test}", plan.ensembles, "ensemble"))
+        data = xr.merge([*parts, facts[test]], join="right", fill_value=FILL)
         out[f"tests/{test}"] = data.drop_vars("member", errors="ignore")
     out["chosen"] = stacked("chosen", plan.models, "model")
     if plan.calibrated_on and plan.ensembles:
@@ -495,13 +490,16 @@ def facts_of(study: Study, plan: Plan) -> Groups:
         an elevation among the inputs, ``wave_height``.
     """
     known = {each.run: _known_of(study, plan, each.run) for each in plan.windows}
-    taught = [parts_of(plan.runs, each.spans).values() for each in plan.training]
-    pooled = [np.concatenate([_columns(plan, each) for each in of]).T.copy() for of in taught]
+    pooled = []
+    for training in plan.training:
+        parts = parts_of(plan.runs, training.spans).items()
+        columns = [channel_matrix(part, plan.states, name) for name, part in parts]
+        pooled.append(np.concatenate(columns).T.copy())
     out = {}
     for test, windows in plan.tests.items():
         cut = []
         for each in windows:
-            at = int(np.argmin(np.abs(plan.runs[each.run]["time"].values - each.start))) + 1
+            at = nearest_sample(plan.runs[each.run]["time"].values, each.start, each.run) + 1
             cut.append(known[each.run].isel(time=slice(at, at + each.steps)))
         judged = [[each.may_test(w.run) for w in windows] for each in plan.training]
         out[test] = xr.concat(cut, "window", data_vars="all").assign(
@@ -527,20 +525,16 @@ def _known_of(study: Study, plan: Plan, name: str) -> xr.Dataset:
     """What a run says without any model, at its instants."""
     run = plan.runs[name]
     noise = [run[each].attrs.get("noise_std", 0.0) for each in plan.states]
-    known: dict[str, Any] = {"measured": (("time", "channel"), _columns(plan, run))}
-    known |= {"run": name, "noise_std": ("channel", noise)}
-    if (waves := next(filter(is_elevation, plan.inputs), None)) is not None:
-        known["wave_height"] = "time", _heights(run[waves], plan.dt)
+    known: dict[str, Any] = {
+        "measured": (("time", "channel"), channel_matrix(run, plan.states, name)),
+        "noise_std": ("channel", noise),
+        "run": name,
+    }
+    if plan.waves is not None:
+        known["wave_height"] = "time", _heights(run[plan.waves], plan.dt)
     if (folder := study.truth_folder) is not None:
         known["truth"] = ("time", "channel"), _truth(folder, plan, name)
     return xr.Dataset(known)
-
-
-def _columns(plan: Plan, run: xr.Dataset) -> FloatArray:
-    """States of a run, (time, channel); NaN of one that it lacks."""
-    nothing = np.full(run.sizes["time"], np.nan)
-    columns = [run[name].values if name in run else nothing for name in plan.states]
-    return np.stack(columns, axis=-1).astype(float)
 
 
 def _heights(elevation: xr.DataArray, dt: float) -> FloatArray:
@@ -563,7 +557,11 @@ def _truth(folder: Path, plan: Plan, run: str) -> FloatArray:
             "it. Play the tank again, or leave study.truth out."
         )
     with decoding(path, "true channels", "Play the tank again."), h5py.File(path) as file:
-        wanted = [name for name in ("time", *plan.states) if name in file]
-        true = xr.Dataset({name: ("time", file[name][:]) for name in wanted})
-    time, known = plan.runs[run]["time"].values, true["time"].values
-    return np.stack([np.interp(time, known, each) for each in _columns(plan, true).T], axis=-1)
+        true = {name: file[name][:] for name in ("time", *plan.states) if name in file}
+    time = plan.runs[run]["time"].values
+    nothing = np.full(time.size, np.nan)
+    columns = [
+        np.interp(time, true["time"], true[name]) if name in true else nothing
+        for name in plan.states
+    ]
+    return np.stack(columns, axis=-1)
