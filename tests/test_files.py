@@ -95,7 +95,7 @@ writers = {
     "model": lambda path: write_sealed(run, path, "model"),
     "forecast": lambda path: comparison.write_forecast(run, path),
     "raw file": lambda path: delivery.write_record(run, path),
-    "study": lambda path: study.write_result(folder, {}, {"prepared": run}, lambda _: None),
+    "study": lambda path: study.write_result(study.StudyResult(folder, {}, {"prepared": run})),
 }
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))

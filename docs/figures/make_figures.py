@@ -403,11 +403,13 @@ def draw_checks(model, runs):
     measured = seakeep.check.measured_response(model, runs)
     motions = ["surge", "heave", "pitch"]
     plots, checks = seakeep.plot, seakeep.check
+    response = checks.response(model, None, runs).sel(state=motions)
+    drift = checks.drift(model, runs).sel(state=[*motions[:1], "mooring_bow"])
     figures = {
-        "response": plots.response(checks.response(model, None, runs), measured, states=motions),
-        "coherence": plots.coherence(checks.coherence(model, runs), states=motions),
-        "exceedance": plots.exceedance(checks.statistics(model, runs), states=motions),
-        "drift": plots.drift(checks.drift(model, runs), states=[*motions[:1], "mooring_bow"]),
+        "response": plots.response(response, measured.sel(state=motions)),
+        "coherence": plots.coherence(checks.coherence(model, runs).sel(state=motions)),
+        "exceedance": plots.exceedance(checks.statistics(model, runs).sel(state=motions)),
+        "drift": plots.drift(drift),
     }
     for name, figure in figures.items():
         save(figure, HERE / f"check_{name}.png")

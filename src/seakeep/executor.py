@@ -13,7 +13,6 @@ import re
 import signal
 import threading
 import uuid
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from concurrent.futures import ProcessPoolExecutor as Pool
@@ -55,67 +54,58 @@ def in_order(
     items: Sequence[Item],
     executor: Executor | None = None,
     progress: Progress | None = None,
-    what: str = "member",
 ) -> Iterator[Result]:
     """Yield ``function(data, item)`` for each item, in the order of the items."""
-
-    def results() -> Iterator[Result]:
-        if not executor:
-            for item in items:
-                with one_blas_thread():
-                    result = function(data, item)
-                yield result
-            return
-        size = -(-len(items) // BATCHES)
-        batches = (items[first : first + size] for first in range(0, len(items), max(size, 1)))
-        with submitting(function, data, executor) as submit:
-            pending = deque(submit(batch) for batch in islice(batches, AHEAD))
-            while pending:
-                _wait_for_any([pending[0]], executor)
-                ready = pending.popleft().result()
-                pending.extend(submit(batch) for batch in islice(batches, 1))
-                yield from ready
-
-    for done, result in enumerate(results(), start=1):
+    size = max(-(-len(items) // BATCHES), 1) if executor else 1
+    batches = [items[first : first + size] for first in range(0, len(items), size)]
+    pieces = _done(function, data, batches, executor, ordered=True)
+    results = (result for _, piece in pieces for result in piece)
+    for done, result in enumerate(results, start=1):
         if progress:
-            progress(done, len(items), f"{what} {done}")
+            progress(done, len(items), f"member {done}")
         yield result
 
 
 def as_finished(
     function: Function[Data, Item, Result],
     data: Data,
-    items: deque[Item],
+    items: Iterable[Item],
     executor: Executor | None = None,
 ) -> Iterator[tuple[Item, Result]]:
-    """Yield each item and ``function(data, item)`` as they finish: large pieces.
+    """Yield each item and ``function(data, item)`` as they finish: large pieces."""
+    for (item,), (result,) in _done(function, data, [[item] for item in items], executor):
+        yield item, result
 
-    Items are taken from the left of `items`. Whoever iterates may append more: those that need a
-    result which has just been yielded.
-    """
+
+def _done(
+    function: Function[Data, Item, Result],
+    data: Data,
+    pieces: Iterable[Sequence[Item]],
+    executor: Executor | None,
+    ordered: bool = False,
+) -> Iterator[tuple[Sequence[Item], list[Result]]]:
+    """Yield pieces of the work and their results, in their order or as they finish."""
     if not executor:
-        while items:
-            item = items.popleft()
+        for piece in pieces:
             with one_blas_thread():
-                result = function(data, item)
-            yield item, result
+                alone = [function(data, item) for item in piece]
+            yield piece, alone
         return
-    pending: dict[Future[list[Result]], Item] = {}
+    waiting = iter(pieces)
+    pending: dict[Future[list[Result]], Sequence[Item]] = {}
     with submitting(function, data, executor) as submit:
-        while items or pending:
-            while items and len(pending) < AHEAD:
-                item = items.popleft()
-                pending[submit([item])] = item
-            finished = _wait_for_any(pending, executor)
-            errors = [error for each in finished if (error := each.exception()) is not None]
-            sound = [each for each in finished if each.exception() is None]
-            results = [(pending.pop(each), each.result()[0]) for each in sound]
+        while True:
+            for piece in islice(waiting, AHEAD - len(pending)):
+                pending[submit(piece)] = piece
+            if not pending:
+                return
+            finished = _wait_for_any(islice(pending, 1) if ordered else pending, executor)
+            # What is done is handed on before an error is.
+            first = min(finished, key=lambda each: each.exception() is not None)
+            piece_done = pending.pop(first), first.result()
             # A result that is still referred to would be computed again if its worker were lost.
-            finished.clear()
-            sound.clear()
-            yield from results  # what is done is handed on before an error is
-            if errors:
-                raise errors[0]
+            del finished, first
+            yield piece_done
 
 
 @contextmanager

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -39,29 +38,18 @@ def ensemble_and_run():
 def test_results_come_in_order_and_progress_is_reported(pool):
     seen = []
     for executor in (None, pool, ThreadPoolExecutor(3)):
-        found = in_order(
-            side_work.square, 3, range(70), executor, lambda *each: seen.append(each), "item"
-        )
+        found = in_order(side_work.square, 3, range(70), executor, lambda *each: seen.append(each))
         assert [value for _, value in found] == [3 * k**2 for k in range(70)]
-        assert seen[-1] == (70, 70, "item 70")
+        assert seen[-1] == (70, 70, "member 70")
         assert list(in_order(side_work.square, 3, [], executor)) == []
 
 
 def test_large_pieces_come_as_they_are_finished(pool):
-    found = dict(as_finished(side_work.square, 3, deque(range(20)), pool))
+    found = dict(as_finished(side_work.square, 3, range(20), pool))
     assert {number: value for number, (_, value) in found.items()} == {
         number: 3 * number**2 for number in range(20)
     }
     assert len({pid for pid, _ in found.values()}) == 2
-
-
-def test_pieces_that_wait_for_others_follow_them(pool):
-    for executor in (None, pool):
-        items, seen = deque([0]), []
-        for item, (_, value) in as_finished(side_work.square, 3, items, executor):
-            seen.append(value)
-            items.extend([item + 1] if item < 4 else [])
-        assert seen == [3 * k**2 for k in range(5)]
 
 
 def test_arrays_do_not_depend_on_the_executor(ensemble_and_run, pool):
@@ -105,13 +93,13 @@ def test_an_interrupt_ends_its_processes_and_waits_for_no_result_on_its_way(tmp_
         "try:",
         "    with processes(1) as pool:",
         "        pids = [pool.submit(side_work.sleep, 0.0, None).result()]",
-        "        work = as_finished(side_work.zeros, 8_000_000, deque(range(99)), pool)",
+        "        work = as_finished(side_work.zeros, 8_000_000, range(99), pool)",
         "        next(work)",
         "        raise KeyboardInterrupt",
         "except KeyboardInterrupt:",
         "    print(*pids)",
     )
-    with alone(tmp_path / "interrupted.py", "from collections import deque", *lines) as child:
+    with alone(tmp_path / "interrupted.py", *lines) as child:
         printed, said = child.communicate(timeout=300)
     assert (said, child.returncode) == ("", 0)
     assert _ends(int(printed))

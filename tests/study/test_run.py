@@ -12,7 +12,7 @@ from tutorial_study import assert_cells_are_what_the_models_say, assert_same, pu
 from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.executor import processes
 from seakeep.statistics import split_bands
-from seakeep.study import read_study, run, run_study
+from seakeep.study import read_study, run_study
 from seakeep.study.judge import joined
 from seakeep.study.plan import make_plan
 from seakeep.study.run import compute, compute_task, facts_of, tasks_of, units_of
@@ -89,29 +89,22 @@ def test_a_study_that_is_interrupted_goes_on_and_ends_the_same(study_folder, fin
     assert_same(finished, again)
 
 
-def test_one_process_works_in_a_folder_and_who_waited_takes_its_result(
-    study_folder, finished, monkeypatch
-):
+def test_one_process_works_in_a_folder(study_folder, finished):
     study, out = read_study(study_folder / "study.toml"), study_folder / "shared"
-    usual = run.warn_of_slow_study
-    refused, told = [], []
+    refused = []
 
-    def third(done, total, what):
+    def second(done, total, what):
         if what == "statistics and densities":
             with pytest.raises(RequestError, match=r"another process works on the study in .*sha"):
                 run_study(study, out)
             refused.append(what)
 
-    def overtaken(plan):
-        monkeypatch.setattr(run, "warn_of_slow_study", usual)
-        assert_same(finished, run_study(study, out, progress=third))
-
-    monkeypatch.setattr(run, "warn_of_slow_study", overtaken)
-    assert_same(finished, run_study(study, out, progress=lambda *each: told.append(each[2])))
+    assert_same(finished, run_study(study, out, progress=second))
     assert refused
     assert not (out / LOCK).exists()
-    assert told[-1] == "finished before"
-    assert not any(each.startswith("fitting") for each in told)
+    told = []
+    assert_same(finished, run_study(study, out, progress=lambda *each: told.append(each[2])))
+    assert told == ["finished before"]
 
 
 @pytest.mark.parametrize("change", [lambda x: x[:40], lambda x: x[:130] + b"4" + x[131:]])

@@ -125,23 +125,14 @@ def forecast(
     count = None if steps is None else samples_of(steps, read, [prepared], identified.dt, "--steps")
     left = round((float(prepared["time"][-1]) - first) / identified.dt)
     warn_of_waves(identified, prepared, run, first, left if count is None else count)
-    if is_ensemble(identified):
-        with (
-            executor_of(workers, scheduler) as executor,
-            progress_bar("Forecasting") as progress,
-        ):
-            play = identified.forecast if members else identified.forecast_summary
-            result = play(
-                prepared,
-                first,
-                count,
-                **({} if members else band_options),
-                ahead=ahead,
-                executor=executor,
-                progress=progress,
-            )
-    else:
-        result = identified.forecast(prepared, start=first, steps=count, ahead=ahead)
+    play: Any = identified.forecast
+    how: dict[str, Any] = {"ahead": ahead}
+    with executor_of(workers, scheduler) as executor, progress_bar("Forecasting") as progress:
+        if is_ensemble(identified):
+            how |= {"executor": executor, "progress": progress}
+            if not members:
+                play, how = identified.forecast_summary, how | band_options
+        result = play(prepared, first, count, **how)
     scaled = ""
     if full_scale:
         scale = _scale(read)
@@ -469,8 +460,7 @@ def check(
         baselines = {}
     with progress_bar("Checking") as progress:
         checked = check_model(identified, runs, progress, baselines)
-    repeats = repeats_of(identified, read, runs)
-    checked = replace(checked, repeats={name: str(each) for name, each in repeats.items()})
+    checked = replace(checked, repeats=repeats_of(identified, read, runs))
     for section in check_sections(checked):
         for text in (*section.points, *section.notices):
             show(f"{section.title}: {text}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from functools import partial
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -89,21 +89,24 @@ def reproduce(
     from seakeep.study.reproduce import ACTS, Size
     from seakeep.study.reproduce import reproduce as reproduce_study
 
-    size = Size.quick() if quick else Size()
     pages = []
     with executor_of(workers, scheduler, cores()) as executor:
-        with progress_bar("Study") as tell:
-            play = partial(
-                reproduce_study, out, preset, size=size, seed=seed, executor=executor, progress=tell
+        near = on_this_machine(executor)
+        drawing = submitting(_write_act, None, near) if near else nullcontext()
+        with progress_bar("Study") as tell, drawing as submit:
+            results = reproduce_study(
+                out,
+                preset,
+                size=Size.quick() if quick else Size(),
+                seed=seed,
+                executor=executor,
+                progress=tell,
+                # While the next act runs.
+                finished=submit and (lambda result: pages.append(submit([result]))),
             )
-            if not (near := on_this_machine(executor)):
-                results = play()
-            else:
-                with submitting(_write_act, None, near) as submit:  # while the next act runs
-                    results = play(finished=lambda result: pages.append(submit([result])))
-                    for done, each in enumerate(pages):
-                        tell(done, len(pages), "drawing the pages of the acts")
-                        each.result()
+            for done, each in enumerate(pages):
+                tell(done, len(pages), "drawing the pages of the acts")
+                each.result()
         page = _write_reproduction(out, results, executor)
     print_table(short_table(results))
     show(finding(results))

@@ -602,12 +602,13 @@ def _scaled(run: xr.Dataset, factor_of: Callable[[str], tuple[float, str]]) -> x
     out = run.copy()
     for name, channel in run.data_vars.items():
         unit = str(channel.attrs.get("units", ""))
-        if (factor := factor_of(unit)[0]) == 1.0 or channel.dtype.kind not in "fiu":
+        factor, shown = factor_of(unit)
+        if factor == 1.0 or channel.dtype.kind not in "fiu":
             continue
         known = {"training_std", "noise_std"} & set(channel.attrs)
         spreads = {key: factor * float(channel.attrs[key]) for key in known}
         out[name] = (channel * factor).assign_attrs(
-            channel.attrs | spreads | ({"units": factor_of(unit)[1]} if unit else {})
+            channel.attrs | spreads | ({"units": shown} if unit else {})
         )
     return out
 

@@ -1,6 +1,5 @@
 """Data of a study: channels with their signs, runs with their quality, spectra."""
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -55,8 +54,8 @@ def _repeats(campaign: Campaign, plan: Plan) -> xr.Dataset | None:
         sets = [each.spans for each in plan.training if each.may_test(name)]
         learnt = [span for of_set in sets for span in of_set if span[0] not in regular]
         pieces, (test,) = parts_of(plan.runs, learnt), parts_of(plan.runs, spans).values()
-        if (repeat := find_repeat(plan.inputs, pieces, name, test, plan.dt)) is not None:
-            rows.append({**asdict(repeat), "words": str(repeat)})
+        if repeat := find_repeat(plan.inputs, pieces, name, test, plan.dt):
+            rows.append(repeat)
     return along("run", rows) if rows else None
 
 
@@ -125,15 +124,13 @@ def _prepared(run: xr.Dataset) -> xr.Dataset:
 def _training(plan: Plan) -> xr.Dataset:
     """Spans of each training set in each run; the run and the stop where each has one alone."""
     runs, seconds = list(plan.runs), {"units": "s"}
-    edges = np.full((2, len(plan.training), len(runs)), np.nan)
-    for number, each in enumerate(plan.training):
-        for run, *span in each.spans:
-            edges[:, number, runs.index(run)] = span
+    spans = [{run: edges for run, *edges in each.spans} for each in plan.training]
+    edges = np.array([[of.get(run, [np.nan, np.nan]) for run in runs] for of in spans])
     over = ("training", "of_run")
     out = xr.Dataset(
         {
-            "begin": (over, edges[0], seconds),
-            "end": (over, edges[1], seconds),
+            "begin": (over, edges[..., 0], seconds),
+            "end": (over, edges[..., 1], seconds),
             "left_out": ("training", [", ".join(each.left_out) for each in plan.training]),
         },
         coords={"training": [each.name for each in plan.training], "of_run": runs},
@@ -149,13 +146,12 @@ def _training(plan: Plan) -> xr.Dataset:
 
 def _runs(plan: Plan) -> xr.Dataset:
     """Waves and spans of each run, and the part of the time at which its lines are slack."""
-    waves = next(filter(is_elevation, plan.inputs), None)
     names = [*plan.states, *plan.inputs]
     rows, slack = [], []
     for key, run in plan.runs.items():
         facts, frequency = run.attrs, np.nan
-        if waves is not None and facts.get("waves") == "regular":
-            elevation = between(run, whole_span(run))[waves].values
+        if plan.waves is not None and facts.get("waves") == "regular":
+            elevation = between(run, whole_span(run))[plan.waves].values
             frequency = dominant_frequency(elevation, plan.dt)
         train, test = (facts.get(f"{use}_span", (np.nan, np.nan)) for use in ("train", "test"))
         rows.append(
@@ -184,7 +180,7 @@ def _runs(plan: Plan) -> xr.Dataset:
 
 def _spectra(plan: Plan) -> xr.Dataset | None:
     """Spectra of the first wave elevation in all runs, as the paper and as recommended."""
-    waves = next(filter(is_elevation, plan.inputs), None)
+    waves = plan.waves
     if waves is None:
         return None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -275,8 +275,8 @@ def _warn_of_slow_model(model: Model, runs: Datasets) -> None:
     warn_of_slow_motions(parts, model.states, trained, period)
 
 
-def repeats_of(model: Model, campaign: Campaign, tested: Groups) -> dict[str, Repeat]:
-    """Tests whose input repeats the model's training input, up to a constant phase, by run.
+def repeats_of(model: Model, campaign: Campaign, tested: Groups) -> dict[str, str]:
+    """Words for tests whose input repeats the model's training input, up to a constant phase.
 
     Training runs that the campaign marks as regular waves are left out: regular waves repeat by
     their nature. So are runs that the campaign does not have.
@@ -289,7 +289,7 @@ def repeats_of(model: Model, campaign: Campaign, tested: Groups) -> dict[str, Re
     }
     prepared = load_prepared(campaign, names=[name for name in spans if name not in tested])
     pieces = {name: between((tested | prepared)[name], span) for name, span in spans.items()}
-    repeats: dict[str, Repeat] = {}
+    repeats = {}
     for name, run in tested.items():
         part = run
         if "test_span" in run.attrs:
@@ -298,62 +298,32 @@ def repeats_of(model: Model, campaign: Campaign, tested: Groups) -> dict[str, Re
             part = run.sel(time=slice(float(pieces[name]["time"][-1]) + 1e-6, None))
         # What a member leaves of a training run is too short to be judged.
         enough = name not in spans or part.sizes["time"] >= model.history_samples
-        if enough and known[name].waves != "regular":
-            repeat = find_repeat(model.inputs, pieces, name, part, model.dt)
-            repeats |= {} if repeat is None else {name: repeat}
+        if not enough or known[name].waves == "regular":
+            continue
+        if repeat := find_repeat(model.inputs, pieces, name, part, model.dt):
+            repeats[name] = repeat["words"]
     return repeats
 
 
 def warn_of_repeats(model: Model, campaign: Campaign, tested: Groups) -> None:
     """Warn where a test run's input repeats the model's training input."""
-    for repeat in repeats_of(model, campaign, tested).values():
-        warn(f"{repeat} This test shows memory, not skill: test on another run.")
-
-
-@dataclass(frozen=True)
-class Repeat:
-    """A part of a test run whose input was in the training input, up to a constant phase.
-
-    Parameters
-    ----------
-    run, input : str
-        What is tested, and the channel that repeats.
-    share : float
-        Fraction of the test record that repeats, 0 to 1.
-    start : float
-        Where the best matching stretch starts, s.
-    source : str
-        The training run that holds it.
-    source_start : float
-        From where on, s.
-    phase : float
-        By which it is turned, rad.
-    correlation : float
-        Of the analytic signals.
-    """
-
-    run: str
-    input: str
-    share: float
-    start: float
-    source: str
-    source_start: float
-    phase: float
-    correlation: float
-
-    def __str__(self) -> str:
-        return (
-            f"the input '{self.input}' of {self.run} repeats training input: "
-            f"{100 * self.share:.0f} % of it, such as from t = {self.start:.4g} s on, is what "
-            f"{self.source} holds from t = {self.source_start:.4g} s on, turned by "
-            f"{np.degrees(self.phase):z.0f} degrees (correlation {self.correlation:.3f})."
-        )
+    for words in repeats_of(model, campaign, tested).values():
+        warn(f"{words} This test shows memory, not skill: test on another run.")
 
 
 def find_repeat(
     inputs: Sequence[str], pieces: Datasets, name: str, test: xr.Dataset, dt: float
-) -> Repeat | None:
-    """Look for the first input of a test part that repeats what the training pieces hold."""
+) -> dict[str, Any] | None:
+    """Look for the first input of a test part that repeats what the training pieces hold.
+
+    Returns
+    -------
+    dict or None
+        ``run`` and ``input``, the channel; ``share``, the fraction of the test record that
+        repeats; ``start``, where the best matching stretch starts, s; ``source``, the training run
+        that holds it, from ``source_start`` on, s; ``phase`` by which it is turned, rad;
+        ``correlation`` of the analytic signals; and all of this in ``words``.
+    """
     for channel in inputs:
         records = {key: piece[channel].values for key, piece in pieces.items() if channel in piece}
         whole = all(np.all(np.isfinite(each)) for each in (*records.values(), test[channel].values))
@@ -361,14 +331,21 @@ def find_repeat(
             continue
         if (leakage := find_leakage(list(records.values()), test[channel].values, dt)) is not None:
             source = list(records)[leakage.training]
-            return Repeat(
-                run=name,
-                input=channel,
-                share=leakage.share,
-                start=float(test["time"][0]) + leakage.test_start,
-                source=source,
-                source_start=float(pieces[source]["time"][0]) + leakage.training_start,
-                phase=leakage.phase,
-                correlation=leakage.correlation,
-            )
+            start = float(test["time"][0]) + leakage.test_start
+            source_start = float(pieces[source]["time"][0]) + leakage.training_start
+            return {
+                "run": name,
+                "input": channel,
+                "share": leakage.share,
+                "start": start,
+                "source": source,
+                "source_start": source_start,
+                "phase": leakage.phase,
+                "correlation": leakage.correlation,
+                "words": f"the input '{channel}' of {name} repeats training input: "
+                f"{100 * leakage.share:.0f} % of it, such as from t = {start:.4g} s on, is what "
+                f"{source} holds from t = {source_start:.4g} s on, turned by "
+                f"{np.degrees(leakage.phase):z.0f} degrees "
+                f"(correlation {leakage.correlation:.3f}).",
+            }
     return None

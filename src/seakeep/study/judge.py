@@ -17,13 +17,13 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from seakeep import metrics, statistics
+from seakeep import statistics
 from seakeep.arrays import ComplexArray, Datasets, FloatArray, Groups, IntArray, undefined
 from seakeep.core.calibration import band_scale, calibrated_bounds
 from seakeep.core.density import jsd_intervals
-from seakeep.core.metrics import over_channels, paired, root_mean_square
+from seakeep.core.metrics import extremes_error, over_channels, paired, root_mean_square
 from seakeep.core.spectra import split_bands
-from seakeep.errors import DataError, RequestError, SeakeepWarning, warn
+from seakeep.errors import DataError, SeakeepError, SeakeepWarning, warn
 from seakeep.executor import in_order
 from seakeep.study.plan import random_stream
 from seakeep.study.settings import StudySettings
@@ -46,54 +46,38 @@ DIFFERENCES = 500
 """Redrawn tables of cells for the interval of a difference between models."""
 
 
-def window_errors(**pair: Any) -> FloatArray:
-    """Errors of forecasts, one row per entry of :data:`MEASURES`.
+def judge_windows(*, dt: float, frequency: float, **pair: Any) -> xr.Dataset:
+    """(Mean) forecasts of windows with their errors; bands meet at `frequency`.
 
     Parameters
     ----------
-    predicted, measured : ndarray, shape (…, time, N)
+    predicted, measured : ndarray, shape (window, time, N)
         In the same units.
-    training_std, noise_std : array_like, shape (N,) and (…, N)
+    training_std, noise_std : array_like, shape (N,) and (window, N)
         As :func:`seakeep.metrics.nrmse`.
 
     Returns
     -------
-    ndarray, shape (3, …, N)
-        NaN where a channel is not judged, or the forecast is lost.
-    """
-    error = np.subtract(pair["predicted"], pair["measured"])
-    in_training_sd = root_mean_square(error) / np.asarray(pair["training_std"])
-    return np.stack(
-        [metrics.nrmse(**pair), metrics.normalised_extremes_error(**pair), in_training_sd]
-    )
-
-
-def judge_windows(*, dt: float, frequency: float, **pair: Any) -> xr.Dataset:
-    """(Mean) forecasts of windows (window, time, N) with their errors; bands meet at `frequency`.
-
-    The other arguments are those of :func:`window_errors`.
-
-    Returns
-    -------
     Dataset
-        ``mean``; ``error`` over (measure, window, channel); ``error_over_time`` over (band, window,
-        time), and over (band, window, channel) the mean of a channel's ε(t), ``level``, and
-        ``growth``: its change over the window along the line of least squares.
+        ``mean``; ``error`` over (measure, window, channel), NaN where a channel is not judged or
+        the forecast is lost; ``error_over_time`` over (band, window, time), and over (band, window,
+        channel) the mean of a channel's ε(t), ``level``, and ``growth``: its change over the window
+        along the line of least squares.
     """
     p, m, spread, judged = paired(**pair)
+    size = root_mean_square(p - m)
+    errors = [size / spread, extremes_error(p, m) / spread, size / np.asarray(pair["training_std"])]
     parts = np.stack([p - m, *split_bands(p - m, dt, frequency)])
     absolute = np.abs(parts) / spread[..., None, :]
     age = np.linspace(-0.5, 0.5, p.shape[-2])
     lines = np.einsum("t,...tc->...c", age / (age @ age), absolute)
     by_channel = ("band", "window", "channel")
+    over_time = over_channels(absolute, judged[..., None, :])
     return xr.Dataset(
         {
             "mean": (("window", "time", "channel"), p),
-            "error": (("measure", "window", "channel"), window_errors(**pair)),
-            "error_over_time": (
-                ("band", "window", "time"),
-                over_channels(absolute, judged[..., None, :]),
-            ),
+            "error": (("measure", "window", "channel"), np.stack(errors)),
+            "error_over_time": (("band", "window", "time"), over_time),
             "level": (by_channel, absolute.mean(axis=-2)),
             "growth": (by_channel, lines),
         }
@@ -141,8 +125,8 @@ def lost_forecasts(groups: Datasets, tests: Iterable[str]) -> xr.Dataset | None:
         gone = test["mean"].isnull().any(("time", "channel")) & test["judged"]
         for model, training, window in np.argwhere(gone.values):
             at = test.isel(model=model, training=training, window=window)
-            cell = {key: at[key].item() for key in ("model", "training", "window", "run", "start")}
-            rows.append(cell | {"test": name})
+            keys = ("model", "training", "window", "run", "start")
+            rows.append({key: at[key].item() for key in keys} | {"test": name})
     return along("cell", rows) if rows else None
 
 
@@ -425,9 +409,7 @@ def joined(test: xr.Dataset, model: str) -> tuple[FloatArray, FloatArray, int]:
     mean = test["mean"].sel(model=model).values
     count = int(judged.sum(axis=0).min())
     rows = np.argsort(~judged, axis=0, kind="stable")[:count]
-    windows = np.arange(judged.shape[1])
-    picked = np.stack([mean[row, windows] for row in rows])
-    picked = picked.reshape(count, -1, mean.shape[-1])
+    picked = mean[rows, np.arange(judged.shape[1])].reshape(count, -1, mean.shape[-1])
     whole = np.isfinite(picked).all(axis=(1, 2))
     measured = test["measured"].values.reshape(-1, mean.shape[-1])
     return picked[whole], measured, int(np.count_nonzero(~whole))
@@ -510,7 +492,7 @@ def _channel_densities(
                     rng=random_stream(settings.study.seed, f"jsd.{name}.{variant}.{channel}"),
                     n_series=settings.statistics.n_series,
                 )
-    except (DataError, RequestError) as error:
+    except SeakeepError as error:
         return str(error)
     tables = [
         [[getattr(each, number) for number in DIVERGENCE] for each in of_model]
@@ -547,13 +529,13 @@ def regular_response(groups: Datasets, test: str) -> xr.Dataset:
     the measurement, degrees.
     """
     data = groups[f"tests/{test}"]
-    squares, answer = (each[..., data["judged"].values, :] for each in _responses(groups, test))
+    squares, answer = _responses(groups, test)
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         # A constant forecast has no phase, and nothing judged no mean.
         warnings.simplefilter("ignore", RuntimeWarning)
-        errors = np.sqrt(np.nanmean(np.maximum(squares, 0.0), axis=2))
-        phase = np.degrees(np.angle(np.nanmean(answer / np.abs(answer), axis=1)))
-        ratio = np.nanmedian(np.abs(answer), axis=1)
+        errors = np.sqrt(np.nanmean(np.maximum(squares, 0.0), axis=(2, 3)))
+        phase = np.degrees(np.angle(np.nanmean(answer / np.abs(answer), axis=(1, 2))))
+        ratio = np.nanmedian(np.abs(answer), axis=(1, 2))
     coords = {"model": data["model"], "channel": data["channel"]}
     return numbered([*errors, ratio, phase], ("number", "model", "channel"), RESPONSE, coords)
 

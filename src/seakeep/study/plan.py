@@ -14,6 +14,7 @@ import xarray as xr
 from seakeep.arrays import Datasets, Groups, Progress
 from seakeep.campaign import load_prepared
 from seakeep.check.parts import whole_span
+from seakeep.conventions import is_elevation
 from seakeep.errors import DataError, RequestError
 from seakeep.models import Needs, Spec
 from seakeep.models.selection import groups_of
@@ -90,8 +91,8 @@ def named(progress: Progress | None, words: str) -> Progress | None:
 
 def between(run: xr.Dataset, span: tuple[float, float]) -> xr.Dataset:
     """Part of a run between two of its own instants, both included."""
-    slack = 1e-6 * float(run.attrs.get("dt", 1.0))
-    return run.sel(time=slice(float(span[0]) - slack, float(span[1]) + slack))
+    first, last = _samples(run, span)
+    return run.isel(time=slice(first, last + 1))
 
 
 def step_of(runs: Datasets) -> float:
@@ -101,10 +102,9 @@ def step_of(runs: Datasets) -> float:
 
 def _samples(run: xr.Dataset, span: tuple[float, float]) -> tuple[int, int]:
     """First and last sample of a run inside a span."""
-    time, dt = run["time"].values, float(run.attrs["dt"])
-    first = int(np.searchsorted(time, span[0] - 1e-6 * dt))
-    last = int(np.searchsorted(time, span[1] + 1e-6 * dt)) - 1
-    return first, last
+    slack = 1e-6 * float(run.attrs.get("dt", 1.0))
+    begin, end = np.searchsorted(run["time"].values, [span[0] - slack, span[1] + slack])
+    return int(begin), int(end) - 1
 
 
 def parts_of(runs: Datasets, spans: Iterable[Span]) -> Groups:
@@ -173,8 +173,8 @@ def choose_training(
         )
     if training.scheme == "pooled":
         return (TrainingSet("pooled", tuple(whole.values())),)
-    rng, remedy = random_stream(settings.study.seed, "training"), "shorten the training length"
-    places = _places("training", training, spans, needed, needs.snapshots, rng, remedy)
+    seed, remedy = settings.study.seed, "shorten the training length"
+    places = _places("training", training, spans, needed, needs.snapshots, seed, remedy)
     return tuple(
         TrainingSet(f"t{number:02d}", (part(*place),)) for number, place in enumerate(places)
     )
@@ -186,7 +186,7 @@ def _places(
     spans: Mapping[str, tuple[int, int]],
     needed: int,
     width: int,
-    rng: np.random.Generator,
+    seed: int,
     remedy: str,
 ) -> list[tuple[str, int]]:
     """Feasible last samples in random order; with 'apart' no two within `width` samples."""
@@ -202,7 +202,7 @@ def _places(
             f"{table}.windows: {count} windows were asked for and {len(every)} are feasible. Ask "
             f"for fewer, or {remedy}."
         )
-    return [every[i] for i in rng.permutation(len(every))[:count]]
+    return [every[i] for i in random_stream(seed, table).permutation(len(every))[:count]]
 
 
 def choose_tests(
@@ -235,8 +235,7 @@ def choose_tests(
             f"{max(longest, 0)} samples after {needs.history} of delay history and the start-up. "
             f"Reduce length or startup{at_most}, or give longer runs."
         )
-    rng = random_stream(seed, f"tests.{name}")
-    places = _places(f"tests.{name}", test, spans, steps + 1, steps, rng, "reduce length")
+    places = _places(f"tests.{name}", test, spans, steps + 1, steps, seed, "reduce length")
     return tuple(
         TestWindow(each, float(runs[each]["time"].values[last - steps]), steps)
         for each, last in sorted(places, key=lambda place: (names.index(place[0]), place[1]))
@@ -264,9 +263,12 @@ def windows_overlap(spans: Sequence[tuple[str, float, float]]) -> float:
     shares = []
     for i, (run, begin, end) in enumerate(spans):
         middle = begin + (end - begin) * (np.arange(200) + 0.5) / 200
-        others = [span[1:] for k, span in enumerate(spans) if k != i and span[0] == run]
-        covered = [(first <= middle) & (middle <= last) for first, last in others]
-        shares.append(np.any([np.zeros(200, bool), *covered], axis=0).mean())
+        covers = sum(
+            (first <= middle) & (middle <= last)
+            for k, (other, first, last) in enumerate(spans)
+            if k != i and other == run
+        )
+        shares.append(np.mean(covers > 0))
     return float(np.mean(shares)) if shares else 0.0
 
 
@@ -335,6 +337,11 @@ class Plan:
         return [name for name, each in self.models.items() if each.spec.is_ensemble]
 
     @property
+    def waves(self) -> str | None:
+        """First wave elevation among the inputs."""
+        return next(filter(is_elevation, self.inputs), None)
+
+    @property
     def windows(self) -> list[TestWindow]:
         """Windows of all test sets."""
         return [each for windows in self.tests.values() for each in windows]
@@ -354,8 +361,7 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
     runs = load_prepared(campaign, names=list(wanted), progress=progress)
     for name, run in runs.items():
         _check_channels(name, run, [*study.states, *study.inputs])
-    shared = next(iter(runs.values())).attrs
-    dt = float(shared["dt"])
+    shared, dt = next(iter(runs.values())).attrs, step_of(runs)
     # Prepared runs hold the period where their preparation counts in it.
     period = general.encounter_period or shared.get("encounter_period")
     period = period or campaign.encounter_period()
@@ -412,8 +418,8 @@ def make_plan(study: Study, progress: Progress | None = None) -> Plan:
 def _test_runs(study: Study, name: str) -> list[str]:
     test, campaign = study.settings.tests[name], study.campaign
     folds = study.settings.training.scheme == "leave_out"
-    default = list(study.settings.training.runs) if folds else campaign.test_runs
-    names = list(test.runs) or default or campaign.test_runs
+    trained = study.settings.training.runs
+    names = test.runs or (trained if folds else ()) or campaign.test_runs
     kinds = {n: campaign.settings.runs[n].waves for n in names}
     chosen = [n for n in names if test.waves in (None, kinds[n] or "irregular")]
     if not chosen:
@@ -427,7 +433,7 @@ def _test_runs(study: Study, name: str) -> list[str]:
             "'irregular' under [runs.NAME]; or name runs = [...] here, without waves; or give runs "
             "of the campaign a test span."
         )
-    trains = list(study.settings.training.runs) or campaign.training_runs
+    trains = trained or campaign.training_runs
     if learnt := [n for n in chosen if n in trains and n not in campaign.test_runs and not folds]:
         raise RequestError(
             f"tests.{name}: the run '{learnt[0]}' trains, and the campaign gives it no test span: "

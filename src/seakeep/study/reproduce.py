@@ -185,8 +185,6 @@ def reproduce(
     campaigns = [out / "campaign" / "campaign.toml"]
     if any(act.without_drift for act in acts):
         campaigns.append(out / "campaign" / "detrended" / "campaign.toml")
-        with storing(out):
-            campaigns[1].parent.mkdir(exist_ok=True)
         text = campaigns[0].read_text(encoding="utf-8")
         _write(campaigns[1], detrended_text(text), CAMPAIGN_FILE)
     prepare_campaigns(campaigns, executor, progress)
@@ -229,8 +227,9 @@ def read_reproduction(out: Path | str) -> dict[str, StudyResult]:
 
 
 def _write(path: Path, text: str, kind: str) -> None:
-    check_output(path, kind)
     with storing(path.parent):
+        path.parent.mkdir(exist_ok=True)
+        check_output(path, kind)
         write_text(path, text)
 
 

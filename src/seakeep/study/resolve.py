@@ -81,7 +81,7 @@ def _values(spec: Spec) -> dict[str, Any]:
     for name in TABLES:
         if (table := out.get(name)) is not None:
             del out[name]
-            out |= {f"{name}.{k}": v for k, v in table.items() if k not in ("period",)}
+            out |= {f"{name}.{k}": v for k, v in table.items() if k != "period"}
     return out
 
 

@@ -9,10 +9,10 @@ puts those of all units side by side, along models and training sets.
 from __future__ import annotations
 
 import json
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
 from time import process_time
@@ -22,8 +22,8 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import Datasets, FloatArray, Groups, IntArray, Progress
-from seakeep.conventions import is_elevation
-from seakeep.core import embed, metrics
+from seakeep.core import metrics
+from seakeep.core.calibration import ConformalMargin
 from seakeep.errors import DataError, SeakeepError, warn
 from seakeep.executor import WorkerLostError, as_finished, versions
 from seakeep.formats.columns import decoding
@@ -31,10 +31,11 @@ from seakeep.models.calibration import envelope_of, held_out, learn_margin
 from seakeep.models.engine import Windows, member_series, read_groups
 from seakeep.models.ensemble import spectral_radius
 from seakeep.models.forecasts import STATISTICS, reduce_members
+from seakeep.models.labelled import channel_matrix, nearest_sample
 from seakeep.models.linear import HankelDMDcModel
 from seakeep.models.selection import Selected
 from seakeep.models.specs import HankelDMDc, left_open
-from seakeep.models.training import gather
+from seakeep.models.training import gather, system_of
 from seakeep.signals import envelope_squared
 from seakeep.study.describe import describe_study, words_of_repeats
 from seakeep.study.judge import (
@@ -48,7 +49,6 @@ from seakeep.study.judge import (
 )
 from seakeep.study.plan import (
     Plan,
-    TestWindow,
     make_plan,
     named,
     parts_of,
@@ -118,21 +118,17 @@ def run_study(
     """
     out = Path(out)
     report = progress or (lambda done, total, what: None)
-    hand_on = finished or (lambda result: None)
     folder = UnitFolder(out, study.digest)
     folder.check()
-    if (result := _finished(study, out, report)) is not None:
-        labels = _labels(study)
-        if any(result.attrs[key] != value for key, value in labels.items()):
-            return write_result(out, {**result.attrs, **labels}, result.groups, hand_on)
-        hand_on(result)
-        return result
-    plan = make_plan(study, named(report, "preparing "))
-    warn_of_slow_study(plan)
-    folder.open(study.name)
     with folder.alone():
-        result = _finished(study, out, report)  # by another process, meanwhile
-        if result is None:
+        labels, before = _labels(study), _finished(study, out)
+        if before is not None:
+            report(1, 1, "finished before")
+            result = replace(before, attrs={**before.attrs, **labels})
+        else:
+            plan = make_plan(study, named(report, "preparing "))
+            warn_of_slow_study(plan)
+            folder.open(study.name)
             facts = facts_of(study, plan)
             computed = _computed(plan, facts, folder, executor, report)
             report(len(computed), len(computed), "statistics and densities")
@@ -143,24 +139,20 @@ def run_study(
             groups |= judge(groups, study.settings, list(plan.states), executor)
             if "statistics/lost" in groups:
                 warn(words_of_lost(groups["statistics/lost"]))
-            groups |= extra or {}
-            attributes = {**_labels(study), **_attributes(study, plan), **(notes or {})}
-            result = write_result(out, attributes, groups, hand_on)
-        else:
-            hand_on(result)
+            attributes = {**labels, **_attributes(study, plan), **(notes or {})}
+            result = StudyResult(out, attributes, {**groups, **(extra or {})})
+        if finished is not None:
+            finished(result)
+        if before is None or before.attrs != result.attrs:
+            write_result(result)
         folder.clear()
     return result
 
 
-def _finished(study: Study, out: Path, report: Progress) -> StudyResult | None:
+def _finished(study: Study, out: Path) -> StudyResult | None:
     """The result of an earlier run, if there is one of the same study."""
-    if not (out / RESULT).exists():
-        return None
-    result = read_result(out)
-    if result.attrs.get("digest") != study.digest:
-        return None
-    report(1, 1, "finished before")
-    return result
+    result = read_result(out) if (out / RESULT).exists() else None
+    return result if result and result.attrs.get("digest") == study.digest else None
 
 
 def _labels(study: Study) -> dict[str, str]:
@@ -176,6 +168,7 @@ def _labels(study: Study) -> dict[str, str]:
 def _attributes(study: Study, plan: Plan) -> dict[str, str | float | int]:
     general = study.settings.study
     return {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "campaign": study.campaign.name,
         "preset": general.preset,
         "seed": general.seed,
@@ -197,14 +190,14 @@ def _computed(
     units = units_of(plan)
     known = {unit: folder.read(unit.name) for unit in units}
     done = {unit: groups for unit, groups in known.items() if groups is not None}
-    items = deque(tasks_of(plan, [unit for unit in units if unit not in done]))
+    tasks = tasks_of(plan, [unit for unit in units if unit not in done])
     members = sum(each.spec.n_members for each in plan.models.values())
     steps = [w.steps for each in plan.training for w in plan.windows if each.may_test(w.run)]
     mebibytes = 8 * members * sum(steps) * len(plan.states) / 2**20
     taken = f"{members * len(steps)} forecasts of {mebibytes:.3g} MiB"
     report(len(done), len(units), f"fitting and forecasting, {taken}")
     try:
-        for task, computed in as_finished(compute_task, (plan, facts), items, executor):
+        for task, computed in as_finished(compute_task, (plan, facts), tasks, executor):
             for unit, groups in zip(task, computed, strict=True):
                 folder.write(unit.name, groups)
                 done[unit] = groups
@@ -272,14 +265,14 @@ def compute_task(data: tuple[Plan, Groups], units: Sequence[Unit]) -> list[Group
     (plan, facts), selected, out = data, None, []
     for unit in units:
         training, spec = plan.training[unit.training], left_open(plan.specs[unit.model])
+        place = f"training set '{training.name}', model '{unit.model}'"
         try:
             if selected is None and spec is not None:
                 selected = spec.central(plan.dt).settled(*plan.taught(training.spans))
             out.append(compute(plan, facts, unit, selected))
+        except SeakeepError as error:
+            raise DataError(f"{place}: {error}") from error
         except Exception as error:
-            place = f"training set '{training.name}', model '{unit.model}'"
-            if isinstance(error, SeakeepError):
-                raise DataError(f"{place}: {error}") from error
             error.add_note(place)  # a model of somebody's own
             raise
     return out
@@ -371,12 +364,8 @@ def regularisation(plan: Plan, facts: Groups, unit: Unit, fitted: HankelDMDcMode
     spec = fitted.settings
     parts, states, inputs = plan.taught(plan.training[unit.training].spans)
     data = gather(parts, states, inputs, None, spec)
-    groups = (data.states, spec.state_delays), (data.delayed, spec.input_delays)
-    regressors = [
-        np.concatenate([embed(x[k], lags, at.first_column, at.columns) for x, lags in groups])
-        for k, at in enumerate(data.windows)
-    ]
-    squares = np.linalg.svd(np.concatenate(regressors, axis=1), compute_uv=False) ** 2
+    system = system_of((data.states, data.delayed, data.direct), data.windows, spec)
+    squares = np.linalg.eigvalsh(system.gram, UPLO="U")
     rank = round(float(np.sum(squares / (squares + fitted.training.ridge))))
     truncated = replace(spec, ridge=0.0, rank=rank)
     variants = {"none": replace(spec, ridge=0.0), "truncated": truncated, "ridge": spec}
@@ -445,13 +434,13 @@ def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
         ).values()
     ]
     nothing = np.full(len(plan.states), np.nan)
-    keys = ("margin", "blocks", "warranted")
-    out: dict[str, Any] = dict.fromkeys(keys, ("channel", nothing))
-    floor: FloatArray | None = nothing
-    law: FloatArray | None = np.tile(nothing, (4, 1))
+    unknown = ConformalMargin(nothing, nothing, nothing, nothing, statistics.level)
+    learnt: Any = unknown, nothing, [nothing] * 4
     if judged:
-        margin, floor, law = learn_margin(judged, statistics.level, statistics.scale)
-        out = {key: ("channel", getattr(margin, key)) for key in keys}
+        learnt = learn_margin(judged, statistics.level, statistics.scale)
+    margin, floor, law = learnt
+    keys = ("margin", "blocks", "warranted")
+    out: dict[str, Any] = {key: ("channel", getattr(margin, key)) for key in keys}
     out["windows"] = sum(len(each.measured) for each in judged)
     if statistics.scale != "constant":
         out["floor"] = ("channel", floor)
@@ -463,24 +452,22 @@ def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
 def collect(plan: Plan, facts: Groups, computed: Mapping[Unit, Groups]) -> Groups:
     """Put all units together, with the facts of their windows."""
     sets = [each.name for each in plan.training]
+    numbers = list(dict.fromkeys(unit.training for unit in computed))
+    nothing = xr.Dataset()
 
     def stacked(group: str, models: Iterable[str], dim: str) -> xr.Dataset:
         """A group of several models, over (`dim`, training)."""
-        mine = [unit for unit in computed if group in computed[unit] and unit.model in models]
-        numbers = list(dict.fromkeys(unit.training for unit in mine))
         names = {dim: list(models), "training": [sets[k] for k in numbers]}
-        grid = [[computed[Unit(model, k)][group] for k in numbers] for model in models]
+        grid = [[computed[Unit(m, k)].get(group, nothing) for k in numbers] for m in models]
         return side_by_side(grid, names, FILL)
 
     out = {}
-    for test, windows in plan.tests.items():
-        every = {"training": sets, "window": range(len(windows))}
-        means = stacked(f"tests/{test}", plan.models, "model").reindex(every)
+    for test in plan.tests:
+        means = stacked(f"tests/{test}", plan.models, "model")
         parts = [means.transpose("model", "measure", "band", "training", ...)]
         if plan.ensembles:
-            bands = stacked(f"bands/{test}", plan.ensembles, "ensemble")
-            parts.append(bands.reindex(every, fill_value=FILL))
-        data = xr.merge([*parts, facts[test]], join="outer")
+            parts.append(stacked(f"bands/{test}", plan.ensembles, "ensemble"))
+        data = xr.merge([*parts, facts[test]], join="right", fill_value=FILL)
         out[f"tests/{test}"] = data.drop_vars("member", errors="ignore")
     out["chosen"] = stacked("chosen", plan.models, "model")
     if plan.calibrated_on and plan.ensembles:
@@ -506,62 +493,52 @@ def facts_of(study: Study, plan: Plan) -> Groups:
         channel), ``judged``, ``start``, ``run``, moments of the training, ``noise_std`` and, with
         an elevation among the inputs, ``wave_height``.
     """
-    tested = {window.run: plan.runs[window.run] for window in plan.windows}
-    known = {"measured": {name: _columns(plan, run) for name, run in tested.items()}}
-    if (waves := next(filter(is_elevation, plan.inputs), None)) is not None:
-        known["wave_height"] = {n: _heights(run[waves], plan.dt) for n, run in tested.items()}
-    if (folder := study.truth_folder) is not None:
-        known["truth"] = {name: _truth(folder, plan, name) for name in tested}
-    taught = [parts_of(plan.runs, each.spans).values() for each in plan.training]
-    pooled = [np.concatenate([_columns(plan, each) for each in of]).T.copy() for of in taught]
-    out, dims = {}, ("window", "time", "channel")
+    known = {each.run: _known_of(study, plan, each.run) for each in plan.windows}
+    pooled = []
+    for training in plan.training:
+        parts = parts_of(plan.runs, training.spans).items()
+        columns = [channel_matrix(part, plan.states, name) for name, part in parts]
+        pooled.append(np.concatenate(columns).T.copy())
+    out = {}
     for test, windows in plan.tests.items():
-        series = {key: _cut(plan, each, windows) for key, each in known.items()}
-        noise = [
-            [tested[each.run][name].attrs.get("noise_std", 0.0) for name in plan.states]
-            for each in windows
-        ]
-        out[test] = xr.Dataset(
-            {
-                **{key: (dims[: each.ndim], each) for key, each in series.items()},
-                "judged": (
-                    ("training", "window"),
-                    [[each.may_test(w.run) for w in windows] for each in plan.training],
-                ),
-                "start": ("window", [each.start for each in windows]),
-                "run": ("window", [each.run for each in windows]),
-                "training_mean": (("training", "channel"), [x.mean(axis=1) for x in pooled]),
-                "training_std": (("training", "channel"), [x.std(axis=1, ddof=1) for x in pooled]),
-                "noise_std": (("window", "channel"), noise),
-            },
-            coords={
-                "model": list(plan.models),
-                "ensemble": plan.ensembles,
-                "measure": list(MEASURES),
-                "band": list(BANDS),
-                "training": [each.name for each in plan.training],
-                "window": range(len(windows)),
-                "time": ("time", plan.dt * np.arange(1, windows[0].steps + 1), {"units": "s"}),
-                "channel": list(plan.states),
-            },
+        cut = []
+        for each in windows:
+            at = nearest_sample(plan.runs[each.run]["time"].values, each.start, each.run) + 1
+            cut.append(known[each.run].isel(time=slice(at, at + each.steps)))
+        judged = [[each.may_test(w.run) for w in windows] for each in plan.training]
+        out[test] = xr.concat(cut, "window", data_vars="all").assign(
+            judged=(("training", "window"), judged),
+            start=("window", [each.start for each in windows]),
+            training_mean=(("training", "channel"), [x.mean(axis=1) for x in pooled]),
+            training_std=(("training", "channel"), [x.std(axis=1, ddof=1) for x in pooled]),
+        )
+        out[test] = out[test].assign_coords(
+            model=list(plan.models),
+            ensemble=plan.ensembles,
+            measure=list(MEASURES),
+            band=list(BANDS),
+            training=[each.name for each in plan.training],
+            window=range(len(windows)),
+            time=("time", plan.dt * np.arange(1, windows[0].steps + 1), {"units": "s"}),
+            channel=list(plan.states),
         )
     return out
 
 
-def _cut(plan: Plan, whole: Mapping[str, FloatArray], windows: Sequence[TestWindow]) -> FloatArray:
-    """Samples of arrays over the time of runs that windows forecast."""
-    parts = []
-    for each in windows:
-        at = int(np.argmin(np.abs(plan.runs[each.run]["time"].values - each.start))) + 1
-        parts.append(whole[each.run][at : at + each.steps])
-    return np.stack(parts)
-
-
-def _columns(plan: Plan, run: xr.Dataset) -> FloatArray:
-    """States of a run, (time, channel); NaN of one that it lacks."""
-    nothing = np.full(run.sizes["time"], np.nan)
-    columns = [run[name].values if name in run else nothing for name in plan.states]
-    return np.stack(columns, axis=-1).astype(float)
+def _known_of(study: Study, plan: Plan, name: str) -> xr.Dataset:
+    """What a run says without any model, at its instants."""
+    run = plan.runs[name]
+    noise = [run[each].attrs.get("noise_std", 0.0) for each in plan.states]
+    known: dict[str, Any] = {
+        "measured": (("time", "channel"), channel_matrix(run, plan.states, name)),
+        "noise_std": ("channel", noise),
+        "run": name,
+    }
+    if plan.waves is not None:
+        known["wave_height"] = "time", _heights(run[plan.waves], plan.dt)
+    if (folder := study.truth_folder) is not None:
+        known["truth"] = ("time", "channel"), _truth(folder, plan, name)
+    return xr.Dataset(known)
 
 
 def _heights(elevation: xr.DataArray, dt: float) -> FloatArray:
@@ -584,7 +561,11 @@ def _truth(folder: Path, plan: Plan, run: str) -> FloatArray:
             "it. Play the tank again, or leave study.truth out."
         )
     with decoding(path, "true channels", "Play the tank again."), h5py.File(path) as file:
-        wanted = [name for name in ("time", *plan.states) if name in file]
-        true = xr.Dataset({name: ("time", file[name][:]) for name in wanted})
-    time, known = plan.runs[run]["time"].values, true["time"].values
-    return np.stack([np.interp(time, known, each) for each in _columns(plan, true).T], axis=-1)
+        true = {name: file[name][:] for name in ("time", *plan.states) if name in file}
+    time = plan.runs[run]["time"].values
+    nothing = np.full(time.size, np.nan)
+    columns = [
+        np.interp(time, true["time"], true[name]) if name in true else nothing
+        for name in plan.states
+    ]
+    return np.stack(columns, axis=-1)

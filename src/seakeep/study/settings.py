@@ -313,31 +313,26 @@ def read_study(path: Path | str) -> Study:
 def _cross_checks(study: Study) -> list[Mistake]:
     """What the study says against what the campaign has."""
     campaign, settings = study.campaign, study.settings
-    mistakes: list[Mistake] = []
-    known = campaign.settings.channel_names
-    for key, names in (("states", study.states), ("inputs", study.inputs)):
-        mistakes += [
-            (
-                ("study", key),
-                f"received {name!r}, and the campaign has no such channel."
-                f"{did_you_mean(name, known)} Channels: {', '.join(known)}.",
-            )
-            for name in names
-            if name not in known
-        ]
+    known = {"channel": campaign.settings.channel_names, "run": list(campaign.runs)}
+    stated: dict[tuple[str, ...], tuple[str, Names]] = {
+        ("study", "states"): ("channel", study.states),
+        ("study", "inputs"): ("channel", study.inputs),
+        ("training", "runs"): ("run", settings.training.runs),
+        **{("tests", name, "runs"): ("run", each.runs) for name, each in settings.tests.items()},
+    }
+    mistakes = [
+        (
+            place,
+            f"received {name!r}, and the campaign has no such {what}."
+            f"{did_you_mean(name, known[what])} {what.title()}s: {', '.join(known[what])}.",
+        )
+        for place, (what, names) in stated.items()
+        for name in names
+        if name not in known[what]
+    ]
     if both := set(study.states) & set(study.inputs):
         words = f"{sorted(both)[0]!r} is among the states too; choose one."
         mistakes.append((("study", "inputs"), words))
-    tables: dict[tuple[str, ...], Names]
-    tables = {("tests", name): each.runs for name, each in settings.tests.items()}
-    for table, runs in {("training",): settings.training.runs, **tables}.items():
-        for run in runs:
-            if run not in campaign.runs:
-                words = (
-                    f"received {run!r}, and the campaign has no such run."
-                    f"{did_you_mean(run, campaign.runs)} Runs: {', '.join(campaign.runs)}."
-                )
-                mistakes.append(((*table, "runs"), words))
     for name, model in settings.models.items():
         mistakes += mistakes_of(model, ("models", name), settings.study.preset)
         for key in ("states", "inputs"):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -308,18 +307,9 @@ class StudyResult:
         return str(self.groups["channels"]["long_name"].sel(name=channel).values)
 
 
-def write_result(
-    folder: Path,
-    attrs: Mapping[str, Any],
-    groups: Datasets,
-    finished: Callable[[StudyResult], None],
-) -> StudyResult:
-    """Write a result into its folder, once it was handed to `finished`; errors as there."""
-    created = datetime.now(UTC).isoformat(timespec="seconds")
-    result = StudyResult(folder, {"created": created, **attrs}, dict(groups))
-    finished(result)
-    write_groups(folder / RESULT, STUDY, result.attrs, result.groups)
-    return result
+def write_result(result: StudyResult) -> None:
+    """Write a result into its folder; errors as :func:`write_groups`."""
+    write_groups(result.folder / RESULT, STUDY, result.attrs, result.groups)
 
 
 def read_result(folder: Path | str) -> StudyResult:
