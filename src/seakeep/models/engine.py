@@ -198,20 +198,19 @@ def read_groups(
                 own = labelled.opened(runs[name], name, signature.dt, labels)
                 opened[name] = _Opened(runs[name], *own)
             spans[-1].append(opened[name].span(signature, start, steps, predicts))
-    drives = {name: each.drives(signature, predicts) for name, each in opened.items()}
+    for each in opened.values():
+        each.drive(signature, predicts)
     return [
-        _windows(signature, [(opened[name], drives[name]) for name, _ in places], own)
+        _windows(signature, [opened[name] for name, _ in places], own)
         for (places, _), own in zip(groups, spans, strict=True)
     ]
 
 
-def _windows(
-    signature: Signature, runs: Sequence[tuple[_Opened, list[Drive]]], spans: Sequence[Span]
-) -> Windows:
+def _windows(signature: Signature, runs: Sequence[_Opened], spans: Sequence[Span]) -> Windows:
     """Windows of one length, each with what drives its run."""
     maps, dt, steps = signature.input_map, signature.dt, spans[0].stop - spans[0].known
     places, time, histories, look_ahead, predicted = [], [], [], [], []
-    for (run, _), span in zip(runs, spans, strict=True):
+    for run, span in zip(runs, spans, strict=True):
         places.append((run.name, float(run.time[span.known])))
         attrs = dict(run.run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
         instants = run.instants(span.known + 1, span.stop + 1, dt)
@@ -226,26 +225,24 @@ def _windows(
         if run.known is not None:
             step = max(run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1, 0)
         predicted.append(step if step < steps else -1)
-    parameter, (first_run, _) = signature.parameter, runs[0]
-    notes: dict[str, str | float] = {"run": first_run.name}
+    notes: dict[str, str | float] = {"run": runs[0].name}
     if maps.alignment is not None:
-        notes |= maps.alignment.notes(first_run.run)
+        notes |= maps.alignment.notes(runs[0].run)
     if signature.inputs:
         notes["reads_input_until"] = max(look_ahead) - dt
     # A run of which nothing is predicted has one future.
     expected, *departures = (
-        _series(signature, histories, [each[number % len(each)] for _, each in runs], spans)
-        for number in range(max(len(each) for _, each in runs))
+        _series(signature, histories, [run.futures[at % len(run.futures)] for run in runs], spans)
+        for at in range(max(len(run.futures) for run in runs))
     )
+    parameter = signature.parameter
     windows = Windows(
         places=tuple(places),
         steps=steps,
         time=tuple(time),
         notes=notes,
         predicted=tuple(predicted),
-        parameters=tuple(
-            parameter_of(run.run, parameter, run.name) for run, _ in runs if parameter
-        ),
+        parameters=tuple(parameter_of(run.run, parameter, run.name) for run in runs if parameter),
         **expected,
     )
     return replace(windows, departures=tuple(replace(windows, **each) for each in departures))
@@ -347,6 +344,9 @@ class _Opened:
         The run, its name and its instants, s.
     spans : list of Span
         Samples that forecasts read, before the map.
+    futures : list of Drive
+        What drives all of them; where inputs are predicted, then departures from these, of each
+        input, and their opposites.
     known : int, optional
         Sample after which inputs are predicted.
     """
@@ -355,6 +355,7 @@ class _Opened:
     name: str
     time: FloatArray
     spans: list[Span] = field(default_factory=list)
+    futures: list[Drive] = field(default_factory=list)
     known: int | None = None
 
     def instants(self, first: int, stop: int, dt: float) -> FloatArray:
@@ -398,12 +399,8 @@ class _Opened:
         self.spans.append(Span(at - signature.input_delays, at, at + count))
         return self.spans[-1]
 
-    def drives(self, signature: Signature, predicts: bool) -> list[Drive]:
-        """What drives all forecasts of the run.
-
-        Where inputs are predicted, departures from these follow, of each input, and their
-        opposites.
-        """
+    def drive(self, signature: Signature, predicts: bool) -> None:
+        """Read what drives all forecasts of the run, once every span is known."""
         maps, names = signature.input_map, signature.inputs
         read = [maps.reads(span) for span in self.spans]
         first = min(each.first for each in read)
@@ -413,14 +410,13 @@ class _Opened:
             last = max(span.known for span in self.spans) + 1  # no later state is read
             channel, rows = [signature.states[follows.column]], slice(first, last)
             surge = labelled.channel_matrix(self.run, channel, self.name, rows)[:, 0]
-        out = []
         for run in self._continued(signature, first, stop) if predicts else [self.run]:
             values = labelled.channel_matrix(run, names, self.name, slice(first, stop))
             for each in read:
                 wanted = values[each.first - first : each.stop - first]
                 labelled.check_finite(wanted, names, run, self.name, each.first)
-            out.append(maps.drive(values, self.spans, run=run, first=first, surge=surge))
-        return out
+            drive = maps.drive(values, self.spans, run=run, first=first, surge=surge)
+            self.futures.append(drive)
 
     def _continued(self, signature: Signature, first: int, stop: int) -> list[xr.Dataset]:
         """The run up to a sample, with what is missing of inputs predicted; then departures.
@@ -514,7 +510,7 @@ def array_windows(
     Returns
     -------
     Windows
-        Their times count from the start.
+        Without instants.
     """
     history = inputs.shape[1] - (steps - 1) - signature.lead_samples
     span = Span(history - 1 - signature.input_delays, history - 1, history - 1 + steps)
@@ -526,11 +522,10 @@ def array_windows(
             known = states[-history:, follows.column]
             surge = np.concatenate([np.full(history - len(known), np.nan), known])
         drives.append(signature.input_map.drive(values, [span], run=rig, surge=surge))
-    time = xr.Variable(("time",), signature.dt * np.arange(1, steps + 1))
     return Windows(
         places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
-        time=(time,) * len(histories),
+        time=(),
         **_series(signature, histories, drives, [span] * len(drives)),
     )
 

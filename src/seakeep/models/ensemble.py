@@ -402,7 +402,7 @@ class HankelEnsemble(Model):
         RequestError, DataError
             As :meth:`HankelDMDcModel.forecast`.
         """
-        windows = self.windows(run, [start], steps, ahead)
+        windows = self.read_windows(run, [start], steps, ahead)
         series, lost = self._series(windows, executor, progress)
         return self._single(run, windows, np.array(series[:, 0]), lost, "member")
 
@@ -459,7 +459,7 @@ class HankelEnsemble(Model):
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows = self.windows(run, [start], steps, ahead)
+        windows = self.read_windows(run, [start], steps, ahead)
         values, lost, statistic, counts = self._banded(windows, level, band, executor, progress)
         forecast = self._single(run, windows, values[0], lost, "statistic")
         return forecast.assign_coords(statistic=statistic).assign_attrs(counts)
@@ -534,7 +534,7 @@ class HankelEnsemble(Model):
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows = self.windows(run, starts, steps, ahead)
+        windows = self.read_windows(run, starts, steps, ahead)
         values, lost, statistic, counts = self._banded(windows, level, band, executor, progress)
         diverged = ("window", (lost >= 0).sum(axis=0))
         forecast = windows_dataset(self.signature, windows, values, "statistic", diverged=diverged)
@@ -583,6 +583,8 @@ class HankelEnsemble(Model):
             The same, with members :attr:`identified`: N(N(s+1) + Q(z+1)) numbers per member with
             exact delay rows, and s + 1 times as many with regressed ones.
         """
+        if self.identified:
+            return self
         numbers = range(len(self._taught))
         members = in_order(HankelEnsemble.dynamics, self, numbers, executor, progress)
         return replace(self, identified=tuple(members))
@@ -646,7 +648,7 @@ class HankelEnsemble(Model):
         The filter predicts with the mean of the members, or with what they are centred on, whose
         errors on what they learnt from are found here; a forecast runs all of them.
         """
-        members = self if self.identified else self.hold()
+        members = self.hold()
         return Live(members, members._means, members.errors, like=like, noise=noise, roles=roles)
 
     @property

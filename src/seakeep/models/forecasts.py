@@ -14,7 +14,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import (
-    Datasets,
     FloatArray,
     IntArray,
     Json,
@@ -118,31 +117,26 @@ class Model:
         """Samples of input after the one a step starts from that drive the step."""
         return self.signature.lead_samples
 
-    def read_windows(
-        self,
-        runs: Datasets,
-        places: Sequence[tuple[str, float]],
-        steps: int | None,
-        ahead: str = "refuse",
-    ) -> Windows:
-        """What forecasts from several starts, in several runs, read: (run, start in s) each."""
-        return engine.read_groups(self.signature, runs, [(places, steps)], ahead)[0]
-
     def free_runs(
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
         raise NotImplementedError
 
-    def windows(
-        self, run: xr.Dataset, starts: Sequence[float], steps: int | None, ahead: str = "refuse"
+    def read_windows(
+        self,
+        run: xr.Dataset,
+        starts: Sequence[float],
+        steps: int | None,
+        ahead: str = "refuse",
+        name: str = "the run",
     ) -> Windows:
-        """What forecasts from several starts in one run read."""
+        """What forecasts from several starts in one run read; `name` is that of a run without."""
         if np.ndim(starts) == 0:
             raise RequestError(
                 f"starts must be a list of instants; received {starts!r}. Write [{starts}]."
             )
-        name = run_name(run, "the run")
+        name = run_name(run, name)
         places = [(name, start) for start in starts]
         return engine.read_groups(self.signature, {name: run}, [(places, steps)], ahead)[0]
 
@@ -156,7 +150,7 @@ class Model:
     ) -> tuple[FloatArray, FloatArray]:
         """Free runs from samples of a run, and the measurement, each (window, steps, N)."""
         time = run["time"].values
-        windows = self.read_windows({name: run}, [(name, float(time[at])) for at in starts], steps)
+        windows = self.read_windows(run, time[list(starts)].tolist(), steps, name=name)
         states = channel_matrix(run, self.states, name)
         measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
         return self.free_runs([windows])[0][0], measured
@@ -273,7 +267,7 @@ class Model:
         DataError
             If the step or the units are not the model's, or needed samples are missing.
         """
-        windows, signature = self.windows(run, [start], steps, ahead), self.signature
+        windows, signature = self.read_windows(run, [start], steps, ahead), self.signature
         (values,) = self.free_runs([windows])[0][0]
         _warn_of_reach(signature, windows, values)
         variables = label_channels(signature, values, ("time",))
@@ -315,7 +309,7 @@ class Model:
         RequestError, DataError
             As :meth:`forecast`, or if there is no start.
         """
-        windows = self.windows(run, starts, steps, ahead)
+        windows = self.read_windows(run, starts, steps, ahead)
         series, lost = self._series(windows, executor, progress)
         values, status = np.array(series).swapaxes(0, 1), statuses(lost, windows, self.dt).T
         return self._of_members(

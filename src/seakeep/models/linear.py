@@ -501,7 +501,7 @@ class HankelDMDcModel(Model):
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows = self.windows(run, [start], 1)
+        windows = self.read_windows(run, [start], 1)
         return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
 
     def initial_state_arrays(

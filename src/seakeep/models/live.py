@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import xarray as xr
 from scipy import special
 
@@ -234,10 +235,9 @@ class Live:
         needed = 2 * (self._begins + self._ahead + 1)
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
         delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
-        widths = {"u": len(signature.inputs), "x": count, "y": count}
-        widths["lost"] = widths["u"]
+        inputs, self._first, room = len(signature.inputs), 0, 2 * self._record
+        widths = {"u": inputs, "lost": inputs, "x": count, "y": count}
         widths |= {"delayed": delayed, "direct": direct}
-        self._first, room = 0, 2 * self._record
         self._recent = {name: np.full((room, width), np.nan) for name, width in widths.items()}
         self._count = _Counts()
         # None of a complete sample after complete ones, which is taken as it is.
@@ -297,8 +297,9 @@ class Live:
         One where errors are as in training, over the last few hundred samples. Well above one for
         longer than that, the model no longer fits the vessel, or a sensor its channel.
         """
-        each = self.consistency_by_state
-        return float(each[np.isfinite(each)].mean()) if np.isfinite(each).any() else math.nan
+        known = self.consistency_by_state
+        known = known[np.isfinite(known)]
+        return float(known.mean()) if known.size else math.nan
 
     @property
     def consistency_by_state(self) -> FloatArray:
@@ -386,6 +387,10 @@ class Live:
         """A view of some samples, by their numbers."""
         return self._recent[name][first - self._first : stop - self._first]
 
+    def _row(self, name: str, at: int) -> FloatArray:
+        """A view of one sample."""
+        return self._recent[name][at - self._first]
+
     @one_blas_thread()
     def step(
         self,
@@ -426,12 +431,10 @@ class Live:
             for values in self._recent.values():
                 values[: self._record] = values[self._record :]
             self._first += self._record
-        self._rows("u", at, at + 1)[:] = inputs
-        self._rows("lost", at, at + 1)[:] = np.isnan(sample)
-        self._rows("y", at, at + 1)[:] = states
+        recent, row = self._recent, at - self._first
+        recent["u"][row], recent["lost"][row], recent["y"][row] = inputs, np.isnan(sample), states
         # Held until it is estimated: an alignment reads where the vessel is.
-        last = self._recent["x"][at - 1 - self._first]
-        self._rows("x", at, at + 1)[:] = np.where(np.isfinite(states), states, last)
+        recent["x"][row] = np.where(np.isfinite(states), states, recent["x"][row - 1])
         self._count.taken += 1
         self._time = instant
         self._filtered(at, np.isfinite(states))
@@ -547,7 +550,7 @@ class Live:
         self._finish(LATE)
         if self._is_exact():
             if count.final < at:
-                self._rows("x", at, at + 1)[:] = self._rows("y", at, at + 1)
+                self._row("x", at)[:] = self._row("y", at)
             return
         known = self._known_inputs()
         if self._ahead and self.signature.inputs:
@@ -580,7 +583,7 @@ class Live:
         """
         s = self.signature.state_delays
         for at in range(first, last + 1):
-            update, measured = self._update_of(at), self._rows("y", at, at + 1)[0]
+            update, measured = self._update_of(at), self._row("y", at)
             predicted = self.signature.state_scale.centre
             if at >= self._begins:
                 if not is_final:
@@ -609,24 +612,23 @@ class Live:
         surge = self._rows("x", at + 1 - place.taps.size, at + 1)[:, self._follows.column]
         (here,) = place.of(surge).tolist()
         on_grid = min((here - place.lowest) / place.spacing, place.highest)
-        read_row(table[at - first], 0, on_grid, self._rows("delayed", at, at + 1)[0])
-        self._rows("direct", at, at + 1)[0, -1] = (here - place.centre) ** 2
+        read_row(table[at - first], 0, on_grid, self._row("delayed", at))
+        self._row("direct", at)[-1] = (here - place.centre) ** 2
 
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""
         delayed = self._rows("delayed", at - self.signature.input_delays, at + 1)
-        direct = self._rows("direct", at, at + 1)[0]
         out = self._a @ history.ravel()
         out += self._offset
         out += self._b @ delayed.ravel()
         if self._d.size:
-            out += self._d @ direct
+            out += self._d @ self._row("direct", at)
         return out
 
     def _judge(self, at: int, update: _Update | None, innovation: FloatArray) -> None:
         """Take a sample into the running squares, NaN for what was not measured."""
         self._innovation, lead = innovation, self._count.lead
-        measured = self._rows("y", at, at + 1)[0]
+        measured = self._row("y", at)
         squares = np.full((2, measured.size), np.nan)
         with np.errstate(over="ignore"):
             squares[0] = (innovation / (update.deviations if update else self._deviations)) ** 2
@@ -790,13 +792,12 @@ class Live:
 
     def _predictable(self) -> float:
         """Time for which the waves at the last probe are known from the first one, s."""
-        placed = np.flatnonzero(np.isfinite(self._places))
-        if not placed.size:
+        if np.isnan(self._places).all():
             return 0.0
-        record = self._known_inputs()[:, self._waves[placed[self._places[placed].argmin()]]]
+        record = self._known_inputs()[:, self._waves[np.nanargmin(self._places)]]
         if not np.ptp(record) > 0:
             return 0.0
-        apart = float(np.ptp(self._places[placed]))
+        apart = float(np.nanmax(self._places) - np.nanmin(self._places))
         return predictable_time(record, self.signature.dt, apart, self._depth)
 
     def _futures(self, steps: int, future: Any, closed: _Closed) -> tuple[FloatArray, float, int]:
@@ -808,25 +809,24 @@ class Live:
         """
         names, waves, (record, gone, tail) = self.signature.inputs, self._waves, closed
         dark, light = min(tail, len(self.errors.rms)), len(record) - tail
+        wanted = steps - 1 + self._ahead
         # What filled a gap that is not closed does not join the waves after it.
         before = np.flatnonzero(gone[:light].all(axis=1)).max(initial=-1) + 1
         before *= bool(waves) and light - before >= AFTER
-        given = _plan(future, names, steps - 1 + self._ahead)
-        for column in sorted(set(range(len(names))) - set(waves)):
-            lost = np.isnan(given[:, column])
-            if self._roles[names[column]] == "known" and lost.any():
+        inputs, begin = np.concatenate([record, _plan(future, names, wanted)]), len(record)
+        for name, role in self._roles.items():
+            own = inputs[begin - 1 :, names.index(name)]
+            known = np.isfinite(own[1:]).sum()
+            if role == "known" and known < wanted:
                 raise RequestError(
-                    f"'{names[column]}' is a known input, and future gives {np.sum(~lost)} of the "
-                    f"{len(given)} samples that {steps} steps need. Give its plan: future = "
-                    f"{{'{names[column]}': …}}, or the role 'constant'."
+                    f"'{name}' is a known input, and future gives {known} of the {wanted} samples "
+                    f"that {steps} steps need. Give its plan: future = {{'{name}': …}}, or the "
+                    "role 'constant'."
                 )
-            whole = np.append(record[-1, column], given[:, column])
-            at = np.where(np.isfinite(whole), np.arange(whole.size), 0)
-            given[:, column] = whole[np.maximum.accumulate(at)][1:]
-        inputs, begin = np.concatenate([record, given]), len(record)
+            own[:] = pd.Series(own).ffill()
         inputs[begin - dark : begin, waves] = np.nan
         if not np.isnan(inputs).any():
-            return inputs[None], math.inf, len(given)
+            return inputs[None], math.inf, wanted
         filled, first, freedom = fill_future(
             inputs[:, waves],
             begin - dark,
@@ -854,13 +854,13 @@ class Live:
         RequestError
             If the file cannot be written, or another one is there.
         """
-        noises = zip(self.signature.states, self._noise.tolist(), strict=True)
+        noises = dict(zip(self.signature.states, self._noise.tolist(), strict=True))
         words = {
             "counts": asdict(self._count),
             "as_it_is": [each is None for each in self._pending()],
             "time": self._time,
             "rig": [self._rig.attrs, {name: each.attrs for name, each in self._rig.items()}],
-            "noise": {name: each for name, each in noises if each},
+            "noise": {name: each for name, each in noises.items() if each},
             "roles": self._roles,
         }
         attrs = {"settings": json.dumps(words), "model": self._identity}
@@ -908,14 +908,13 @@ class Live:
         for as_it_is in content["as_it_is"]:
             blank = _Update(np.empty((len(covariance), count)), np.empty(count))
             self._updates.append(None if as_it_is else blank)
-        parts, at = [*self._parts(), covariance], 0
-        size = sum(part.size for part in parts)
+        parts = [*self._parts(), covariance]
+        *ends, size = np.cumsum([part.size for part in parts]).tolist()
         head = -(-size // 32)
         bits, whole = values[:head].astype(np.uint32), np.zeros(size)
         whole[np.unpackbits(bits.view(np.uint8), count=size) > 0] = values[head:]
-        for part in parts:
-            part[:] = whole[at : at + part.size].reshape(part.shape)
-            at += part.size
+        for part, own in zip(parts, np.split(whole, ends), strict=True):
+            part[:] = own.reshape(part.shape)
         covariance += np.tril(covariance, -1).T
         taken, unseen = self._count.taken, self._count.since
         if not self._count.partly:
