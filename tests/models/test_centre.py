@@ -108,8 +108,8 @@ def test_regressors_depart_from_their_means_over_the_reference_period():
     spec, run = replace(SPEC, ridge=1e-3, observables=observables), vessel(3, 1.0)
     runs = {"run": run}
     centred, pooled = (replace(spec, centre=c).fit(runs, *CHANNELS) for c in ("run", "pooled"))
-    own, other = (each.read_windows(runs, [("run", 40.0)], 50) for each in (centred, pooled))
-    before = pooled.read_windows(runs, [("run", 40.0 - DT * (PERIOD - 1))], PERIOD)
+    own, other = (each.read_windows(run, [40.0], 50) for each in (centred, pooled))
+    before = pooled.read_windows(run, [40.0 - DT * (PERIOD - 1)], PERIOD)
     # Sums of a few hundred numbers, in another order.
     for name in ("delayed", "direct"):
         mean = getattr(before, name)[:, -PERIOD:].mean(axis=1, keepdims=True)
@@ -144,7 +144,7 @@ def test_a_surge_that_is_followed_stays_as_it_is(tmp_path):
     change = table(after - before, states) - [5.0 * moves.get(name, 0.0) for name in states]
     np.testing.assert_allclose(change, 0.0, atol=1e-7)  # loads of 30 N, by ridge regressions
     pooled = replace(spec, centre="pooled").fit(plain, states, inputs)
-    assert first.read_windows({"run": run}, [("run", 80.0)], 1).zero[0, 0] == 0.0
+    assert first.read_windows(run, [80.0], 1).zero[0, 0] == 0.0
     assert first.state_mean[0] == pooled.state_mean[0]
     assert first.signature.direct_scale.mean[-1] == pooled.signature.direct_scale.mean[-1]
     assert before.attrs["status"] == "ok"

@@ -41,11 +41,11 @@ def test_settings_know_the_history_that_carriers_read(models, drift):
 
 def test_bands_take_the_waves_at_the_place_of_the_start(models, drift):
     model, run = models["ahead"], drift
-    windows = model.read_windows({"a": run}, [("a", 60.0), ("a", 80.0)], 50)
+    windows = model.read_windows(run, [60.0, 80.0], 50)
     assert windows.delayed.shape == (2, 40 + 50, 6)
     found = envelope_of(model.signature, windows)
     still = run.assign(surge=("time", np.full(run.sizes["time"], 0.0), run["surge"].attrs))
-    other = envelope_of(model.signature, model.read_windows({"a": still}, [("a", 60.0)], 50))
+    other = envelope_of(model.signature, model.read_windows(still, [60.0], 50))
     assert found.shape == (2, 50)
     assert np.all((found > 0.2) & (found < 3))  # SD of the waves of training
     assert not np.allclose(found[0], other[0], rtol=1e-3)

@@ -11,6 +11,7 @@ from scipy import signal
 from seakeep import DataError, HankelDMDc, RequestError, SeakeepWarning, check, load_model, tune
 from seakeep.hosts.program import exportable
 from seakeep.models import specs
+from seakeep.models.engine import read_groups
 
 DT = 0.1
 ON_STATE = np.array([1.5, -0.9]), np.array([0.2, -0.03])
@@ -91,7 +92,8 @@ def test_where_waves_are_predicted_the_forecast_is_that_of_its_file(tmp_path):
 def test_windows_of_several_runs_take_the_value_of_each(model):
     runs = {"shallow": vessel(0.2, 5), "deep": vessel(0.9, 6)}
     places = [("deep", 5.0), ("shallow", 6.0), ("deep", 7.0)]
-    together = model.free_runs([model.read_windows(runs, places, 50)])[0][0]
+    windows = read_groups(model.signature, runs, [(places, 50)])
+    together = model.free_runs(windows)[0][0]
     for (name, start), values in zip(places, together, strict=True):
         alone = model.forecast(runs[name], start, 50)
         # Windows side by side are summed in another order.

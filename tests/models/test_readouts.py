@@ -57,7 +57,7 @@ def test_the_line_and_its_load_are_recovered_to_the_noise(chosen, drift):
     spacing = chosen.signature.input_map.follows.place.spacing
     assert abs(line.load.place - LINE) <= spacing / 2
     # Of measured motions: what is left is noise, and what the carriers err.
-    windows = chosen.read_windows({"a": drift}, [("a", START)], STEPS)
+    windows = chosen.read_windows(drift, [START], STEPS)
     measured = table(drift, STATES)[601 : 601 + STEPS]
     found = line.read(measured, windows.waves[0, :, 0])
     left = float(np.sqrt(np.mean((found - measured[:, 2]) ** 2)))
@@ -65,7 +65,7 @@ def test_the_line_and_its_load_are_recovered_to_the_noise(chosen, drift):
 
 
 def test_the_wave_at_the_line_is_that_of_the_tank(chosen, drift):
-    windows = chosen.read_windows({"a": drift}, [("a", START)], STEPS)
+    windows = chosen.read_windows(drift, [START], STEPS)
     wave, rate = windows.waves[0, :, 0].T
     # From the definition of the load, where its line is wet.
     motions = 30.0 - 2.0 * drift["surge"].values + 5.0 * drift["heave"].values

@@ -258,8 +258,8 @@ def held_out(
         starts = tuple(float(time[at]) for at in places)
         places_of = [(name, start) for start in starts]
         (windows,) = read_groups(signature, {name: run}, [(places_of, steps)])
-        with member_series(ensemble, [windows], executor, tell) as ((series, lost),):
-            values = reduce_members(series, lost, level)
+        ((series, lost),) = member_series(ensemble, [windows], executor, tell)
+        values = reduce_members(series, lost, level)
         states = labelled.channel_matrix(run, signature.states, name)
         measured = np.stack([states[at + 1 : at + 1 + steps] for at in places])
         judged[name] = Judged(values, measured, envelope_of(signature, windows), starts)

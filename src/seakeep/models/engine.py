@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from operator import call
@@ -77,10 +76,9 @@ class Windows:
         start on those at the place of the start.
     direct : ndarray, shape (window, steps, m)
         Direct regressors from the start on; then without the slow surge squared.
-    look_ahead : tuple of float
-        Seconds of input after the instant a step starts from that drive it.
     notes : dict
-        What a forecast's attributes report of the input map, for the first run.
+        What a forecast's attributes report of the first run, of the input map there, and of how
+        far ahead it reads.
     table : ndarray, shape (time, place, n), optional
         What would drive a step at each place, where the model follows its own surge.
     starts : ndarray of int, shape (window,), optional
@@ -104,7 +102,6 @@ class Windows:
     histories: FloatArray
     delayed: FloatArray
     direct: FloatArray
-    look_ahead: tuple[float, ...] = ()
     notes: Mapping[str, str | float] = field(default_factory=dict)
     table: FloatArray | None = None
     starts: IntArray | None = None
@@ -186,7 +183,6 @@ def read_groups(
     check_choice("ahead", ahead, ("refuse", "predict"))
     predicts = ahead == "predict" and bool(signature.inputs)
     labels, opened = signature.state_labels + signature.input_labels, dict[str, _Opened]()
-    wanted: dict[str, list[Span]] = {}
     spans: list[list[Span]] = []
     for places, steps in groups:
         if not places:
@@ -200,48 +196,25 @@ def read_groups(
         for name, start in places:
             if name not in opened:
                 own = labelled.opened(runs[name], name, signature.dt, labels)
-                opened[name], wanted[name] = _Opened(runs[name], *own), []
-            span = opened[name].span(signature, start, steps, predicts)
-            spans[-1].append(span)
-            wanted[name].append(span)
-    futures = {
-        name: each.continued(signature, wanted[name]) if predicts else [each]
-        for name, each in opened.items()
-    }
-    # A run of which nothing is predicted has one future, whose drive all share.
-    driven = {
-        name: [(each, each.drive(signature, wanted[name])) for each in runs_of]
-        for name, runs_of in futures.items()
-    }
-    made = []
-    for number in range(max(map(len, driven.values()), default=0)):
-        now = {name: each[number % len(each)] for name, each in driven.items()}
-        made.append(
-            [
-                _driven(
-                    signature,
-                    [now[name][1] for name, _ in places],
-                    mine,
-                    [now[name][0] for name, _ in places],
-                )
-                for (places, _), mine in zip(groups, spans, strict=True)
-            ]
-        )
-    return [replace(each, departures=tuple(others)) for each, *others in zip(*made, strict=True)]
+                opened[name] = _Opened(runs[name], *own)
+            spans[-1].append(opened[name].span(signature, start, steps, predicts))
+    for each in opened.values():
+        each.drive(signature, predicts)
+    return [
+        _windows(signature, [opened[name] for name, _ in places], own)
+        for (places, _), own in zip(groups, spans, strict=True)
+    ]
 
 
-def _driven(
-    signature: Signature, drives: Sequence[Drive], spans: Sequence[Span], runs: Sequence[_Opened]
-) -> Windows:
-    """Windows of one length, each with its run's drive."""
+def _windows(signature: Signature, runs: Sequence[_Opened], spans: Sequence[Span]) -> Windows:
+    """Windows of one length, each with what drives its run."""
     maps, dt, steps = signature.input_map, signature.dt, spans[0].stop - spans[0].known
     places, time, histories, look_ahead, predicted = [], [], [], [], []
     for run, span in zip(runs, spans, strict=True):
         places.append((run.name, float(run.time[span.known])))
-        inside = run.time[span.known + 1 : span.stop + 1]
-        beyond = run.time[-1] + dt * np.arange(1, steps - inside.size + 1)
         attrs = dict(run.run.variables["time"].attrs) or {"units": "s", "long_name": "time"}
-        time.append(xr.Variable(("time",), np.concatenate([inside, beyond]), attrs))
+        instants = run.instants(span.known + 1, span.stop + 1, dt)
+        time.append(xr.Variable(("time",), instants, attrs))
         first = span.known + 1 - signature.state_samples
         rows = slice(first, span.known + 1)
         states = labelled.channel_matrix(run.run, signature.states, run.name, rows)
@@ -252,17 +225,27 @@ def _driven(
         if run.known is not None:
             step = max(run.known - math.ceil(look_ahead[-1] / dt - 1e-6) - span.known + 1, 0)
         predicted.append(step if step < steps else -1)
+    notes: dict[str, str | float] = {"run": runs[0].name}
+    if maps.alignment is not None:
+        notes |= maps.alignment.notes(runs[0].run)
+    if signature.inputs:
+        notes["reads_input_until"] = max(look_ahead) - dt
+    # A run of which nothing is predicted has one future.
+    expected, *departures = (
+        _series(signature, histories, [run.futures[at % len(run.futures)] for run in runs], spans)
+        for at in range(max(len(run.futures) for run in runs))
+    )
     parameter = signature.parameter
-    return Windows(
+    windows = Windows(
         places=tuple(places),
         steps=steps,
         time=tuple(time),
-        look_ahead=tuple(look_ahead),
-        notes={} if maps.alignment is None else maps.alignment.notes(runs[0].run),
+        notes=notes,
         predicted=tuple(predicted),
         parameters=tuple(parameter_of(run.run, parameter, run.name) for run in runs if parameter),
-        **_series(signature, histories, drives, spans),
+        **expected,
     )
+    return replace(windows, departures=tuple(replace(windows, **each) for each in departures))
 
 
 def _series(
@@ -351,19 +334,38 @@ def parameter_of(run: xr.Dataset, parameter: str, name: str) -> float:
     return float(value)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Opened:
-    """A run that was checked; its inputs may be predicted after the sample `known`."""
+    """A run that was checked, and what forecasts read of it.
+
+    Parameters
+    ----------
+    run, name, time : Dataset, str, ndarray
+        The run, its name and its instants, s.
+    spans : list of Span
+        Samples that forecasts read, before the map.
+    futures : list of Drive
+        What drives all of them; where inputs are predicted, then departures from these, of each
+        input, and their opposites.
+    known : int, optional
+        Sample after which inputs are predicted.
+    """
 
     run: xr.Dataset
     name: str
     time: FloatArray
+    spans: list[Span] = field(default_factory=list)
+    futures: list[Drive] = field(default_factory=list)
     known: int | None = None
 
-    def span(
-        self, signature: Signature, start: float, steps: int | None, predicts: bool = False
-    ) -> Span:
-        """Samples of input that a forecast reads, before the map."""
+    def instants(self, first: int, stop: int, dt: float) -> FloatArray:
+        """Instants of samples, which may lie beyond the end of the run."""
+        inside = self.time[first:stop]
+        beyond = np.arange(1, stop - first - inside.size + 1)
+        return np.concatenate([inside, self.time[-1] + dt * beyond])
+
+    def span(self, signature: Signature, start: float, steps: int | None, predicts: bool) -> Span:
+        """Samples of input that one more forecast reads, before the map."""
         time, dt, name = self.time, signature.dt, self.name
         at = labelled.nearest_sample(time, start, name)
         needed, lead = signature.history_samples, 0 if predicts else signature.lead_samples
@@ -394,59 +396,59 @@ class _Opened:
                 f"{shown(time[-1])} s{ahead}. At most {max(most, 0)} steps can be forecast from "
                 "there; ahead = 'predict' continues the input by linear prediction."
             )
-        return Span(at - signature.input_delays, at, at + count)
+        self.spans.append(Span(at - signature.input_delays, at, at + count))
+        return self.spans[-1]
 
-    def continued(self, signature: Signature, spans: Sequence[Span]) -> list[_Opened]:
-        """The run up to the last sample that is wanted, with inputs predicted that are missing.
+    def drive(self, signature: Signature, predicts: bool) -> None:
+        """Read what drives all forecasts of the run, once every span is known."""
+        maps, names = signature.input_map, signature.inputs
+        read = [maps.reads(span) for span in self.spans]
+        first = min(each.first for each in read)
+        stop = max(each.stop for each in read) if names else first
+        surge = None
+        if (follows := maps.follows) is not None:
+            last = max(span.known for span in self.spans) + 1  # no later state is read
+            channel, rows = [signature.states[follows.column]], slice(first, last)
+            surge = labelled.channel_matrix(self.run, channel, self.name, rows)[:, 0]
+        for run in self._continued(signature, first, stop) if predicts else [self.run]:
+            values = labelled.channel_matrix(run, names, self.name, slice(first, stop))
+            for each in read:
+                wanted = values[each.first - first : each.stop - first]
+                labelled.check_finite(wanted, names, run, self.name, each.first)
+            drive = maps.drive(values, self.spans, run=run, first=first, surge=surge)
+            self.futures.append(drive)
 
-        Then departures from these, of each input, and their opposites.
+    def _continued(self, signature: Signature, first: int, stop: int) -> list[xr.Dataset]:
+        """The run up to a sample, with what is missing of inputs predicted; then departures.
+
+        The run as it is where nothing is missing, or something before a start: only the future
+        is predicted.
         """
-        stop = max(signature.input_map.reads(span).stop for span in spans)
-        start = max(span.known for span in spans)
+        start = max(span.known for span in self.spans)
         values = labelled.channel_matrix(self.run, signature.inputs, self.name, slice(stop))
         values = np.pad(values, ((0, stop - len(values)), (0, 0)), constant_values=np.nan)
         gaps = np.flatnonzero(~np.isfinite(values).all(axis=1))
-        # Only the future is predicted: missing samples that are read before a start are refused.
-        begin = min(signature.input_map.reads(span).first for span in spans)
-        if gaps.max(initial=0) <= start or np.any((gaps >= begin) & (gaps <= start)):
-            return [self]
+        if gaps.max(initial=0) <= start or np.any((gaps >= first) & (gaps <= start)):
+            return [self.run]
         if signature.input_map.reads_surge:
             raise RequestError(
                 f"ahead = 'predict' continues inputs, and those of {self.name} are carried to the "
                 "measured surge, which nothing continues. Forecast fewer steps, or fit a model "
                 "with surge = 'predicted' or 'none'."
             )
+        futures, missing = filled(signature, values, start + 1, self.run)
+        self.known = missing - 1
         names = [each for each in (*signature.inputs, *signature.states) if each in self.run]
-        run = self.run[names].isel(time=slice(0, stop))
-        more = stop - run.sizes["time"]
-        beyond = self.time[-1] + signature.dt * np.arange(1, more + 1)
-        run = run.pad(time=(0, more), keep_attrs=True)
-        run = run.assign_coords(time=np.concatenate([self.time[:stop], beyond]))
-        futures, first = filled(signature, values, start + 1, self.run)
-        out = []
-        for future in futures:
-            columns = zip(signature.inputs, future.T, strict=True)
-            own = run.assign({name: run[name].copy(data=each) for name, each in columns})
-            out.append(replace(self, run=own, known=first - 1))
-        return out
-
-    def drive(self, signature: Signature, spans: Sequence[Span]) -> Drive:
-        """Regressors of the run, made once for all windows."""
-        read = [signature.input_map.reads(span) for span in spans]
-        first = min(each.first for each in read)
-        stop = max(each.stop for each in read) if signature.inputs else first
-        rows = slice(first, stop)
-        values = labelled.channel_matrix(self.run, signature.inputs, self.name, rows)
-        for each in read:
-            wanted = values[each.first - first : max(each.stop - first, 0)]
-            labelled.check_finite(wanted, signature.inputs, self.run, self.name, each.first)
-        surge = None
-        if (follows := signature.input_map.follows) is not None:
-            last = max(span.known for span in spans) + 1  # no later state is read
-            channel = [signature.states[follows.column]]
-            rows = slice(first, last)
-            surge = labelled.channel_matrix(self.run, channel, self.name, rows)[:, 0]
-        return signature.input_map.drive(values, spans, run=self.run, first=first, surge=surge)
+        run = self.run[names].reindex(time=self.instants(0, stop, signature.dt))
+        return [
+            run.assign(
+                {
+                    name: run[name].copy(data=each)
+                    for name, each in zip(signature.inputs, future.T, strict=True)
+                }
+            )
+            for future in futures
+        ]
 
 
 def filled(
@@ -508,7 +510,7 @@ def array_windows(
     Returns
     -------
     Windows
-        Their times count from the start.
+        Without instants.
     """
     history = inputs.shape[1] - (steps - 1) - signature.lead_samples
     span = Span(history - 1 - signature.input_delays, history - 1, history - 1 + steps)
@@ -520,11 +522,10 @@ def array_windows(
             known = states[-history:, follows.column]
             surge = np.concatenate([np.full(history - len(known), np.nan), known])
         drives.append(signature.input_map.drive(values, [span], run=rig, surge=surge))
-    time = xr.Variable(("time",), signature.dt * np.arange(1, steps + 1))
     return Windows(
         places=(("these arrays", 0.0),) * len(histories),
         steps=steps,
-        time=(time,) * len(histories),
+        time=(),
         **_series(signature, histories, drives, [span] * len(drives)),
     )
 
@@ -647,16 +648,13 @@ def cut_lost(values: FloatArray, signature: Signature, windows: Windows) -> Floa
     scale = signature.state_scale
     start = np.abs(windows.histories - scale.centre).max(axis=1, initial=0.0)
     reach = GROWTH * np.maximum(scale.bound, start)
-
-    def beyond(excess: FloatArray | float) -> BoolArray:
-        lost = np.zeros(values.shape[:2], dtype=bool)
-        for column, centre in enumerate(scale.centre):  # one after the other takes little room
-            lost |= ~(np.abs(values[..., column] - centre) <= reach[:, [column]] * excess)
-        return lost
-
     with np.errstate(invalid="ignore", over="ignore"):
-        if beyond(1.0).any():
-            lost = beyond(_excess(signature, windows))
+        farthest = np.zeros(values.shape[:2])
+        for column, centre in enumerate(scale.centre):  # one after the other takes little room
+            away = np.abs(values[..., column] - centre)
+            np.maximum(farthest, away / reach[:, [column]], out=farthest)
+        if not (farthest <= 1.0).all():
+            lost = ~(farthest <= _excess(signature, windows))
             values[np.logical_or.accumulate(lost, axis=1)] = np.nan
     return values
 
@@ -664,13 +662,12 @@ def cut_lost(values: FloatArray, signature: Signature, windows: Windows) -> Floa
 Series = tuple[FloatArray, IntArray]
 
 
-@contextmanager
 def member_series(
     model: Runs,
     groups: Sequence[Windows],
     executor: Executor | None = None,
     progress: Progress | None = None,
-) -> Iterator[list[Series]]:
+) -> list[Series]:
     """Free runs of all members, in a temporary file where they take more than ``HELD`` bytes.
 
     Each member is identified once.
@@ -684,12 +681,11 @@ def member_series(
     executor, progress
         As in :meth:`HankelEnsemble.forecast`.
 
-    Yields
-    ------
+    Returns
+    -------
     list of (series, lost), one of each group
         States in physical units, shape (member, window, steps, N), NaN from where a window is lost
-        on and gone when the block is left; and the first instant lost, or −1, shape (member,
-        window).
+        on; and the first instant lost, or −1, shape (member, window).
 
     Raises
     ------
@@ -697,38 +693,33 @@ def member_series(
         If the temporary folder has no room.
     """
     count, channels = model.n_members, len(model.signature.states)
-    with ExitStack() as stack:
-        runs: list[Series] = [
-            (
-                stack.enter_context(_room((count, len(each), each.steps, channels))),
-                np.empty((count, len(each)), dtype=np.int64),
-            )
-            for each in groups
-        ]
-        # What members are centred on comes after them.
-        total = count + model.is_centred
-        together = 1
-        if any(each.table is not None for each in groups):
-            size = sum(series.nbytes for series, _ in runs) // count
-            most = TOGETHER // max(len(each) for each in groups)
-            together = max(1, min(most, HELD // size))
-        parts = [range(total)[at : at + together] for at in range(0, total, together)]
-
-        def tell(done: int, of: int, what: str) -> None:
-            assert progress is not None
-            number = min(parts[done - 1].stop, count)
+    runs: list[Series] = [
+        (
+            _room((count, len(each), each.steps, channels)),
+            np.empty((count, len(each)), dtype=np.int64),
+        )
+        for each in groups
+    ]
+    # What members are centred on comes after them.
+    total = count + model.is_centred
+    together = 1
+    if any(each.table is not None for each in groups):
+        size = sum(series.nbytes for series, _ in runs) // count
+        most = TOGETHER // max(len(each) for each in groups)
+        together = max(1, min(most, HELD // size))
+    parts = [range(total)[at : at + together] for at in range(0, total, together)]
+    computed = in_order(call, partial(model.free_runs, groups), parts, executor)
+    for part, every in zip(parts, computed, strict=True):
+        number = min(part.stop, count)
+        if progress:
             progress(number, count, f"member {number}")
-
-        told = tell if progress else None
-        computed = in_order(call, partial(model.free_runs, groups), parts, executor, told)
-        for part, every in zip(parts, computed, strict=True):
-            for (series, lost), values in zip(runs, every, strict=True):
-                members = values[: count - part.start]
-                series[part.start : part.start + len(members)] = members
-                lost[part.start : part.start + len(members)] = first_lost(members)
-                if part.stop > count:
-                    _centre(series, lost, values[-1])
-        yield runs
+        for (series, lost), values in zip(runs, every, strict=True):
+            members = values[: count - part.start]
+            series[part.start : number] = members
+            lost[part.start : number] = first_lost(members)
+            if part.stop > count:
+                _centre(series, lost, values[-1])
+    return runs
 
 
 def _centre(series: FloatArray, lost: IntArray, runs: FloatArray) -> None:
@@ -745,26 +736,23 @@ def _centre(series: FloatArray, lost: IntArray, runs: FloatArray) -> None:
     series += shift
 
 
-@contextmanager
-def _room(shape: tuple[int, ...]) -> Iterator[FloatArray]:
-    """Array for member series, in a file without a name where it is large."""
+def _room(shape: tuple[int, ...]) -> FloatArray:
+    """Array for member series, in a file without a name, which goes with it, where it is large."""
     size = 8 * math.prod(shape)
     if size <= HELD:
-        yield np.empty(shape)
-        return
-    with ExitStack() as stack:
-        try:
-            file = stack.enter_context(tempfile.TemporaryFile(prefix="seakeep-"))
+        return np.empty(shape)
+    try:
+        with tempfile.TemporaryFile(prefix="seakeep-") as file:
             if hasattr(os, "posix_fallocate"):  # a full disk is reported now, not by a signal
                 os.posix_fallocate(file.fileno(), 0, size)
-        except OSError as error:
-            raise RequestError(
-                f"cannot keep {size / 2**20:.0f} MiB of members in the temporary folder "
-                f"{tempfile.gettempdir()}: {error.strerror or error}. Free space there, name a "
-                "folder on another disk in the environment variable TMPDIR, or ask for fewer "
-                "steps, windows or members at a time."
-            ) from error
-        yield np.memmap(file, dtype=np.float64, mode="w+", shape=shape)
+            return np.memmap(file, dtype=np.float64, mode="w+", shape=shape)
+    except OSError as error:
+        raise RequestError(
+            f"cannot keep {size / 2**20:.0f} MiB of members in the temporary folder "
+            f"{tempfile.gettempdir()}: {error.strerror or error}. Free space there, name a "
+            "folder on another disk in the environment variable TMPDIR, or ask for fewer "
+            "steps, windows or members at a time."
+        ) from error
 
 
 def first_lost(values: FloatArray) -> IntArray:

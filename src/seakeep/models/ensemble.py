@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple, Self, get_args
@@ -35,13 +34,11 @@ from seakeep.models.forecasts import (
     check_arrays,
     counted,
     forecast_attrs,
-    forecast_notes,
     label_channels,
-    one_run,
     reduce_members,
     statistic_coordinate,
     statuses,
-    window_coords,
+    windows_dataset,
     with_units,
 )
 from seakeep.models.growth import LeadErrors, Stretch, lead_errors, weigh_members
@@ -405,28 +402,27 @@ class HankelEnsemble(Model):
         RequestError, DataError
             As :meth:`HankelDMDcModel.forecast`.
         """
-        windows = self.read_windows(*one_run(run, [start]), steps, ahead)
-        with self._series(windows, executor, progress) as (series, lost):
-            return self._single(run, windows, np.array(series[:, 0]), lost, "member")
+        windows = self.read_windows(run, [start], steps, ahead)
+        series, lost = self._series(windows, executor, progress)
+        return self._single(run, windows, np.array(series[:, 0]), lost, "member")
 
-    @contextmanager
     def _series(
         self, windows: Windows, executor: Executor | None, progress: Progress | None
-    ) -> Iterator[Series]:
-        """Series of the members, weighed where waves are predicted, as :func:`member_series`."""
+    ) -> Series:
+        """Series of all members, weighed where waves are predicted."""
         held = self
         # Weights take errors of all members, and what follows its surge is stepped together.
         if (windows.departures or windows.table is not None) and not self.identified:
             held = self.hold(executor=executor, progress=progress)
             progress = None  # the rest is a small part
-        with member_series(held, [windows, *windows.departures], executor, progress) as parts:
-            if windows.departures:
-                runs, signature = [series for series, _ in parts], self.signature
-                weigh_members(windows, runs, held.errors, signature.state_scale)
-                for each in signature.readouts:  # what moved the members ends at a floor
-                    load = runs[0][..., each.column]
-                    np.maximum(load, each.floor, out=load)
-            yield parts[0]
+        parts = member_series(held, [windows, *windows.departures], executor, progress)
+        if windows.departures:
+            runs, signature = [series for series, _ in parts], self.signature
+            weigh_members(windows, runs, held.errors, signature.state_scale)
+            for each in signature.readouts:  # what moved the members ends at a floor
+                load = runs[0][..., each.column]
+                np.maximum(load, each.floor, out=load)
+        return parts[0]
 
     def forecast_summary(
         self,
@@ -463,7 +459,7 @@ class HankelEnsemble(Model):
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows = self.read_windows(*one_run(run, [start]), steps, ahead)
+        windows = self.read_windows(run, [start], steps, ahead)
         values, lost, statistic, counts = self._banded(windows, level, band, executor, progress)
         forecast = self._single(run, windows, values[0], lost, "statistic")
         return forecast.assign_coords(statistic=statistic).assign_attrs(counts)
@@ -482,11 +478,6 @@ class HankelEnsemble(Model):
         time, gone = windows.time[0], lost[:, 0]
         words = {"units": "s", "long_name": "first instant at which the member is lost"}
         middle = values if dimension == "member" else values[:1]
-        facts = {
-            "ensemble": json.dumps(self.origin),
-            "diverged": int(np.count_nonzero(gone >= 0)),
-            "members": self.n_members,
-        }
         return xr.Dataset(
             variables,
             coords={
@@ -494,49 +485,21 @@ class HankelEnsemble(Model):
                 "diverged_at": ("member", np.where(gone >= 0, time.values[gone], np.nan), words),
                 "time": time,
             },
-            attrs=forecast_attrs(self, run, windows, middle, **facts),
+            attrs=forecast_attrs(
+                self,
+                run,
+                windows,
+                middle,
+                ensemble=json.dumps(self.origin),
+                diverged=int(np.count_nonzero(gone >= 0)),
+                members=self.n_members,
+            ),
         )
 
-    def forecast_windows(
-        self,
-        run: xr.Dataset,
-        starts: Sequence[float],
-        steps: int,
-        *,
-        ahead: str = "refuse",
-        executor: Executor | None = None,
-        progress: Progress | None = None,
-    ) -> xr.Dataset:
-        """Free runs of all members from several starts side by side.
-
-        Parameters
-        ----------
-        run, steps, ahead, executor, progress
-            As in :meth:`forecast`; `steps` holds for all.
-        starts : sequence of float
-            Instants of the last measured state, s.
-
-        Returns
-        -------
-        Dataset
-            States with dimensions (window, member, lead), ``lead`` in s after each ``start``
-            (over ``window``), and ``status`` over (window, member); with predicted input also
-            ``input_predicted_from`` over ``window``.
-
-        Raises
-        ------
-        RequestError, DataError
-            As :meth:`forecast`.
-        """
-        windows = self.read_windows(*one_run(run, starts), steps, ahead)
-        with self._series(windows, executor, progress) as (series, lost):
-            values = np.array(series).swapaxes(0, 1)
-        variables = label_channels(self.signature, values, ("window", "member", "lead"))
-        status = statuses(lost, windows, self.dt).T
-        variables["status"] = xr.Variable(("window", "member"), status)
-        coords = window_coords(windows, self.dt) | {"member": np.arange(self.n_members)}
-        attrs = {"ensemble": json.dumps(self.origin), **forecast_notes(self.signature, windows)}
-        return xr.Dataset(variables, coords=coords, attrs=attrs)
+    def _of_members(self, forecast: xr.Dataset) -> xr.Dataset:
+        """A forecast of all members, with their numbers and where they come from."""
+        attrs = {"ensemble": json.dumps(self.origin)}
+        return forecast.assign_coords(member=np.arange(self.n_members)).assign_attrs(attrs)
 
     def summarize_windows(
         self,
@@ -571,16 +534,11 @@ class HankelEnsemble(Model):
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows = self.read_windows(*one_run(run, starts), steps, ahead)
+        windows = self.read_windows(run, starts, steps, ahead)
         values, lost, statistic, counts = self._banded(windows, level, band, executor, progress)
-        variables = label_channels(self.signature, values, ("window", "statistic", "lead"))
-        variables["diverged"] = xr.Variable(("window",), (lost >= 0).sum(axis=0))
-        attrs = {"ensemble": json.dumps(self.origin), **forecast_notes(self.signature, windows)}
-        return xr.Dataset(
-            variables,
-            coords=window_coords(windows, self.dt) | {"statistic": statistic},
-            attrs=attrs | counts,
-        )
+        diverged = ("window", (lost >= 0).sum(axis=0))
+        forecast = windows_dataset(self.signature, windows, values, "statistic", diverged=diverged)
+        return forecast.assign_coords(statistic=statistic).assign_attrs(counts)
 
     def _banded(
         self,
@@ -596,13 +554,17 @@ class HankelEnsemble(Model):
         """
         level = fraction(level, "level")
         check_choice("band", band, get_args(Band))
-        attrs: dict[str, Any] = {"level": level, "members": self.n_members}
+        attrs: dict[str, Any] = {
+            "ensemble": json.dumps(self.origin),
+            "level": level,
+            "members": self.n_members,
+        }
         bounds, calibrated = "", None
         if band == "calibrated":
             calibrated = calibrated_for(self.calibration, level)
             bounds, attrs["band"] = calibrated.bounds, band
-        with self._series(windows, executor, progress) as (series, lost):
-            values = reduce_members(series, lost, level)
+        series, lost = self._series(windows, executor, progress)
+        values = reduce_members(series, lost, level)
         if calibrated is not None:
             values = widened(calibrated, values, self.signature, windows)
         return values, lost, statistic_coordinate(level, bounds), attrs
@@ -621,6 +583,8 @@ class HankelEnsemble(Model):
             The same, with members :attr:`identified`: N(N(s+1) + Q(z+1)) numbers per member with
             exact delay rows, and s + 1 times as many with regressed ones.
         """
+        if self.identified:
+            return self
         numbers = range(len(self._taught))
         members = in_order(HankelEnsemble.dynamics, self, numbers, executor, progress)
         return replace(self, identified=tuple(members))
@@ -684,7 +648,7 @@ class HankelEnsemble(Model):
         The filter predicts with the mean of the members, or with what they are centred on, whose
         errors on what they learnt from are found here; a forecast runs all of them.
         """
-        members = self if self.identified else self.hold()
+        members = self.hold()
         return Live(members, members._means, members.errors, like=like, noise=noise, roles=roles)
 
     @property
@@ -851,8 +815,7 @@ class HankelEnsemble(Model):
     def to_dataset(self) -> xr.Dataset:
         """The ensemble as a Dataset: what :meth:`save` writes."""
         parts = store.pack({name: getattr(self, name) for name in PARTS})
-        draws = draws_dataset(self.members, self.origin)
-        return draws.assign(parts.data_vars).assign_attrs(parts.attrs)
+        return self.draws.assign(parts.data_vars).assign_attrs(parts.attrs)
 
 
 def _spectral_radius(ensemble: HankelEnsemble, number: int) -> float:

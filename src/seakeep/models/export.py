@@ -70,18 +70,11 @@ def matrices(a_hat: FloatArray, b_hat: FloatArray, signature: Signature) -> Syst
     scale_u = np.concatenate([np.tile(delayed, signature.input_delays + 1), direct])
     a = a_hat * scale_x[:, None] / scale_x
     b = b_hat * scale_x[:, None] / scale_u
-    extended, line = a.shape[0], n * signature.input_delays
-    size = extended + line
-    A = np.zeros((size, size))
-    A[:extended, :extended] = a
-    A[:extended, extended:] = b[:, n : n + line]
-    B = np.zeros((size, n + m))
-    B[:extended, :n] = b[:, :n]
-    B[:extended, n:] = b[:, n + line :]
-    if line:
-        A[extended + n :, extended : size - n] = np.eye(line - n)
-        B[extended : extended + n, :n] = np.eye(n)
-    return A, B, np.eye(states, size), np.zeros((states, n + m))
+    now, before, beside = np.split(b, [n, b.shape[1] - m], axis=1)
+    line = before.shape[1]
+    A = np.block([[a, before], [np.zeros((line, len(a))), np.eye(line, k=-n)]])
+    B = np.block([[now, beside], [np.eye(line, n), np.zeros((line, m))]])
+    return A, B, np.eye(states, len(A)), np.zeros((states, n + m))
 
 
 def observables(signature: Signature) -> dict[str, Any]:

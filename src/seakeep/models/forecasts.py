@@ -14,9 +14,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from seakeep.arrays import (
-    Datasets,
     FloatArray,
-    Groups,
     IntArray,
     Json,
     Progress,
@@ -29,7 +27,7 @@ from seakeep.errors import RequestError, warn
 from seakeep.files import write_sealed
 from seakeep.models import engine, store
 from seakeep.models.alignment import ProbeAlignment
-from seakeep.models.engine import Windows, first_lost
+from seakeep.models.engine import Series, Windows, first_lost
 from seakeep.models.inputs import Signature
 from seakeep.models.labelled import ChannelLabel, Runs, Stop, channel_matrix, run_name
 from seakeep.models.settings import Needs, Role
@@ -119,21 +117,28 @@ class Model:
         """Samples of input after the one a step starts from that drive the step."""
         return self.signature.lead_samples
 
-    def read_windows(
-        self,
-        runs: Datasets,
-        places: Sequence[tuple[str, float]],
-        steps: int | None,
-        ahead: str = "refuse",
-    ) -> Windows:
-        """What forecasts from several starts, in several runs, read: (run, start in s) each."""
-        return engine.read_groups(self.signature, runs, [(places, steps)], ahead)[0]
-
     def free_runs(
         self, groups: Sequence[Windows], members: Sequence[int] = (0,)
     ) -> list[FloatArray]:
         """Free runs over groups of windows, each (1, window, steps, N), NaN from where lost."""
         raise NotImplementedError
+
+    def read_windows(
+        self,
+        run: xr.Dataset,
+        starts: Sequence[float],
+        steps: int | None,
+        ahead: str = "refuse",
+        name: str = "the run",
+    ) -> Windows:
+        """What forecasts from several starts in one run read; `name` is that of a run without."""
+        if np.ndim(starts) == 0:
+            raise RequestError(
+                f"starts must be a list of instants; received {starts!r}. Write [{starts}]."
+            )
+        name = run_name(run, name)
+        places = [(name, start) for start in starts]
+        return engine.read_groups(self.signature, {name: run}, [(places, steps)], ahead)[0]
 
     def judged_starts(self, run: xr.Dataset, steps: int, first: int = 0) -> range:
         """Samples from which windows end to end can be forecast in a run, from `first` on."""
@@ -145,7 +150,7 @@ class Model:
     ) -> tuple[FloatArray, FloatArray]:
         """Free runs from samples of a run, and the measurement, each (window, steps, N)."""
         time = run["time"].values
-        windows = self.read_windows({name: run}, [(name, float(time[at])) for at in starts], steps)
+        windows = self.read_windows(run, time[list(starts)].tolist(), steps, name=name)
         states = channel_matrix(run, self.states, name)
         measured = np.stack([states[at + 1 : at + 1 + steps] for at in starts])
         return self.free_runs([windows])[0][0], measured
@@ -262,12 +267,11 @@ class Model:
         DataError
             If the step or the units are not the model's, or needed samples are missing.
         """
-        windows, signature = self.read_windows(*one_run(run, [start]), steps, ahead), self.signature
-        values = self.free_runs([windows])[0][0]
-        _warn_of_reach(signature, windows, values[0])
-        variables = label_channels(signature, values[0], ("time",))
-        lost = outcome(windows, 0, int(first_lost(values)[0]))
-        attrs = forecast_attrs(self, run, windows, values[0], **lost)
+        windows, signature = self.read_windows(run, [start], steps, ahead), self.signature
+        (values,) = self.free_runs([windows])[0][0]
+        _warn_of_reach(signature, windows, values)
+        variables = label_channels(signature, values, ("time",))
+        attrs = forecast_attrs(self, run, windows, values, int(first_lost(values)))
         # The instants stand among the variables: given as coords, xarray would merge twice.
         return xr.Dataset({"time": windows.time[0], **variables}, attrs=attrs)
 
@@ -295,26 +299,34 @@ class Model:
         Returns
         -------
         Dataset
-            States with dimensions (window, lead), ``lead`` in s after each ``start`` (over
-            ``window``), and ``status`` over ``window``; with predicted input also
-            ``input_predicted_from`` over ``window``, NaN where it is all measured.
+            States with dimensions (window, lead), of an ensemble (window, member, lead), ``lead``
+            in s after each ``start`` (over ``window``), and ``status`` over ``window``, of an
+            ensemble over (window, member); with predicted input also ``input_predicted_from``
+            over ``window``, NaN where it is all measured.
 
         Raises
         ------
         RequestError, DataError
             As :meth:`forecast`, or if there is no start.
         """
-        windows = self.read_windows(*one_run(run, starts), steps, ahead)
-        with engine.member_series(self, [windows], executor, progress) as ((series, lost),):
-            values = np.array(series[0])
-        signature = self.signature
-        variables = label_channels(signature, values, ("window", "lead"))
-        variables["status"] = xr.Variable(("window",), statuses(lost, windows, signature.dt)[0])
-        return xr.Dataset(
-            variables,
-            coords=window_coords(windows, signature.dt),
-            attrs=forecast_notes(signature, windows),
+        windows = self.read_windows(run, starts, steps, ahead)
+        series, lost = self._series(windows, executor, progress)
+        values, status = np.array(series).swapaxes(0, 1), statuses(lost, windows, self.dt).T
+        return self._of_members(
+            windows_dataset(
+                self.signature, windows, values, "member", status=(("window", "member"), status)
+            )
         )
+
+    def _series(
+        self, windows: Windows, executor: Executor | None, progress: Progress | None
+    ) -> Series:
+        """Series of all members, as :func:`seakeep.models.engine.member_series`."""
+        return engine.member_series(self, [windows], executor, progress)[0]
+
+    def _of_members(self, forecast: xr.Dataset) -> xr.Dataset:
+        """A forecast of all members: of one alone, without their dimension."""
+        return forecast.isel(member=0)
 
 
 class Spec(Protocol):
@@ -370,15 +382,23 @@ class Spec(Protocol):
 
 
 def forecast_attrs(
-    model: Model, run: xr.Dataset, windows: Windows, values: FloatArray, **facts: Any
+    model: Model,
+    run: xr.Dataset,
+    windows: Windows,
+    values: FloatArray,
+    lost: int = -1,
+    **facts: Any,
 ) -> dict[str, Any]:
-    """Attributes of a forecast from one start, shape (…, steps, N), and facts of its runs."""
+    """Attributes of a forecast from one start, shape (…, steps, N), and facts of its runs.
+
+    A single run is `lost` from that instant on, or −1.
+    """
     signature, (_, start) = model.signature, windows.places[0]
     names = signature.states
     surge = values[..., names.index("surge")] if "surge" in names else None
     if reasons := outside_training(model, run, start, windows.steps, surge):
         facts["outside_training"] = "; ".join(reasons)
-    attrs = {**forecast_notes(signature, windows), "start": start, **facts}
+    attrs = {**windows.notes, "start": start, **outcome(windows, 0, lost), **facts}
     return {**attrs, "status": status_text(attrs, signature.dt)}
 
 
@@ -400,26 +420,6 @@ def _warn_of_reach(signature: Signature, windows: Windows, values: FloatArray) -
         )
 
 
-def one_run(run: xr.Dataset, starts: Sequence[float]) -> tuple[Groups, list[tuple[str, float]]]:
-    """A run and the places in it, as :meth:`Model.read_windows` takes them."""
-    if np.ndim(starts) == 0:
-        raise RequestError(
-            f"starts must be a list of instants; received {starts!r}. Write [{starts}]."
-        )
-    name = run_name(run, "the run")
-    return {name: run}, [(name, start) for start in starts]
-
-
-def forecast_notes(signature: Signature, windows: Windows) -> dict[str, Any]:
-    """Attributes of a forecast: its run, what its input map reads, and how far ahead."""
-    notes: dict[str, Any] = {}
-    if signature.inputs:
-        notes["reads_input_until"] = max(windows.look_ahead) - signature.dt
-    if len(windows) == 1:
-        notes |= outcome(windows, 0)
-    return {"run": windows.places[0][0], **windows.notes, **notes}
-
-
 def label_channels(
     signature: Signature, values: FloatArray, dims: tuple[str, ...]
 ) -> dict[str, Any]:
@@ -439,22 +439,25 @@ def label_channels(
     }
 
 
-def window_coords(windows: Windows, dt: float) -> dict[str, xr.Variable]:
-    """Start of each of several windows, and the time after it."""
-    lead = dt * np.arange(1, windows.steps + 1)
-    starts = np.array([start for _, start in windows.places])
+def windows_dataset(
+    signature: Signature, windows: Windows, values: FloatArray, inner: str, **more: Any
+) -> xr.Dataset:
+    """Forecasts from several starts, shape (window, inner, lead, N), and more variables."""
+    lead = signature.dt * np.arange(1, windows.steps + 1)
+    starts = [start for _, start in windows.places]
     coords = {
-        "start": xr.Variable(("window",), starts, {"units": "s", "long_name": "start"}),
-        "lead": xr.Variable(("lead",), lead, {"units": "s", "long_name": "time after start"}),
+        "start": ("window", starts, {"units": "s", "long_name": "start"}),
+        "lead": ("lead", lead, {"units": "s", "long_name": "time after start"}),
     }
-    if any(at >= 0 for at in windows.predicted):
+    if max(windows.predicted) >= 0:
         instants = [
-            outcome(windows, each).get("input_predicted_from") for each in range(len(windows))
+            outcome(windows, each).get("input_predicted_from", np.nan)
+            for each in range(len(starts))
         ]
         words = {"units": "s", "long_name": "first instant that depends on predicted input"}
-        values = np.array(instants, dtype=float)  # None becomes NaN
-        coords["input_predicted_from"] = xr.Variable(("window",), values, words)
-    return coords
+        coords["input_predicted_from"] = ("window", instants, words)
+    variables = label_channels(signature, values, ("window", inner, "lead"))
+    return xr.Dataset(variables | more, coords=coords, attrs=windows.notes)
 
 
 def outcome(windows: Windows, window: int, lost: int = -1) -> dict[str, float]:
@@ -587,7 +590,7 @@ def _finite(name: str, needed: FloatArray) -> FloatArray:
             f"{name} holds {int(np.sum(~np.isfinite(needed)))} values that are not finite in the "
             f"{len(needed)} rows needed. Fill the gap first."
         )
-    return as_real(needed, name)
+    return needed
 
 
 def statistics_of(values: FloatArray, level: float) -> FloatArray:
@@ -616,19 +619,13 @@ def statistics_of(values: FloatArray, level: float) -> FloatArray:
     if len(values) > SORTED:
         out[2:] = np.quantile(values, probabilities, axis=0)
         return out
-    # As numpy.quantile gives them to the last bit.
-    ordered = np.sort(values, axis=0)
+    # As numpy.quantile gives them to the last bit: from the nearer of two.
+    ordered, last = np.sort(values, axis=0), len(values) - 1
     for row, probability in zip(out[2:], probabilities, strict=True):
-        place = probability * (len(ordered) - 1)
-        below = int(place)
-        low, high, part = ordered[below], ordered[min(below + 1, len(ordered) - 1)], place - below
-        np.subtract(high, low, out=row)
-        if part < 0.5:  # from the nearer of the two, as NumPy does
-            row *= part
-            row += low
-        else:
-            row *= part - 1.0
-            row += high
+        below = int(probability * last)
+        part = probability * last - below
+        low, high = ordered[below], ordered[min(below + 1, last)]
+        row[:] = low + part * (high - low) if part < 0.5 else high - (1.0 - part) * (high - low)
     return out
 
 

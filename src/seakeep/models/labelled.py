@@ -266,8 +266,7 @@ def common_step(runs: Datasets) -> float:
     first_name, first_run = next(iter(runs.items()))
     dt = run_step(first_run, first_name)
     for name, run in runs.items():
-        if run is not first_run:
-            run_step(run, name, dt)
+        run_step(run, name, dt)
     return dt
 
 
@@ -341,7 +340,7 @@ def nearest_sample(time: FloatArray, value: object, name: str, what: str = "star
             f"{what} = {instant_text(instant, step)} s is outside {name}, which runs from "
             f"{span_text(time[0], time[-1], step)}. Choose an instant inside it."
         )
-    return min(max(round((instant - float(time[0])) / step), 0), time.size - 1)
+    return round((instant - float(time[0])) / step)
 
 
 def wave_channel(run: xr.Dataset, inputs: Sequence[str], name: str) -> str | None:

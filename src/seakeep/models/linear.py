@@ -18,7 +18,7 @@ from seakeep.errors import RequestError, warn
 from seakeep.models import engine, export, labelled, store
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.engine import Dynamics, Windows, linear_runs
-from seakeep.models.forecasts import Model, check_arrays, counted, one_run, rows_by_name
+from seakeep.models.forecasts import Model, check_arrays, counted, rows_by_name
 from seakeep.models.growth import LeadErrors, training_errors, weigh_members
 from seakeep.models.inputs import Scale, Signature
 from seakeep.models.labelled import Span
@@ -501,7 +501,7 @@ class HankelDMDcModel(Model):
         RequestError, DataError
             As :meth:`forecast`.
         """
-        windows = self.read_windows(*one_run(run, [start]), 1)
+        windows = self.read_windows(run, [start], 1)
         return export.initial_state(self.signature, windows.histories[0], windows.delayed[0])
 
     def initial_state_arrays(

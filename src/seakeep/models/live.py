@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import xarray as xr
 from scipy import special
 
@@ -44,7 +45,7 @@ from seakeep.models import engine, store
 from seakeep.models.engine import Dynamics, Runs
 from seakeep.models.forecasts import label_channels, rows_by_name, statistic_coordinate
 from seakeep.models.growth import WINDOWS, LeadErrors, weighed
-from seakeep.models.inputs import Drive, Signature
+from seakeep.models.inputs import Drive, Scale, Signature
 from seakeep.models.labelled import Span
 from seakeep.models.validity import Conditions, Coverage, Validity
 from seakeep.signals.prediction import close_gaps, fill_future, predict_waves, predictable_time
@@ -217,10 +218,7 @@ class Live:
         size, variances = count * (s + 1), self._noise**2
         process = process_noise(errors.residual, self._a, variances)
         self._filter = DelayFilter(self._a, process, variances, np.zeros((size, size)))
-        self._as_it_is = _Update(  # of a complete sample after complete ones
-            np.eye(size, count, count - size),
-            np.sqrt(np.diagonal(process) + variances),
-        )
+        self._deviations = np.sqrt(np.diagonal(process) + variances)  # after complete samples
         self._time = math.nan
         # Samples after an instant whose input is needed before its estimate is final.
         self._ahead = signature.lead_samples
@@ -237,13 +235,13 @@ class Live:
         needed = 2 * (self._begins + self._ahead + 1)
         self._record = max(LEAST_RECORD, needed, RECORD * longest)
         delayed, direct = signature.input_scale.mean.size, signature.direct_scale.mean.size
-        widths = {"u": len(signature.inputs), "x": count, "y": count}
-        widths["lost"] = widths["u"]
+        inputs, self._first, room = len(signature.inputs), 0, 2 * self._record
+        widths = {"u": inputs, "lost": inputs, "x": count, "y": count}
         widths |= {"delayed": delayed, "direct": direct}
-        self._first, room = 0, 2 * self._record
         self._recent = {name: np.full((room, width), np.nan) for name, width in widths.items()}
         self._count = _Counts()
-        self._updates: deque[_Update] = deque(maxlen=self._ahead + LATE + 2)
+        # None of a complete sample after complete ones, which is taken as it is.
+        self._updates: deque[_Update | None] = deque(maxlen=self._ahead + LATE + 2)
         self._history = np.tile(signature.state_scale.centre, (s + 1, 1))
         self._innovation = np.full(count, np.nan)
         # Of squares that fade: sums, and weights; of each state, and of each in free runs.
@@ -299,8 +297,9 @@ class Live:
         One where errors are as in training, over the last few hundred samples. Well above one for
         longer than that, the model no longer fits the vessel, or a sensor its channel.
         """
-        each = self.consistency_by_state
-        return float(each[np.isfinite(each)].mean()) if np.isfinite(each).any() else math.nan
+        known = self.consistency_by_state
+        known = known[np.isfinite(known)]
+        return float(known.mean()) if known.size else math.nan
 
     @property
     def consistency_by_state(self) -> FloatArray:
@@ -356,8 +355,7 @@ class Live:
         """Estimates of the surge over the record."""
         if "surge" not in self.signature.states:
             return None
-        rows = self._rows("x", max(self._count.taken - self._record, 0), self._count.taken)
-        return rows[:, self.signature.states.index("surge")]
+        return self._known_inputs("x")[:, self.signature.states.index("surge")]
 
     @property
     def equations(self) -> dict[str, Any]:
@@ -388,6 +386,10 @@ class Live:
     def _rows(self, name: str, first: int, stop: int) -> FloatArray:
         """A view of some samples, by their numbers."""
         return self._recent[name][first - self._first : stop - self._first]
+
+    def _row(self, name: str, at: int) -> FloatArray:
+        """A view of one sample."""
+        return self._recent[name][at - self._first]
 
     @one_blas_thread()
     def step(
@@ -429,12 +431,10 @@ class Live:
             for values in self._recent.values():
                 values[: self._record] = values[self._record :]
             self._first += self._record
-        self._rows("u", at, at + 1)[:] = inputs
-        self._rows("lost", at, at + 1)[:] = np.isnan(sample)
-        self._rows("y", at, at + 1)[:] = states
+        recent, row = self._recent, at - self._first
+        recent["u"][row], recent["lost"][row], recent["y"][row] = inputs, np.isnan(sample), states
         # Held until it is estimated: an alignment reads where the vessel is.
-        last = self._recent["x"][at - 1 - self._first]
-        self._rows("x", at, at + 1)[:] = np.where(np.isfinite(states), states, last)
+        recent["x"][row] = np.where(np.isfinite(states), states, recent["x"][row - 1])
         self._count.taken += 1
         self._time = instant
         self._filtered(at, np.isfinite(states))
@@ -494,7 +494,7 @@ class Live:
         return out
 
     def _known_inputs(self, name: str = "u") -> FloatArray:
-        """Inputs that waves are predicted from: the last ones, always as many once there are."""
+        """Rows of the record that waves are predicted from: as many as there are, up to so many."""
         return self._rows(name, max(self._count.taken - self._record, 0), self._count.taken)
 
     def _closed(self) -> _Closed:
@@ -510,9 +510,8 @@ class Live:
         """Covariance and gain of a sample."""
         count = self._count
         is_exact = bool(seen.all()) and not self._noise.any()
-        if is_exact and count.since == 0 and at >= self._begins:
-            update = self._as_it_is
-        else:
+        update = None
+        if not is_exact or count.since or at < self._begins:
             self._predict_covariance(at, count.since, blind=not (count.partly or seen.any()))
             deviations = np.sqrt(np.diagonal(self.covariance) + self._noise**2)
             update = _Update(self._filter.measure(seen), deviations)
@@ -523,7 +522,7 @@ class Live:
             if count.since:  # or it is zero already
                 self._filter.covariance.fill(0.0)
             count.since, count.partly = 0, False
-        elif update is not self._as_it_is:
+        elif update:
             count.since += 1
             count.partly = count.partly or bool(seen.any())
 
@@ -551,7 +550,7 @@ class Live:
         self._finish(LATE)
         if self._is_exact():
             if count.final < at:
-                self._rows("x", at, at + 1)[:] = self._rows("y", at, at + 1)
+                self._row("x", at)[:] = self._row("y", at)
             return
         known = self._known_inputs()
         if self._ahead and self.signature.inputs:
@@ -570,9 +569,9 @@ class Live:
 
     def _is_exact(self) -> bool:
         """Whether all samples whose estimates are not final are taken as they are."""
-        return all(each is self._as_it_is for each in self._pending())
+        return not any(self._pending())
 
-    def _update_of(self, at: int) -> _Update:
+    def _update_of(self, at: int) -> _Update | None:
         return self._updates[at - self._count.taken]
 
     def _advance(
@@ -584,7 +583,7 @@ class Live:
         """
         s = self.signature.state_delays
         for at in range(first, last + 1):
-            update, measured = self._update_of(at), self._rows("y", at, at + 1)[0]
+            update, measured = self._update_of(at), self._row("y", at)
             predicted = self.signature.state_scale.centre
             if at >= self._begins:
                 if not is_final:
@@ -592,7 +591,7 @@ class Live:
                 predicted = self._predicted(history, at - 1)
             innovation = measured - predicted
             history[:-1] = history[1:]
-            if update is self._as_it_is:
+            if update is None:
                 history[-1] = measured
             else:
                 history[-1] = predicted
@@ -613,27 +612,26 @@ class Live:
         surge = self._rows("x", at + 1 - place.taps.size, at + 1)[:, self._follows.column]
         (here,) = place.of(surge).tolist()
         on_grid = min((here - place.lowest) / place.spacing, place.highest)
-        read_row(table[at - first], 0, on_grid, self._rows("delayed", at, at + 1)[0])
-        self._rows("direct", at, at + 1)[0, -1] = (here - place.centre) ** 2
+        read_row(table[at - first], 0, on_grid, self._row("delayed", at))
+        self._row("direct", at)[-1] = (here - place.centre) ** 2
 
     def _predicted(self, history: FloatArray, at: int) -> FloatArray:
         """One-step prediction from the sample `at`."""
         delayed = self._rows("delayed", at - self.signature.input_delays, at + 1)
-        direct = self._rows("direct", at, at + 1)[0]
         out = self._a @ history.ravel()
         out += self._offset
         out += self._b @ delayed.ravel()
         if self._d.size:
-            out += self._d @ direct
+            out += self._d @ self._row("direct", at)
         return out
 
-    def _judge(self, at: int, update: _Update, innovation: FloatArray) -> None:
+    def _judge(self, at: int, update: _Update | None, innovation: FloatArray) -> None:
         """Take a sample into the running squares, NaN for what was not measured."""
         self._innovation, lead = innovation, self._count.lead
-        measured = self._rows("y", at, at + 1)[0]
+        measured = self._row("y", at)
         squares = np.full((2, measured.size), np.nan)
         with np.errstate(over="ignore"):
-            squares[0] = (innovation / update.deviations) ** 2
+            squares[0] = (innovation / (update.deviations if update else self._deviations)) ** 2
             if lead:
                 predicted = self._predicted(self._free, at - 1)
                 self._free[:-1], self._free[-1] = self._free[1:], predicted
@@ -643,7 +641,7 @@ class Live:
         self._squares[0] += np.where(known, np.minimum(squares, SPIKE), 0.0)
         self._squares[1] += known
         lead = (lead + 1) % (len(self.errors.rms) + 1) if lead else 0
-        if not lead and (update is self._as_it_is or self._noise.any()):
+        if not lead and (update is None or self._noise.any()):
             self._free[:], lead = self._history, 1
         self._count.lead = lead
 
@@ -659,7 +657,7 @@ class Live:
         begin = max(taken - self._record, 0)
         delayed, direct = self._rows("delayed", first, stop), self._rows("direct", first, stop)
         if self._follows is not None:
-            surge = self._rows("x", begin, taken)[:, self._follows.column]
+            surge = self._known_inputs("x")[:, self._follows.column]
             drive = Drive(signature.input_map, known, begin, surge, self._banks)
             table, places = drive.table(first, stop), drive.places(first, stop)
             self._table = (first, table)
@@ -743,8 +741,8 @@ class Live:
             dark + count,
             None if self._follows is None else self._rig,
         )
-        with engine.member_series(self.model, [windows]) as ((values, lost),):
-            complete = values[lost.max(axis=1) < 0]
+        ((values, lost),) = engine.member_series(self.model, [windows])
+        complete = values[lost.max(axis=1) < 0]
         conditions, (late, free) = self.conditions, self.consistency_by_state
         worst = np.fmax(np.fmax(late, free), 1.0)
         wider = np.where(worst > ALARM, worst, 1.0)
@@ -773,12 +771,16 @@ class Live:
             variables[label.name][2]["lead_time"] = int(samples) * signature.dt
         words = "the mean minus and plus a quantile times std"
         time = self._time + signature.dt * np.arange(1, count + 1)
-        attrs: dict[str, Any] = {"start": self._time, "level": level, "known_input": max(known, 0)}
-        attrs |= {"diverged": len(values) - len(complete)}
-        attrs |= {"predictable": self._predictable()}
-        if conditions is not None:
-            attrs |= conditions.attrs()
-        attrs |= {"validity": self._validity(conditions, closed).words, "consistency": worst}
+        attrs = {
+            "start": self._time,
+            "level": level,
+            "known_input": max(known, 0),
+            "diverged": len(values) - len(complete),
+            "predictable": self._predictable(),
+            **({} if conditions is None else conditions.attrs()),
+            "validity": self._validity(conditions, closed).words,
+            "consistency": worst,
+        }
         return xr.Dataset(
             variables,
             coords={
@@ -790,13 +792,12 @@ class Live:
 
     def _predictable(self) -> float:
         """Time for which the waves at the last probe are known from the first one, s."""
-        placed = np.flatnonzero(np.isfinite(self._places))
-        if not placed.size:
+        if np.isnan(self._places).all():
             return 0.0
-        record = self._known_inputs()[:, self._waves[placed[self._places[placed].argmin()]]]
+        record = self._known_inputs()[:, self._waves[np.nanargmin(self._places)]]
         if not np.ptp(record) > 0:
             return 0.0
-        apart = float(np.ptp(self._places[placed]))
+        apart = float(np.nanmax(self._places) - np.nanmin(self._places))
         return predictable_time(record, self.signature.dt, apart, self._depth)
 
     def _futures(self, steps: int, future: Any, closed: _Closed) -> tuple[FloatArray, float, int]:
@@ -808,25 +809,24 @@ class Live:
         """
         names, waves, (record, gone, tail) = self.signature.inputs, self._waves, closed
         dark, light = min(tail, len(self.errors.rms)), len(record) - tail
+        wanted = steps - 1 + self._ahead
         # What filled a gap that is not closed does not join the waves after it.
         before = np.flatnonzero(gone[:light].all(axis=1)).max(initial=-1) + 1
         before *= bool(waves) and light - before >= AFTER
-        given = _plan(future, names, steps - 1 + self._ahead)
-        for column in sorted(set(range(len(names))) - set(waves)):
-            lost = np.isnan(given[:, column])
-            if self._roles[names[column]] == "known" and lost.any():
+        inputs, begin = np.concatenate([record, _plan(future, names, wanted)]), len(record)
+        for name, role in self._roles.items():
+            own = inputs[begin - 1 :, names.index(name)]
+            known = np.isfinite(own[1:]).sum()
+            if role == "known" and known < wanted:
                 raise RequestError(
-                    f"'{names[column]}' is a known input, and future gives {np.sum(~lost)} of the "
-                    f"{len(given)} samples that {steps} steps need. Give its plan: future = "
-                    f"{{'{names[column]}': …}}, or the role 'constant'."
+                    f"'{name}' is a known input, and future gives {known} of the {wanted} samples "
+                    f"that {steps} steps need. Give its plan: future = {{'{name}': …}}, or the "
+                    "role 'constant'."
                 )
-            whole = np.append(record[-1, column], given[:, column])
-            at = np.where(np.isfinite(whole), np.arange(whole.size), 0)
-            given[:, column] = whole[np.maximum.accumulate(at)][1:]
-        inputs, begin = np.concatenate([record, given]), len(record)
+            own[:] = pd.Series(own).ffill()
         inputs[begin - dark : begin, waves] = np.nan
         if not np.isnan(inputs).any():
-            return inputs[None], math.inf, len(given)
+            return inputs[None], math.inf, wanted
         filled, first, freedom = fill_future(
             inputs[:, waves],
             begin - dark,
@@ -854,13 +854,13 @@ class Live:
         RequestError
             If the file cannot be written, or another one is there.
         """
-        noises = zip(self.signature.states, self._noise.tolist(), strict=True)
+        noises = dict(zip(self.signature.states, self._noise.tolist(), strict=True))
         words = {
             "counts": asdict(self._count),
-            "as_it_is": [each is self._as_it_is for each in self._pending()],
+            "as_it_is": [each is None for each in self._pending()],
             "time": self._time,
             "rig": [self._rig.attrs, {name: each.attrs for name, each in self._rig.items()}],
-            "noise": {name: each for name, each in noises if each},
+            "noise": {name: each for name, each in noises.items() if each},
             "roles": self._roles,
         }
         attrs = {"settings": json.dumps(words), "model": self._identity}
@@ -873,7 +873,7 @@ class Live:
         whole = np.concatenate([bits.view(np.uint32), values[values != 0]])
         return write_sealed(xr.Dataset({"values": ("number", whole)}, attrs=attrs), path, STATE)
 
-    def _pending(self) -> list[_Update]:
+    def _pending(self) -> list[_Update | None]:
         """Updates of the samples whose estimates are not final."""
         return [self._update_of(at) for at in range(self._count.final + 1, self._count.taken)]
 
@@ -885,7 +885,7 @@ class Live:
         tail = max(taken - (self._ahead + LATE + longest + 4), 0)
         rows = [self._rows(each, tail, taken) for each in ("y", "delayed", "direct")]
         rows.append(self._rows("x", max(tail - len(self.errors.rms), self._first), taken))
-        updates = [update for update in self._pending() if update is not self._as_it_is]
+        updates = filter(None, self._pending())
         state = [self._history, self._free, self._innovation, self._squares]
         state += [self._known_inputs(), self._known_inputs("lost")]
         if self._surge is not None:
@@ -904,23 +904,22 @@ class Live:
         """Restore what :meth:`save` wrote."""
         self._count, self._time = _Counts(**content["counts"]), content["time"]
         self._first = max(self._count.taken - self._record, 0)
-        shapes = [each.shape for each in self._as_it_is]
+        covariance, count = self._filter.covariance, len(self.signature.states)
         for as_it_is in content["as_it_is"]:
-            self._updates.append(self._as_it_is if as_it_is else _Update(*map(np.empty, shapes)))
-        covariance = self._filter.covariance
-        parts, at = [*self._parts(), covariance], 0
-        size = sum(part.size for part in parts)
+            blank = _Update(np.empty((len(covariance), count)), np.empty(count))
+            self._updates.append(None if as_it_is else blank)
+        parts = [*self._parts(), covariance]
+        *ends, size = np.cumsum([part.size for part in parts]).tolist()
         head = -(-size // 32)
         bits, whole = values[:head].astype(np.uint32), np.zeros(size)
         whole[np.unpackbits(bits.view(np.uint8), count=size) > 0] = values[head:]
-        for part in parts:
-            part[:] = whole[at : at + part.size].reshape(part.shape)
-            at += part.size
+        for part, own in zip(parts, np.split(whole, ends), strict=True):
+            part[:] = own.reshape(part.shape)
         covariance += np.tril(covariance, -1).T
-        count = self._count
-        if not count.partly:
-            for since in range(count.since):
-                self._predict_covariance(count.taken - count.since + since, since, blind=True)
+        taken, unseen = self._count.taken, self._count.since
+        if not self._count.partly:
+            for since in range(unseen):
+                self._predict_covariance(taken - unseen + since, since, blind=True)
 
 
 def load_live(model: Servable, path: str | Path) -> Live:
@@ -983,25 +982,24 @@ def _mean_predictor(
 
     Physical units; blocks of a and b are oldest first.
     """
-    scales = signature.state_scale, signature.input_scale, signature.direct_scale
-    count, blocks = len(signature.states), (signature.state_delays, signature.input_delays, 0)
-    out = [
-        np.zeros((count, each + 1, of.mean.size)) for each, of in zip(blocks, scales, strict=True)
-    ]
+
+    def groups(of: Signature) -> list[tuple[int, Scale]]:
+        delays = of.state_delays, of.input_delays, 0
+        return list(zip(delays, (of.state_scale, of.input_scale, of.direct_scale), strict=True))
+
+    count = len(signature.states)
+    out = [np.zeros((count, delays + 1, of.mean.size)) for delays, of in groups(signature)]
     offset = np.zeros(count)
     for member in members:
-        own, first = member.signature, 0
-        moments = own.state_scale, own.input_scale, own.direct_scale
-        offset += own.state_scale.mean
-        for whole, of, delays in zip(
-            out, moments, (own.state_delays, own.input_delays, 0), strict=True
-        ):
-            shape = delays + 1, of.mean.size
-            columns = member.coefficients[:count, first : first + math.prod(shape)]
-            physical = columns.reshape(count, *shape) * own.state_scale.std[:, None, None] / of.std
+        own, first = member.signature.state_scale, 0
+        offset += own.mean
+        for whole, (delays, of) in zip(out, groups(member.signature), strict=True):
+            stop = first + (delays + 1) * of.mean.size
+            columns = member.coefficients[:count, first:stop].reshape(count, delays + 1, -1)
+            physical = columns * own.std[:, None, None] / of.std
             offset -= np.einsum("nlc,c->n", physical, of.mean)
-            whole[:, whole.shape[1] - shape[0] :] += physical[:, ::-1]
-            first += math.prod(shape)
+            whole[:, whole.shape[1] - delays - 1 :] += physical[:, ::-1]
+            first = stop
     a, b, d = (each.reshape(count, -1) / len(members) for each in out)
     return offset / len(members), a, b, d
 
@@ -1018,41 +1016,41 @@ def _rig(signature: Signature, like: xr.Dataset | None) -> xr.Dataset:
     return rig
 
 
-def _named(what: str, given: object, names: Sequence[str]) -> Iterator[tuple[int, Any]]:
-    """Values of a mapping, with the places of their names."""
-    for name, value in ({} if given is None else as_table(given, what)).items():
+def _named(what: str, given: object, names: Sequence[str]) -> Mapping[str, Any]:
+    """A mapping of some names, none of which is unknown."""
+    table = {} if given is None else as_table(given, what)
+    for name in table:
         if name not in names:
             raise RequestError(
                 f"{what} names '{name}', which the model does not know."
                 f"{did_you_mean(str(name), names)} It takes: {', '.join(names) or 'none'}."
             )
-        yield list(names).index(name), value
+    return table
 
 
 def _noise(signature: Signature, noise: Mapping[str, float] | None) -> FloatArray:
-    out, labels = np.zeros(len(signature.states)), signature.state_labels
-    for place, value in _named("noise", noise, signature.states):
-        out[place] = positive(value, f"noise of {labels[place].name}", labels[place].units)
+    out, given = np.zeros(len(signature.states)), _named("noise", noise, signature.states)
+    for place, label in enumerate(signature.state_labels):
+        if label.name in given:
+            out[place] = positive(given[label.name], f"noise of {label.name}", label.units)
     return out
 
 
 def _roles(signature: Signature, roles: Mapping[str, str] | None) -> dict[str, str]:
     """Roles of the inputs that are no waves."""
-    out, names = dict[str, str](), signature.inputs
-    for place, role in _named("roles", roles, names):
-        check_choice(f"role of {names[place]}", role, ("wave", "known", "constant"))
-        if role != "wave":
-            out[names[place]] = role
-    return out
+    given = _named("roles", roles, signature.inputs)
+    for name, role in given.items():
+        check_choice(f"role of {name}", role, ("wave", "known", "constant"))
+    return {name: role for name, role in given.items() if role != "wave"}
 
 
 def _plan(future: Any, names: Sequence[str], count: int) -> FloatArray:
     """Rows of inputs to come, shape (count, Q), NaN where they are not given."""
     out = np.full((count, len(names)), np.nan)
     if isinstance(future, Mapping):
-        for place, values in _named("future", future, names):
-            given = as_real(values, f"future of {names[place]}").ravel()[:count]
-            out[: len(given), place] = given
+        for name, values in _named("future", future, names).items():
+            given = as_real(values, f"future of {name}").ravel()[:count]
+            out[: len(given), names.index(name)] = given
     elif future is not None and np.size(future):
         given = rows_by_name("future", future, 0, names, "any number")[:count]
         out[: len(given)] = given
@@ -1066,7 +1064,7 @@ def _sample(name: str, value: object, names: Sequence[str]) -> FloatArray:
     if value is None:
         return np.full(len(names), np.nan)
     if isinstance(value, Mapping):
-        list(_named(name, value, names))
+        _named(name, value, names)
         value = [value.get(each, math.nan) for each in names]
     array = as_real(value, name)
     if array.shape != (len(names),):

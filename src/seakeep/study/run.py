@@ -400,9 +400,9 @@ def _free_runs(
         for windows in chosen.values()
     ]
     groups = read_groups(fitted.signature, plan.runs, places)
-    with member_series(fitted, groups) as every:
-        for test, (series, lost), windows in zip(tested, every, groups, strict=True):
-            yield test, series, lost, windows
+    every = member_series(fitted, groups)
+    for test, (series, lost), windows in zip(tested, every, groups, strict=True):
+        yield test, series, lost, windows
 
 
 def band_margins(plan: Plan, unit: Unit, fitted: Any) -> xr.Dataset:
