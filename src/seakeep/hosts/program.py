@@ -57,7 +57,7 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             "model.at(parameter=…)."
         )
     input_map = model.signature.input_map
-    aligned, observed = input_map.alignment, input_map.observed
+    aligned = input_map.alignment
     if not input_map.follows and aligned and aligned.settings.carries:
         to = " to the measured surge" if input_map.reads_surge else ""
         raise RequestError(
@@ -66,7 +66,7 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             "recursion runs on every host, fed with the probes as they are measured; or without "
             "alignment."
         )
-    for bound in observed.bound if observed else ():
+    for bound in input_map.columns.bound:
         if not bound.terms:
             raise RequestError(
                 f"the observable '{bound.labels[0].name}' states no terms, by which other "

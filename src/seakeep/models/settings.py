@@ -426,11 +426,6 @@ class HankelSettings:
         follows = Following.fit(aligned, runs, states, window, self.lead)
         return InputMap(aligned, observed=observed, follows=follows)
 
-    @property
-    def may_observe(self) -> tuple[Observable, ...]:
-        """Observables that a model of these settings may have."""
-        return self.observables
-
     def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that it asks of its runs.
 
@@ -446,7 +441,7 @@ class HankelSettings:
         RequestError
             If an observable counts in encounter periods and does not state its own.
         """
-        before, after = zip((0, self.lead), *(o.reach(dt) for o in self.may_observe), strict=True)
+        before, after = zip((0, self.lead), *(o.reach(dt) for o in self.observables), strict=True)
         delayed = self.input_delays
         if encounter_period and self.alignment and self.alignment.surge == "predicted":
             delayed += round(BACK * encounter_period / dt)
