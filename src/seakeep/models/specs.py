@@ -141,9 +141,16 @@ class Choosing(HankelSettings, Generic[Fitted]):
         named = until(as_runs(runs), stop)
         check_names(states, inputs)
         spec = self.resolved_in(named, inputs)
-        central = spec.central(labelled.common_step(named))
-        how: dict[str, Any] = {"kinds": (FIR(0),), "executor": executor, "progress": progress}
-        return spec._adopt(settle(central, named, list(states), list(inputs), **how))
+        choice = settle(
+            spec.central(labelled.common_step(named)),
+            named,
+            list(states),
+            list(inputs),
+            kinds=(FIR(0),),
+            executor=executor,
+            progress=progress,
+        )
+        return spec._adopt(choice)
 
     def fit(
         self,
