@@ -211,14 +211,14 @@ def _model(model: HankelDMDcModel, steps: int) -> Any:
             if each.load:  # elevation and rate at the line, (steps, 2)
                 assert follows
                 taps, probes = follows.lines(None, (each.load.place,))
-                samples = signature.input_map.history(signature.input_delays) + np.arange(steps)
+                samples = signature.input_history + np.arange(steps)
                 wave = _carried(u, samples, follows, taps, probes)
             columns[each.column] = each.read(x, wave).reshape(steps, 1)
     graph("Concat", *columns.values(), into="x", axis=1)
     given = [value("x_history", size, N)]
     if signature.inputs:
-        length = signature.input_map.history(signature.input_delays)
-        given.append(value("u", length + signature.lead_samples + steps, len(signature.inputs)))
+        length = signature.input_history + signature.lead_samples + steps
+        given.append(value("u", length, len(signature.inputs)))
     graph_proto = helper.make_graph(
         graph.nodes,
         "forecast",
@@ -250,7 +250,7 @@ def _forcing(
     """What inputs add at each step, (steps, rows); without what the surge drives."""
     input_map = signature.input_map
     z, n, observed = signature.input_delays, signature.input_scale.mean.size, input_map.columns
-    now = input_map.history(z)
+    now = signature.input_history
     groups, parts = [], []
     if signature.inputs and not input_map.follows:
         rows = u[now - z + input_map.lead : now + input_map.lead + steps]
@@ -313,7 +313,7 @@ def _tables(
     """
     place, z, n = follows.place, signature.input_delays, signature.input_scale.mean.size
     count, columns, past = z + steps, [], place.taps.size
-    samples = signature.input_map.history(z) - z + np.arange(count)
+    samples = signature.input_history - z + np.arange(count)
     banks = {each.column: each for each in follows.banks(None)}
     for column in range(len(signature.inputs)):
         total = graph("Expand", u[:, column : column + 1][samples], np.array([count, place.count]))

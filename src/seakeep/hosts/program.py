@@ -124,7 +124,7 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
         If there are gaps in them, or step or units of the run are not those of the model.
     """
     signature = exportable(model).signature
-    history = signature.input_map.history(signature.input_delays)
+    history = signature.input_history
     labels = signature.state_labels + signature.input_labels
     name, time = labelled.opened(run, "the run", signature.dt, labels)
     at = labelled.nearest_sample(time, start, name)

@@ -385,9 +385,14 @@ class Signature:
         ]
 
     @property
+    def input_history(self) -> int:
+        """Samples of input before the start that a forecast reads."""
+        return self.input_map.history(self.input_delays)
+
+    @property
     def history_samples(self) -> int:
         """Samples a forecast needs up to its start, that one included."""
-        return max(self.state_delays, self.input_map.history(self.input_delays)) + 1
+        return max(self.state_delays, self.input_history) + 1
 
     @property
     def state_samples(self) -> int:

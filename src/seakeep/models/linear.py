@@ -382,7 +382,7 @@ class HankelDMDcModel(Model):
         or quadratic in its rows. A model that follows its surge takes a run for each number.
         """
         signature = self.signature
-        rows = signature.input_map.history(self.input_delays) + 1 + signature.lead_samples
+        rows = signature.input_history + 1 + signature.lead_samples
         x = rows_by_name(
             "x_history", x_history, signature.state_samples, self.states, "of the states"
         )[-signature.state_samples :]
