@@ -149,8 +149,8 @@ CHANGES = {
     "core/metrics.py": [
         ("NOISE_FACTOR = 2**0.5", "NOISE_FACTOR = 2.0", "test_metrics.py::test_a_channel_is_judged_where_less_than_half_of_its_variance_is_noise"),
         ("load <= noise_std", "load <= 2 * noise_std", "tank/test_quality_on_tank.py::test_the_share_of_a_slack_line_is_that_of_the_truth"),
-        ("np.sqrt(m.shape[-2] - 1)", "np.sqrt(m.shape[-2])", "test_metrics.py::test_fit_percent_is_matlabs_formula"),
-        ("p.min(axis=-2) - m.min(axis=-2)", "p.min(axis=-2) - m.max(axis=-2)", "test_metrics.py::test_nammae_by_hand"),
+        ("np.sqrt(pair.m.shape[-2] - 1)", "np.sqrt(pair.m.shape[-2])", "test_metrics.py::test_fit_percent_is_matlabs_formula"),
+        ("pair.p.min(axis=-2) - pair.m.min(axis=-2)", "pair.p.min(axis=-2) - pair.m.max(axis=-2)", "test_metrics.py::test_nammae_by_hand"),
         ("spread = m.std(axis=-2, ddof=1)", "spread = m.std(axis=-2, ddof=0)", "test_metrics.py::test_nrmse_by_hand"),
         ("total / np.maximum(count, 1)", "total / values.shape[-1]", "test_metrics.py::test_a_slack_channel_is_nan_and_left_out_of_averages"),
     ],
@@ -535,7 +535,7 @@ CHANGES = {
         (' or stated.get("centre") == "run"', "", "study/test_resolve.py::test_the_reference_period_of_each_run_counts_in_encounter_periods"),
     ],
     "tank/_loop.py": [
-        ("2.0 * (s[1, i] + s[2, i]) + s[3, i]", "2.0 * s[1, i] + 2.0 * s[2, i] + s[3, i] * 0.99", "tank/test_dynamics.py::test_response_in_time_is_that_in_frequency"),
+        ("2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i]", "2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i] * 0.99", "tank/test_dynamics.py::test_response_in_time_is_that_in_frequency"),
         ("arm_z * force_x - arm_x * force_z", "arm_x * force_z - arm_z * force_x", "tank/test_moorings.py::test_stiffness_is_the_slope_of_the_forces"),
         ("relative = v[3] - (v[1] - pool[0] * v[2])", "relative = v[3] - (v[1] + pool[0] * v[2])", "tank/test_dynamics.py::test_response_in_time_is_that_in_frequency"),
         ("speed_z = velocity[1] - velocity[2] * arm_x", "speed_z = velocity[1] + velocity[2] * arm_x", "tank/test_moorings.py::test_a_line_damps_the_rate_of_its_length"),

@@ -159,3 +159,11 @@ def test_the_recommended_subspace_model_takes_one_state(state):
     model = spec.fit(linear_run(1), [state], INPUTS)
     assert spec.order is None
     assert model.settings.order == len(model.space.A) == 9
+
+
+def test_a_subspace_model_without_inputs_continues_the_states():
+    swing = np.sin(2 * np.pi * np.arange(400) / 25)
+    run = record(DT, {}, heave=swing)
+    model = Subspace(6, 0, order=2, ridge=0.0).fit(run, ["heave"], [], stop=19.9)
+    forecast = model.forecast(run, start=25.0, steps=40)
+    np.testing.assert_allclose(forecast["heave"], swing[251:291], atol=1e-4)

@@ -257,7 +257,7 @@ def test_other_vessels_need_no_code(settings, hydro):
     other = settings.model_copy(update={"moorings": lines})
     rig = assemble_rig(other, plain)
     motion = simulate(rig, wave(2.8, 0.1), 30.0)
-    assert motion.names == ("surge", "heave", "pitch")
+    assert len(motion.position) == 3
     assert tensions(rig, motion.position, motion.velocity).shape == (1, motion.time.size)
     assert 0.01 < motion.position[1].std() < 0.1
 

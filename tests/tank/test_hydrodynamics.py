@@ -166,5 +166,5 @@ def test_another_hull_is_built_and_played_from_a_settings_file(tmp_path):
     assert made.names == ("surge", "heave", "pitch")
     assert made.mass[0, 0] == 55.0
     played = play_run(read_tank(settings), "one")
-    assert played.motion.names == made.names
+    assert played.rig.names == made.names
     assert 0.01 < played.motion.position[1, -500:].std() < 0.05

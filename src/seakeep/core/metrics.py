@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,17 +23,26 @@ NOISE_FACTOR = 2**0.5
 is noise there, which no model forecasts."""
 
 
+class Pair(NamedTuple):
+    """Two histories, the measured SD, and which channels are judged.
+
+    The SD is NaN where a channel is slack or noise, and where the measurement has a gap; the first
+    two are not judged, the third is (and found to be NaN).
+    """
+
+    p: FloatArray
+    m: FloatArray
+    spread: FloatArray
+    judged: BoolArray
+
+
 def paired(
     predicted: npt.ArrayLike,
     measured: npt.ArrayLike,
     training_std: npt.ArrayLike | None = None,
     noise_std: npt.ArrayLike | None = None,
-) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Check two histories and return them with the measured SD and which channels are judged.
-
-    The SD is NaN where a channel is slack or noise, and where the measurement has a gap; the first
-    two are not judged, the third is (and found to be NaN).
-    """
+) -> Pair:
+    """Check two histories, and say which channels are judged."""
     p, m = as_real(predicted, "predicted"), as_real(measured, "measured")
     if m.ndim == 1 and p.ndim >= 1 and p.shape[-1:] == m.shape:
         p, m = p[..., None], m[:, None]
@@ -58,14 +67,14 @@ def paired(
     for name, given, part in known:
         if given is not None:
             slack |= spread < part * as_real(given, name)
-    return p, m, np.where(slack, np.nan, spread), ~slack
+    return Pair(p, m, np.where(slack, np.nan, spread), ~slack)
 
 
 Values = TypeVar("Values", bound=np.generic)
 
 
 def _measure(
-    of: Callable[[FloatArray, FloatArray, FloatArray, BoolArray], npt.NDArray[Values]],
+    of: Callable[[Pair], npt.NDArray[Values]],
 ) -> Callable[..., npt.NDArray[Values]]:
     """Make a measure of what :func:`paired` returns one of histories."""
 
@@ -76,7 +85,7 @@ def _measure(
         training_std: npt.ArrayLike | None = None,
         noise_std: npt.ArrayLike | None = None,
     ) -> npt.NDArray[Values]:
-        return of(*paired(predicted, measured, training_std, noise_std))
+        return of(paired(predicted, measured, training_std, noise_std))
 
     functools.update_wrapper(measure, of)
     del measure.__wrapped__  # type: ignore[attr-defined]
@@ -84,7 +93,7 @@ def _measure(
 
 
 @_measure
-def is_slack(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -> BoolArray:
+def is_slack(pair: Pair) -> BoolArray:
     """Say which channels are not judged, because the measurement barely moves or is noise.
 
     Parameters
@@ -110,7 +119,7 @@ def is_slack(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray
     >>> is_slack(predicted=measured, measured=measured)
     array([False,  True])
     """
-    return ~judged
+    return ~pair.judged
 
 
 def slack_share(load: FloatArray, noise_std: float) -> float:
@@ -135,7 +144,7 @@ def slack_share(load: FloatArray, noise_std: float) -> float:
 
 
 @_measure
-def nrmse(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -> FloatArray:
+def nrmse(pair: Pair) -> FloatArray:
     """Root mean square error of each channel, divided by its measured standard deviation.
 
     Parameters
@@ -171,11 +180,11 @@ def nrmse(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -
     >>> nrmse(predicted=0.9 * measured, measured=measured).round(2)
     array([0.1, 0.1])
     """
-    return root_mean_square(p - m) / spread
+    return root_mean_square(pair.p - pair.m) / pair.spread
 
 
 @_measure
-def anrmse(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -> FloatArray:
+def anrmse(pair: Pair) -> FloatArray:
     """Average of :func:`nrmse` over the channels that can be judged (paper, equation ANRMSE).
 
     Parameters
@@ -193,13 +202,11 @@ def anrmse(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) 
     RequestError, DataError
         As :func:`nrmse`.
     """
-    return over_channels(root_mean_square(p - m) / spread, judged)
+    return over_channels(root_mean_square(pair.p - pair.m) / pair.spread, pair.judged)
 
 
 @_measure
-def error_over_time(
-    p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray
-) -> FloatArray:
+def error_over_time(pair: Pair) -> FloatArray:
     """Error at each instant in measured SDs, averaged over the channels: ε(t) of the paper.
 
     Parameters
@@ -216,13 +223,13 @@ def error_over_time(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    return over_channels(np.abs(p - m) / spread[..., None, :], judged[..., None, :])
+    return over_channels(
+        np.abs(pair.p - pair.m) / pair.spread[..., None, :], pair.judged[..., None, :]
+    )
 
 
 @_measure
-def normalised_extremes_error(
-    p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray
-) -> FloatArray:
+def normalised_extremes_error(pair: Pair) -> FloatArray:
     """Mean absolute error of minimum and maximum of each channel, in measured SDs.
 
     Parameters
@@ -240,11 +247,11 @@ def normalised_extremes_error(
     RequestError, DataError
         As :func:`nrmse`.
     """
-    return extremes_error(p, m) / spread
+    return _extremes_error(pair)
 
 
 @_measure
-def nammae(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -> FloatArray:
+def nammae(pair: Pair) -> FloatArray:
     """Normalised average minimum/maximum absolute error (paper, equation NAMMAE).
 
     Parameters
@@ -262,11 +269,11 @@ def nammae(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) 
     RequestError, DataError
         As :func:`nrmse`.
     """
-    return over_channels(extremes_error(p, m) / spread, judged)
+    return over_channels(_extremes_error(pair), pair.judged)
 
 
 @_measure
-def fit_percent(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolArray) -> FloatArray:
+def fit_percent(pair: Pair) -> FloatArray:
     r"""Fit of each channel as MATLAB's ``compare`` states it, percent.
 
     Parameters
@@ -285,8 +292,8 @@ def fit_percent(p: FloatArray, m: FloatArray, spread: FloatArray, judged: BoolAr
     RequestError, DataError
         As :func:`nrmse`.
     """
-    norm = np.sqrt(np.sum((p - m) ** 2, axis=-2))
-    return 100.0 * (1.0 - norm / (spread * np.sqrt(m.shape[-2] - 1)))
+    norm = np.sqrt(np.sum((pair.p - pair.m) ** 2, axis=-2))
+    return 100.0 * (1.0 - norm / (pair.spread * np.sqrt(pair.m.shape[-2] - 1)))
 
 
 def root_mean_square(error: FloatArray) -> FloatArray:
@@ -294,11 +301,11 @@ def root_mean_square(error: FloatArray) -> FloatArray:
     return np.sqrt(np.mean(error**2, axis=-2))
 
 
-def extremes_error(p: FloatArray, m: FloatArray) -> FloatArray:
-    """Mean absolute error of minimum and maximum over time."""
-    low = np.abs(p.min(axis=-2) - m.min(axis=-2))
-    high = np.abs(p.max(axis=-2) - m.max(axis=-2))
-    return 0.5 * (low + high)
+def _extremes_error(pair: Pair) -> FloatArray:
+    """Mean absolute error of minimum and maximum over time, in measured SDs."""
+    low = np.abs(pair.p.min(axis=-2) - pair.m.min(axis=-2))
+    high = np.abs(pair.p.max(axis=-2) - pair.m.max(axis=-2))
+    return 0.5 * (low + high) / pair.spread
 
 
 def over_channels(values: FloatArray, judged: BoolArray) -> FloatArray:

@@ -47,7 +47,7 @@ class StateSpace:
         outputs: FloatArray,
         inputs: FloatArray,
         steps: int,
-        direct: FloatArray | None = None,
+        direct: FloatArray,
     ) -> FloatArray:
         """Free runs over several windows.
 
@@ -59,7 +59,7 @@ class StateSpace:
             Inputs, oldest first; sample z is that of the start.
         steps : int
             Number of instants.
-        direct : ndarray, shape (window, steps, d), optional
+        direct : ndarray, shape (window, steps, d)
             Further inputs, from the start on, which the filter of the past does not read.
 
         Returns
@@ -70,9 +70,7 @@ class StateSpace:
         count, delays = len(outputs), inputs.shape[1] - steps
         past = [outputs[:, ::-1].reshape(count, -1), inputs[:, :delays][:, ::-1].reshape(count, -1)]
         start = np.concatenate(past, axis=1) @ self.filter.T
-        driving = inputs[:, delays:]
-        if direct is not None:
-            driving = np.concatenate([driving, direct], axis=2)
+        driving = np.concatenate([inputs[:, delays:], direct], axis=2)
         after = rollout(self.A, self.B, start, driving, n_states=len(self.A))
         states = np.concatenate([start[:, None], after[:, :-1]], axis=1)
         return states @ self.C.T + driving @ self.D.T
@@ -81,6 +79,7 @@ class StateSpace:
 def identify_subspace(
     outputs: Sequence[FloatArray],
     inputs: Sequence[FloatArray],
+    direct: Sequence[FloatArray],
     windows: Sequence[TrainingWindow],
     *,
     order: int,
@@ -88,7 +87,6 @@ def identify_subspace(
     input_delays: int,
     future: int,
     ridge: float,
-    direct: Sequence[FloatArray] | None = None,
 ) -> StateSpace:
     """Identify a state-space model from one or several runs.
 
@@ -98,6 +96,8 @@ def identify_subspace(
         Outputs of the runs, standardised.
     inputs : sequence of ndarray, each (time, Q)
         Their inputs.
+    direct : sequence of ndarray, each (time, d)
+        Further inputs, which the filter of the past does not read.
     windows : sequence of TrainingWindow
         The samples of each run that train; a pair is an instant and the next.
     order : int
@@ -108,8 +108,6 @@ def identify_subspace(
         f, instants of the future.
     ridge : float
         λ of the first regression per column, for inputs that nearly predict their own future.
-    direct : sequence of ndarray, each (time, d), optional
-        Further inputs of the runs, which the filter of the past does not read.
 
     Returns
     -------
@@ -121,9 +119,8 @@ def identify_subspace(
     DataError
         If the past decides fewer than `order` directions of the future.
     """
-    beside = [u[:, :0] for u in inputs] if direct is None else direct
     pasts, driving, following, ahead = [], [], [], []
-    for y, u, d, window in zip(outputs, inputs, beside, windows, strict=True):
+    for y, u, d, window in zip(outputs, inputs, direct, windows, strict=True):
         first, columns = window.first_column, window.columns
         if columns < future:
             raise DataError(
@@ -140,7 +137,7 @@ def identify_subspace(
         count = columns - future + 1
         seen = embed(drives, future - 1, first + future - 1, count)
         ahead.append(np.concatenate([seen, embed(y, future - 1, first + future, count)]))
-    split = (inputs[0].shape[1] + beside[0].shape[1]) * future
+    split = (inputs[0].shape[1] + direct[0].shape[1]) * future
     seen, targets = np.split(np.concatenate(ahead, axis=1), [split])
     known = np.concatenate(
         [past[:, : each.shape[1]] for past, each in zip(pasts, ahead, strict=True)], axis=1

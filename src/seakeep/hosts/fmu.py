@@ -136,7 +136,7 @@ def _described(model: HankelDMDcModel, ahead: int | None) -> dict[str, Any]:
     """What the model description says beside names and numbers."""
     signature = model.signature
     inputs, states = signature.input_labels, signature.state_labels
-    history = signature.input_map.history(signature.input_delays) + signature.lead_samples
+    history = signature.input_history + signature.lead_samples
     # Before any are known, inputs and outputs are their means in training.
     means = (signature.input_scale.centre[: len(inputs)], signature.state_scale.centre)
     groups = [

@@ -211,14 +211,14 @@ def _model(model: HankelDMDcModel, steps: int) -> Any:
             if each.load:  # elevation and rate at the line, (steps, 2)
                 assert follows
                 taps, probes = follows.lines(None, (each.load.place,))
-                samples = signature.input_map.history(signature.input_delays) + np.arange(steps)
+                samples = signature.input_history + np.arange(steps)
                 wave = _carried(u, samples, follows, taps, probes)
             columns[each.column] = each.read(x, wave).reshape(steps, 1)
     graph("Concat", *columns.values(), into="x", axis=1)
     given = [value("x_history", size, N)]
     if signature.inputs:
-        length = signature.input_map.history(signature.input_delays)
-        given.append(value("u", length + signature.lead_samples + steps, len(signature.inputs)))
+        length = signature.input_history + signature.lead_samples + steps
+        given.append(value("u", length, len(signature.inputs)))
     graph_proto = helper.make_graph(
         graph.nodes,
         "forecast",
@@ -249,8 +249,8 @@ def _forcing(
 ) -> _Value:
     """What inputs add at each step, (steps, rows); without what the surge drives."""
     input_map = signature.input_map
-    z, n, observed = signature.input_delays, signature.input_scale.mean.size, input_map.observed
-    now = input_map.history(z)
+    z, n, observed = signature.input_delays, signature.input_scale.mean.size, input_map.columns
+    now = signature.input_history
     groups, parts = [], []
     if signature.inputs and not input_map.follows:
         rows = u[now - z + input_map.lead : now + input_map.lead + steps]
@@ -258,7 +258,7 @@ def _forcing(
         windows = values[np.arange(steps)[:, None] + np.arange(z, -1, -1)]
         groups.append(windows.reshape(steps, (z + 1) * n))
         parts.append(weights[:, : (z + 1) * n])
-    if observed and observed.slopes.size:
+    if observed.slopes.size:
         terms = [term for each in observed.groups[1] for term in each.terms]
         values = np.concatenate(
             [_column(graph, term, u, now, steps, observed) for term in terms], axis=1
@@ -272,13 +272,11 @@ def _forcing(
     return np.concatenate(groups, axis=1) @ np.concatenate(parts, axis=1).T
 
 
-def _with_delayed(observed: Observed | None, rows: _Value) -> _Value:
+def _with_delayed(observed: Observed, rows: _Value) -> _Value:
     """Inputs beside the columns that take the input delays."""
-    columns = [rows]
-    if observed:
-        terms = [term for each in observed.groups[0] for term in each.terms]
-        columns += [term.columns(rows, observed.limits) for term in terms]
-    return np.concatenate(columns, axis=1)
+    terms = [term for each in observed.groups[0] for term in each.terms]
+    columns = [term.columns(rows, observed.limits) for term in terms]
+    return np.concatenate([rows, *columns], axis=1)
 
 
 def _column(
@@ -315,14 +313,14 @@ def _tables(
     """
     place, z, n = follows.place, signature.input_delays, signature.input_scale.mean.size
     count, columns, past = z + steps, [], place.taps.size
-    samples = signature.input_map.history(z) - z + np.arange(count)
+    samples = signature.input_history - z + np.arange(count)
     banks = {each.column: each for each in follows.banks(None)}
     for column in range(len(signature.inputs)):
         total = graph("Expand", u[:, column : column + 1][samples], np.array([count, place.count]))
         if bank := banks.get(column):
             total = _carried(u, samples, follows, bank.taps, bank.columns)
         columns.append(total.reshape(count * place.count, 1))
-    rows = _with_delayed(signature.input_map.observed, np.concatenate(columns, axis=1))
+    rows = _with_delayed(signature.input_map.columns, np.concatenate(columns, axis=1))
     rows = signature.input_scale.deviations(rows)
     surge, last = history[:, follows.column], signature.state_samples - 1 - np.arange(past)
     before = surge[last - np.arange(z, 0, -1)[:, None]]

@@ -57,7 +57,7 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             "model.at(parameter=…)."
         )
     input_map = model.signature.input_map
-    aligned, observed = input_map.alignment, input_map.observed
+    aligned = input_map.alignment
     if not input_map.follows and aligned and aligned.settings.carries:
         to = " to the measured surge" if input_map.reads_surge else ""
         raise RequestError(
@@ -66,7 +66,7 @@ def exportable(model: Model, follows: bool = False) -> HankelDMDcModel:
             "recursion runs on every host, fed with the probes as they are measured; or without "
             "alignment."
         )
-    for bound in observed.bound if observed else ():
+    for bound in input_map.columns.bound:
         if not bound.terms:
             raise RequestError(
                 f"the observable '{bound.labels[0].name}' states no terms, by which other "
@@ -124,7 +124,7 @@ def start_rows(model: Model, run: xr.Dataset, start: float) -> tuple[FloatArray,
         If there are gaps in them, or step or units of the run are not those of the model.
     """
     signature = exportable(model).signature
-    history = signature.input_map.history(signature.input_delays)
+    history = signature.input_history
     labels = signature.state_labels + signature.input_labels
     name, time = labelled.opened(run, "the run", signature.dt, labels)
     at = labelled.nearest_sample(time, start, name)

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import xarray as xr
 
-from seakeep.arrays import FloatArray, Json, check_keys, whole_number
+from seakeep.arrays import FloatArray, whole_number
+from seakeep.core.embedding import History
 from seakeep.core.solve import Solution
 from seakeep.core.subspace import StateSpace, identify_subspace
 from seakeep.errors import RequestError
@@ -27,7 +28,6 @@ from seakeep.models.selection import RIDGES, select
 from seakeep.models.settings import (
     DelayRows,
     HankelSettings,
-    Needs,
     RidgeScale,
     Role,
     periods_to_samples,
@@ -45,8 +45,25 @@ ORDER = 40
 """Latent states of a subspace model, where the future has as many values."""
 
 
+def _fixed(value: Any) -> Any:
+    """A setting that a kind of model leaves no choice of."""
+    return field(default=value, init=False, repr=False)
+
+
 @dataclass(frozen=True)
-class Constant(LinearKind):
+class Plain(HankelSettings):
+    """Settings with exact delay rows, of a model without truncation, read-outs and memory."""
+
+    n_members: ClassVar[int] = 1
+    delay_rows: DelayRows = _fixed("exact")
+    rank: int | None = _fixed(None)
+    readouts: ReadOuts = _fixed(())
+    stable: bool | float = _fixed(False)
+    memory: int = _fixed(0)
+
+
+@dataclass(frozen=True)
+class Constant(LinearKind, Plain):
     """A model of nothing but the last state: its deviation from the mean, times a factor.
 
     Parameters
@@ -55,31 +72,18 @@ class Constant(LinearKind):
         Snapshots per run; None takes all up to ``stop``.
     """
 
-    kind: ClassVar[str]
-    title: ClassVar[str]
     factor: ClassVar[float]
     role: ClassVar[Role] = "reference"
-    is_ensemble: ClassVar[bool] = False
-    n_members: ClassVar[int] = 1
-    standardize: ClassVar[bool] = False
-    alignment: ClassVar[None] = None
-    window: int | None = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "window", self._settings.window)
-
-    @property
-    def _settings(self) -> HankelSettings:
-        """Settings of the windows from which moments are taken."""
-        return HankelSettings(0, 0, 0.0, window=self.window, history="inside")
-
-    def resolved(self, dt: float, encounter_period: float | None) -> Self:
-        """Settings whose window counts in samples."""
-        return replace(self, window=self._settings.resolved(dt, encounter_period).window)
-
-    def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
-        """Samples that it asks of its runs."""
-        return self._settings.needs(dt)
+    state_delays: int = _fixed(0)
+    input_delays: int = _fixed(0)
+    ridge: float = _fixed(0.0)
+    history: History = _fixed("inside")
+    ridge_scale: RidgeScale = _fixed("absolute")
+    standardize: bool = _fixed(False)
+    alignment: None = _fixed(None)
+    lead: int = _fixed(0)
+    observables: tuple[()] = _fixed(())
+    centre: int = _fixed(0)
 
     def fit(
         self, runs: Runs, states: Sequence[str], inputs: Sequence[str] = (), stop: Stop = None
@@ -89,22 +93,12 @@ class Constant(LinearKind):
         `inputs` are accepted and not read.
         """
         named = as_runs(runs)
-        settings = self._settings.resolved_in(named, [])
-        data = gather(named, states, [], stop, settings)
+        spec = self.resolved_in(named, [])
+        moments = HankelSettings(0, 0, 0.0, spec.window, self.history)
+        data = gather(named, states, [], stop, moments)
         size = len(data.signature.states)
         solution = Solution(self.factor * np.eye(size), "svd", 0.0, size * bool(self.factor))
-        spec = replace(self, window=settings.window)
         return HankelDMDcModel.fitted(spec, data, solution, named)
-
-    def to_json(self) -> Json:
-        """Settings as JSON values."""
-        return {"window": self._settings.to_json()["window"]}
-
-    @classmethod
-    def from_json(cls, content: Json) -> Self:
-        """Settings from JSON values; an unknown key or a value out of range raises an error."""
-        check_keys(cls, content)
-        return cls(**content)
 
 
 class Mean(Constant):
@@ -144,18 +138,6 @@ class HoldLast(Constant):
     kind = "hold_last"
     title = "Hold last: the state at the start, kept constant"
     factor = 1.0
-
-
-@dataclass(frozen=True)
-class Plain(HankelSettings):
-    """Settings with exact delay rows, of a model without truncation, read-outs and memory."""
-
-    n_members: ClassVar[int] = 1
-    delay_rows: DelayRows = field(default="exact", init=False, repr=False)
-    rank: int | None = field(default=None, init=False, repr=False)
-    readouts: ReadOuts = field(default=(), init=False, repr=False)
-    stable: bool | float = field(default=False, init=False, repr=False)
-    memory: int = field(default=0, init=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -328,7 +310,7 @@ class Subspace(Plain):
     role: ClassVar[Role] = "reference"
     has_path: ClassVar[bool] = False
     ridge: float = 1e-3
-    ridge_scale: RidgeScale = field(default="per_snapshot", init=False, repr=False)
+    ridge_scale: RidgeScale = _fixed("per_snapshot")
     order: int | None = field(default=None, kw_only=True)
     future: int | None = None
 
@@ -368,13 +350,13 @@ class Subspace(Plain):
         space = identify_subspace(
             data.states,
             data.delayed,
+            data.direct,
             data.windows,
             order=order,
             output_delays=spec.state_delays,
             input_delays=spec.input_delays,
             future=future,
             ridge=float(spec.ridge),
-            direct=data.direct,
         )
         columns = sum(window.columns for window in data.windows)
         solution = Solution(space.A, "svd", float(spec.ridge) * columns, order)
@@ -425,14 +407,15 @@ class SubspaceModel(Model):
 
     def _free_run(self, windows: Windows) -> FloatArray:
         signature, histories = self.signature, windows.histories
-        driving = windows.delayed[:, -signature.input_delays - windows.steps :]
-        if not driving.shape[2]:
-            driving = np.zeros((len(histories), signature.input_delays + windows.steps, 0))
+        reach, direct = signature.input_delays + windows.steps, windows.direct
+        driving = windows.delayed[:, -reach:]
+        if not signature.inputs:
+            driving, direct = (np.zeros((len(histories), n, 0)) for n in (reach, windows.steps))
         values = self.space.free_runs(
             signature.state_scale.deviations(histories[:, -1 - signature.state_delays :]),
             signature.input_scale.deviations(driving),
             windows.steps,
-            signature.direct_scale.deviations(windows.direct),
+            signature.direct_scale.deviations(direct),
         )
         with np.errstate(over="ignore"):  # a run that is lost is cut just below
             values = signature.state_scale.physical(values, out=values)

@@ -23,7 +23,7 @@ from seakeep.errors import RequestError
 from seakeep.models.alignment import FittedAlignment
 from seakeep.models.following import SQUARED, Bank, Following
 from seakeep.models.labelled import ChannelLabel, Span
-from seakeep.models.observables import Observed
+from seakeep.models.observables import NOTHING, Observed
 from seakeep.models.readouts import FittedReadOut
 
 
@@ -65,10 +65,15 @@ class InputMap:
     follows: Following | None = None
     reference: int = 0
 
+    @property
+    def columns(self) -> Observed:
+        """The observables, which may be none."""
+        return self.observed or NOTHING
+
     @cached_property
     def _around(self) -> tuple[int, int, int]:
         """Samples that rows read: before those with delays, before those without, after both."""
-        delayed, direct = ((), ()) if self.observed is None else self.observed.groups
+        delayed, direct = self.columns.groups
         if self.follows is not None:
             back = max(self.follows.back, self.follows.place.taps.size - 1)
             ahead = self.follows.ahead
@@ -101,16 +106,15 @@ class InputMap:
         """
         if self.follows is None:
             return None
-        if self.observed is None:
-            return np.ones(len(self.follows.alignment.inputs)), np.ones(1)
-        delayed, direct = self.observed.stretch
-        return delayed, np.append(direct, 1.0)
+        inputs = np.ones(len(self.follows.alignment.inputs))
+        delayed, direct = self.columns.stretch
+        return np.append(inputs, delayed), np.append(direct, 1.0)
 
     def regressors(
         self, inputs: tuple[ChannelLabel, ...]
     ) -> tuple[tuple[ChannelLabel, ...], tuple[ChannelLabel, ...]]:
         """Labels of the delayed and of the direct regressors made of these inputs."""
-        delayed, direct = ((), ()) if self.observed is None else self.observed.labels
+        delayed, direct = self.columns.labels
         return inputs + delayed, direct + (SQUARED,) * (self.follows is not None)
 
     def reads(self, span: Span) -> Span:
@@ -162,8 +166,10 @@ class InputMap:
 
     def look_ahead(self, run: xr.Dataset, dt: float) -> float:
         """Seconds of input after the one a step starts from that drive the step, in this run."""
-        still = self.alignment is None or self.follows is not None
-        return self.lead_samples * dt + (0.0 if still else self.alignment.look_ahead(run))  # type: ignore[union-attr]
+        ahead = self.lead_samples * dt
+        if self.alignment is not None and self.follows is None:
+            ahead += self.alignment.look_ahead(run)
+        return ahead
 
     def describe(self, dt: float) -> list[str]:
         """Lines of a model's summary."""
@@ -181,7 +187,7 @@ class InputMap:
             lines.append(
                 f"  centre        departures from means of {self.reference} samples up to a start"
             )
-        return lines + ([] if self.observed is None else self.observed.describe(dt, self.lead))
+        return lines + self.columns.describe(dt, self.lead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,9 +231,7 @@ class Drive:
             begin, end = (each + input_map.lead - self.first for each in (first, stop))
             back, _, ahead = input_map._around
             low = max(begin - back, 0)
-            values = self.values[low : end + ahead - input_map.lead]
-            if input_map.observed is not None:
-                values = input_map.observed.with_delayed(values)
+            values = input_map.columns.with_delayed(self.values[low : end + ahead - input_map.lead])
             return Regressors(values[begin - low : end - low], direct)
         place, here = input_map.follows.place, self.places(first, stop)
         table = self.table(first, stop)
@@ -242,7 +246,7 @@ class Drive:
         _, before, after = self.input_map._around
         begin = max(first - before, self.first)
         values = self.values[begin - self.first : stop + after - self.first]
-        return self.input_map.observed.direct(values)[first - begin : stop - begin]
+        return self.input_map.columns.direct(values)[first - begin : stop - begin]
 
     @cached_property
     def whole(self) -> tuple[int, FloatArray]:
@@ -260,10 +264,8 @@ class Drive:
         out[:] = values[back : back + stop - first, None]
         for bank in self.banks:
             out[:, :, bank.column] = carried(bank.taps, values[:, bank.columns])
-        if input_map.observed is not None:
-            flat = input_map.observed.with_delayed(out.reshape(-1, out.shape[2]))
-            out = flat.reshape(stop - first, count, -1)
-        return out
+        flat = input_map.columns.with_delayed(out.reshape(-1, out.shape[2]))
+        return flat.reshape(stop - first, count, flat.shape[1])
 
     def waves(self, places: tuple[float, ...], first: int, stop: int) -> FloatArray:
         """Wave at places about the vessel at rest an instant after samples.
@@ -392,9 +394,14 @@ class Signature:
         return replace(self, state_scale=states, input_scale=inputs, direct_scale=direct)
 
     @property
+    def input_history(self) -> int:
+        """Samples of input before the start that a forecast reads."""
+        return self.input_map.history(self.input_delays)
+
+    @property
     def history_samples(self) -> int:
         """Samples a forecast needs up to its start, that one included."""
-        return max(self.state_delays, self.input_map.history(self.input_delays)) + 1
+        return max(self.state_delays, self.input_history) + 1
 
     @property
     def state_samples(self) -> int:

@@ -382,7 +382,7 @@ class HankelDMDcModel(Model):
         or quadratic in its rows. A model that follows its surge takes a run for each number.
         """
         signature = self.signature
-        rows = signature.input_map.history(self.input_delays) + 1 + signature.lead_samples
+        rows = signature.input_history + 1 + signature.lead_samples
         x = rows_by_name(
             "x_history", x_history, signature.state_samples, self.states, "of the states"
         )[-signature.state_samples :]
@@ -533,9 +533,8 @@ class HankelDMDcModel(Model):
 
     def _system(self, *, is_file: bool = False) -> export.System:
         export.check_linear(self.signature)
-        observed = self.signature.input_map.observed
-        if is_file and observed is not None and not all(each.terms for each in observed.bound):
-            is_file = False  # only Python computes it
+        if not all(each.terms for each in self.signature.input_map.columns.bound):
+            is_file = False  # only Python computes them
         if not is_file and (more := self.regressors[len(self.inputs) :]):
             raise RequestError(
                 f"the model is driven by observables too ({', '.join(more)}), which a state-space "

@@ -171,23 +171,18 @@ class _Line:
             known, seen = x[inside, [*columns, column]], wave[inside]
             sound = np.isfinite(known).all(axis=1) & np.isfinite(seen).all(axis=(1, 2))
             self.pieces.append((known[sound], seen[sound].swapaxes(0, 1)))
-        motions = np.concatenate([known[:, :-1] for known, _ in self.pieces])
-        around = np.concatenate([seen for _, seen in self.pieces], axis=1)
-        every = len(places), 1
-        self.mean = np.hstack([np.tile(motions.mean(axis=0), every), around.mean(axis=1)])
-        spreads = motions.std(axis=0, ddof=1), around.std(axis=1, ddof=1)
-        self.std = np.hstack([np.tile(spreads[0], every), spreads[1]])
-        self.knots = np.quantile((motions[:, 0] - self.mean[0, 0]) / self.std[0, 0], KNOTS)
-        runs = range(len(self.pieces))
-        self.sums = np.array(
-            [
-                [
-                    sums((values[:, :-1] - mean) / std, values[:, -1], self.knots)
-                    for values in (self._read(run, at) for run in runs)
-                ]
-                for at, (mean, std) in enumerate(zip(self.mean, self.std, strict=True))
-            ]
-        )
+        moments, products = [], []
+        for at in range(len(places)):
+            values = [self._read(run, at) for run in range(len(self.pieces))]
+            every = np.concatenate(values)[:, :-1]
+            mean, std = every.mean(axis=0), every.std(axis=0, ddof=1)
+            # Of the surge, which is the same wherever the line is.
+            self.knots = np.quantile((every[:, 0] - mean[0]) / std[0], KNOTS)
+            moments.append((mean, std))
+            products.append(
+                [sums((each[:, :-1] - mean) / std, each[:, -1], self.knots) for each in values]
+            )
+        self.moments, self.sums = np.array(moments), np.array(products)
 
     def _read(self, run: int, at: int) -> FloatArray:
         """Motions, wave and load of a run with the line at a place, shape (sample, …)."""
@@ -198,6 +193,7 @@ class _Line:
         """The load as some runs tell it."""
         products = self.sums[:, list(runs)]
         at = best_place(products)
+        mean, std = self.moments[at]
         seen = np.concatenate([self._read(run, at) for run in runs])
         low, high = seen.min(axis=0), seen.max(axis=0)
         margin = MARGIN * (high[-1] - low[-1])
@@ -205,8 +201,8 @@ class _Line:
             float(self.places[at]),
             self.column,
             self.columns,
-            self.mean[at],
-            self.std[at],
+            mean,
+            std,
             low[:-1],
             high[:-1],
             self.knots,

@@ -421,17 +421,17 @@ class Observed:
 
     @property
     def stretch(self) -> tuple[FloatArray, FloatArray]:
-        """Factors of the standard deviations that inputs and columns are divided by."""
+        """Factors of the standard deviations of the columns with delays, and of those without."""
         delayed, direct = (
-            [math.sqrt(each.stiffness) for each in group for _ in each.labels]
+            np.array([math.sqrt(each.stiffness) for each in group for _ in each.labels])
             for group in self.groups
         )
-        return np.array([1.0] * len(self.inputs) + delayed), np.array(direct)
+        return delayed, direct
 
     def with_delayed(self, inputs: FloatArray) -> FloatArray:
         """Inputs, shape (time, Q), beside the columns that take the input delays."""
         more = [each.of(inputs, self.limits) for each in self.groups[0]]
-        return np.concatenate([inputs, *more], axis=1)
+        return np.concatenate([inputs, *more], axis=1) if more else inputs
 
     def direct(self, inputs: FloatArray) -> FloatArray:
         """Columns that stand as they are, of inputs of shape (time, Q)."""
@@ -453,3 +453,7 @@ class Observed:
                 f"{max(ahead - 1, 0) * dt:.3g} s after the instant forecast"
             )
         return lines
+
+
+NOTHING = Observed((), (), 0.0, None, ())
+"""No observables."""

@@ -127,7 +127,7 @@ def in_samples(length: float | Length, dt: float, encounter_period: float | None
     return periods_to_samples(length.value, encounter_period, dt)
 
 
-def as_length(name: str, value: Any, least: int = 0, optional: bool = False) -> int | Length | None:
+def as_length(name: str, value: Any, least: int, optional: bool) -> int | Length | None:
     """A setting that is a number of samples, or a length such as ``"1 T"`` or ``"0.5 s"``.
 
     ``"inf T"`` of an optional one is None: all there is.
@@ -431,11 +431,6 @@ class HankelSettings:
         """Whether waves are carried to the surge that the model predicts."""
         return self.alignment is not None and self.alignment.surge == "predicted"
 
-    @property
-    def may_observe(self) -> tuple[Observable, ...]:
-        """Observables that a model of these settings may have."""
-        return self.observables
-
     def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that it asks of its runs.
 
@@ -451,7 +446,7 @@ class HankelSettings:
         RequestError
             If an observable counts in encounter periods and does not state its own.
         """
-        before, after = zip((0, self.lead), *(o.reach(dt) for o in self.may_observe), strict=True)
+        before, after = zip((0, self.lead), *(o.reach(dt) for o in self.observables), strict=True)
         delayed = self.input_delays
         if encounter_period and self.follows_surge:
             delayed += round(BACK * encounter_period / dt)
@@ -465,12 +460,9 @@ class HankelSettings:
     def to_json(self) -> Json:
         """Settings as JSON values."""
         content = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
-        select = content.get("select")
         maps = {
-            "alignment": None if self.alignment is None else asdict(self.alignment),
             "observables": [observable_json(each) for each in self.observables],
             "readouts": readouts_json(self.readouts),
-            "select": None if select is None else asdict(select),
         }
         return plain({key: maps.get(key, _written(each)) for key, each in content.items()})
 
@@ -484,7 +476,9 @@ class HankelSettings:
 
 
 def _written(value: Any) -> Any:
-    """A setting as its file states it: a length or a prior as its text or table."""
+    """A setting as its file states it: a length as text, and settings or a prior as a table."""
     if isinstance(value, Length):
         return str(value)
+    if isinstance(value, ProbeAlignment | Select):
+        return asdict(value)
     return prior_json(value) if isinstance(value, Prior) else value

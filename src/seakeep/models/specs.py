@@ -44,7 +44,6 @@ from seakeep.models.settings import (
     in_samples,
     periods_to_samples,
 )
-from seakeep.models.terms import Observable
 from seakeep.models.training import TrainingArrays, check_names, departures, gather, moments, until
 from seakeep.models.validity import Coverage
 from seakeep.toml import Length
@@ -141,9 +140,16 @@ class Choosing(HankelSettings, Generic[Fitted]):
         named = until(as_runs(runs), stop)
         check_names(states, inputs)
         spec = self.resolved_in(named, inputs)
-        central = spec.central(labelled.common_step(named))
-        how: dict[str, Any] = {"kinds": (FIR(0),), "executor": executor, "progress": progress}
-        return spec._adopt(settle(central, named, list(states), list(inputs), **how))
+        choice = settle(
+            spec.central(labelled.common_step(named)),
+            named,
+            list(states),
+            list(inputs),
+            kinds=(FIR(0),),
+            executor=executor,
+            progress=progress,
+        )
+        return spec._adopt(choice)
 
     def fit(
         self,
@@ -328,20 +334,14 @@ class HankelDMDc(LinearKind, Choosing[HankelDMDcModel]):
                 "Change them, or leave parameter out."
             )
 
-    @property
-    def may_observe(self) -> tuple[Observable, ...]:
-        """Observables that are stated, or those among which `fit` chooses."""
-        select = self.select
-        if self.observables or select is None or not select.observables:
-            return self.observables
-        return default_observables(("eta",), select.period)
-
     def needs(self, dt: float, encounter_period: float | None = None) -> Needs:
         """Samples that it asks of its runs, whichever observables are chosen."""
-        select, period = self.select, encounter_period
-        if select is None:
-            return super().needs(dt, period)
-        needs, period = super().needs(dt, period or select.period), period or select.period
+        if (select := self.select) is None:
+            return super().needs(dt, encounter_period)
+        spec, period = replace(self, select=None), encounter_period or select.period
+        if select.observables and not self.observables:
+            spec = replace(spec, observables=default_observables(("eta",), select.period))
+        needs = spec.needs(dt, period)
         most = round(MEMORY * period / dt) if select.memory and period else 0
         return replace(needs, history=max(needs.history, most))
 

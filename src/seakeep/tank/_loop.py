@@ -5,7 +5,7 @@ Imported only where a run is simulated; needs the extra ``tank`` (numba). Arrays
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -17,6 +17,33 @@ from seakeep.arrays import FloatArray, IntArray
 # other pairs, and the last bits would differ between the first run and the second.
 _fast = numba.njit(cache=True, fastmath={"reassoc"})
 _exact = numba.njit(cache=True)
+
+
+class Body(NamedTuple):
+    """Vessel and moorings as the loop takes them; see `dynamics.Rig`."""
+
+    inverse_mass: FloatArray
+    stiffness: FloatArray
+    linear: FloatArray
+    quadratic: FloatArray
+    pool: FloatArray
+    lines: FloatArray
+
+
+class Waves(NamedTuple):
+    """Waves as the loop takes them.
+
+    `components` holds one row each for ω, k, and the surge response (re, im) times the amplitude;
+    `excitation` the forces times the amplitude, first the real parts; `drift` and `signs` the
+    envelopes of the drift force, and `drift_damping` its damping.
+    """
+
+    components: FloatArray
+    phase: FloatArray
+    excitation: FloatArray
+    signs: FloatArray
+    drift: FloatArray
+    drift_damping: float
 
 
 @_exact
@@ -62,33 +89,28 @@ def _wave_forces(
     surge_speed: float,
     place: float,
     ramp: float,
-    waves: FloatArray,
-    excitation: FloatArray,
-    signs: FloatArray,
-    drift: FloatArray,
-    drift_damping: float,
+    waves: Waves,
     moved: FloatArray,
     force: FloatArray,
 ) -> float:
     """Add wave and drift forces to `force`; return the slow part of surge.
 
-    `real` and `imag` are the components' phases at `place`; `waves` holds one row each for ω, k,
-    and the surge response (re, im) times the amplitude, `excitation` the forces times the
-    amplitude, `drift` and `signs` the envelopes of the drift force. `moved` is overwritten.
+    `real` and `imag` are the components' phases at `place`; `moved` is overwritten.
     """
+    components, excitation, drift = waves.components, waves.excitation, waves.drift
     fast = fast_speed = 0.0
     for n in range(real.size):
-        first = waves[2, n] * real[n] - waves[3, n] * imag[n]
+        first = components[2, n] * real[n] - components[3, n] * imag[n]
         fast += first
-        fast_speed += waves[0, n] * (waves[2, n] * imag[n] + waves[3, n] * real[n])
+        fast_speed += components[0, n] * (components[2, n] * imag[n] + components[3, n] * real[n])
     slow = surge - ramp * fast
     shift = slow - place
     for n in range(real.size):
-        angle = waves[1, n] * shift
+        angle = components[1, n] * shift
         # Second order in k·shift: within a step the vessel moves millimetres.
         c, s = 1.0 - 0.5 * angle * angle, angle
         moved[0, n], moved[1, n] = real[n] * c - imag[n] * s, imag[n] * c + real[n] * s
-    dofs, count = force.size, signs.size
+    dofs, count = force.size, waves.signs.size
     now_re, now_im = moved[0], moved[1]
     for i in range(dofs):
         along, across, total = excitation[i], excitation[dofs + i], 0.0
@@ -100,28 +122,19 @@ def _wave_forces(
         for n in range(real.size):
             re += along[n] * now_re[n] - across[n] * now_im[n]
             im += along[n] * now_im[n] + across[n] * now_re[n]
-        force[0] += ramp * ramp * signs[i] * (re * re + im * im)
-    force[0] -= ramp * ramp * drift_damping * (surge_speed - ramp * fast_speed)
+        force[0] += ramp * ramp * waves.signs[i] * (re * re + im * im)
+    force[0] -= ramp * ramp * waves.drift_damping * (surge_speed - ramp * fast_speed)
     return slow
 
 
 @_fast
-def _body_forces(
-    q: FloatArray,
-    v: FloatArray,
-    stiffness: FloatArray,
-    linear: FloatArray,
-    quadratic: FloatArray,
-    pool: FloatArray,
-    lines: FloatArray,
-    force: FloatArray,
-) -> None:
+def _body_forces(q: FloatArray, v: FloatArray, body: Body, force: FloatArray) -> None:
     """Add restoring, viscous, moon-pool and mooring forces to `force`."""
-    dofs = q.size
+    dofs, pool = q.size, body.pool
     for i in range(dofs):
-        total = linear[i] * v[i] + quadratic[i] * abs(v[i]) * v[i]
+        total = body.linear[i] * v[i] + body.quadratic[i] * abs(v[i]) * v[i]
         for j in range(dofs):
-            total += stiffness[i, j] * q[j]
+            total += body.stiffness[i, j] * q[j]
         force[i] -= total
     if dofs > 3:
         # pool: centre, quadratic and linear loss of the flow through the opening.
@@ -130,8 +143,8 @@ def _body_forces(
         force[3] -= loss
         force[1] += loss
         force[2] -= pool[0] * loss
-    for i in range(lines.shape[0]):
-        _, fx, fz, moment = line_tension(lines[i], q[0], q[1], q[2], v)
+    for i in range(body.lines.shape[0]):
+        _, fx, fz, moment = line_tension(body.lines[i], q[0], q[1], q[2], v)
         force[0] += fx
         force[1] += fz
         force[2] += moment
@@ -155,34 +168,22 @@ def _memory_ahead(
 
 @_fast
 def _phases(
-    waves: FloatArray,
-    phase: FloatArray,
-    place: float,
-    time: float,
-    dt: float,
-    real: FloatArray,
-    imag: FloatArray,
+    waves: Waves, place: float, time: float, dt: float, real: FloatArray, imag: FloatArray
 ) -> None:
     """Components' cosines and sines at `place`, now, half a step and a step later."""
-    for n in range(phase.size):
+    frequency, wavenumber = waves.components[0], waves.components[1]
+    for n in range(waves.phase.size):
         for part in range(3):
-            angle = waves[1, n] * place - waves[0, n] * (time + 0.5 * part * dt) + phase[n]
+            angle = wavenumber[n] * place - frequency[n] * (time + 0.5 * part * dt) + waves.phase[n]
             real[part, n], imag[part, n] = math.cos(angle), math.sin(angle)
 
 
 @_fast
-def _advance(
-    q: FloatArray, v: FloatArray, step: int, origin: int, dt: float, slopes: FloatArray
-) -> None:
-    """Fourth-order step from the four stages' slopes, shape (2, stage, dof)."""
-    for i in range(q.shape[0]):
-        for part in range(2):
-            s = slopes[part]
-            total = dt / 6.0 * (s[0, i] + 2.0 * (s[1, i] + s[2, i]) + s[3, i])
-            if part == 0:
-                q[i, step + 1] = q[i, step] + total
-            else:
-                v[i, origin + 1] = v[i, origin] + total
+def _gain(slopes: FloatArray, dt: float, out: FloatArray) -> None:
+    """Add the gain of a fourth-order step by the slopes of its four stages, shape (stage, dof)."""
+    for i in range(out.size):
+        total = slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i]
+        out[i] += dt / 6.0 * total
 
 
 @_exact
@@ -198,20 +199,10 @@ def integrate(
     dt: float,
     ramp_time: float,
     start: FloatArray,
-    inverse_mass: FloatArray,
-    stiffness: FloatArray,
-    linear: FloatArray,
-    quadratic: FloatArray,
-    pool: FloatArray,
-    lines: FloatArray,
+    body: Body,
     pairs: IntArray,
     kernel: FloatArray,
-    waves: FloatArray,
-    phase: FloatArray,
-    excitation: FloatArray,
-    signs: FloatArray,
-    drift: FloatArray,
-    drift_damping: float,
+    waves: Waves,
     limits: FloatArray,
 ) -> tuple[Any, ...]:
     """Integrate the motion.
@@ -221,7 +212,7 @@ def integrate(
     position, velocity, acceleration, radiation memory (dof, time), slow surge (time,), and the
     index and degree of freedom that passed a limit (−1 if none).
     """
-    dofs, length, count = start.shape[1], kernel.shape[1] - 1, phase.size
+    dofs, length, count = start.shape[1], kernel.shape[1] - 1, waves.phase.size
     q, a = np.zeros((dofs, steps + 1)), np.zeros((dofs, steps + 1))
     memory = np.zeros((dofs, steps + 1))
     v = np.zeros((dofs, steps + 1 + length))
@@ -235,7 +226,7 @@ def integrate(
     for step in range(steps + 1):
         origin = length + step  # column of v at this instant
         _memory_ahead(pairs, kernel, v, origin, ahead)
-        _phases(waves, phase, place, step * dt, dt, real, imag)
+        _phases(waves, place, step * dt, dt, real, imag)
         for stage in range(4):
             part = (stage + 1) // 2
             fraction = 0.5 * part
@@ -246,21 +237,22 @@ def integrate(
             for p in range(pairs.shape[0]):
                 previous[pairs[p, 0]] += kernel[p, length] * state[1, pairs[p, 1]]
             force[:] = -previous
-            _body_forces(state[0], state[1], stiffness, linear, quadratic, pool, lines, force)
+            _body_forces(state[0], state[1], body, force)
             reached = _wave_forces(
                 real[part], imag[part], state[0, 0], state[1, 0], place,
-                _ramp((step + fraction) * dt, ramp_time), waves, excitation, signs, drift,
-                drift_damping, moved, force,
+                _ramp((step + fraction) * dt, ramp_time), waves, moved, force,
             )  # fmt: skip
             slopes[0, stage] = state[1]
             for i in range(dofs):
-                slopes[1, stage, i] = np.sum(inverse_mass[i] * force)
+                slopes[1, stage, i] = np.sum(body.inverse_mass[i] * force)
             if stage == 0:
                 a[:, step], memory[:, step], slow[step] = slopes[1, 0], previous, reached
-                if step == steps:
-                    return q, v[:, length:], a, memory, slow, -1, -1
+        if step == steps:
+            break
         place = slow[step]
-        _advance(q, v, step, origin, dt, slopes)
+        q[:, step + 1], v[:, origin + 1] = q[:, step], v[:, origin]
+        _gain(slopes[0], dt, q[:, step + 1])
+        _gain(slopes[1], dt, v[:, origin + 1])
         now[:] = ahead
         for i in range(dofs):
             if not abs(q[i, step + 1]) < limits[i]:

@@ -116,7 +116,6 @@ class Motion:
     """
 
     time: FloatArray
-    names: tuple[str, ...]
     position: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
@@ -239,7 +238,7 @@ def sea_losses(rig: Rig, sea: Sea) -> FloatArray:
         motion = linear_response(rig, sea.omega, losses)
         power = 0.5 * np.abs(sea.omega * sea.amplitude * (rig.flow @ motion.T)) ** 2
         total = power.sum(axis=1)
-        steady = power.max(axis=1) > 0.5 * total
+        steady = power.max(axis=1, initial=0.0) > 0.5 * total
         damping = drag * np.where(steady, 8 * np.sqrt(2) / (3 * np.pi), np.sqrt(8 / np.pi))
         damping = damping * np.sqrt(total)
         if np.allclose(damping, weights, rtol=1e-9, atol=1e-12):
@@ -311,7 +310,7 @@ def drift_envelopes(rig: Rig, sea: Sea) -> tuple[FloatArray, ComplexArray]:
     first, second = np.hsplit(factor, 2)
     mixed = first @ second.conj().T
     values, vectors = np.linalg.eigh(0.5 * (mixed + mixed.conj().T))
-    significant = np.abs(values) > 1e-6 * np.abs(values).max()
+    significant = np.abs(values) > 1e-6 * np.abs(values).max(initial=0.0)
     return values[significant], (basis @ vectors[:, significant]).conj().T
 
 
@@ -332,21 +331,19 @@ def linear_response(rig: Rig, omega: FloatArray, losses: FloatArray | None = Non
     return np.asarray(np.linalg.solve(dynamic, force)[..., 0], complex)
 
 
-def _wave_arrays(rig: Rig, sea: Sea) -> tuple[Any, ...]:
-    """Arrays of the waves as `_loop.integrate` takes them, and the wave-drift damping."""
-    dofs = len(rig.names)
-    if sea.omega.size == 0:
-        return np.zeros((4, 0)), np.zeros((2 * dofs, 0)), np.zeros(0), np.zeros((0, 0)), 0.0
+def _waves(rig: Rig, sea: Sea, begin: float) -> Any:
+    """Waves of a sea as the loop takes them, for a run whose first instant is `begin`."""
     force = excitation_at(rig.hydro, sea.omega) * sea.amplitude[:, None]
     surge = linear_response(rig, sea.omega)[:, 0] * sea.amplitude
-    waves = np.stack([sea.omega, sea.wavenumber, surge.real, surge.imag])
     signs, envelopes = drift_envelopes(rig, sea)
     damping = 0.0
     if rig.drift.damping:
         damping = np.sum(drift_coefficient(rig, sea)[1] * sea.amplitude**2)
     parts = (np.concatenate([x.real, x.imag]) for x in (force.T, envelopes))
     excitation, drift = (np.ascontiguousarray(x) for x in parts)
-    return waves, excitation, signs, drift, damping
+    components = np.stack([sea.omega, sea.wavenumber, surge.real, surge.imag])
+    phase = sea.phase - sea.omega * begin
+    return _loop().Waves(components, phase, excitation, signs, drift, damping)
 
 
 def simulate(
@@ -377,7 +374,6 @@ def simulate(
     loop = _loop()
     dofs = len(rig.names)
     steps = max(1, round(duration / rig.step))
-    waves, excitation, *drift = _wave_arrays(rig, sea)
     # Pairs of degrees of freedom that have a memory, and their weights from the oldest lag.
     memories = rig.kernel.values * trapezoid(rig.kernel.lags.size, rig.step)[:, None, None]
     pairs = np.argwhere(np.any(memories != 0.0, axis=0))
@@ -391,13 +387,10 @@ def simulate(
         rig.ramp,
         state,
         # Contiguous, so that every hull runs the same compiled code.
-        *map(np.ascontiguousarray, body),
+        loop.Body(*map(np.ascontiguousarray, body)),
         pairs,
         kernel,
-        waves,
-        sea.phase - sea.omega * begin,
-        excitation,
-        *drift,
+        _waves(rig, sea, begin),
         np.array([LIMITS[name] for name in rig.names]),
     )
     if failed >= 0:
@@ -408,7 +401,7 @@ def simulate(
             "the damping, stiffen the moorings, or take a smaller simulation.step."
         )
     time = begin + rig.step * np.arange(steps + 1, dtype=float)
-    return Motion(time, rig.names, q, np.ascontiguousarray(v), a, memory, slow)
+    return Motion(time, q, np.ascontiguousarray(v), a, memory, slow)
 
 
 def tensions(rig: Rig, position: FloatArray, velocity: FloatArray) -> FloatArray:
