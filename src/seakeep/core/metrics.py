@@ -247,7 +247,7 @@ def normalised_extremes_error(pair: Pair) -> FloatArray:
     RequestError, DataError
         As :func:`nrmse`.
     """
-    return _extremes_error(pair)
+    return extremes_error(pair)
 
 
 @_measure
@@ -269,7 +269,7 @@ def nammae(pair: Pair) -> FloatArray:
     RequestError, DataError
         As :func:`nrmse`.
     """
-    return over_channels(_extremes_error(pair), pair.judged)
+    return over_channels(extremes_error(pair), pair.judged)
 
 
 @_measure
@@ -301,7 +301,7 @@ def root_mean_square(error: FloatArray) -> FloatArray:
     return np.sqrt(np.mean(error**2, axis=-2))
 
 
-def _extremes_error(pair: Pair) -> FloatArray:
+def extremes_error(pair: Pair) -> FloatArray:
     """Mean absolute error of minimum and maximum over time, in measured SDs."""
     low = np.abs(pair.p.min(axis=-2) - pair.m.min(axis=-2))
     high = np.abs(pair.p.max(axis=-2) - pair.m.max(axis=-2))

@@ -64,9 +64,10 @@ def judge_windows(*, dt: float, frequency: float, **pair: Any) -> xr.Dataset:
         channel) the mean of a channel's ε(t), ``level``, and ``growth``: its change over the window
         along the line of least squares.
     """
-    p, m, spread, judged = paired(**pair)
+    both = paired(**pair)
+    p, m, spread, judged = both
     size = root_mean_square(p - m)
-    errors = [size / spread, extremes_error(p, m) / spread, size / np.asarray(pair["training_std"])]
+    errors = [size / spread, extremes_error(both), size / np.asarray(pair["training_std"])]
     parts = np.stack([p - m, *split_bands(p - m, dt, frequency)])
     absolute = np.abs(parts) / spread[..., None, :]
     age = np.linspace(-0.5, 0.5, p.shape[-2])
