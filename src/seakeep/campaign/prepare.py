@@ -12,7 +12,7 @@ import xarray as xr
 
 from seakeep.arrays import Groups, Progress, number, whole_number
 from seakeep.campaign.live_chain import LiveChain
-from seakeep.campaign.pipeline import celerity_of, checked, cropped, resampled, strays
+from seakeep.campaign.pipeline import Run, celerity_of, checked, cropped, resampled, strays
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Failures, Survey, spare, survey
@@ -199,11 +199,10 @@ class Campaign:
         DataError
             If the file is damaged, has gaps, or its times are not uniform.
         """
-        surveyed, _, _ = self._whole([name], steps=False)
-        run = surveyed.channels(name)
+        run = self._survey([name], self._counts_in_periods).channels(name)
         dt = uniform_step(run.reference_time, f"run '{name}'")
-        data = resampled(run, dt).data
-        return data.assign_attrs(self._attributes(name, data, dt, surveyed))
+        run = resampled(run, dt)
+        return run.data.assign_attrs(self._attributes(run, dt))
 
     def clocks(self, names: Iterable[str] | None = None) -> dict[str, dict[str, Clock]]:
         """Clocks of the loggers of each run against the reference.
@@ -232,21 +231,24 @@ class Campaign:
     def _survey(
         self,
         wanted: list[str],
-        periods: bool,
+        needs_period: bool,
         progress: Progress | None = None,
         failures: Failures | None = None,
     ) -> Survey:
-        """Clocks of the wanted runs and, if asked for, periods of the irregular ones."""
+        """Clocks of the wanted runs, the encounter period if needed, and settings in seconds."""
         for name in wanted:
             self._run(name)
-        settings = self._in_seconds(self.settings.campaign.encounter_period)
-        channel = self.period_channel() if periods else None
+        stated = self.settings.campaign.encounter_period
+        settings = self._in_seconds(stated)
+        channel = self.period_channel() if needs_period and not stated else None
         if channel and not settings.period_runs:
             raise RequestError(
                 f"{self.path} has no run with waves in use. Give a run another role, or state "
                 "encounter_period (s) in [campaign]."
             )
-        return survey(settings, self.files_of, wanted, channel, progress, failures)
+        surveyed = survey(settings, self.files_of, wanted, channel, progress, failures)
+        period = stated or surveyed.period
+        return replace(surveyed, settings=self._in_seconds(period), period=period)
 
     def period_channel(self) -> str:
         """Name of the wave channel that defines the encounter period.
@@ -289,8 +291,7 @@ class Campaign:
         DataError
             If no run is left.
         """
-        stated = self.settings.campaign.encounter_period
-        return stated or self._survey([], True).period
+        return self.settings.campaign.encounter_period or self._survey([], True).period
 
     def seconds(self, stated: float | str) -> float:
         """Seconds of a length or an instant that may be stated in encounter periods.
@@ -377,8 +378,8 @@ class Campaign:
             As :meth:`prepare`.
         """
         wanted = list(self.runs if names is None else names)
-        surveyed, period, dt = self._whole(wanted, progress, failures)
-        stated, first = dt is not None, ""
+        surveyed = self._survey(wanted, self._measures_period, progress, failures)
+        dt, first = surveyed.dt, ""
         reported = {(str(self.settings.wave_channel), "PERIOD")}  # the survey has warned of it
         for done, name in enumerate(wanted, 1):
             try:
@@ -386,27 +387,28 @@ class Campaign:
                     raise failures[name]
                 run = surveyed.channels(name)
                 own = uniform_step(run.reference_time, f"run '{name}'")
-                dt, first = own if dt is None else dt, first or name
-                if not stated and strays(own, run.reference_time.size, dt):
+                dt, first = dt or own, first or name
+                if not surveyed.dt and strays(own, run.reference_time.size, dt):
                     raise RequestError(
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
                 run = checked(resampled(run, dt), surveyed.doubts.get(name), surveyed.left_out)
                 warn_of(run.findings, reported)
-                data = cropped(run).data
+                run = cropped(run)
+                data = run.data
                 data.attrs["quality"] = as_json(run.findings)
                 for channel in data.data_vars.values():
                     channel.attrs["noise_std"] = noise_floor(channel.values)
-                data.attrs.update(self._attributes(name, data, dt, surveyed))
+                data.attrs.update(self._attributes(run, dt))
             except SeakeepError as error:
                 is_named = f"'{name}'" in str(error)
                 spare(failures, name, error if is_named else type(error)(f"run '{name}': {error}"))
                 if progress:
                     progress(done, len(wanted), f"{name} cannot be prepared")
                 continue
-            if period:
-                data.attrs["encounter_period"] = period
+            if surveyed.period:
+                data.attrs["encounter_period"] = surveyed.period
             if progress:
                 progress(done, len(wanted), name)
             yield name, data
@@ -441,10 +443,9 @@ class Campaign:
         DataError
             If a file of the run cannot be read.
         """
-        surveyed, _, dt = self._whole([run])
+        surveyed = self._survey([run], self._measures_period)
         settings = surveyed.settings
-        if not dt:
-            dt = uniform_step(surveyed.channels(run).reference_time, run)
+        dt = surveyed.dt or uniform_step(surveyed.channels(run).reference_time, run)
         late, length = self.seconds(delay), self.seconds(window)
         if not 0 <= 4 * late <= length:
             raise RequestError(
@@ -458,33 +459,11 @@ class Campaign:
         source = replace(surveyed, settings=settings.model_copy(update=changed)).read(run)
         return LiveChain(source, dt, late, length, whole_number(every, "every"))
 
-    def _whole(
-        self,
-        wanted: list[str],
-        progress: Progress | None = None,
-        failures: Failures | None = None,
-        steps: bool = True,
-    ) -> tuple[Survey, float | None, float | None]:
-        """Survey with settings in seconds, encounter period if needed, common step if stated."""
-        preparation, period = self.settings.preparation, self.settings.campaign.encounter_period
-        needed = self._counts_in_periods or (steps and preparation.steps_per_period)
-        surveyed = self._survey(wanted, bool(needed) and not period, progress, failures)
-        if needed and not period:
-            period = surveyed.period
-        dt = preparation.dt
-        if preparation.steps_per_period and period:
-            dt = period / preparation.steps_per_period
-        elif preparation.sampling_rate:
-            dt = 1.0 / preparation.sampling_rate
-        return replace(surveyed, settings=self._in_seconds(period)), period, dt
-
-    def _attributes(
-        self, name: str, run: xr.Dataset, dt: float, surveyed: Survey
-    ) -> dict[str, Any]:
-        """Attributes that settings (lengths in seconds) and clocks give to a run that was cut."""
-        campaign = surveyed.settings
-        settings, rig, general = campaign.runs[name], campaign.rig, campaign.campaign
-        time = run["time"].values
+    def _attributes(self, run: Run, dt: float) -> dict[str, Any]:
+        """Attributes that settings and clocks give to a run that was cut."""
+        name, settings, campaign = run.name, run.own, run.settings
+        rig, general = campaign.rig, campaign.campaign
+        time = run.data["time"].values
         attributes: dict[str, Any] = {
             "campaign": self.name,
             "campaign_digest": self.digest,
@@ -504,7 +483,7 @@ class Campaign:
             "frame": rig.frame,
             "encounter_period": general.encounter_period,
             "probe_offset": settings.probe_offset,
-            "celerity": celerity_of(run, dt, campaign, settings),
+            "celerity": celerity_of(run, dt),
         }
         whole = (time[0], time[-1])
         for use in ("train", "test"):
@@ -515,7 +494,7 @@ class Campaign:
                 used = time[inside(time, span, dt)]
                 if used.size:
                     attributes[f"{use}_span"] = (float(used[0]), float(used[-1]))
-        for logger, clock in list(surveyed.clocks[name].items())[1:]:
+        for logger, clock in list(run.clocks.items())[1:]:
             attributes |= {
                 f"clock_{logger}": clock.describe(),
                 f"clock_{logger}_method": clock.method,

@@ -1,6 +1,6 @@
 """From a TOML file to settings, with one message that names every mistake in it."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Sequence
 from graphlib import CycleError, TopologicalSorter
 
 from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings, units_of
@@ -10,14 +10,15 @@ from seakeep.signals.expressions import parse
 from seakeep.toml import Mistake, lengths
 
 
-def derivation_order(
-    derived: Mapping[str, DerivedSettings], channels: Collection[str]
-) -> list[str]:
-    """Order derived channels so that each finds what it needs."""
-    graph = {
-        name: [source for source in sources_of(name, each, channels) if source in derived]
-        for name, each in derived.items()
-    }
+def needed_channels(settings: CampaignSettings, wanted: Collection[str] | None = None) -> list[str]:
+    """Names of channels, by default all, and of all that they are derived from, these first."""
+    graph: dict[str, Sequence[str]] = {}
+    ahead = list(settings.channel_names if wanted is None else wanted)
+    while ahead:
+        if (name := ahead.pop(0)) not in graph:
+            own = settings.derived.get(name)
+            graph[name] = sources_of(name, own, settings.channel_names) if own else ()
+            ahead += graph[name]
     try:
         return list(TopologicalSorter(graph).static_order())
     except CycleError as error:
@@ -44,19 +45,6 @@ def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) 
             turning = turning[: {"m": 1, "m/s": 2}.get(known.units, 3)]
         sources += [turn + kind for kind in turning for turn in TURNS if turn + kind in channels]
     return tuple(dict.fromkeys(each for each in sources if each != name))
-
-
-def needed_channels(settings: CampaignSettings, wanted: Collection[str] | None) -> set[str]:
-    """Names of channels, by default all, and of all that they are derived from."""
-    needed = set()
-    ahead = list(settings.channel_names if wanted is None else wanted)
-    while ahead:
-        name = ahead.pop()
-        if name not in needed:
-            needed.add(name)
-            if name in settings.derived:
-                ahead += sources_of(name, settings.derived[name], settings.channel_names)
-    return needed
 
 
 def cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
@@ -185,6 +173,6 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
             )
     if sound:
         try:
-            derivation_order(settings.derived, names)
+            needed_channels(settings)
         except RequestError as error:
             yield ("derived",), str(error)
