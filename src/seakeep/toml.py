@@ -188,8 +188,8 @@ def lengths(value: object, place: tuple[str, ...] = ()) -> Iterator[tuple[str, .
         yield place
 
 
-def in_seconds(table: Settings, period: float) -> Settings:
-    """Replace each :class:`Length` of a table, tables in it included, by seconds or hertz.
+def in_seconds(table: Settings, period: float, places: Iterable[tuple[str, ...]]) -> Settings:
+    """Replace the :class:`Length` at each of some places of a table by seconds or hertz.
 
     Parameters
     ----------
@@ -197,41 +197,40 @@ def in_seconds(table: Settings, period: float) -> Settings:
         The settings.
     period : float
         Encounter period, s.
+    places : iterable of tuple of str
+        Some of its :func:`lengths`.
 
     Returns
     -------
     BaseModel
-        A copy; the table itself where nothing in it counts in periods.
+        A copy; the table itself where there is no place.
 
     Raises
     ------
     RequestError
         If a span of which one end counts in periods runs backwards.
     """
-    return _resolved(table, period, ())
+    for place in places:
+        table = _resolved(table, period, place, place)
+    return table
 
 
-def _resolved(value: Any, period: float, place: tuple[str, ...]) -> Any:
+def _resolved(value: Any, period: float, place: tuple[str, ...], ahead: tuple[str, ...]) -> Any:
+    """A value in seconds where no key is `ahead`, else the table that holds it there."""
+    if ahead:
+        name, *rest = ahead
+        inner = dict(value)
+        inner[name] = _resolved(inner[name], period, place, tuple(rest))
+        return inner if isinstance(value, dict) else value.model_copy(update={name: inner[name]})
     if isinstance(value, Length):
         return value.at(period)
-    if isinstance(value, BaseModel):
-        update = {
-            name: _resolved(each, period, (*place, name))
-            for name, each in value
-            if any(True for _ in lengths(each))
-        }
-        return value.model_copy(update=update) if update else value
-    if isinstance(value, dict):
-        return {name: _resolved(each, period, (*place, str(name))) for name, each in value.items()}
-    if isinstance(value, tuple) and any(isinstance(each, Length) for each in value):
-        start, end = (_resolved(each, period, place) for each in value)
-        if not start < end:
-            raise RequestError(
-                f"{'.'.join(place)}: received [{value[0]}, {value[1]}], which with an encounter "
-                f"period of {period:.6g} s is [{start:g}, {end:g}]. State the lower one first."
-            )
-        return start, end
-    return value
+    start, end = (each.at(period) if isinstance(each, Length) else each for each in value)
+    if not start < end:
+        raise RequestError(
+            f"{'.'.join(place)}: received [{value[0]}, {value[1]}], which with an encounter "
+            f"period of {period:.6g} s is [{start:g}, {end:g}]. State the lower one first."
+        )
+    return start, end
 
 
 Mistake = tuple[tuple[str, ...], str]

@@ -23,7 +23,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray
-from seakeep.campaign.derivation import derive
+from seakeep.campaign.derivation import derive, needed_channels, sources_of
 from seakeep.campaign.guesses import is_wave
 from seakeep.campaign.readers import (
     counts_samples,
@@ -43,7 +43,6 @@ from seakeep.campaign.settings import (
     long_name_of,
     units_of,
 )
-from seakeep.campaign.validation import needed_channels, sources_of
 from seakeep.conventions import MOTIONS, conversion
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean, naming
 from seakeep.formats import Columns, read_columns
@@ -300,9 +299,10 @@ def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
     """Channels of one logger, gaps and jitter as they are."""
     time = run.clocks[logger.name].reference(logger.time)
     start, end = (number(edge) for edge in run.own.record or (-np.inf, np.inf))
-    step, whole = usual_step(time), (time[0], time[-1])
-    slack = step * (1 + 1e-6) if logger.name == next(iter(run.loggers)) else np.inf
-    records = _part(f"runs.{run.name}.record", (start, end), time, step, whole, slack)
+    is_reference = logger.name == next(iter(run.loggers))
+    slack = usual_step(time) * (1 + 1e-6) if is_reference else np.inf
+    whole = time[0], time[-1]
+    records = _part(f"runs.{run.name}.record", (start, end), time, whole, slack)
     variables = {}
     for name, each in channels.items():
         wanted, path = each.column or name, logger.path
@@ -390,13 +390,13 @@ def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> x
         uniform_step(time, name)
         return data
     except DataError as error:
-        report = inspect_times(time, name)
+        report, mend = inspect_times(time, name), ""
         if report.gaps and preparation.gaps == "refuse":
-            raise DataError(
-                f"{error} Or state gaps = 'mask' or 'bridge' in [preparation]."
-            ) from None
-        if report.jittered and preparation.jitter == "refuse":
-            raise DataError(f"{error} Or state jitter = 'interpolate' in [preparation].") from None
+            mend = "gaps = 'mask' or 'bridge'"
+        elif report.jittered and preparation.jitter == "refuse":
+            mend = "jitter = 'interpolate'"
+        if mend:
+            raise DataError(f"{error} Or state {mend} in [preparation].") from None
     series = np.column_stack([each.values for each in data.values()])
     new, values = onto_uniform(time, series, name)
     variables = {
@@ -623,16 +623,16 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
 def cropped(run: Run) -> Run:
     """Step 8: cut the run to its span; spans that lie outside the record are refused."""
     data, reference = run.data, run.reference_time
-    dt = usual_step(data["time"].values)
     record = reference[0], reference[-1]
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
-    slack = max(dt, (record[1] - record[0]) / (reference.size - 1)) * (1 + 1e-6)
+    step = (record[1] - record[0]) / (reference.size - 1)
+    slack = max(usual_step(data["time"].values), step) * (1 + 1e-6)
     stated = {key: getattr(run.own, key) for key in ("span", "train", "test")}
     spans = {k: (number(each[0]), number(each[1])) for k, each in stated.items() if each}
 
     def used(key: str, record: tuple[float, float], slack: float) -> BoolArray:
         place = f"runs.{run.name}.{key}"
-        return _part(place, spans[key], data["time"].values, dt, record, slack)
+        return _part(place, spans[key], data["time"].values, record, slack)
 
     parts = {key: used(key, record, slack) for key in spans}
     if "span" in parts:
@@ -647,7 +647,6 @@ def _part(
     key: str,
     span: tuple[float, float],
     time: FloatArray,
-    dt: float,
     record: tuple[float, float],
     slack: float,
 ) -> BoolArray:
@@ -655,6 +654,7 @@ def _part(
 
     Refused is also a span that reaches beyond the reference's record by more than a slack.
     """
+    dt = usual_step(time)
     shown = f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}] s"
     finite = [edge for edge in span if np.isfinite(edge)]
     if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):

@@ -103,8 +103,8 @@ class Campaign:
     @property
     def digest(self) -> str:
         """SHA-256 of all settings on which the prepared runs depend, in hexadecimal digits."""
-        content = self.settings.model_dump(mode="json", exclude={"model", "models"})
-        del content["campaign"]["name"], content["campaign"]["description"]
+        words = {"model": True, "models": True, "campaign": {"name", "description"}}
+        content = self.settings.model_dump(mode="json", exclude=words)
         if self._measures_period:
             content["campaign"]["period_channel"] = self.period_channel()
         content["celerity_channels"] = self.settings.celerity_channels
@@ -114,22 +114,17 @@ class Campaign:
     @property
     def _measures_period(self) -> bool:
         settings = self.settings
-        asked = settings.preparation.steps_per_period or self._counts_in_periods
+        asked = settings.preparation.steps_per_period or self._lengths
         return bool(asked) and not settings.campaign.encounter_period
 
     @cached_property
-    def _counts_in_periods(self) -> bool:
-        """Whether something on which prepared runs depend is stated in encounter periods."""
-        return any(place[0] not in ("model", "models") for place in lengths(self.settings))
+    def _lengths(self) -> list[tuple[str, ...]]:
+        """Places of what counts in encounter periods; models keep theirs, which become samples."""
+        return [place for place in lengths(self.settings) if place[0] not in ("model", "models")]
 
     def _in_seconds(self, period: float | None) -> CampaignSettings:
-        """Settings with all that counts in encounter periods turned into seconds and hertz."""
-        if not (period and self._counts_in_periods):
-            return self.settings
-        # Models keep their periods: their delays become samples.
-        models = {"model": self.settings.model, "models": self.settings.models}
-        bare = self.settings.model_copy(update={"model": None, "models": {}})
-        return in_seconds(bare, period).model_copy(update=models)
+        """Settings with what counts in encounter periods turned into seconds and hertz."""
+        return in_seconds(self.settings, period, self._lengths) if period else self.settings
 
     def files_of(self, name: str) -> dict[str, Path]:
         """Paths of a run's files.
@@ -199,7 +194,7 @@ class Campaign:
         DataError
             If the file is damaged, has gaps, or its times are not uniform.
         """
-        run = self._survey([name], self._counts_in_periods).channels(name)
+        run = self._survey([name], bool(self._lengths)).channels(name)
         dt = uniform_step(run.reference_time, f"run '{name}'")
         run = resampled(run, dt)
         return run.data.assign_attrs(self._attributes(run, dt))
@@ -533,5 +528,5 @@ def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:
     path = expanded(path)
     content = read_toml(path, "campaign", " Draft one with 'seakeep init FILE…'.")
     settings = validated(CampaignSettings, content, path, "campaign", cross_checks)
-    preparation = settings.preparation.filtered_as(preset or settings.preset)
+    preparation = settings.preparation.with_preset(preset or settings.preset)
     return Campaign(path, settings.model_copy(update={"preparation": preparation}))
