@@ -103,8 +103,10 @@ class Campaign:
     @property
     def digest(self) -> str:
         """SHA-256 of all settings on which the prepared runs depend, in hexadecimal digits."""
-        words = {"model": True, "models": True, "campaign": {"name", "description"}}
-        content = self.settings.model_dump(mode="json", exclude=words)
+        content = self.settings.model_dump(
+            mode="json",
+            exclude={"model": True, "models": True, "campaign": {"name", "description"}},
+        )
         if self._measures_period:
             content["campaign"]["period_channel"] = self.period_channel()
         content["celerity_channels"] = self.settings.celerity_channels
