@@ -298,11 +298,10 @@ def _by_logger(run: Run, channels: ChannelMap) -> dict[str, ChannelMap]:
 def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
     """Channels of one logger, gaps and jitter as they are."""
     time = run.clocks[logger.name].reference(logger.time)
-    start, end = (number(edge) for edge in run.own.record or (-np.inf, np.inf))
     is_reference = logger.name == next(iter(run.loggers))
     slack = usual_step(time) * (1 + 1e-6) if is_reference else np.inf
-    whole = time[0], time[-1]
-    records = _part(f"runs.{run.name}.record", (start, end), time, whole, slack)
+    span, whole = run.own.record or (-np.inf, np.inf), (time[0], time[-1])
+    records = _part(f"runs.{run.name}.record", span, time, whole, slack)
     variables = {}
     for name, each in channels.items():
         wanted, path = each.column or name, logger.path
@@ -622,30 +621,25 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
 
 def cropped(run: Run) -> Run:
     """Step 8: cut the run to its span; spans that lie outside the record are refused."""
-    data, reference = run.data, run.reference_time
-    record = reference[0], reference[-1]
+    data, reference, place = run.data, run.reference_time, f"runs.{run.name}."
+    time, record = data["time"].values, (reference[0], reference[-1])
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
     step = (record[1] - record[0]) / (reference.size - 1)
-    slack = max(usual_step(data["time"].values), step) * (1 + 1e-6)
+    slack = max(usual_step(time), step) * (1 + 1e-6)
     stated = {key: getattr(run.own, key) for key in ("span", "train", "test")}
-    spans = {k: (number(each[0]), number(each[1])) for k, each in stated.items() if each}
-
-    def used(key: str, record: tuple[float, float], slack: float) -> BoolArray:
-        place = f"runs.{run.name}.{key}"
-        return _part(place, spans[key], data["time"].values, record, slack)
-
-    parts = {key: used(key, record, slack) for key in spans}
+    spans = {key: span for key, span in stated.items() if span}
+    parts = {key: _part(place + key, span, time, record, slack) for key, span in spans.items()}
     if "span" in parts:
         data = data.isel(time=parts.pop("span"))
         time = data["time"].values
         for key in parts:
-            used(key, (time[0], time[-1]), np.inf)
+            _part(place + key, spans[key], time, (time[0], time[-1]), np.inf)
     return replace(run, data=data)
 
 
 def _part(
     key: str,
-    span: tuple[float, float],
+    stated: tuple[float | Length, float | Length],
     time: FloatArray,
     record: tuple[float, float],
     slack: float,
@@ -654,7 +648,7 @@ def _part(
 
     Refused is also a span that reaches beyond the reference's record by more than a slack.
     """
-    dt = usual_step(time)
+    dt, span = usual_step(time), (number(stated[0]), number(stated[1]))
     shown = f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}] s"
     finite = [edge for edge in span if np.isfinite(edge)]
     if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):
@@ -665,15 +659,15 @@ def _part(
     used = inside(time, span, dt)
     if (count := used.sum()) > 1:
         return used
-    stated = f"{key}: {shown} holds {count} sample(s) at a step of {dt:.4g} s"
+    lacks = f"{key}: {shown} holds {count} sample(s) at a step of {dt:.4g} s"
     common = span_text(time[0], time[-1], dt)
     if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:
         raise DataError(
-            f"{stated}, since all loggers recorded together only from {common}; the reference runs "
+            f"{lacks}, since all loggers recorded together only from {common}; the reference runs "
             f"from {span_text(*record, dt)}. Check whether the files of the other loggers are "
             "whole, or correct the span."
         )
-    raise RequestError(f"{stated}. Lengthen the span, or move it into the run's {common}.")
+    raise RequestError(f"{lacks}. Lengthen the span, or move it into the run's {common}.")
 
 
 def celerity_of(run: Run, dt: float) -> float | None:

@@ -1,6 +1,6 @@
 """From a TOML file to settings, with one message that names every mistake in it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from seakeep.campaign.derivation import needed_channels, sources_of
 from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings, units_of
@@ -93,17 +93,16 @@ def _period_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
 
 
 def _unit_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
-    tables: dict[tuple[str, ...], ChannelSettings | DerivedSettings]
-    tables = {("channels", name): each for name, each in settings.channels.items()}
-    tables |= {("derived", name): each for name, each in settings.derived.items()}
-    for run, of_run in settings.runs.items():
-        tables |= {("runs", run, "channels", n): each for n, each in of_run.channels.items()}
-    for place, each in tables.items():
-        if each.unit is not None:
+    tables: dict[tuple[str, ...], Mapping[str, ChannelSettings | DerivedSettings]]
+    tables = {("channels",): settings.channels, ("derived",): settings.derived}
+    tables |= {("runs", run, "channels"): each.channels for run, each in settings.runs.items()}
+    for place, channels in tables.items():
+        units = {name: each.unit for name, each in channels.items() if each.unit is not None}
+        for name, unit in units.items():
             try:
-                conversion(each.unit, units_of(place[-1], each.unit), place[-1])
+                conversion(unit, units_of(name, unit), name)
             except RequestError as error:
-                yield (*place, "unit"), str(error)
+                yield (*place, name, "unit"), str(error)
 
 
 def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
