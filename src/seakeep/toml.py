@@ -182,8 +182,8 @@ def lengths(value: object, place: tuple[str, ...] = ()) -> Iterator[tuple[str, .
     if isinstance(value, Length):
         yield place
     elif isinstance(value, BaseModel | dict):
-        for name, each in value if isinstance(value, BaseModel) else value.items():
-            yield from lengths(each, (*place, str(name)))
+        for name, each in dict(value).items():
+            yield from lengths(each, (*place, name))
     elif isinstance(value, tuple) and any(isinstance(each, Length) for each in value):
         yield place
 
@@ -371,10 +371,10 @@ def _parts(dotted: str) -> tuple[str, ...]:
     return tuple("".join(match) for match in _PART.findall(dotted))
 
 
-def _reason(item: Any, place: list[str], table: type[BaseModel] | None, description: str) -> str:
+def _reason(item: Any, place: list[str], table: type[BaseModel], description: str) -> str:
     kind, value = item["type"], item["input"]
     give = f" Give {description}." if description else ""
-    if kind == "extra_forbidden" and table:
+    if kind == "extra_forbidden":
         known = [field.alias or name for name, field in table.model_fields.items()]
         near, keys = did_you_mean(place[-1], known), ", ".join(known)
         return f"unknown key, received {_shown(value)}.{near} Keys here: {keys}."
@@ -400,7 +400,7 @@ def _shown(value: object) -> str:
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
 
 
-def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel] | None, str, int]:
+def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel], str, int]:
     """Table in which the last key stands, that key's description, and how many keys count."""
     here: Any = root
     owner, description = root, ""

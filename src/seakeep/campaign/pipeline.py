@@ -36,7 +36,6 @@ from seakeep.campaign.settings import (
     CampaignSettings,
     ChannelSettings,
     FileSettings,
-    InstrumentSettings,
     InstrumentsSettings,
     PreparationSettings,
     RunSettings,
@@ -207,18 +206,16 @@ def sync(run: Run) -> Run:
     """Step 2: find each logger's clock against the reference's."""
     reference, *others = run.loggers.values()
     by_reference = {reference.name: Clock()}
-    instruments = run.settings.instruments
     for each in others:
         with naming(f"run '{run.name}', clock of '{each.name}' ({each.path})"):
-            by_reference[each.name] = _clock(each, reference, instruments[each.name], instruments)
+            by_reference[each.name] = _clock(each, reference, run.settings.instruments)
     return replace(run, clocks=by_reference)
 
 
-def _clock(
-    logger: Logger, reference: Logger, own: InstrumentSettings, every: InstrumentsSettings
-) -> Clock:
+def _clock(logger: Logger, reference: Logger, instruments: InstrumentsSettings) -> Clock:
+    own = instruments[logger.name]
     if own.trigger is not None:
-        theirs = every[reference.name].trigger
+        theirs = instruments[reference.name].trigger
         if theirs is None:
             raise RequestError(
                 f"'{logger.name}' states a trigger and the reference '{reference.name}' none. Add "
@@ -499,7 +496,7 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         time = origin + dt * np.arange(first, last + 1)
     channels: dict[str, xr.Variable] = {}
     for group in run.groups.values():
-        channels |= _on_axis(group, time, dt, run.settings.preparation, run.name)
+        channels |= _on_axis(run, group, time, dt)
     for name in run.ahead:
         channels |= derive(channels, name, run.settings, dt, run.name)
     axis = xr.Variable("time", time, next(iter(run.groups.values()))["time"].attrs)
@@ -515,12 +512,10 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
     return replace(run, data=xr.Dataset(data, coordinates))
 
 
-def _on_axis(
-    group: xr.Dataset, wanted: FloatArray, dt: float, settings: PreparationSettings, run: str
-) -> dict[str, xr.Variable]:
+def _on_axis(run: Run, group: xr.Dataset, wanted: FloatArray, dt: float) -> dict[str, xr.Variable]:
     """Channels of a logger and their flags at other instants."""
-    time = group["time"].values
-    own = uniform_step(time, f"run '{run}'")
+    time, settings = group["time"].values, run.settings.preparation
+    own = uniform_step(time, f"run '{run.name}'")
     channels = {name: group.variables[name] for name in group.data_vars}
     series = np.column_stack([channel.values for channel in channels.values()])
     low, filtered = settings.low_pass, {}
