@@ -514,8 +514,7 @@ class CampaignSettings(Table):
         for names in (*(model.inputs for model in self.all_models().values()), waves):
             placed = {n: self.rig.positions[n] for n in names if n in self.rig.positions}
             if len(set(placed.values())) > 1:
-                first, last = (pick(placed, key=placed.__getitem__) for pick in (min, max))
-                return first, last
+                return min(placed, key=placed.__getitem__), max(placed, key=placed.__getitem__)
         return None
 
     def all_models(self) -> dict[str, ModelSettings]:
