@@ -36,9 +36,6 @@ CHANGES = {
         ("rtol=1e-6, atol=0), np.nan", "rtol=0, atol=0), np.nan", "campaign/test_prepare.py::test_a_number_for_no_reading_is_a_gap_of_channels_alone"),
         ("each.sign * factor * (readings + each.offset)", "each.sign * factor * readings + each.offset", "campaign/test_prepare.py::test_offset_is_added_in_the_files_unit_before_the_sign"),
     ],
-    "campaign/prepare.py": [
-        ("dt = period / preparation.steps_per_period", "dt = period / (preparation.steps_per_period - 1)", "campaign/test_prepare.py::test_the_step_is_the_stated_one"),
-    ],
     "campaign/settings.py": [
         ('if kind != "still")', 'if kind)', "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
     ],
@@ -46,6 +43,7 @@ CHANGES = {
         ("times = table.values[name] * factor", "times = table.values[name]", "formats/test_read_text.py::test_options"),
     ],
     "campaign/survey.py": [
+        ("self.period / stated.steps_per_period", "self.period / (stated.steps_per_period - 1)", "campaign/test_prepare.py::test_the_step_is_the_stated_one"),
         ("if each[3] >= FEWEST} or spans", "} or spans", "campaign/test_periods.py::test_runs_of_few_waves_or_none_have_no_part_in_the_period"),
         ("or steady > NOISY * counted", "", "campaign/test_plausibility.py::test_a_count_that_noise_leads_is_told"),
     ],

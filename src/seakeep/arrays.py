@@ -143,7 +143,7 @@ def as_series(
     return finite(array, name)
 
 
-def as_bundle(values: object, name: str = "the series", *, minimum: int = 2) -> FloatArray:
+def as_bundle(values: object, name: str = "the series") -> FloatArray:
     """Return one series, or several of equal length, as rows.
 
     Parameters
@@ -152,8 +152,6 @@ def as_bundle(values: object, name: str = "the series", *, minimum: int = 2) -> 
         Samples; time runs along the last axis.
     name : str, optional
         What messages call them.
-    minimum : int, optional
-        Fewest samples of each.
 
     Returns
     -------
@@ -169,10 +167,9 @@ def as_bundle(values: object, name: str = "the series", *, minimum: int = 2) -> 
     array = as_real(values, name)
     if array.ndim not in (1, 2) or (array.ndim == 2 and array.shape[0] == 0):
         raise RequestError(f"{name} has shape {array.shape}; expected (time,) or (series, time).")
-    if array.shape[-1] < minimum:
+    if array.shape[-1] < 2:
         raise DataError(
-            f"{name} has {array.shape[-1]} sample(s); at least {minimum} are needed. Give a longer "
-            "series."
+            f"{name} has {array.shape[-1]} sample(s); at least 2 are needed. Give a longer series."
         )
     finite(array.T, name)
     return np.atleast_2d(array)

@@ -59,16 +59,10 @@ def existing_file(path: Path | str) -> Path:
     Raises
     ------
     MissingFileError
-        If there is no such file, it is a folder, a pipe, a socket or a device, or the system
-        refuses to look at it.
+        As :func:`reading`.
     """
-    place = expanded(path)
-    if not is_there(place):
-        raise _missing(place)
-    if not place.is_file():
-        what = "a folder" if place.is_dir() else "a pipe or a device"
-        raise MissingFileError(f"{path} is {what}, and only regular files are read. Give a file.")
-    return place
+    with reading(path) as place:
+        return place
 
 
 def is_there(path: Path) -> bool:
@@ -102,10 +96,18 @@ def reading(path: Path | str) -> Iterator[Path]:
     Raises
     ------
     MissingFileError
-        As :func:`existing_file`; also if the system fails while the file is read.
+        If there is no such file, it is a folder, a pipe, a socket or a device, or the system
+        refuses to look at it or fails while it is read.
     """
-    place = existing_file(path)
+    place = expanded(path)
     try:
+        if not place.exists():
+            raise _missing(place)
+        if not place.is_file():
+            what = "a folder" if place.is_dir() else "a pipe or a device"
+            raise MissingFileError(
+                f"{path} is {what}, and only regular files are read. Give a file."
+            )
         yield place
     except OSError as error:
         raise _unreadable(path, error) from error

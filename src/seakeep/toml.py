@@ -182,14 +182,14 @@ def lengths(value: object, place: tuple[str, ...] = ()) -> Iterator[tuple[str, .
     if isinstance(value, Length):
         yield place
     elif isinstance(value, BaseModel | dict):
-        for name, each in value if isinstance(value, BaseModel) else value.items():
-            yield from lengths(each, (*place, str(name)))
+        for name, each in dict(value).items():
+            yield from lengths(each, (*place, name))
     elif isinstance(value, tuple) and any(isinstance(each, Length) for each in value):
         yield place
 
 
-def in_seconds(table: Settings, period: float) -> Settings:
-    """Replace each :class:`Length` of a table, tables in it included, by seconds or hertz.
+def in_seconds(table: Settings, period: float, places: Iterable[tuple[str, ...]]) -> Settings:
+    """Replace the :class:`Length` at each of some places of a table by seconds or hertz.
 
     Parameters
     ----------
@@ -197,41 +197,40 @@ def in_seconds(table: Settings, period: float) -> Settings:
         The settings.
     period : float
         Encounter period, s.
+    places : iterable of tuple of str
+        Some of its :func:`lengths`.
 
     Returns
     -------
     BaseModel
-        A copy; the table itself where nothing in it counts in periods.
+        A copy; the table itself where there is no place.
 
     Raises
     ------
     RequestError
         If a span of which one end counts in periods runs backwards.
     """
-    return _resolved(table, period, ())
+    for place in places:
+        table = _resolved(table, period, place, place)
+    return table
 
 
-def _resolved(value: Any, period: float, place: tuple[str, ...]) -> Any:
+def _resolved(value: Any, period: float, place: tuple[str, ...], ahead: tuple[str, ...]) -> Any:
+    """A value in seconds where no key is `ahead`, else the table that holds it there."""
+    if ahead:
+        name, *rest = ahead
+        inner = dict(value)
+        inner[name] = _resolved(inner[name], period, place, tuple(rest))
+        return inner if isinstance(value, dict) else value.model_copy(update={name: inner[name]})
     if isinstance(value, Length):
         return value.at(period)
-    if isinstance(value, BaseModel):
-        update = {
-            name: _resolved(each, period, (*place, name))
-            for name, each in value
-            if any(True for _ in lengths(each))
-        }
-        return value.model_copy(update=update) if update else value
-    if isinstance(value, dict):
-        return {name: _resolved(each, period, (*place, str(name))) for name, each in value.items()}
-    if isinstance(value, tuple) and any(isinstance(each, Length) for each in value):
-        start, end = (_resolved(each, period, place) for each in value)
-        if not start < end:
-            raise RequestError(
-                f"{'.'.join(place)}: received [{value[0]}, {value[1]}], which with an encounter "
-                f"period of {period:.6g} s is [{start:g}, {end:g}]. State the lower one first."
-            )
-        return start, end
-    return value
+    start, end = (each.at(period) if isinstance(each, Length) else each for each in value)
+    if not start < end:
+        raise RequestError(
+            f"{'.'.join(place)}: received [{value[0]}, {value[1]}], which with an encounter "
+            f"period of {period:.6g} s is [{start:g}, {end:g}]. State the lower one first."
+        )
+    return start, end
 
 
 Mistake = tuple[tuple[str, ...], str]
@@ -372,10 +371,10 @@ def _parts(dotted: str) -> tuple[str, ...]:
     return tuple("".join(match) for match in _PART.findall(dotted))
 
 
-def _reason(item: Any, place: list[str], table: type[BaseModel] | None, description: str) -> str:
+def _reason(item: Any, place: list[str], table: type[BaseModel], description: str) -> str:
     kind, value = item["type"], item["input"]
     give = f" Give {description}." if description else ""
-    if kind == "extra_forbidden" and table:
+    if kind == "extra_forbidden":
         known = [field.alias or name for name, field in table.model_fields.items()]
         near, keys = did_you_mean(place[-1], known), ", ".join(known)
         return f"unknown key, received {_shown(value)}.{near} Keys here: {keys}."
@@ -401,7 +400,7 @@ def _shown(value: object) -> str:
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
 
 
-def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel] | None, str, int]:
+def _place(loc: list[str], root: type[BaseModel]) -> tuple[type[BaseModel], str, int]:
     """Table in which the last key stands, that key's description, and how many keys count."""
     here: Any = root
     owner, description = root, ""

@@ -14,7 +14,7 @@ step       what it does
 ========== =====================================================================================
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,7 +23,7 @@ import numpy as np
 import xarray as xr
 
 from seakeep.arrays import BoolArray, Datasets, FloatArray
-from seakeep.campaign.derivation import derive
+from seakeep.campaign.derivation import derive, needed_channels, sources_of
 from seakeep.campaign.guesses import is_wave
 from seakeep.campaign.readers import (
     counts_samples,
@@ -36,17 +36,15 @@ from seakeep.campaign.settings import (
     CampaignSettings,
     ChannelSettings,
     FileSettings,
-    InstrumentSettings,
     InstrumentsSettings,
     PreparationSettings,
     RunSettings,
     long_name_of,
     units_of,
 )
-from seakeep.campaign.validation import derivation_order, needed_channels, sources_of
 from seakeep.conventions import MOTIONS, conversion
 from seakeep.errors import DataError, RequestError, SeakeepError, did_you_mean, naming
-from seakeep.formats import Columns, Options
+from seakeep.formats import Columns, read_columns
 from seakeep.formats.columns import is_unit, meant_column, same_unit
 from seakeep.quality import Finding, Rate, Record, Redundant, check
 from seakeep.quality.faults import (
@@ -79,7 +77,7 @@ from seakeep.signals.synchronisation import ASSUMED
 from seakeep.signals.time_axis import inside, instant_text, span_text, stretches, usual_step
 from seakeep.toml import Length, number
 
-Reader = Callable[[Path, Options], Columns]
+ChannelMap = dict[str, ChannelSettings]
 COMMON = "the common step"
 """Place of derived channels whose sources come from several loggers."""
 MOST_FINER = 8.0
@@ -127,8 +125,8 @@ class Run:
         Clock of each logger.
     groups : mapping of str to Dataset
         Channels by logger, each at its own rate.
-    late : sequence of str
-        Derived channels that need several loggers.
+    ahead : sequence of str
+        Derived channels that are still to be made, each behind those that it needs.
     data : Dataset or None
         All channels on one axis.
     findings : sequence of Finding
@@ -140,7 +138,7 @@ class Run:
     loggers: Mapping[str, Logger]
     clocks: Mapping[str, Clock] = field(default_factory=dict)
     groups: Datasets = field(default_factory=dict)
-    late: Sequence[str] = ()
+    ahead: Sequence[str] = ()
     data: xr.Dataset = field(default_factory=xr.Dataset)
     findings: Sequence[Finding] = ()
 
@@ -150,12 +148,34 @@ class Run:
         return self.settings.runs[self.name]
 
     @property
+    def channels(self) -> ChannelMap:
+        """Channel map: the campaign's, with the keys that the run replaces."""
+        chosen = dict(self.settings.channels)
+        for name, own in self.own.channels.items():
+            chosen[name] = chosen[name].model_copy(update=own.model_dump(exclude_unset=True))
+        return chosen
+
+    @property
+    def size(self) -> int:
+        """Bytes of its columns."""
+        columns = [each.columns.values for each in self.loggers.values()]
+        return sum(values.nbytes for own in columns for values in own.values())
+
+    @property
+    def used_span(self) -> tuple[float, float]:
+        """First and last instant that is used at all, s."""
+        own = self.own
+        stated = (own.span,) if own.span else (own.train, own.test)
+        edges = [number(edge) for span in stated if span for edge in span]
+        return min(edges, default=-np.inf), max(edges, default=np.inf)
+
+    @property
     def reference_time(self) -> FloatArray:
         """Instants of the reference logger, s."""
         return next(iter(self.groups.values()))["time"].values
 
 
-def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reader: Reader) -> Run:
+def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path]) -> Run:
     """Step 1: open the files of a run.
 
     Parameters
@@ -166,8 +186,6 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
         The campaign.
     paths : mapping of str to Path
         File by logger; one file alone has the name "".
-    reader : callable
-        Gives the columns of a file.
     """
     loggers = {}
     for key, path in paths.items():
@@ -175,7 +193,7 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
         if key:
             own, keys = settings.instruments[key], {"time", "time_unit", "sampling_rate"}
             options = options.model_copy(update=own.model_dump(include=keys, exclude_none=True))
-        columns = reader(path, options)
+        columns = read_columns(path, options)
         if key and time_column(columns, options.time):
             options = options.model_copy(update={"sampling_rate": None})
         loggers[key] = Logger(key, path, columns, options)
@@ -184,24 +202,20 @@ def read(name: str, settings: CampaignSettings, paths: Mapping[str, Path], reade
     return Run(name, settings, {reference: loggers.pop(reference), **loggers})
 
 
-def sync(run: Run, clocks: Mapping[str, Clock] | None = None) -> Run:
-    """Step 2: find each logger's clock against the reference's, or take those that are known."""
-    if clocks:
-        return replace(run, clocks=clocks)
+def sync(run: Run) -> Run:
+    """Step 2: find each logger's clock against the reference's."""
     reference, *others = run.loggers.values()
     by_reference = {reference.name: Clock()}
-    instruments = run.settings.instruments
     for each in others:
         with naming(f"run '{run.name}', clock of '{each.name}' ({each.path})"):
-            by_reference[each.name] = _clock(each, reference, instruments[each.name], instruments)
+            by_reference[each.name] = _clock(each, reference, run.settings.instruments)
     return replace(run, clocks=by_reference)
 
 
-def _clock(
-    logger: Logger, reference: Logger, own: InstrumentSettings, every: InstrumentsSettings
-) -> Clock:
+def _clock(logger: Logger, reference: Logger, instruments: InstrumentsSettings) -> Clock:
+    own = instruments[logger.name]
     if own.trigger is not None:
-        theirs = every[reference.name].trigger
+        theirs = instruments[reference.name].trigger
         if theirs is None:
             raise RequestError(
                 f"'{logger.name}' states a trigger and the reference '{reference.name}' none. Add "
@@ -224,14 +238,6 @@ def _clock(
     return find(series, time, other, instants, number(own.window), number(own.largest_lag))
 
 
-def channels_of(settings: CampaignSettings, run: RunSettings) -> dict[str, ChannelSettings]:
-    """Channel map of a run: the campaign's, with the keys that the run replaces."""
-    chosen = dict(settings.channels)
-    for name, own in run.channels.items():
-        chosen[name] = chosen[name].model_copy(update=own.model_dump(exclude_unset=True))
-    return chosen
-
-
 def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
     """Step 3: columns become channels with names, SI units and signs, on the reference's time.
 
@@ -243,22 +249,21 @@ def mapped(run: Run, wanted: Collection[str] | None = None) -> Run:
         The channels wanted, with what they need; the default is all.
     """
     needed = needed_channels(run.settings, wanted)
-    every = channels_of(run.settings, run.own)
-    chosen = {name: each for name, each in every.items() if name in needed}
-    homes = _homes(run, chosen)
+    chosen = {name: each for name, each in run.channels.items() if name in needed}
     groups = {
-        key: _channels(run, logger, own)
-        for key, logger in run.loggers.items()
-        if (own := {name: each for name, each in chosen.items() if homes[name] == key})
+        key: _channels(run, run.loggers[key], own)
+        for key, own in _by_logger(run, chosen).items()
+        if own
     }
-    return replace(run, groups=groups)
+    ahead = [name for name in needed if name in run.settings.derived]
+    return replace(run, groups=groups, ahead=ahead)
 
 
-def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
-    """Logger that holds each channel."""
+def _by_logger(run: Run, channels: ChannelMap) -> dict[str, ChannelMap]:
+    """Channels that each logger holds."""
     if len(run.loggers) == 1:
-        return dict.fromkeys(channels, next(iter(run.loggers)))
-    homes = {}
+        return dict.fromkeys(run.loggers, channels)
+    held: dict[str, ChannelMap] = {key: {} for key in run.loggers}
     for name, each in channels.items():
         if each.instrument is not None:
             if each.instrument not in run.loggers:
@@ -267,7 +272,7 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
                     f"channels.{name}.instrument: run '{run.name}' has no file of "
                     f"'{each.instrument}'.{near} Its files: {', '.join(run.loggers)}."
                 )
-            homes[name] = each.instrument
+            held[each.instrument][name] = each
             continue
         column, tables = each.column or name, [one.columns for one in run.loggers.values()]
         having = [key for key, one in run.loggers.items() if one.columns.find(column) is not None]
@@ -283,19 +288,17 @@ def _homes(run: Run, channels: Mapping[str, ChannelSettings]) -> dict[str, str]:
                 f"run '{run.name}': the column '{column}' of channel '{name}' stands in the files "
                 f"of {' and '.join(having)}. State instrument = '{having[0]}' in [channels.{name}]."
             )
-        homes[name] = having[0]
-    return homes
+        held[having[0]][name] = each
+    return held
 
 
-def _channels(run: Run, logger: Logger, channels: Mapping[str, ChannelSettings]) -> xr.Dataset:
+def _channels(run: Run, logger: Logger, channels: ChannelMap) -> xr.Dataset:
     """Channels of one logger, gaps and jitter as they are."""
     time = run.clocks[logger.name].reference(logger.time)
-    records: slice | BoolArray = slice(None)
-    if run.own.record:
-        start, end = (number(edge) for edge in run.own.record)
-        step, whole = usual_step(time), (time[0], time[-1])
-        slack = step * (1 + 1e-6) if logger.name == next(iter(run.loggers)) else np.inf
-        records = _part(f"runs.{run.name}.record", (start, end), time, step, whole, slack)
+    is_reference = logger.name == next(iter(run.loggers))
+    slack = usual_step(time) * (1 + 1e-6) if is_reference else np.inf
+    span, whole = run.own.record or (-np.inf, np.inf), (time[0], time[-1])
+    records = _part(f"runs.{run.name}.record", span, time, whole, slack)
     variables = {}
     for name, each in channels.items():
         wanted, path = each.column or name, logger.path
@@ -383,13 +386,13 @@ def _regular(data: xr.Dataset, preparation: PreparationSettings, name: str) -> x
         uniform_step(time, name)
         return data
     except DataError as error:
-        report = inspect_times(time, name)
+        report, mend = inspect_times(time, name), ""
         if report.gaps and preparation.gaps == "refuse":
-            raise DataError(
-                f"{error} Or state gaps = 'mask' or 'bridge' in [preparation]."
-            ) from None
-        if report.jittered and preparation.jitter == "refuse":
-            raise DataError(f"{error} Or state jitter = 'interpolate' in [preparation].") from None
+            mend = "gaps = 'mask' or 'bridge'"
+        elif report.jittered and preparation.jitter == "refuse":
+            mend = "jitter = 'interpolate'"
+        if mend:
+            raise DataError(f"{error} Or state {mend} in [preparation].") from None
     series = np.column_stack([each.values for each in data.values()])
     new, values = onto_uniform(time, series, name)
     variables = {
@@ -439,28 +442,22 @@ def flag_samples(data: xr.Dataset, preparation: PreparationSettings) -> xr.Datas
     return data
 
 
-def derived(run: Run, wanted: Collection[str] | None = None) -> Run:
-    """Step 5: channels made from others of one logger, at its own rate; others are noted as late.
-
-    `wanted` is as in :func:`mapped`.
-    """
-    settings, groups, late = run.settings, dict(run.groups), []
-    needed = needed_channels(settings, wanted)
+def derived(run: Run) -> Run:
+    """Step 5: channels made from others of one logger, at its own rate."""
+    settings, groups, ahead = run.settings, dict(run.groups), []
     home = {str(name): key for key, data in groups.items() for name in data.data_vars}
-    for name in derivation_order(settings.derived, settings.channel_names):
-        if name not in needed:
-            continue
+    for name in run.ahead:
         sources = sources_of(name, settings.derived[name], settings.channel_names)
         places = {home[source] for source in sources}
         home[name] = places.pop() if len(places) == 1 else COMMON
         if home[name] == COMMON:
-            late.append(name)
+            ahead.append(name)
             continue
         data = groups[home[name]]
         step = uniform_step(data["time"].values, f"run '{run.name}'")
         variable = derive(data.variables, name, settings, step, run.name)
         groups[home[name]] = data.assign({name: variable.pop(name)}).assign_coords(variable)
-    return replace(run, groups=groups, late=late)
+    return replace(run, groups=groups, ahead=ahead)
 
 
 def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
@@ -499,8 +496,8 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
         time = origin + dt * np.arange(first, last + 1)
     channels: dict[str, xr.Variable] = {}
     for group in run.groups.values():
-        channels |= _on_axis(group, time, dt, run.settings.preparation, run.name)
-    for name in run.late:
+        channels |= _on_axis(run, group, time, dt)
+    for name in run.ahead:
         channels |= derive(channels, name, run.settings, dt, run.name)
     axis = xr.Variable("time", time, next(iter(run.groups.values()))["time"].attrs)
     data, coordinates = {}, {"time": axis}
@@ -515,12 +512,10 @@ def resampled(run: Run, dt: float, time: FloatArray | None = None) -> Run:
     return replace(run, data=xr.Dataset(data, coordinates))
 
 
-def _on_axis(
-    group: xr.Dataset, wanted: FloatArray, dt: float, settings: PreparationSettings, run: str
-) -> dict[str, xr.Variable]:
+def _on_axis(run: Run, group: xr.Dataset, wanted: FloatArray, dt: float) -> dict[str, xr.Variable]:
     """Channels of a logger and their flags at other instants."""
-    time = group["time"].values
-    own = uniform_step(time, f"run '{run}'")
+    time, settings = group["time"].values, run.settings.preparation
+    own = uniform_step(time, f"run '{run.name}'")
     channels = {name: group.variables[name] for name in group.data_vars}
     series = np.column_stack([channel.values for channel in channels.values()])
     low, filtered = settings.low_pass, {}
@@ -591,7 +586,7 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
         own = settings.instruments[name] if name else settings.files
         if own.sampling_rate:
             rates[name] = Rate(own.sampling_rate, own.time is None, own.sampling_rate_assumed)
-    channels = channels_of(settings, run.own)
+    channels = run.channels
     units = {name: each.unit or "-" for name, each in channels.items() if each.unit_assumed}
     waves = {
         name: each.column
@@ -603,7 +598,7 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
         whole=run.data,
         groups=run.groups,
         clocks=run.clocks,
-        span=used_span(run.own),
+        span=run.used_span,
         waves=run.own.waves,
         water_depth=settings.rig.water_depth,
         wave_channel=settings.wave_channel,
@@ -620,41 +615,28 @@ def checked(run: Run, period: tuple[float, float] | None, left_out: Mapping[str,
     return replace(run, findings=check(record))
 
 
-def used_span(settings: RunSettings) -> tuple[float, float]:
-    """First and last instant of a run that is used at all, s."""
-    stated = (settings.span,) if settings.span else (settings.train, settings.test)
-    edges = [number(edge) for span in stated if span for edge in span]
-    return min(edges, default=-np.inf), max(edges, default=np.inf)
-
-
 def cropped(run: Run) -> Run:
     """Step 8: cut the run to its span; spans that lie outside the record are refused."""
-    data, reference = run.data, run.reference_time
-    dt = usual_step(data["time"].values)
-    record = reference[0], reference[-1]
+    data, reference, place = run.data, run.reference_time, f"runs.{run.name}."
+    time, record = data["time"].values, (reference[0], reference[-1])
     # The last sample of a record stands for its own step, too: 60 s at 50 Hz end at 59.98 s.
-    slack = max(dt, (record[1] - record[0]) / (reference.size - 1)) * (1 + 1e-6)
+    step = (record[1] - record[0]) / (reference.size - 1)
+    slack = max(usual_step(time), step) * (1 + 1e-6)
     stated = {key: getattr(run.own, key) for key in ("span", "train", "test")}
-    spans = {k: (number(each[0]), number(each[1])) for k, each in stated.items() if each}
-
-    def used(key: str, record: tuple[float, float], slack: float) -> BoolArray:
-        place = f"runs.{run.name}.{key}"
-        return _part(place, spans[key], data["time"].values, dt, record, slack)
-
-    parts = {key: used(key, record, slack) for key in spans}
+    spans = {key: span for key, span in stated.items() if span}
+    parts = {key: _part(place + key, span, time, record, slack) for key, span in spans.items()}
     if "span" in parts:
         data = data.isel(time=parts.pop("span"))
         time = data["time"].values
         for key in parts:
-            used(key, (time[0], time[-1]), np.inf)
+            _part(place + key, spans[key], time, (time[0], time[-1]), np.inf)
     return replace(run, data=data)
 
 
 def _part(
     key: str,
-    span: tuple[float, float],
+    stated: tuple[float | Length, float | Length],
     time: FloatArray,
-    dt: float,
     record: tuple[float, float],
     slack: float,
 ) -> BoolArray:
@@ -662,6 +644,7 @@ def _part(
 
     Refused is also a span that reaches beyond the reference's record by more than a slack.
     """
+    dt, span = usual_step(time), (number(stated[0]), number(stated[1]))
     shown = f"[{instant_text(span[0], dt)}, {instant_text(span[1], dt)}] s"
     finite = [edge for edge in span if np.isfinite(edge)]
     if any(not record[0] - slack <= edge <= record[1] + slack for edge in finite):
@@ -672,28 +655,26 @@ def _part(
     used = inside(time, span, dt)
     if (count := used.sum()) > 1:
         return used
-    stated = f"{key}: {shown} holds {count} sample(s) at a step of {dt:.4g} s"
+    lacks = f"{key}: {shown} holds {count} sample(s) at a step of {dt:.4g} s"
     common = span_text(time[0], time[-1], dt)
     if time[0] > record[0] + 2 * dt or time[-1] < record[1] - 2 * dt:
         raise DataError(
-            f"{stated}, since all loggers recorded together only from {common}; the reference runs "
+            f"{lacks}, since all loggers recorded together only from {common}; the reference runs "
             f"from {span_text(*record, dt)}. Check whether the files of the other loggers are "
             "whole, or correct the span."
         )
-    raise RequestError(f"{stated}. Lengthen the span, or move it into the run's {common}.")
+    raise RequestError(f"{lacks}. Lengthen the span, or move it into the run's {common}.")
 
 
-def celerity_of(
-    run: xr.Dataset, dt: float, campaign: CampaignSettings, settings: RunSettings
-) -> float | None:
+def celerity_of(run: Run, dt: float) -> float | None:
     """Effective celerity of the waves in the part of a run that is used, m/s; None if unknown."""
-    channels, depth = campaign.celerity_channels, campaign.rig.water_depth
-    if channels is None or depth is None or any(name not in run for name in channels):
+    channels, rig = run.settings.celerity_channels, run.settings.rig
+    if channels is None or rig.water_depth is None:
         return None
-    apart = campaign.rig.positions[channels[1]] - campaign.rig.positions[channels[0]]
+    apart = rig.positions[channels[1]] - rig.positions[channels[0]]
     try:
-        used = inside(run["time"].values, used_span(settings), dt)
-        first, last = (run[name].values[used] for name in channels)
-        return effective_celerity(first, last, dt, apart, depth).celerity
+        used = inside(run.data["time"].values, run.used_span, dt)
+        first, last = (run.data[name].values[used] for name in channels)
+        return effective_celerity(first, last, dt, apart, rig.water_depth).celerity
     except SeakeepError:  # gaps, still water, or waves that do not run from one to the other
         return None

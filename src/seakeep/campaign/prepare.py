@@ -12,7 +12,7 @@ import xarray as xr
 
 from seakeep.arrays import Groups, Progress, number, whole_number
 from seakeep.campaign.live_chain import LiveChain
-from seakeep.campaign.pipeline import celerity_of, checked, cropped, resampled, strays
+from seakeep.campaign.pipeline import Run, celerity_of, checked, cropped, resampled, strays
 from seakeep.campaign.readers import checksum, expand
 from seakeep.campaign.settings import CampaignSettings, ModelSettings, RunSettings
 from seakeep.campaign.survey import Failures, Survey, spare, survey
@@ -103,8 +103,10 @@ class Campaign:
     @property
     def digest(self) -> str:
         """SHA-256 of all settings on which the prepared runs depend, in hexadecimal digits."""
-        content = self.settings.model_dump(mode="json", exclude={"model", "models"})
-        del content["campaign"]["name"], content["campaign"]["description"]
+        content = self.settings.model_dump(
+            mode="json",
+            exclude={"model": True, "models": True, "campaign": {"name", "description"}},
+        )
         if self._measures_period:
             content["campaign"]["period_channel"] = self.period_channel()
         content["celerity_channels"] = self.settings.celerity_channels
@@ -114,22 +116,17 @@ class Campaign:
     @property
     def _measures_period(self) -> bool:
         settings = self.settings
-        asked = settings.preparation.steps_per_period or self._counts_in_periods
+        asked = settings.preparation.steps_per_period or self._lengths
         return bool(asked) and not settings.campaign.encounter_period
 
     @cached_property
-    def _counts_in_periods(self) -> bool:
-        """Whether something on which prepared runs depend is stated in encounter periods."""
-        return any(place[0] not in ("model", "models") for place in lengths(self.settings))
+    def _lengths(self) -> list[tuple[str, ...]]:
+        """Places of what counts in encounter periods; models keep theirs, which become samples."""
+        return [place for place in lengths(self.settings) if place[0] not in ("model", "models")]
 
     def _in_seconds(self, period: float | None) -> CampaignSettings:
-        """Settings with all that counts in encounter periods turned into seconds and hertz."""
-        if not (period and self._counts_in_periods):
-            return self.settings
-        # Models keep their periods: their delays become samples.
-        models = {"model": self.settings.model, "models": self.settings.models}
-        bare = self.settings.model_copy(update={"model": None, "models": {}})
-        return in_seconds(bare, period).model_copy(update=models)
+        """Settings with what counts in encounter periods turned into seconds and hertz."""
+        return in_seconds(self.settings, period, self._lengths) if period else self.settings
 
     def files_of(self, name: str) -> dict[str, Path]:
         """Paths of a run's files.
@@ -199,11 +196,10 @@ class Campaign:
         DataError
             If the file is damaged, has gaps, or its times are not uniform.
         """
-        surveyed, _, _ = self._whole([name], steps=False)
-        run = surveyed.channels(name)
+        run = self._survey([name], bool(self._lengths)).channels(name)
         dt = uniform_step(run.reference_time, f"run '{name}'")
-        data = resampled(run, dt).data
-        return data.assign_attrs(self._attributes(name, data, dt, surveyed))
+        run = resampled(run, dt)
+        return run.data.assign_attrs(self._attributes(run, dt))
 
     def clocks(self, names: Iterable[str] | None = None) -> dict[str, dict[str, Clock]]:
         """Clocks of the loggers of each run against the reference.
@@ -232,21 +228,24 @@ class Campaign:
     def _survey(
         self,
         wanted: list[str],
-        periods: bool,
+        needs_period: bool,
         progress: Progress | None = None,
         failures: Failures | None = None,
     ) -> Survey:
-        """Clocks of the wanted runs and, if asked for, periods of the irregular ones."""
+        """Clocks of the wanted runs, the encounter period if needed, and settings in seconds."""
         for name in wanted:
             self._run(name)
-        settings = self._in_seconds(self.settings.campaign.encounter_period)
-        channel = self.period_channel() if periods else None
+        stated = self.settings.campaign.encounter_period
+        settings = self._in_seconds(stated)
+        channel = self.period_channel() if needs_period and not stated else None
         if channel and not settings.period_runs:
             raise RequestError(
                 f"{self.path} has no run with waves in use. Give a run another role, or state "
                 "encounter_period (s) in [campaign]."
             )
-        return survey(settings, self.files_of, wanted, channel, progress, failures)
+        surveyed = survey(settings, self.files_of, wanted, channel, progress, failures)
+        period = stated or surveyed.period
+        return replace(surveyed, settings=self._in_seconds(period), period=period)
 
     def period_channel(self) -> str:
         """Name of the wave channel that defines the encounter period.
@@ -289,8 +288,7 @@ class Campaign:
         DataError
             If no run is left.
         """
-        stated = self.settings.campaign.encounter_period
-        return stated or self._survey([], True).period
+        return self.settings.campaign.encounter_period or self._survey([], True).period
 
     def seconds(self, stated: float | str) -> float:
         """Seconds of a length or an instant that may be stated in encounter periods.
@@ -377,8 +375,8 @@ class Campaign:
             As :meth:`prepare`.
         """
         wanted = list(self.runs if names is None else names)
-        surveyed, period, dt = self._whole(wanted, progress, failures)
-        stated, first = dt is not None, ""
+        surveyed = self._survey(wanted, self._measures_period, progress, failures)
+        dt, first = surveyed.dt, ""
         reported = {(str(self.settings.wave_channel), "PERIOD")}  # the survey has warned of it
         for done, name in enumerate(wanted, 1):
             try:
@@ -386,27 +384,28 @@ class Campaign:
                     raise failures[name]
                 run = surveyed.channels(name)
                 own = uniform_step(run.reference_time, f"run '{name}'")
-                dt, first = own if dt is None else dt, first or name
-                if not stated and strays(own, run.reference_time.size, dt):
+                dt, first = dt or own, first or name
+                if not surveyed.dt and strays(own, run.reference_time.size, dt):
                     raise RequestError(
                         f"the runs differ in rate: '{first}' has a step of {dt:g} s and '{name}' "
                         f"one of {own:g} s. State sampling_rate (Hz) or dt (s) in [preparation]."
                     )
                 run = checked(resampled(run, dt), surveyed.doubts.get(name), surveyed.left_out)
                 warn_of(run.findings, reported)
-                data = cropped(run).data
+                run = cropped(run)
+                data = run.data
                 data.attrs["quality"] = as_json(run.findings)
                 for channel in data.data_vars.values():
                     channel.attrs["noise_std"] = noise_floor(channel.values)
-                data.attrs.update(self._attributes(name, data, dt, surveyed))
+                data.attrs.update(self._attributes(run, dt))
             except SeakeepError as error:
                 is_named = f"'{name}'" in str(error)
                 spare(failures, name, error if is_named else type(error)(f"run '{name}': {error}"))
                 if progress:
                     progress(done, len(wanted), f"{name} cannot be prepared")
                 continue
-            if period:
-                data.attrs["encounter_period"] = period
+            if surveyed.period:
+                data.attrs["encounter_period"] = surveyed.period
             if progress:
                 progress(done, len(wanted), name)
             yield name, data
@@ -441,10 +440,9 @@ class Campaign:
         DataError
             If a file of the run cannot be read.
         """
-        surveyed, _, dt = self._whole([run])
+        surveyed = self._survey([run], self._measures_period)
         settings = surveyed.settings
-        if not dt:
-            dt = uniform_step(surveyed.channels(run).reference_time, run)
+        dt = surveyed.dt or uniform_step(surveyed.channels(run).reference_time, run)
         late, length = self.seconds(delay), self.seconds(window)
         if not 0 <= 4 * late <= length:
             raise RequestError(
@@ -458,33 +456,11 @@ class Campaign:
         source = replace(surveyed, settings=settings.model_copy(update=changed)).read(run)
         return LiveChain(source, dt, late, length, whole_number(every, "every"))
 
-    def _whole(
-        self,
-        wanted: list[str],
-        progress: Progress | None = None,
-        failures: Failures | None = None,
-        steps: bool = True,
-    ) -> tuple[Survey, float | None, float | None]:
-        """Survey with settings in seconds, encounter period if needed, common step if stated."""
-        preparation, period = self.settings.preparation, self.settings.campaign.encounter_period
-        needed = self._counts_in_periods or (steps and preparation.steps_per_period)
-        surveyed = self._survey(wanted, bool(needed) and not period, progress, failures)
-        if needed and not period:
-            period = surveyed.period
-        dt = preparation.dt
-        if preparation.steps_per_period and period:
-            dt = period / preparation.steps_per_period
-        elif preparation.sampling_rate:
-            dt = 1.0 / preparation.sampling_rate
-        return replace(surveyed, settings=self._in_seconds(period)), period, dt
-
-    def _attributes(
-        self, name: str, run: xr.Dataset, dt: float, surveyed: Survey
-    ) -> dict[str, Any]:
-        """Attributes that settings (lengths in seconds) and clocks give to a run that was cut."""
-        campaign = surveyed.settings
-        settings, rig, general = campaign.runs[name], campaign.rig, campaign.campaign
-        time = run["time"].values
+    def _attributes(self, run: Run, dt: float) -> dict[str, Any]:
+        """Attributes that settings and clocks give to a run that was cut."""
+        name, settings, campaign = run.name, run.own, run.settings
+        rig, general = campaign.rig, campaign.campaign
+        time = run.data["time"].values
         attributes: dict[str, Any] = {
             "campaign": self.name,
             "campaign_digest": self.digest,
@@ -504,7 +480,7 @@ class Campaign:
             "frame": rig.frame,
             "encounter_period": general.encounter_period,
             "probe_offset": settings.probe_offset,
-            "celerity": celerity_of(run, dt, campaign, settings),
+            "celerity": celerity_of(run, dt),
         }
         whole = (time[0], time[-1])
         for use in ("train", "test"):
@@ -515,7 +491,7 @@ class Campaign:
                 used = time[inside(time, span, dt)]
                 if used.size:
                     attributes[f"{use}_span"] = (float(used[0]), float(used[-1]))
-        for logger, clock in list(surveyed.clocks[name].items())[1:]:
+        for logger, clock in list(run.clocks.items())[1:]:
             attributes |= {
                 f"clock_{logger}": clock.describe(),
                 f"clock_{logger}_method": clock.method,
@@ -554,5 +530,5 @@ def read_campaign(path: Path | str, preset: str | None = None) -> Campaign:
     path = expanded(path)
     content = read_toml(path, "campaign", " Draft one with 'seakeep init FILE…'.")
     settings = validated(CampaignSettings, content, path, "campaign", cross_checks)
-    preparation = settings.preparation.filtered_as(preset or settings.preset)
+    preparation = settings.preparation.with_preset(preset or settings.preset)
     return Campaign(path, settings.model_copy(update={"preparation": preparation}))

@@ -45,16 +45,13 @@ def expand(file: str, folder: Path) -> Path:
     RequestError
         If an environment variable is not set.
     """
-
-    def value(match: re.Match[str]) -> str:
-        if not (setting := os.environ.get(match[1])):
+    for name in _VARIABLE.findall(file):
+        if not os.environ.get(name):
             raise RequestError(
-                f"the file {file!r} needs the environment variable {match[1]}, which is not set. "
-                f"Set it to the folder of the data: export {match[1]}=/path/to/data"
+                f"the file {file!r} needs the environment variable {name}, which is not set. "
+                f"Set it to the folder of the data: export {name}=/path/to/data"
             )
-        return setting
-
-    return folder / expanded(_VARIABLE.sub(value, file))
+    return folder / expanded(_VARIABLE.sub(lambda match: os.environ[match[1]], file))
 
 
 def checksum(path: Path) -> str:

@@ -327,17 +327,6 @@ class PreparationSettings(Table):
         "'flag', or 'replace' by what is interpolated across them", "flag"
     )
 
-    @model_validator(mode="before")
-    @classmethod
-    def _with_preset(cls, received: Any) -> Any:
-        preset = received.get("preset") if isinstance(received, dict) else None
-        if isinstance(preset, str) and preset in _FILTERS:
-            chain = dict(_FILTERS[preset])
-            if not {"sampling_rate", "dt", "steps_per_period"} & set(received):
-                chain["steps_per_period"] = 32
-            return {**chain, **received}
-        return received
-
     @model_validator(mode="after")
     def _one_rate(self) -> PreparationSettings:
         given = [k for k in ("sampling_rate", "dt", "steps_per_period") if getattr(self, k)]
@@ -345,16 +334,24 @@ class PreparationSettings(Table):
             raise ValueError(f"state only one of {', '.join(given)}")
         return self
 
-    def filtered_as(self, preset: str | None) -> PreparationSettings:
-        """Take the filters of a preset, unless one is stated; keys that are stated stay."""
-        if self.preset is not None or preset is None:
+    def with_preset(self, preset: str | None) -> PreparationSettings:
+        """Take filters and rate of the preset that is stated, else the filters of another one.
+
+        Keys that are stated stay.
+        """
+        chosen = self.preset or preset
+        if chosen is None:
             return self
-        if preset not in _FILTERS:
+        if chosen not in _FILTERS:
             raise RequestError(
                 f"preset must be {' or '.join(map(repr, _FILTERS))}; received {preset!r}."
             )
-        filters = {k: v for k, v in _FILTERS[preset].items() if k not in self.model_fields_set}
-        return self.model_copy(update={**filters, "preset": preset})
+        taken = {"preset": chosen, **_FILTERS[chosen]}
+        if self.preset and not (self.sampling_rate or self.dt):
+            taken["steps_per_period"] = 32
+        return self.model_copy(
+            update={key: taken[key] for key in taken.keys() - self.model_fields_set}
+        )
 
 
 class RunSettings(Table):
@@ -517,8 +514,7 @@ class CampaignSettings(Table):
         for names in (*(model.inputs for model in self.all_models().values()), waves):
             placed = {n: self.rig.positions[n] for n in names if n in self.rig.positions}
             if len(set(placed.values())) > 1:
-                first, last = (pick(placed, key=placed.__getitem__) for pick in (min, max))
-                return first, last
+                return min(placed, key=placed.__getitem__), max(placed, key=placed.__getitem__)
         return None
 
     def all_models(self) -> dict[str, ModelSettings]:

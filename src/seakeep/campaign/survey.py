@@ -1,7 +1,7 @@
 """Computed from all runs together: the clocks of the loggers and the encounter period."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +15,9 @@ from seakeep.campaign.pipeline import (
     read,
     resampled,
     sync,
-    used_span,
 )
 from seakeep.campaign.settings import CampaignSettings
 from seakeep.errors import DataError, MissingFileError, SeakeepError, naming, warn
-from seakeep.formats import Columns, Options, read_columns
 from seakeep.quality import Finding, warn_of
 from seakeep.quality.clocks import ClocksKind
 from seakeep.signals import Clock, encounter_period, pool_drift, uniform_step, waves_part
@@ -72,30 +70,6 @@ def as_one(errors: Mapping[str, SeakeepError]) -> SeakeepError:
     return DataError(f"{len(errors)} runs cannot be read:\n" + "\n".join(lines))
 
 
-@dataclass
-class ReadOnce:
-    """Reads files, and keeps those that are wanted again as long as they fit.
-
-    Parameters
-    ----------
-    keep : bool
-        Whether what is read now is read a second time, after the survey of all runs.
-    """
-
-    keep: bool = False
-    columns: dict[tuple[Path, Options], Columns] = field(default_factory=dict)
-
-    def __call__(self, path: Path, options: Options) -> Columns:
-        """Columns of a file."""
-        if known := self.columns.pop((path, options), None):
-            return known
-        columns = read_columns(path, options)
-        size = sum(x.nbytes for each in self.columns.values() for x in each.values.values())
-        if self.keep and size < KEPT:
-            self.columns[path, options] = columns
-        return columns
-
-
 @dataclass(frozen=True)
 class Survey:
     """What is computed from all runs together, and how each of them is read with it.
@@ -106,12 +80,13 @@ class Survey:
         The campaign.
     files_of : callable
         Gives the paths of a run's files by logger.
-    reader : ReadOnce
-        Reads them.
+    kept : dict of str to Run
+        Runs that were read for the survey, each until it is wanted.
     clocks : dict of str to dict of str to Clock
         By run and logger.
     period : float
-        Mean zero-up-crossing period of the wave channel, s; NaN where it was not asked for.
+        Encounter period, s: the stated one, or the mean zero-up-crossing period of the wave
+        channel; 0 where it was not asked for.
     left_out : dict of str to str
         By run, what it is left out of because it cannot be read, and why.
     doubts : dict of str to (float, float)
@@ -120,16 +95,24 @@ class Survey:
 
     settings: CampaignSettings
     files_of: Callable[[str], Mapping[str, Path]]
-    reader: ReadOnce
+    kept: dict[str, Run]
     clocks: Mapping[str, Mapping[str, Clock]]
     period: float
     left_out: Mapping[str, str]
     doubts: Mapping[str, tuple[float, float]]
 
+    @property
+    def dt(self) -> float | None:
+        """Common time step, s, if one is stated."""
+        stated = self.settings.preparation
+        if stated.steps_per_period and self.period:
+            return self.period / stated.steps_per_period
+        return 1.0 / stated.sampling_rate if stated.sampling_rate else stated.dt
+
     def read(self, name: str) -> Run:
         """Steps 1 and 2: a run's files, their clocks known."""
-        run = read(name, self.settings, self.files_of(name), self.reader)
-        return sync(run, self.clocks[name])
+        run = self.kept.pop(name, None) or read(name, self.settings, self.files_of(name))
+        return replace(run, settings=self.settings, clocks=self.clocks[name])
 
     def channels(self, name: str) -> Run:
         """Steps 1 to 5: the channels of a run by logger, at their own rates."""
@@ -150,24 +133,28 @@ def survey(
     a warning; of the others, `failures` takes the errors, or they are raised. Drifts are pooled
     where the campaign does not say otherwise, and one that is not certain is left out.
     """
-    reader, pools = ReadOnce(), settings.instruments.pool_drift
+    pools = settings.instruments.pool_drift
     # Those whose drifts are pooled with theirs, too.
     pooled = settings.used_runs if pools and any(settings.runs[n].files for n in asked) else ()
     clock_runs = [n for n in dict.fromkeys([*asked, *pooled]) if settings.runs[n].files]
     period_runs = () if channel is None else settings.period_runs
     runs = list(dict.fromkeys([*clock_runs, *period_runs]))
+    kept: dict[str, Run] = {}
+    free = KEPT
     clocks = {}
     spans = {}
     bad, left_out = {}, {}
     for count, name in enumerate(runs, 1):
         if progress:
             progress(0, len(runs), f"clocks and waves of {name} ({count} of {len(runs)})")
-        reader.keep = name in asked
         try:
-            run = sync(read(name, settings, files_of(name), reader))
+            run = sync(read(name, settings, files_of(name)))
+            if name in asked and free > 0:
+                kept[name] = run
+                free -= run.size
             clocks[name] = dict(run.clocks)
-            if channel and name in period_runs:
-                spans[name] = _period(run, channel)
+            if name in period_runs:
+                spans[name] = _period(run, str(channel))
         except SeakeepError as error:
             if name in asked:
                 spare(failures, name, error)
@@ -178,9 +165,8 @@ def survey(
                 f"run '{name}' is left out of {' and of '.join(lacks) or 'the clocks'}: {error} "
                 f"Once it is repaired, prepare again; or state role = 'unused' in [runs.{name}]."
             )
-    reader.keep = False
     long = {name: each for name, each in spans.items() if each[3] >= FEWEST} or spans
-    period = float(np.mean([each[0] for each in long.values()])) if long else np.nan
+    period = float(np.mean([each[0] for each in long.values()])) if long else 0.0
     doubts = {
         name: (counted, energy)
         for name, (counted, energy, steady, _) in spans.items()
@@ -192,24 +178,29 @@ def survey(
         warn(words)
     kind = ClocksKind.PERIOD
     warn_of([Finding(kind, run, str(channel), *two, "s") for run, two in doubts.items()], set())
+    _settle_drifts(clocks, pools)
+    alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}
+    return Survey(settings, files_of, kept, alone | clocks, period, left_out, doubts)
+
+
+def _settle_drifts(clocks: Mapping[str, dict[str, Clock]], pools: bool) -> None:
+    """Pool the drifts of each logger, if that is wanted, and leave out those in doubt."""
     for logger in {name for each in clocks.values() for name in each}:
         having = [each for each in clocks.values() if logger in each]
         known = [each[logger] for each in having]
         for each, clock in zip(having, pool_drift(known) if pools else known, strict=True):
             each[logger] = without_doubtful_drift(clock)
-    alone = {name: {"": Clock()} for name in asked if settings.runs[name].file is not None}
-    return Survey(settings, files_of, reader, alone | clocks, period, left_out, doubts)
 
 
 def _period(run: Run, channel: str) -> tuple[float, float, float, float]:
     """Counted and energy period of a run's waves, one that little noise leads (s), and waves."""
-    run = derived(cleaned(mapped(run, [channel])), [channel])
+    run = derived(cleaned(mapped(run, [channel])))
     waves = next((group for group in run.groups.values() if channel in group), None)
     if waves is None:  # it needs several loggers
         waves = resampled(run, uniform_step(run.reference_time)).data
     time, series = waves["time"].values, waves[channel].values
     step = uniform_step(time, f"run '{run.name}'")
-    used = inside(time, used_span(run.own), step)
+    used = inside(time, run.used_span, step)
     series = series[used] if used.sum() > 2 else series
     with naming(f"run '{run.name}', channel '{channel}'"):
         stated = run.settings.campaign.period_hysteresis

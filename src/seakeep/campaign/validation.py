@@ -1,62 +1,12 @@
 """From a TOML file to settings, with one message that names every mistake in it."""
 
-from collections.abc import Collection, Iterable, Mapping
-from graphlib import CycleError, TopologicalSorter
+from collections.abc import Iterable, Mapping
 
+from seakeep.campaign.derivation import needed_channels, sources_of
 from seakeep.campaign.settings import CampaignSettings, ChannelSettings, DerivedSettings, units_of
-from seakeep.conventions import TURNS, canonical_channel, conversion
+from seakeep.conventions import canonical_channel, conversion
 from seakeep.errors import RequestError, did_you_mean
-from seakeep.signals.expressions import parse
 from seakeep.toml import Mistake, lengths
-
-
-def derivation_order(
-    derived: Mapping[str, DerivedSettings], channels: Collection[str]
-) -> list[str]:
-    """Order derived channels so that each finds what it needs."""
-    graph = {
-        name: [source for source in sources_of(name, each, channels) if source in derived]
-        for name, each in derived.items()
-    }
-    try:
-        return list(TopologicalSorter(graph).static_order())
-    except CycleError as error:
-        shown = " -> ".join(reversed(error.args[1]))
-        raise RequestError(
-            f"derived channels need one another in a circle: {shown}. Make one of them from "
-            "measured channels."
-        ) from None
-
-
-def sources_of(name: str, settings: DerivedSettings, channels: Collection[str]) -> tuple[str, ...]:
-    """Channels that a derived channel needs."""
-    if settings.expression is not None:
-        return parse(settings.expression).channels
-    sources = [str(settings.source)]
-    if settings.position is not None:
-        sources.append(settings.position)
-    sources += settings.components or ()
-    if settings.step in ("transfer", "remove_gravity"):
-        turning = ["", "_rate", "_acceleration"]
-        if settings.step == "remove_gravity":
-            turning = [""]
-        elif known := canonical_channel(sources[0]) or canonical_channel(name):
-            turning = turning[: {"m": 1, "m/s": 2}.get(known.units, 3)]
-        sources += [turn + kind for kind in turning for turn in TURNS if turn + kind in channels]
-    return tuple(dict.fromkeys(each for each in sources if each != name))
-
-
-def needed_channels(settings: CampaignSettings, wanted: Collection[str] | None) -> set[str]:
-    """Names of channels, by default all, and of all that they are derived from."""
-    needed = set()
-    ahead = list(settings.channel_names if wanted is None else wanted)
-    while ahead:
-        name = ahead.pop()
-        if name not in needed:
-            needed.add(name)
-            if name in settings.derived:
-                ahead += sources_of(name, settings.derived[name], settings.channel_names)
-    return needed
 
 
 def cross_checks(settings: CampaignSettings) -> Iterable[Mistake]:
@@ -143,17 +93,16 @@ def _period_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
 
 
 def _unit_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
-    tables: dict[tuple[str, ...], ChannelSettings | DerivedSettings]
-    tables = {("channels", name): each for name, each in settings.channels.items()}
-    tables |= {("derived", name): each for name, each in settings.derived.items()}
-    for run, of_run in settings.runs.items():
-        tables |= {("runs", run, "channels", n): each for n, each in of_run.channels.items()}
-    for place, each in tables.items():
-        if each.unit is not None:
+    tables: dict[tuple[str, ...], Mapping[str, ChannelSettings | DerivedSettings]]
+    tables = {("channels",): settings.channels, ("derived",): settings.derived}
+    tables |= {("runs", run, "channels"): each.channels for run, each in settings.runs.items()}
+    for place, channels in tables.items():
+        units = {name: each.unit for name, each in channels.items() if each.unit is not None}
+        for name, unit in units.items():
             try:
-                conversion(each.unit, units_of(place[-1], each.unit), place[-1])
+                conversion(unit, units_of(name, unit), name)
             except RequestError as error:
-                yield (*place, "unit"), str(error)
+                yield (*place, name, "unit"), str(error)
 
 
 def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
@@ -185,6 +134,6 @@ def _derived_mistakes(settings: CampaignSettings) -> Iterable[Mistake]:
             )
     if sound:
         try:
-            derivation_order(settings.derived, names)
+            needed_channels(settings)
         except RequestError as error:
             yield ("derived",), str(error)

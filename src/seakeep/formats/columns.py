@@ -102,10 +102,10 @@ def is_unit(text: str) -> bool:
 
 def same_unit(one: str, other: str) -> bool:
     """Whether two texts say the same unit, however it is spelled."""
-    if one == other or not (is_unit(one) and is_unit(other)):
+    try:
+        return conversion(one, other) == 1.0
+    except RequestError:  # one is not known, or they measure different things
         return one == other
-    si = si_unit(one)
-    return si == si_unit(other) and conversion(one, si) == conversion(other, si)
 
 
 def split_unit(header: str) -> tuple[str, str | None]:

@@ -41,13 +41,11 @@ def read_recording(path: Path, options: Options) -> Columns:
         ),
         highlevel.AnyReader([place], default_typestore=store) as reader,
     ):
-        begin = reader.start_time
-        rows = _read_topic(path, reader, options.group)
-    return _columns(path, begin, *rows)
+        return _read_topic(path, reader, options.group)
 
 
-def _read_topic(path: Path, reader: Any, wanted: str | None) -> tuple[Any, ...]:
-    """Name and type of a topic; times of reception and header stamps (ns), and its numbers."""
+def _read_topic(path: Path, reader: Any, wanted: str | None) -> Columns:
+    """Columns of a topic: times of reception, stamps of its headers, and its numbers."""
     connections = list(reader.connections)
     topics = {connection.topic for connection in connections}
     if wanted is not None and wanted not in topics:
@@ -78,7 +76,8 @@ def _read_topic(path: Path, reader: Any, wanted: str | None) -> tuple[Any, ...]:
             f"{path}: the topic '{wanted}' ({chosen[0].msgtype}, {len(received)} messages) holds "
             "no numbers. State another topic with group = 'NAME' in [files]."
         )
-    return wanted, chosen[0].msgtype, received, stamps, numbers
+    kind = chosen[0].msgtype
+    return _columns(path, reader.start_time, wanted, kind, received, stamps, numbers)
 
 
 def _only_topic(path: Path, reader: Any, connections: list[Any]) -> str:

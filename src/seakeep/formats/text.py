@@ -74,30 +74,7 @@ def read_text(path: Path, options: Options) -> Columns:
                 f"{path} ends within line {len(lines)}, at {last!r}: it seems to be cut off. "
                 "Export it again, or end the last line if it is whole."
             )
-    names, units = unique_names(layout.headers)
-    if layout.units:
-        for name, row, unit in zip(names, layout.units, units, strict=True):
-            if row and unit and is_unit(unit) and not same_unit(row, unit):
-                raise DataError(
-                    f"{path}: the header says '{unit}' for the column '{name}', and the row of "
-                    f"units below it '{row}'. Correct the wrong one of them in the file."
-                )
-        units = [row or unit for row, unit in zip(layout.units, units, strict=True)]
-    count = Counter(names)
-    keep = {i: name for i, name in enumerate(names) if name and count[name] == 1}
-    numbers, faults = _numbers(path, frame, layout, keep)
-    faults |= {
-        name: f"{path}: {count[name]} columns have the name '{name}'. Rename them in the file's "
-        "header, so that it is plain which one is meant."
-        for name in count
-        if name and count[name] > 1
-    }
-    return Columns(
-        values=numbers,
-        units={name: unit for i, name in keep.items() if (unit := units[i]) is not None},
-        faults=faults,
-        headers={name: full for name, full in zip(names, layout.headers, strict=True) if name},
-    )
+    return _columns(path, frame, layout)
 
 
 def _decoded(path: Path, raw: bytes, encoding: str | None) -> str:
@@ -335,29 +312,51 @@ _RELEASE = tuple(int(part) for part in pd.__version__.split(".")[:2])
 _EXACT = {"float_precision": "round_trip"} if _RELEASE < (3, 1) else {}
 
 
-def _numbers(
-    path: Path, frame: pd.DataFrame, layout: _Layout, names: dict[int, str]
-) -> tuple[dict[str, FloatArray], dict[str, str]]:
-    """Columns by name, and those that are not all numbers, with the first cell at fault."""
-    values, faults = {}, {}
-    for i, name in names.items():
-        column = frame[i]
-        if column.dtype.kind in "fiu":
-            values[name] = column.to_numpy(dtype=float)
-            continue
-        out = np.empty(len(column))
-        for row, cell in enumerate(column):
-            number = np.nan if pd.isna(cell) else _number(str(cell).strip(), layout.decimal)
-            if number is None:
-                faults[name] = (
-                    f"{path}, line {layout.rows[row][0]}, column '{name}': {cell!r} is "
-                    f"not a number. {_mend(str(cell))}"
+def _columns(path: Path, frame: pd.DataFrame, layout: _Layout) -> Columns:
+    """Columns by name, with the units that header and row of units state."""
+    names, units = unique_names(layout.headers)
+    if layout.units:
+        for name, row, unit in zip(names, layout.units, units, strict=True):
+            if row and unit and is_unit(unit) and not same_unit(row, unit):
+                raise DataError(
+                    f"{path}: the header says '{unit}' for the column '{name}', and the row of "
+                    f"units below it '{row}'. Correct the wrong one of them in the file."
                 )
-                break
-            out[row] = number
-        else:
-            values[name] = out
-    return values, faults
+        units = [row or unit for row, unit in zip(layout.units, units, strict=True)]
+    count, out = Counter(names), Columns({})
+    for i, name in enumerate(names):
+        if not name:
+            continue
+        out.headers[name] = layout.headers[i]
+        if count[name] > 1:
+            out.faults[name] = (
+                f"{path}: {count[name]} columns have the name '{name}'. Rename them in the file's "
+                "header, so that it is plain which one is meant."
+            )
+            continue
+        if (unit := units[i]) is not None:
+            out.units[name] = unit
+        try:
+            out.values[name] = _numbers(path, name, frame[i], layout)
+        except DataError as error:
+            out.faults[name] = str(error)
+    return out
+
+
+def _numbers(path: Path, name: str, column: pd.Series, layout: _Layout) -> FloatArray:
+    """Values of a column; an error names the first cell that is no number."""
+    if column.dtype.kind in "fiu":
+        return column.to_numpy(dtype=float)
+    out = np.empty(len(column))
+    for row, cell in enumerate(column):
+        number = np.nan if pd.isna(cell) else _number(str(cell).strip(), layout.decimal)
+        if number is None:
+            raise DataError(
+                f"{path}, line {layout.rows[row][0]}, column '{name}': {cell!r} is not a number. "
+                f"{_mend(str(cell))}"
+            )
+        out[row] = number
+    return out
 
 
 def _number(cell: str, decimal: str) -> float | None:
