@@ -17,6 +17,8 @@ from seakeep.errors import RequestError, SeakeepWarning
 from seakeep.models import KINDS
 from seakeep.study import compare, comparison_table, fit_campaign
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*shows waves of")  # of unit size
+
 RATE = 10.0
 
 
