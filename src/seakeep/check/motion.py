@@ -10,6 +10,7 @@ from seakeep.arrays import Datasets, FloatArray
 from seakeep.check.parts import (
     HERTZ,
     driven,
+    gathered,
     is_regular,
     read_off,
     reference_probe,
@@ -168,24 +169,30 @@ def measured_decay(model: Model, runs: Datasets) -> xr.Dataset:
             "no run in use is a free decay in still water. State waves = 'still' and role = 'test' "
             "of such runs (unused ones are not read), and the model's decay stands beside theirs."
         )
-    parts = []
-    for name, run in still.items():
+    spread = dict(zip(model.states, model.signature.state_scale.spread, strict=True))
+
+    def released(name: str) -> xr.Dataset:
+        run = still[name]
         values = channel_matrix(run, motions, name)
         values = values[np.isfinite(values).all(axis=1)]
-        spread = dict(zip(model.states, model.signature.state_scale.spread, strict=True))
         moved = (values - values[-1]) / [spread[each] for each in motions]
         column = np.argmax(np.abs(moved).max(axis=0))
         first = np.argmax(np.abs(moved[:, column]))
-        released = free_decay(values[first:, column], model.dt)
-        numbers = {key: getattr(released, key) for key in ("period", "damping_ratio", "p", "q")}
-        cycles = {
-            "amplitude": ("cycle", released.amplitudes),
-            "decrement": ("cycle", released.decrements),
+        noise = run[motions[column]].attrs.get("noise_std", 0.0)
+        found = free_decay(values[first:, column], model.dt, noise)
+        if not found.cycles:
+            raise DataError("no motion swings above its noise. Was anything released?")
+        each = {
+            "motion": motions[column],
+            **{key: getattr(found, key) for key in ("period", "damping_ratio", "p", "q", "cycles")},
+            "amplitude": ("cycle", found.amplitudes),
+            "decrement": ("cycle", found.decrements),
         }
-        each = {"motion": motions[column], **numbers, "cycles": released.cycles, **cycles}
-        parts.append(xr.Dataset(each, {"cycle": range(len(released.decrements))}))
-    names = xr.Variable("run", list(still))
-    return xr.concat(parts, names, join="outer").drop_vars("cycle")
+        return xr.Dataset(each, {"cycle": range(found.cycles)})
+
+    parts = gathered(still, released, "no run in still water is a free decay.", "no decay from")
+    names = xr.Variable("run", list(parts))
+    return xr.concat([*parts.values()], names, join="outer").drop_vars("cycle")
 
 
 PERIODS = 32
