@@ -44,14 +44,15 @@ def statistics(
     Returns
     -------
     Dataset
-        Over (state, kind), kind "measured" or "forecast": ``significant_double_amplitude`` (four
-        SDs), ``zero_crossing_period`` (s), ``peaks`` (how many), ``rayleigh_scale`` (the SD),
-        ``weibull_shape`` and ``weibull_scale`` (maximum likelihood), ``extreme`` (most probable
-        in the duration by Weibull's law) with ``extreme_lower`` and ``extreme_upper`` (95 %, what
-        the fit does not know); over (state, kind, rank): ``peak`` and ``exceedance``, largest
-        first; over (state, kind, place): ``density`` of the deviations at ``deviation`` over
-        (state, place); over state: ``divergence`` (Jensen–Shannon) of the two densities, NaN where
-        one stands still. ``attrs["duration"]`` (s).
+        Over (state, kind), kind "measured" or "forecast": ``mean``,
+        ``significant_double_amplitude`` (four SDs), ``zero_crossing_period`` (s), ``peaks`` (how
+        many), ``rayleigh_scale`` (the SD), ``weibull_shape`` and ``weibull_scale`` (maximum
+        likelihood), ``extreme`` (most probable in the duration by Weibull's law) with
+        ``extreme_lower`` and ``extreme_upper`` (95 %, what the fit does not know); over (state,
+        kind, rank): ``peak`` and ``exceedance``, largest first; over (state, kind, place):
+        ``density`` of the deviations at ``deviation`` over (state, place); over state:
+        ``divergence`` (Jensen–Shannon) of the two densities, NaN where one stands still.
+        ``attrs["duration"]`` (s).
 
     Raises
     ------
@@ -75,6 +76,8 @@ def statistics(
     names = xr.Variable("state", model.states)
     out = xr.concat(parts, names, join="outer").drop_vars("rank").transpose("state", ...)
     deviation, density = _densities(np.array([np.concatenate(each) for each in moved.values()]))
+    means = [np.concatenate([getattr(x, k) for x in known.values()]).mean(axis=0) for k in KINDS]
+    out["mean"] = (("kind", "state"), means)
     out["deviation"] = (("state", "place"), deviation)
     out["density"] = (("state", "kind", "place"), density)
     divergence = [jensen_shannon(*x) if np.isfinite(x).all() else np.nan for x in density]
